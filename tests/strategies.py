@@ -25,7 +25,7 @@ from orbiflow.symmetry import (
     translation,
     wallpaper_group,
 )
-from orbiflow.tiles import CLASSES
+from orbiflow.tiles import CLASSES, TileModel, subdivided
 
 Operation = tuple[Sequence[Sequence[int]], Sequence[float]]
 
@@ -321,3 +321,9 @@ def neural_field(
     nn.init.zeros_(last.weight)
     nn.init.zeros_(last.bias)
     return Symmetrized(nn.Sequential(*layers), group, periodic=True)
+
+
+def divided_start(model: TileModel, pieces: int) -> torch.Tensor:
+    """Return what a model's flow starts from (S, N, 2), with each side in so many pieces."""
+    start = model.prototile()[0].detach()
+    return torch.as_tensor(subdivided(start.numpy(), pieces)).to(start.dtype)

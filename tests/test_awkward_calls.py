@@ -36,7 +36,7 @@ MODEL = Model(KIND, 0.0, max_frequency=1)
 PAIR = Model(KIND, [0.0, 1.0], max_frequency=1)
 OTHER = Model("IH7", 0.0, max_frequency=1)
 SOFT = tiles.SoftTarget(TARGET, resolution=32)
-FEW: dict[str, Any] = {"count": 1, "projected": 20, "measured": 5, "vertices": 60}
+FEW = tiles.OverlapSearch(candidates=1, resolutions=(30,), projected=20, measured=5, boundary=60)
 
 polygon_functions: dict[str, Call] = {
     "Tile": lambda ring: tiles.certify(Tile(ring, GROUP)),
@@ -92,7 +92,7 @@ WORKS: dict[str, Call] = {
     "one index": lambda: MODEL.take(0),
     "descent by name": lambda: tiles.fit_descent(TARGET, "IH4", FAST),
     "occupancy by name": lambda: tiles.fit_occupancy(TARGET, "ih4", QUICK),
-    "starts by name": lambda: outline_starts(TARGET, "IH4", resolutions=(30,), **FEW),
+    "starts of an outline": lambda: outline_starts(TARGET, KIND, FEW),
     "template starts by name": lambda: template_starts("IH4", turns=1, stretch=0.1, vertices=30),
     "loss of arrays": lambda: loss(MODEL, np.zeros((3, 2)), np.zeros(3), 1.0),
     "occupancy of float64": lambda: SOFT.occupancy(torch.zeros(3, 2, dtype=torch.float64), 0.1),
@@ -169,8 +169,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (lambda t: tiles.fit_descent(t, KIND, FAST), BOOT, "must be a Target, got a list of 7"),
     (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be a SearchMethod"),
     (lambda t: tiles.OccupancySamples(t, 9, seed=0), BOOT, "must be a Target"),
-    (lambda t: outline_starts(t, KIND, **FEW), BOOT, "must be a Target"),
-    (lambda r: outline_starts(TARGET, KIND, resolutions=r, **FEW), (35,), "must divide vertices"),
+    (lambda r: tiles.OverlapSearch(resolutions=r), (35,), "divide boundary = 240"),
     (tiles.SoftTarget, BOOT, "must be a Target"),
     (lambda r: tiles.SoftTarget(TARGET, resolution=r), 0, "resolution must be"),
     (lambda b: SOFT.occupancy(torch.zeros(1, 2), b), 0.0, "blur must be above 0"),

@@ -333,10 +333,6 @@ class FourierField(InvariantField):
         gradient.index_add_(1, self.columns, table[:, self.rows] * self.values)
         return (gradient * self.scale).reshape(self.parameters_.shape)
 
-    def forward(self, points: Tensor) -> Tensor:
-        """Return V at points (..., d): vectors of the same shape."""
-        return self._values(self.weights(), points)
-
     def divergence(self, points: Tensor) -> Tensor:
         """Return the trace of the Jacobian, (...,), in closed form: itself one Fourier sum."""
         return self._values(self._divergence_weights(self.weights()), points)[..., 0]

@@ -216,6 +216,14 @@ class InvariantField(nn.Module, ABC):
         """Return the basis in the coefficients that the field evaluates, as (row, column, value)."""
 
     @abstractmethod
+    def bound(self) -> Callable[[Tensor], Tensor]:
+        """Return the field as a function for many evaluations at its present parameters."""
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Return V at points (..., d): vectors of the same shape."""
+        return self.bound()(points)
+
+    @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
 
@@ -283,14 +291,6 @@ class InvariantField(nn.Module, ABC):
         return f"{self.group!r}, max_frequency={self.max_frequency}, parameters={self.size}"
 
 
-def sobolev_weights(
-    group: CrystallographicGroup, basis: InvariantBasis, smoothness: float
-) -> Array:
-    """Return (P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
-    size = group.cell_volume ** (1 / group.dim)
-    return (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)
-
-
 @cached_by_basis(maxsize=64)  # the segments of a flow share them
 @torch.inference_mode(False)  # cached in inference mode, they could never be trained
 def _constants(
@@ -303,7 +303,8 @@ def _constants(
 ) -> dict[str, Tensor]:
     basis = invariant_basis(group, max_frequency)
     rows, columns, values = layout(group, basis)
-    scale = sobolev_weights(group, basis, smoothness)
+    size = group.cell_volume ** (1 / group.dim)  # makes the factors free of the unit of length
+    scale = (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)
     reals = {"values": values, "scale": scale, "frame": group.inverse_lattice}
     return {
         "rows": torch.tensor(rows, device=device),

@@ -55,12 +55,12 @@ def prepared_with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Ten
     own: Any = getattr(field, "bound_with_divergence", None)
     if own:
         return own()
-    in_closed_form = hasattr(field, "divergence") or hasattr(field, "jacobian")
+    if hasattr(field, "divergence"):
+        return lambda points: (_values(field, points), divergence(field, points.clone()))
+    joint = prepared_with_jacobian(field)
 
     def both(points: Tensor) -> tuple[Tensor, Tensor]:
-        if in_closed_form:
-            return _values(field, points), divergence(field, points.clone())
-        values, slopes = _by_autograd(field, points)
+        values, slopes = joint(points)
         return values, _trace(slopes)
 
     return both

@@ -220,19 +220,15 @@ def _outer(factors: list[Tensor]) -> Tensor:
     return product
 
 
-def spline_sum(table: Tensor, u: Tensor) -> Tensor:
+def spline_sum(
+    table: Tensor, u: Tensor, rates: tuple[float, ...] | None = None
+) -> tuple[Tensor, Tensor]:
     """Return values (C, N) of splines at `u` (d, N), in cells of a `padded` grid of coefficients.
 
-    First derivatives in both arguments are in closed form; higher ones, and those of `torch.func`, use
+    Beside them sum_i rates_i d value_i / du_i (N,) of a vector field (C = d), zero without rates. First
+    derivatives in both arguments are in closed form; higher ones, and those of `torch.func`, use
     ordinary operations. A cubic spline's third derivatives are constant in each cell.
     """
-    return spline_sum_with_divergence(table, u, None)[0]
-
-
-def spline_sum_with_divergence(
-    table: Tensor, u: Tensor, rates: tuple[float, ...] | None
-) -> tuple[Tensor, Tensor]:
-    """Return `spline_sum` of a vector field (C = d), and sum_i rates_i d value_i / du_i (N,)."""
     if transformed():
         return _plain_sum(table, u, rates)  # pyright: ignore[reportReturnType]
     return applied(_SplineSum, table, u, rates)
@@ -320,27 +316,23 @@ class SplineField(InvariantField):
 
     def bound(self) -> Callable[[Tensor], Tensor]:
         """Return the field with its grid filled once, for many evaluations (an integrator's)."""
-        table = padded(self.table())
-
-        def values(points: Tensor) -> Tensor:
-            return spline_sum(table, self._cells(points)).mT.reshape(points.shape)
-
-        return values
+        both = self._evaluated(None)
+        return lambda points: both(points)[0]
 
     def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
         """Return, as `bound` does, a function for V and its divergence from the same coefficients."""
+        return self._evaluated(self._per_length)
+
+    def _evaluated(
+        self, rates: tuple[float, ...] | None
+    ) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
         table = padded(self.table())
 
         def both(points: Tensor) -> tuple[Tensor, Tensor]:
-            u = self._cells(points)
-            values, divergence = spline_sum_with_divergence(table, u, self._per_length)
+            values, divergence = spline_sum(table, self._cells(points), rates)
             return values.mT.reshape(points.shape), divergence.reshape(points.shape[:-1])
 
         return both
-
-    def forward(self, points: Tensor) -> Tensor:
-        """Return V at points (..., d): vectors of the same shape."""
-        return self.bound()(points)
 
     def divergence(self, points: Tensor) -> Tensor:
         """Return the trace of the Jacobian, (...,), exact."""
@@ -368,10 +360,9 @@ class SplineField(InvariantField):
             return torch.autograd.grad(work, self.parameters_)[0]
 
     def _cells(self, points: Tensor) -> Tensor:
-        d = self.group.dim
         self._check_points(points)
         rates = torch.tensor(self._per_length, dtype=points.dtype, device=points.device)
-        return points.reshape(-1, d).mT * rates[:, None]
+        return points.reshape(-1, self.group.dim).mT * rates[:, None]
 
 
 def has_even_grid(group: CrystallographicGroup) -> bool:

@@ -109,7 +109,7 @@ class Flow(nn.Module):
             f if isinstance(f, nn.Module) else _FunctionSegment(f) for f in listed
         )
         self._duration = as_number(duration, "duration")
-        self._steps = _checked_steps(steps)
+        self._steps = as_whole(steps, "steps", 1)
         self.integrator: RungeKutta = runge_kutta(method)
         self._step_check = StepCheck() if warn and not bijective else None
         self._bijective = bool(bijective)
@@ -121,7 +121,7 @@ class Flow(nn.Module):
 
         If the flow is `bijective`, so many as its fields need now, and at least those given.
         """
-        if not self._bijective:
+        if not self.bijective:
             return self._steps
         return max([self._steps, *map(self._injective_steps, self.fields())])
 
@@ -160,7 +160,7 @@ class Flow(nn.Module):
         (16, 8)
         """
         view = copy.copy(self)  # shallow: it shares modules and parameters
-        view._steps = _checked_steps(steps)
+        view._steps = as_whole(steps, "steps", 1)
         if method is not None:
             view.integrator = runge_kutta(method)
         view._step_check = None if self._step_check is None else StepCheck()
@@ -228,9 +228,10 @@ class Flow(nn.Module):
         """Return what becomes of points (..., d), and of their log-determinants if they are given."""
         points, steps, fields = state[0], self.steps, self.fields()
         h = (-self.duration if inverse else self.duration) / steps
-        exact = self._bijective and len(state) == 2
+        exact = self.bijective and len(state) == 2
         step: Step = self._differentiated_step if exact else self.integrator.step
-        with _thread_limit(points):
+        small = points.device.type == "cpu" and points.numel() < MULTITHREADED_COORDINATES
+        with one_thread() if small else contextlib.nullcontext():
             try:
                 for field in reversed(fields) if inverse else fields:
                     # fields prepare their weights once per segment, not once per stage
@@ -269,11 +270,7 @@ class Flow(nn.Module):
 
     def extra_repr(self) -> str:
         own = f"steps={self.steps}, method={self.method}, duration={self.duration}"
-        return f"{own}, bijective=True" if self._bijective else own
-
-
-def _checked_steps(value: int) -> int:
-    return as_whole(value, "steps", 1)
+        return f"{own}, bijective=True" if self.bijective else own
 
 
 def _check_points(points: Tensor) -> None:
@@ -287,11 +284,6 @@ def _check_points(points: Tensor) -> None:
             f"expected points (..., d) of a floating-point dtype, got {points.dtype} of shape "
             f"{tuple(points.shape)}"
         )
-
-
-def _thread_limit(points: Tensor) -> contextlib.AbstractContextManager[None]:
-    small = points.device.type == "cpu" and points.numel() < MULTITHREADED_COORDINATES
-    return one_thread() if small else contextlib.nullcontext()
 
 
 def _slope(field: VectorField, *, with_log_det: bool, exact: bool) -> Callable[[State], State]:

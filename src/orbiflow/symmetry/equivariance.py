@@ -1,13 +1,12 @@
 """A check for tests: does a function commute with a crystallographic group?"""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.elements import lattice_along
 from orbiflow.symmetry.group import CrystallographicGroup, checked_group
@@ -88,7 +87,9 @@ def assert_equivariant(
     values = _values(function, points, kind)
     lattice = group.lattice if along is None else lattice_along(group, along)
     worst: tuple[float, int, Isometry, Tensor] | None = None
-    for number, element in _elements(group, lattice, cells):
+    moves = [translation(sign * cells * vector) for vector in lattice.T for sign in (1, -1)]
+    cosets = enumerate(group.cosets, start=1)
+    for number, element in ((k, h) for k, g in cosets for h in (g, *(m @ g for m in moves))):
         moved = {"field": element.push, "map": element}.get(kind)
         expected = moved(values) if moved else values
         errors = (_values(function, element(points), kind) - expected).abs()
@@ -97,7 +98,9 @@ def assert_equivariant(
         if worst is None or not largest <= worst[0]:
             at = points[int(errors.reshape(len(points), -1).amax(dim=1).argmax())]
             worst = (largest, number, element, at)
-    allowed = _least(group, kind) if atol is None else atol
+    size = group.cell_volume ** (1 / group.dim)
+    least = {"map": 1e-9 * size, "field": ROUNDING * size, "invariant": ROUNDING}[kind]
+    allowed = least if atol is None else atol
     allowed += rtol * float(values.abs().max())
     if worst is not None and not worst[0] <= allowed:
         error, number, element, at = worst
@@ -107,22 +110,6 @@ def assert_equivariant(
             element,
             error,
         )
-
-
-def _least(group: CrystallographicGroup, kind: Kind) -> float:
-    """Return the deviation that is accepted where values vanish."""
-    size = group.cell_volume ** (1 / group.dim)
-    return {"map": 1e-9 * size, "field": ROUNDING * size, "invariant": ROUNDING}[kind]
-
-
-def _elements(
-    group: CrystallographicGroup, lattice: Array, cells: int
-) -> Iterator[tuple[int, Isometry]]:
-    """Yield each coset's number, from 1, with its representative and translates of it."""
-    moves = [translation(sign * cells * vector) for vector in lattice.T for sign in (1, -1)]
-    for number, coset in enumerate(group.cosets, start=1):
-        yield number, coset
-        yield from ((number, move @ coset) for move in moves)
 
 
 def _values(function: Callable[[Tensor], Tensor], points: Tensor, kind: Kind) -> Tensor:

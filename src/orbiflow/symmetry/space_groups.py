@@ -22,7 +22,6 @@ from orbiflow.errors import (
     system_errors,
 )
 from orbiflow.extras import naming_extras
-from orbiflow.symmetry.cells import cell_lattice, cell_parameters, fitting_cell
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.group_symbols import (
     find_hall,
@@ -30,7 +29,14 @@ from orbiflow.symmetry.group_symbols import (
     settings_named,
     settings_numbered,
 )
-from orbiflow.symmetry.triplets import group_from_operators, operators, parse_operator
+from orbiflow.symmetry.triplets import (
+    cell_lattice,
+    cell_parameters,
+    fitting_cell,
+    group_from_operators,
+    operators,
+    parse_operator,
+)
 
 MAX_CIF_BYTES = 64 * 2**20
 _TYPICAL = (1.0, 1.1, 1.3, 80.0, 100.0, 95.0)  # without symmetry; all default cells come from it
@@ -87,7 +93,8 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
 def _named(name: int | str) -> tuple[str, list[str]]:
     """Return the name that a group goes by, and all its operators in the conventional cell."""
     gemmi, text = _gemmi(), str(name).strip()
-    if known := _setting(gemmi, text):
+    numbered = settings_numbered(gemmi, text)
+    if known := numbered[0] if numbered else find_setting(gemmi, text):
         return known.xhm(), [op.triplet() for op in known.operations()]
     if found := find_hall(gemmi, text):
         known = gemmi.find_spacegroup_by_ops(gemmi.GroupOps(found))
@@ -96,13 +103,6 @@ def _named(name: int | str) -> tuple[str, list[str]]:
         f"unknown space group {described(name)}: give a number from 1 to 230, a Hermann-Mauguin "
         'symbol such as "P 21 21 21" or "R -3 m:H", or a Hall symbol such as "Hall: -P 2ybc"'
     )
-
-
-def _setting(gemmi: Any, text: str) -> Any | None:
-    """Return gemmi's row of a number or a Hermann-Mauguin symbol, or None."""
-    if numbered := settings_numbered(gemmi, text):
-        return numbered[0]
-    return find_setting(gemmi, text)
 
 
 def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> CrystallographicGroup:

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arguments import is_tensor
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 
@@ -60,27 +59,18 @@ def orient(ring: Array, *, counter_clockwise: bool = True) -> Array:
     return ring if bool(signed_area(ring) > 0) == counter_clockwise else reverse(ring)
 
 
-def subdivided(ring: AnyRing, pieces: int, phase: float = 0.0) -> AnyRing:
+def subdivided(ring: Array, pieces: int) -> Array:
     """Return points (..., N pieces, 2) of rings (..., N, 2): each side divided evenly into `pieces`.
 
-    With phase 0 they include every vertex; `phase` moves them along by that share of a piece. Sides
-    that are isometric images of each other are divided alike, to the last digit.
+    Sides that are isometric images of each other are divided alike, to the last digit.
 
     >>> subdivided(np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]]), 2)[:3].tolist()
     [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
     """
-    shape = (*ring.shape[:-2], ring.shape[-2] * pieces, 2)
-    if is_tensor(ring):
-        import torch
-
-        steps = torch.arange(pieces, dtype=ring.dtype, device=ring.device)
-        sides = ring.roll(-1, dims=-2) - ring
-    else:
-        steps = np.arange(pieces, dtype=np.float64)
-        sides = np.roll(ring, -1, axis=-2) - ring
-    shares = ((steps + phase) / pieces)[:, None]
+    sides = np.roll(ring, -1, axis=-2) - ring
+    shares = (np.arange(pieces) / pieces)[:, None]
     points = ring[..., :, None, :] + shares * sides[..., :, None, :]
-    return points.reshape(shape)  # pyright: ignore[reportReturnType]
+    return points.reshape(*ring.shape[:-2], ring.shape[-2] * pieces, 2)
 
 
 def _crosses(local: AnyRing) -> AnyRing:

@@ -7,11 +7,11 @@ import shapely
 import torch
 
 from orbiflow.errors import CertificationError
-from orbiflow.tiles import CLASSES, TileModel, certify, subdivided
+from orbiflow.tiles import CLASSES, TileModel, certify
 from orbiflow.tiles.flowing import tile_model
 from orbiflow.tiles.flowing.tile_model import converge, extract_tile
 from orbiflow.tiles.search.candidates import SAMPLE_COUNTS, TOLERANCES
-from strategies import error_estimate
+from strategies import divided_start, error_estimate
 
 
 def bent(name: str, rms: float = 0.15, seed: int = 0) -> TileModel:
@@ -35,7 +35,7 @@ def crossed() -> TileModel:
 
 def test_converge_doubles_until_accurate() -> None:
     model = bent("IH4")
-    points = subdivided(model.prototile()[0], 4).detach()
+    points = divided_start(model, 4)
     model.flow = model.flow.with_steps(2)
     _, error = converge(model, points, tolerance=1e-7)
     assert error <= 1e-7
@@ -52,7 +52,7 @@ def test_converge_gives_up_on_a_steep_field() -> None:
     model = bent("IH1", rms=3000.0)
     model.flow = model.flow.with_steps(512, method="euler")
     with pytest.raises(CertificationError, match=r"not accurate after 1024 steps .*too steep"):
-        converge(model, subdivided(model.prototile()[0], 1).detach())
+        converge(model, divided_start(model, 1))
 
 
 def test_converge_refuses_a_field_that_is_not_finite() -> None:
@@ -61,7 +61,7 @@ def test_converge_refuses_a_field_that_is_not_finite() -> None:
         next(model.flow.parameters()).fill_(float("nan"))
     steps = model.flow.steps
     with pytest.raises(CertificationError, match="no finite values"):
-        converge(model, subdivided(model.prototile()[0], 1).detach())
+        converge(model, divided_start(model, 1))
     assert model.flow.steps == steps
     for force in (False, True):
         with pytest.raises(CertificationError, match="finite"):
@@ -77,7 +77,7 @@ def test_polygon_follows_the_curve(name: str) -> None:
     kind = CLASSES[name]
     with torch.no_grad():
         pieces = 2 * -(-SAMPLE_COUNTS[0] // (2 * len(kind.template())))
-        curve = fine(subdivided(fine.prototile()[0], pieces))[0].numpy()
+        curve = fine(divided_start(fine, pieces))[0].numpy()
     assert tile.isohedral_class == name
     assert len(tile.corners) == len(kind.template())
     assert np.allclose(tile.polygon[list(tile.corners)], curve[::pieces], atol=1e-12)

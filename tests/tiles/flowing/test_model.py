@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles import CLASSES, IsohedralClass, Tile, TileModel, certify, subdivided
+from orbiflow.tiles import CLASSES, IsohedralClass, Tile, TileModel, certify
 from orbiflow.tiles.flowing.tile_model import extract_tile
-from strategies import largest, random_field, random_points, random_tensor, seeds
+from strategies import divided_start, largest, random_field, random_points, random_tensor, seeds
 
 GLIDES = ["IH2", "IH3", "IH5", "IH6"]
 kinds = st.sampled_from(list(CLASSES.values()))
@@ -152,7 +152,7 @@ def test_take_keeps_the_values(kind: IsohedralClass, seed: int) -> None:
 
 def test_boundary_is_even_on_every_edge() -> None:
     model = random_model(CLASSES["IH28"], 3, 2)
-    points = subdivided(model.prototile()[0], 4).detach()
+    points = divided_start(model, 4)
     corners = model.template().detach()
     assert points.shape == (2, 20, 2)
     assert torch.equal(points[:, ::4], corners)

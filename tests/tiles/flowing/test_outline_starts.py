@@ -1,6 +1,7 @@
 """Placements, nearest tiles and start tiles."""
 
 import itertools
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
-from orbiflow.tiles import CLASSES, Target, Tile, TileModel, certify, resampled, subdivided
+from orbiflow.tiles import CLASSES, OverlapSearch, Target, Tile, TileModel, certify, resampled
 from orbiflow.tiles.flowing.starts import nearest_tiles, outline_starts, template_starts
 from orbiflow.tiles.search import template_symmetries
 from orbiflow.tiles.search.candidates import Prototiles
@@ -22,6 +23,7 @@ from orbiflow.tiles.search.tile_space import (
     best_placements,
     edge_lengths,
 )
+from strategies import divided_start
 
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])
 TARGET = Target.from_polygon(BOOT)
@@ -44,7 +46,7 @@ def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
         field.parameters_.copy_(0.04 * torch.randn_like(field.parameters_))
         model.log_scale.add_(0.3)
         model.stretch.normal_(std=0.1)
-        ring = model(subdivided(model.prototile()[0], pieces))[0].numpy()
+        ring = model(divided_start(model, pieces))[0].numpy()
         turn = float(model.angle) if kind.stretch_dim == 1 else 0.0
     lengths = np.full((1, len(kind.template())), pieces)
     return ring, Placements(lengths, np.zeros(1, int), np.array([turn]), np.ones(1))
@@ -158,8 +160,8 @@ def test_template_starts_are_centred(name: str) -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_starts_are_simple_different_and_best_first(name: str) -> None:
     kind = CLASSES[name]
-    few = {"count": 8, "resolutions": (30, 48), "projected": 100, "measured": 20}
-    found = outline_starts(TARGET, kind, **few)
+    few = OverlapSearch(candidates=8, resolutions=(30, 48), projected=100, measured=20)
+    found = outline_starts(TARGET, kind, few)
     assert 1 <= len(found.prototiles) <= 8
     assert (np.diff(found.iou) <= 0).all()
     model = TileModel(kind, max_frequency=1, prototiles=found.prototiles)
@@ -171,7 +173,7 @@ def test_starts_are_simple_different_and_best_first(name: str) -> None:
         assert polygon.is_valid
         iou = polygon.intersection(goal).area / polygon.union(goal).area
         assert iou == pytest.approx(value, abs=1e-9)
-    shifted = outline_starts(TARGET, kind, **few, phase=0.5)
+    shifted = outline_starts(TARGET, kind, replace(few, seed=1))
     assert shifted.iou.shape != found.iou.shape or not np.allclose(shifted.iou, found.iou)
 
 
@@ -179,16 +181,15 @@ def test_thin_limbs_still_give_starts() -> None:
     angle = np.linspace(0, 2 * np.pi, 160, endpoint=False)
     radius = 0.25 + np.cos(4 * angle) ** 16
     star = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
-    found = outline_starts(Target.from_polygon(star), CLASSES["IH4"], count=10)
+    found = outline_starts(Target.from_polygon(star), CLASSES["IH4"], OverlapSearch(candidates=10))
     assert len(found.prototiles) == 10
 
 
 def test_only_ih21_needs_mirror_images() -> None:
     assert [name for name, kind in CLASSES.items() if not template_symmetries(kind)[1]] == ["IH21"]
     image = Target.from_polygon(BOOT * (-1, 1))
-    one, two = (
-        outline_starts(t, CLASSES["IH21"], count=40, resolutions=(60,)) for t in (TARGET, image)
-    )
+    wide = OverlapSearch(candidates=40, resolutions=(60,))
+    one, two = (outline_starts(t, CLASSES["IH21"], wide) for t in (TARGET, image))
     assert one.prototiles.mirrored.any()
     assert not one.prototiles.mirrored.all()
     assert one.iou[0] == pytest.approx(two.iou[0], abs=0.02)  # the points differ

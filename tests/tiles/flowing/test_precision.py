@@ -5,10 +5,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.tiles import CLASSES, TileModel, certify, subdivided
+from orbiflow.tiles import CLASSES, TileModel, certify
 from orbiflow.tiles.flowing.starts import template_starts
 from orbiflow.tiles.flowing.tile_model import extract_tile
-from strategies import random_tensor, seeds
+from strategies import divided_start, random_tensor, seeds
 
 CASTS = {
     "float": lambda model: model.float(),
@@ -67,6 +67,6 @@ def test_the_group_of_a_rounded_model_is_that_of_its_polygon(name: str) -> None:
 def test_a_rounded_model_still_maps_in_its_own_precision() -> None:
     model = started("IH6", 3, from_template=False).float()
     assert model.prototile()[0].dtype == torch.float32
-    assert model(subdivided(model.prototile()[0], 2)).dtype == torch.float32
+    assert model(divided_start(model, 2)).dtype == torch.float32
     assert model.take([0]).vertices is not None
     assert model.take([0]).vertices.dtype == torch.float64  # pyright: ignore[reportOptionalMemberAccess]

@@ -61,7 +61,6 @@ def test_stacks_and_tensors_give_the_same(ring: np.ndarray, count: int) -> None:
     assert np.array_equal(subdivided(stack, 3)[-1], subdivided(stack[-1], 3))
     tensor = torch.tensor(stack)
     assert np.allclose(signed_area(tensor).numpy(), areas, rtol=1e-12)
-    assert np.allclose(subdivided(tensor, 3, 0.5).numpy(), subdivided(stack, 3, 0.5), rtol=1e-14)
 
 
 def test_the_area_has_its_gradient_in_torch() -> None:
@@ -76,6 +75,5 @@ def test_subdividing_keeps_the_vertices_and_the_region(ring: np.ndarray, pieces:
     points = subdivided(ring, pieces)
     assert np.array_equal(points[::pieces], ring)
     assert signed_area(points) == pytest.approx(signed_area(ring), rel=1e-9)
-    middles = subdivided(ring, pieces, phase=0.5)
-    ahead = np.roll(points, -1, axis=0)
-    assert np.allclose(middles, (points + ahead) / 2, atol=1e-12 * np.abs(ring).max())
+    steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).reshape(-1, pieces)
+    assert np.allclose(steps, steps[:, :1], atol=1e-12 * np.abs(ring).max())

@@ -10,21 +10,11 @@ import shapely
 import torch
 
 from orbiflow.errors import CertificationError
-from orbiflow.tiles import (
-    CLASSES,
-    EscherTile,
-    Fit,
-    Target,
-    TileMap,
-    TileModel,
-    as_model,
-    certify,
-    subdivided,
-)
+from orbiflow.tiles import CLASSES, EscherTile, Fit, Target, TileMap, TileModel, as_model, certify
 from orbiflow.tiles.result_file import tile_json
 from orbiflow.tiles.search.candidates import SAMPLE_COUNTS
 from orbiflow.tiles.search.finished_tiles import best_tiles
-from strategies import random_tensor
+from strategies import divided_start, random_tensor
 
 KIND = CLASSES["IH21"]
 
@@ -120,7 +110,7 @@ def test_a_file_alone_places_the_tile_in_the_input(name: str, y_down: bool, tmp_
     loaded = as_model(saved)
     pieces = 2 * -(-SAMPLE_COUNTS[0] // (2 * len(kind.template())))
     with torch.no_grad():
-        curve = saved.frame.to_input(loaded(subdivided(loaded.prototile()[0], pieces)))[0].numpy()
+        curve = saved.frame.to_input(loaded(divided_start(loaded, pieces)))[0].numpy()
     # half of the polygon is flowed, the other half its image: the map has both
     nearest = np.asarray(scipy.spatial.KDTree(curve).query(polygon)[0])
     assert nearest.max() < 1e-9

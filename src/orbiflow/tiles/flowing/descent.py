@@ -318,17 +318,10 @@ def shared_soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
 
 def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
     """Return the candidates after a start that none of them beats, whose flow moves nothing."""
-    still = TileModel(
-        model.isohedral_class,
-        max_frequency=model.max_frequency,
-        smoothness=model.smoothness,
-        steps=model.flow.steps,
-        method=model.flow.method,
-        dtype=model.angle.dtype,
-        prototiles=prototile,
-    )
-    zero = torch.zeros_like(still.fourier_fields()[0].parameters_)
-    return TileModel.joined([still.with_fields([zero] * model.segments), model])
+    zero = torch.zeros_like(model.fourier_fields()[0].parameters_[:1])
+    start = model.with_fields([zero] * model.segments, [0])
+    start.start_from(prototile)
+    return TileModel.joined([start, model])
 
 
 def _polished(
@@ -377,20 +370,9 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
 def _starts(
     target: Target, kind: IsohedralClass, settings: OverlapSearch, cancel: Cancel
 ) -> Starts:
-    phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     found: Starts | None = None
     if settings.starts == "outline":
-        found = outline_starts(
-            target,
-            kind,
-            count=settings.candidates,
-            resolutions=settings.resolutions,
-            projected=settings.projected,
-            measured=settings.measured,
-            vertices=settings.boundary,
-            phase=phase,
-            cancel=cancel,
-        )
+        found = outline_starts(target, kind, settings, cancel=cancel)
         if len(found.prototiles) >= MIN_STARTS and found.iou.max() >= MIN_START_IOU:
             return found
     templates = template_starts(
@@ -398,7 +380,7 @@ def _starts(
         turns=settings.turns,
         stretch=settings.stretch if settings.lattice else 0.0,
         vertices=settings.boundary,
-        phase=phase,
+        phase=settings.phase,
     )
     # their overlap is not known: 0 says that any result is better
     plain = Starts(templates, np.zeros(len(templates)))

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
+
 from orbiflow.arguments import refusal
 from orbiflow.errors import CertificationError
 from orbiflow.flows import method
@@ -115,6 +117,11 @@ class OverlapSearch(Settings, SearchMethod):
         """Steps of all stages."""
         return sum(steps for steps, _ in self.stages)
 
+    @property
+    def phase(self) -> float:
+        """The place of an outline's points, in their spacings, which the seed changes."""
+        return float(np.random.default_rng(self.seed).random()) if self.seed else 0.0
+
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
@@ -131,13 +138,9 @@ class OverlapSearch(Settings, SearchMethod):
         """Return the tiles nearest to the outline."""
         if self.starts != "outline":
             return super().sketch(goal, kind, cancel)
-        few: dict[str, Any] = {
-            "count": 3,
-            "resolutions": (PREVIEW_POINTS,),
-            "measured": 40,
-            "vertices": PREVIEW_POINTS,
-        }
-        own = outline_starts(goal.target, kind, **few, cancel=cancel).prototiles
+        few: dict[str, Any] = {"candidates": 3, "projected": 1000, "measured": 40, "seed": 0}
+        few |= {"resolutions": (PREVIEW_POINTS,), "boundary": PREVIEW_POINTS}
+        own = outline_starts(goal.target, kind, replace(self, **few), cancel=cancel).prototiles
         if not len(own):
             raise CertificationError("no tile near the outline is simple")
         return Fit(StillTiles(kind, own), len(own), 0, 1)

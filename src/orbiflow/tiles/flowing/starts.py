@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from orbiflow.arguments import as_instance, as_whole
 from orbiflow.arrays import Array, Complex
-from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.geometry import plane_points, resampled, reverse, subdivided
@@ -29,6 +28,9 @@ from orbiflow.tiles.search import (
 )
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.flowing.overlap_search import OverlapSearch
 
 
 def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Array, NDArray[np.bool_]]:
@@ -55,44 +57,30 @@ class Starts:
 
 
 def outline_starts(
-    target: Target,
-    kind: IsohedralClass | str,
-    *,
-    count: int,
-    resolutions: Sequence[int] = (40, 60, 80),
-    projected: int = 1000,
-    measured: int = 200,
-    vertices: int = 240,
-    phase: float = 0.0,
-    cancel: Cancel = NEVER,
+    target: Target, kind: IsohedralClass, settings: OverlapSearch, *, cancel: Cancel = NEVER
 ) -> Starts:
     """Return the best start tiles of one class for a target, no two of them twins.
 
-    At each of the `resolutions`, points of the outline that divide `vertices`, so many placements are
-    `projected` onto tiles and the nearest `measured`. A seed changes `phase`, the place of the points
-    in spacings.
+    At each of the `resolutions`, points of the outline, so many placements are `projected` onto tiles
+    and the nearest `measured`.
     """
-    kind = isohedral_class(kind)
-    as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    for points in resolutions:
-        if vertices % as_whole(points, "a resolution", 24):
-            raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
     for mirrored in (False,) if template_symmetries(kind)[1] else (False, True):
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
         goal = prepared_region(ring)
-        for points in resolutions:
+        for points in settings.resolutions:
             cancel.check()
-            outline = resampled(ring, points, phase) @ [1, 1j]
-            found = best_placements(kind, outline, projected)
-            for tiles, placements, score in _simple_tiles(kind, goal, outline, found, measured):
-                parts.append(Prototiles.of(kind, tiles, vertices, mirrored=mirrored))
+            outline = resampled(ring, points, settings.phase) @ [1, 1j]
+            found = best_placements(kind, outline, settings.projected)
+            nearest = _simple_tiles(kind, goal, outline, found, settings.measured)
+            for tiles, placements, score in nearest:
+                parts.append(Prototiles.of(kind, tiles, settings.boundary, mirrored=mirrored))
                 scores.append(score)
                 places.append((placements.starts[:, None] + tiles.corners) / points)
     iou, all_tiles = np.concatenate(scores), Prototiles.joined(parts)
-    chosen = _apart(iou, np.concatenate(places), all_tiles.mirrored, count)
+    chosen = _apart(iou, np.concatenate(places), all_tiles.mirrored, settings.candidates)
     return Starts(all_tiles.take(chosen), iou[chosen])
 
 

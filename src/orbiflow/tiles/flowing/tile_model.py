@@ -115,24 +115,27 @@ class TileModel(nn.Module, Candidates):
         self.max_frequency = max_frequency
         self.segments = segments
         self.smoothness = smoothness
-        self._start_from(prototiles)
-
-    @torch.no_grad()
-    def _start_from(self, prototiles: Prototiles | None) -> None:
         self.register_buffer("vertices", None)
         self.register_buffer("corners", None)
-        if prototiles is None:  # each template's centre at the target's centroid
+        if prototiles is not None:
+            self.start_from(prototiles)
+            return
+        with torch.no_grad():  # each template's centre at the target's centroid
             center = self.template().mean(dim=-2, keepdim=True) @ self.linear().mT
             self.offset.copy_(-center[:, 0])
-            return
+
+    @torch.no_grad()
+    def start_from(self, prototiles: Prototiles) -> None:
+        """Take S start tiles with their poses, in place of those that there are."""
         kind = self.isohedral_class
         own = prototiles.corners.shape[-1], prototiles.stretch.shape[-1]
         if own != (len(kind.template()), kind.stretch_dim):
             raise OrbiflowError(f"the prototiles are not of class {kind.name}")
         self.vertices = torch.tensor(prototiles.vertices, dtype=torch.float64)
         self.corners = torch.tensor(prototiles.corners)
-        for name in ("log_scale", "offset", "stretch"):
-            getattr(self, name).copy_(torch.as_tensor(getattr(prototiles, name)))
+        self.mirror = torch.tensor(prototiles.mirrored)
+        for name in ("angle", "log_scale", "offset", "stretch"):
+            getattr(self, name).copy_(torch.tensor(getattr(prototiles, name)))
 
     @property
     def size(self) -> int:

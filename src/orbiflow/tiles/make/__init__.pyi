@@ -4,9 +4,9 @@ from .art import art_scene as art_scene
 from .art import artwork as artwork
 from .art import render_artwork as render_artwork
 from .art_settings import ArtSettings as ArtSettings
-from .cuts import MAKERS as MAKERS
 from .drawings import dark_parts as dark_parts
 from .export_settings import ExportSettings as ExportSettings
+from .exporting import MAKERS as MAKERS
 from .exporting import Exported as Exported
 from .exporting import laid_out as laid_out
 from .exporting import scenes as scenes

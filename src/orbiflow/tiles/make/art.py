@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from orbiflow import __version__
+from orbiflow.arrays import Array
 from orbiflow.drawing import palette, png_bytes
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Outcome
 from orbiflow.tiles.make.art_settings import ArtSettings
-from orbiflow.tiles.make.pixels import render_page
 from orbiflow.tiles.make.repeats import repeating_page
 from orbiflow.tiles.motifs import (
+    NOWHERE,
+    Grid,
     Over,
     Paint,
     Picture,
+    Runs,
+    bilinear,
     carried_raster,
     drawn_motif,
     paint_motif,
     picture_paint,
+    rgb_of,
+    ring_sides,
+    runs,
     with_map,
 )
 from orbiflow.tiles.page import Curve, Motif, Page, Part, Scene, Style, edge_margin, longer_side
@@ -33,6 +42,7 @@ TEXELS_PER_PIXEL = 1.5  # texels of the tile's raster along a pixel of the page
 TILE_PER_OUTLINE = 120  # the tile's size over the outline's usual width
 USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
 SEAM = 0.3  # width in pixels of hairlines between filled tiles
+BAND = 2_000_000  # number of samples that are computed at a time
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -190,7 +200,6 @@ def art_scene(art: Artwork) -> Scene:
         rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
     name = art.tile.isohedral_class or "a tile"
     return page.scene(
-        [Curve.polyline(page.ring, closed=True)],
         chosen,
         Style(None, chosen.outline, art.outline),
         clipped=True,
@@ -211,3 +220,95 @@ def art_file(art: Artwork, format: str, *, cancel: Cancel | None = None) -> byte
 def png_of(pixels: np.ndarray, dpi: float) -> bytes:
     """Return pixels (height, width, 3) as a PNG that gives their resolution."""
     return png_bytes(Image.fromarray(pixels), dpi=(dpi, dpi), compress_level=5)
+
+
+def render_page(
+    page: Page,
+    pixels: float,
+    grid: Grid,
+    coloured: Array,
+    paper: str,
+    *,
+    samples: int,
+    cancel: Cancel | None = None,
+) -> np.ndarray:
+    """Return the picture of a page (height, width, 3) in 8 bits, with so many `pixels` in a mm.
+
+    Every sample belongs to exactly one copy of the tile, and has its colour in the raster (colours,
+    height, width, 3) that `Paint.coloured` returns; a pixel is the mean of `samples` x `samples`.
+    """
+    cancel = cancel or Cancel()
+    every, shown = _with_hidden(page)
+    look = _lookup(every, pixels * samples, grid, coloured, paper)
+    rings = np.array(every.rings()) * (pixels * samples)
+    page_width, page_height = (round(side * pixels) for side in page.size)
+    low, high = rings[..., 1].min(axis=1), rings[..., 1].max(axis=1)
+    result = np.empty((page_height, page_width, 3), dtype=np.uint8)
+    step = max(1, BAND // (page_width * samples * samples))
+    for top in range(0, page_height, step):
+        cancel.check()
+        rows = min(step, page_height - top)
+        first = top * samples
+        near = np.flatnonzero((high > first) & (low < first + rows * samples))
+        found = runs(ring_sides(rings[near]), first, rows * samples, page_width * samples)
+        unpainted = (found.label < 0) | ~shown[near[found.label]]
+        named = found._replace(label=np.where(unpainted, NOWHERE, near[found.label]))
+        colours = look(named, first).reshape(rows * samples, page_width * samples, 3)
+        mean = _pooled(colours, samples) * 255 + 0.5
+        result[top : top + rows] = mean.clip(0, 255).astype(np.uint8)
+    return result
+
+
+def _with_hidden(page: Page) -> tuple[Page, NDArray[np.bool_]]:
+    """Return the page with all copies that meet it, which leave no gap, and which of them it shows."""
+    every = replace(page, whole=None)
+    shown, keys = (
+        list(zip(own.aspects.tolist(), *own.cells.T.tolist(), strict=True))
+        for own in (page.copies, every.copies)
+    )
+    known = set(shown)
+    return every, np.array([key in known for key in keys])
+
+
+def _pooled(colours: Array, samples: int) -> Array:
+    """Return the mean of `samples` x `samples` colours for each pixel."""
+    parts = [colours[i::samples, j::samples] for i in range(samples) for j in range(samples)]
+    return sum(parts[1:], parts[0]) / len(parts)
+
+
+def _lookup(
+    page: Page, samples: float, grid: Grid, coloured: Array, paper: str
+) -> Callable[[Runs, int], Array]:
+    """Return a function for the colours (samples, 3), row by row, of samples in copies of the tile."""
+    copies = page.copies
+    count, height, width = coloured.shape[:3]
+    # all colours in one tall raster, and a strip of paper under them
+    strip = np.broadcast_to(rgb_of(paper).astype(np.float32), (8, width, 3))
+    tall = np.concatenate([coloured.reshape(count * height, width, 3), strip])
+    raster = np.ascontiguousarray(tall, dtype=np.float32)
+    # from samples to texels: linear @ sample + offset, one a copy
+    to_page = page.stretch @ copies.group.linear_parts[copies.cosets] * samples
+    inverse = np.linalg.inv(to_page @ page.place.linear)
+    shift = to_page @ page.place.offset
+    shift += samples * copies.translations @ page.stretch.T
+    start = -np.einsum("mij,mj->mi", inverse, shift) - grid.corner
+    start *= grid.density
+    start[:, 1] += page.colours * height
+    # nowhere, the last: the middle of the strip
+    linears = np.concatenate([inverse * grid.density, np.zeros((1, 2, 2))])
+    offsets = np.concatenate([start, [[width / 2, count * height + 4.0]]])
+
+    def look(found: Runs, top: int) -> Array:
+        kept = found.length > 0
+        own = Runs(*(part[kept] for part in found))
+        linear, offset = linears[own.label], offsets[own.label]
+        y = own.row + top + 0.5
+        # texel = start + step * column
+        start = offset + linear[:, :, 1] * y[:, None] + linear[:, :, 0] * (own.start + 0.5)[:, None]
+        at = np.concatenate([start, linear[:, :, 0]], axis=1).astype(np.float32)
+        first = np.cumsum(own.length) - own.length
+        along = np.arange(own.length.sum()) - own.spread(first)
+        spread = own.spread(at)
+        return bilinear(raster, spread[:, :2] + along[:, None].astype(np.float32) * spread[:, 2:])
+
+    return look

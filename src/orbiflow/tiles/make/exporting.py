@@ -1,21 +1,26 @@
-"""What an export puts on its sheets, whatever is cut, and the files that it wrote."""
+"""What an export puts on its sheets, the kinds of cut, and the files that it wrote."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from orbiflow import __version__
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Outcome
 from orbiflow.tiles.likeness import narrowest_neck
-from orbiflow.tiles.make.cuts import MAKERS, Maker
 from orbiflow.tiles.make.drawings import drawn_on, with_drawing
 from orbiflow.tiles.make.export_settings import ExportSettings
-from orbiflow.tiles.make.layout import Layout, layout
+from orbiflow.tiles.make.jigsaws import jigsaw_scenes
+from orbiflow.tiles.make.layout import Layout, layout, tiling_scene
 from orbiflow.tiles.make.offsets import place_on
+from orbiflow.tiles.make.pieces import pieces_scenes
 from orbiflow.tiles.make.sheets import calibrated, registered, split
+from orbiflow.tiles.make.skeletons import skeleton_scene
+from orbiflow.tiles.make.templates import template_scene
 from orbiflow.tiles.motifs import Over, read_over, with_map
 from orbiflow.tiles.page import Scene, flattened
 from orbiflow.tiles.result_file import as_tile
@@ -24,6 +29,27 @@ from orbiflow.tiles.tilings import Certificate, colouring
 from orbiflow.tiles.write import LINES_ALONE, write_png, write_scene
 
 VISIBLE = 0.05  # the least width in mm of a line that shows on a screen
+
+EVERY, FIRST, LAST = slice(None), slice(1), slice(-1, None)
+
+
+class Maker(NamedTuple):
+    """How one kind of cut is made."""
+
+    scenes: Callable[[Layout], list[Scene]]
+    called: str  # what is counted on its sheets
+    calibrated: slice = LAST  # the sheets that have a strip for the calibration mark
+    splits: bool = False  # whether a page larger than the bed is split, cutting tiles
+
+
+MAKERS = {
+    "none": Maker(lambda layout: [tiling_scene(layout)], "tiles", splits=True),
+    "skeleton": Maker(lambda layout: [skeleton_scene(layout)], "tiles in outline", splits=True),
+    "pieces": Maker(pieces_scenes, "pieces", EVERY),
+    "jigsaw": Maker(jigsaw_scenes, "pieces of a jigsaw", FIRST),
+    "template": Maker(lambda layout: [template_scene(layout)], "template"),
+}
+"""The kinds of cut: to add one, write its scenes in a file here, name it here and in `cut`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -56,10 +56,7 @@ class Layout:
 
     def scene(self, layers: Iterable[Layer], tiles: tuple[PlacedTile, ...], **more: Any) -> Scene:
         """Return a scene of the page with these layers and tiles."""
-        box, ring = self.page.box, self.page.ring
-        return Scene(
-            *self.page.size, tuple(layers), window=box, prototile=ring, tiles=tiles, **more
-        )
+        return self.page.empty(layers, prototile=self.page.ring, tiles=tiles, **more)
 
     @cached_property
     def piece(self) -> tuple[Array, str]:
@@ -137,9 +134,9 @@ def tiling_scene(layout: Layout) -> Scene:
         line = settings.stroke or chosen.outline
     width = USUAL_WIDTH if settings.outline is None else settings.outline
     return page.scene(
-        [layout.outline.closed],
         chosen,
         Style(None, line, width),
+        outlines=[layout.outline.closed],
         clipped=settings.clip,
         seam=SEAM if motif is not None else None,
         motif=motif,

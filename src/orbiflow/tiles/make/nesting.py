@@ -55,7 +55,11 @@ class Arrangement:
         ]
         reach = float(np.linalg.norm(ring - _middle(ring), axis=1).max())
         centers = self.linear @ _middle(ring) + self.offsets
-        steps = self._steps(2 * reach + gap, centers)
+        # the integer coordinates of all lattice vectors that can bring two pieces together
+        far = 2 * reach + gap + float(np.ptp(centers, axis=0).max()) * 1.5
+        bound = np.ceil(far * np.linalg.norm(np.linalg.inv(self.lattice), axis=1)).astype(int)
+        ranges = [np.arange(-b, b + 1) for b in np.minimum(bound, 40)]
+        steps = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
         shifts = steps @ self.lattice.T
         for first, piece in enumerate(pieces):
             shapely.prepare(piece)
@@ -70,14 +74,6 @@ class Arrangement:
                     if shapely.dwithin(piece, others, gap).any():
                         return False
         return True
-
-    def _steps(self, reach: float, centers: Array) -> Array:
-        """Return the integer coordinates of all lattice vectors that can bring two pieces together."""
-        far = reach + float(np.ptp(centers, axis=0).max()) * 1.5
-        bound = np.ceil(far * np.linalg.norm(np.linalg.inv(self.lattice), axis=1)).astype(int)
-        bound = np.minimum(bound, 40)
-        ranges = [np.arange(-b, b + 1) for b in bound]
-        return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 MOST_SPREAD = 4.0  # how far apart pieces are moved at most, in their distances

@@ -38,10 +38,7 @@ def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
             f"the kerf of {kerf:g} mm is wider than a slit of the piece: it is {slit.width:.2f} mm "
             f"wide {place_on(ring, slit.place)}, and would be burned away; choose a larger tile size"
         )
-    return _offset_ring(ring, (kerf - clearance) / 2)
-
-
-def _offset_ring(ring: Array, distance: float) -> Array:
+    distance = (kerf - clearance) / 2
     if abs(distance) < 1e-9:
         return ring
     moved = shapely.Polygon(ring).buffer(distance, join_style="mitre", mitre_limit=MITRE)

@@ -11,7 +11,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make.layout import Layout, line_style
 from orbiflow.tiles.page import Curve, Layer, Scene, clipped, rectangle
@@ -153,42 +152,23 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
 
 def in_short_order(curves: list[Curve]) -> list[Curve]:
     """Return curves in the order and direction of a way from each to the nearest end that is left."""
-    if not curves:
-        return []
-    nearest = _Nearest(np.array([[curve.start, curve.end] for curve in curves]))
-    place, ordered = np.zeros(2), []
+    ends = np.array([[curve.start, curve.end] for curve in curves])
+    left, taken = np.ones(len(ends), dtype=bool), 0
+    place, ordered, numbers, tree = np.zeros(2), [], np.zeros(0, dtype=np.int64), None
     for _ in curves:
-        number, side = nearest.take(place)
+        if tree is None or 2 * taken > len(
+            numbers
+        ):  # most of the tree's curves are taken: a new one
+            numbers, taken = np.flatnonzero(left), 0
+            tree = KDTree(ends[numbers].reshape(-1, 2))
+        number, side, count = -1, 0, min(8, 2 * len(numbers))
+        while number < 0:
+            for hit in np.atleast_1d(tree.query(place, k=count)[1]).tolist():
+                if left[numbers[hit // 2]]:
+                    number, side = int(numbers[hit // 2]), hit % 2
+                    break
+            count = min(4 * count, 2 * len(numbers))
+        left[number], taken = False, taken + 1
         ordered.append(curves[number].reversed() if side else curves[number])
-        place = nearest.ends[number, 1 - side]
+        place = ends[number, 1 - side]
     return ordered
-
-
-class _Nearest:
-    """The ends (n, 2, 2) of curves, with a tree that finds the nearest of those that are left."""
-
-    def __init__(self, ends: Array) -> None:
-        self.ends = ends
-        self.left = np.ones(len(ends), dtype=bool)
-        self._build_tree()
-
-    def _build_tree(self) -> None:
-        self.numbers = np.flatnonzero(self.left)
-        self.tree = KDTree(self.ends[self.numbers].reshape(-1, 2))
-        self.taken = 0
-
-    def take(self, place: Array) -> tuple[int, int]:
-        """Take the curve with the end nearest to `place`; return its number and which end it is."""
-        if 2 * self.taken > len(self.numbers):
-            self._build_tree()
-        size = 2 * len(self.numbers)
-        count = min(8, size)
-        while True:
-            _, found = self.tree.query(place, k=count)
-            for hit in np.atleast_1d(found).tolist():
-                number, side = int(self.numbers[hit // 2]), hit % 2
-                if self.left[number]:
-                    self.left[number] = False
-                    self.taken += 1
-                    return number, side
-            count = min(4 * count, size)

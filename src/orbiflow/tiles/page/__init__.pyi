@@ -12,11 +12,11 @@ from .outlines import turning as turning
 from .page import MOTIF as MOTIF
 from .page import Page as Page
 from .page import Place as Place
-from .placing import edge_margin as edge_margin
-from .placing import inset as inset
-from .placing import longer_side as longer_side
-from .placing import mark_corners as mark_corners
-from .placing import rectangle_sides as rectangle_sides
+from .page import edge_margin as edge_margin
+from .page import inset as inset
+from .page import longer_side as longer_side
+from .page import mark_corners as mark_corners
+from .page import rectangle_sides as rectangle_sides
 from .scene import INK as INK
 from .scene import Box as Box
 from .scene import Curve as Curve

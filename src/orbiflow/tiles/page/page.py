@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 
 from orbiflow.arrays import Array, Integers, Window, checked_window
 from orbiflow.drawing import Palette
-from orbiflow.symmetry import Isometry
-from orbiflow.tiles.page.placing import edge_margin, inset, longer_side, place_on_page
+from orbiflow.symmetry import Isometry, rotation_matrix
 from orbiflow.tiles.page.scene import (
     Box,
     Curve,
@@ -24,7 +24,13 @@ from orbiflow.tiles.page.scene import (
     Uses,
     rectangle,
 )
-from orbiflow.tiles.page.settings import ColourRule, PageSettings
+from orbiflow.tiles.page.settings import (
+    MARKS_EDGE,
+    USUAL_WIDTH,
+    ColourRule,
+    PageSettings,
+    usual_tolerance,
+)
 from orbiflow.tiles.tilings import (
     Colouring,
     Copies,
@@ -39,6 +45,12 @@ from orbiflow.tiles.tilings import (
 
 MOTIF = "motif"
 """The name of what lies on every tile, among a scene's motifs."""
+
+MARK = 20.0  # length in mm of registration marks, around which nothing else may lie
+# Places along each side of a lattice cell that are tried for a page with most whole tiles
+SHIFTS = 10
+# Number of tiles on a page beyond which a few more are not worth looking for
+MOST_TILES_TO_SHIFT = 1000
 
 
 class Place(NamedTuple):
@@ -98,11 +110,15 @@ class Page:
         size = settings.page
         box = box or Box(0.0, 0.0, *size)
         tiling = as_tiling(tile)
-        longer = scale * longer_side(tiling.prototiles[0].polygon)
-        margin = None if centred else edge_margin(longer)
-        place = place_on_page(tiling, scale, box, y_down, rotate=settings.rotate, margin=margin)
-        moved = tiling.transformed(*place)
-        return cls(size, box, moved, Place(*place), whole, settings.colour)
+        turn = rotation_matrix(-np.radians(settings.rotate))  # y points down on the page
+        linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
+        middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
+        place = Place(linear, middle - linear @ tiling.center)
+        if not centred:
+            within = inset(box, edge_margin(scale * longer_side(tiling.prototiles[0].polygon)))
+            shift = _shift_to_most_whole(tiling.transformed(*place), within)
+            place = place._replace(offset=place.offset + shift)
+        return cls(size, box, tiling.transformed(*place), place, whole, settings.colour)
 
     @classmethod
     def of_window(
@@ -127,6 +143,11 @@ class Page:
     def ring(self) -> Array:
         """The polygon (N, 2) of the first prototile, in its place."""
         return self.tiling.prototiles[0].polygon
+
+    @property
+    def polygons(self) -> list[Curve]:
+        """The polygon of each prototile, in its place, as a curve."""
+        return [Curve.polyline(own.polygon, closed=True) for own in self.tiling.prototiles]
 
     @property
     def tile_size(self) -> float:
@@ -210,10 +231,10 @@ class Page:
 
     def scene(
         self,
-        outlines: Sequence[Curve],
         chosen: Palette | None,
         line: Style,
         *,
+        outlines: Sequence[Curve] | None = None,
         clipped: bool,
         seam: float | None = None,
         motif: Motif | None = None,
@@ -222,17 +243,16 @@ class Page:
         """Return the copies as a scene: symbols, a use of them for each copy, a layer for each colour.
 
         Args:
-            outlines: The outline of each prototile, on the page.
             chosen: The colours; None for lines alone.
             line: The lines around tiles, drawn around each; or above all, if hairlines `seam` mm wide
                 close the seams that viewers leave between neighbours.
+            outlines: The outline of each prototile, on the page. Default: its polygon.
             clipped: Whether tiles are cut off at the box.
             motif: What lies on the first prototile, on the page.
             more: Further fields of the scene.
         """
-        symbols = {
-            symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in enumerate(outlines)
-        }
+        given = enumerate(self.polygons if outlines is None else outlines)
+        symbols = {symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in given}
         motifs = {}
         if motif is not None and (motif.parts or motif.rasters):
             own = motif.moved(*self.about_middle())
@@ -243,7 +263,7 @@ class Page:
         layers += self._tile_layers(chosen, line, clipped, seam, drawn=bool(motifs))
         return Scene(*self.size, tuple(layers), symbols, self.box, motifs=motifs, **more)
 
-    def empty(self, layers: Sequence[Layer], **more: Any) -> Scene:
+    def empty(self, layers: Iterable[Layer], **more: Any) -> Scene:
         """Return the page as a scene of other layers."""
         return Scene(*self.size, tuple(layers), window=self.box, **more)
 
@@ -265,7 +285,7 @@ class Page:
             style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
             layers.append(Layer(name, "tiles", style, tuple(filter(len, own)), clipped))
             if drawn:
-                on = (own[0].of(MOTIF),)
+                on = (replace(own[0], symbol=MOTIF),)
                 ink = chosen.ink(colour)
                 layers.append(Layer(f"drawing on {name}", "drawing", Style(), on, clipped, ink))
         if seam is not None and line.width > 0:
@@ -288,3 +308,64 @@ class Page:
 def symbol_of(prototile: int) -> str:
     """Return the name of a prototile's outline among a scene's symbols."""
     return "tile" if prototile == 0 else f"tile-{prototile + 1}"
+
+
+def edge_margin(tile_size: float) -> float:
+    """Return the distance in mm that whole tiles of a size keep from the page's edge."""
+    return usual_tolerance(tile_size) + USUAL_WIDTH / 2
+
+
+def inset(box: Box, margin: float) -> Box:
+    """Return a box that is smaller by a margin on each side."""
+    return Box(box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
+
+
+def mark_corners(page: tuple[float, float]) -> list[Box]:
+    """Return the boxes of registration marks: in the corners of a page but the lower right one."""
+    left = top = MARKS_EDGE
+    right, bottom = page[0] - MARKS_EDGE, page[1] - MARKS_EDGE
+    return [
+        Box(left, top, left + MARK, top + MARK),
+        Box(right - MARK, top, right, top + MARK),
+        Box(left, bottom - MARK, left + MARK, bottom),
+    ]
+
+
+def _shift_to_most_whole(tiling: Tiling, box: Box) -> Array:
+    """Return the shift after which most tiles are whole in a box; none if it is best."""
+    if box.width * box.height > MOST_TILES_TO_SHIFT * tiling.tile_area:
+        return np.zeros(2)
+    best, shift = len(copies_inside(tiling, box)), np.zeros(2)
+    shares = np.arange(SHIFTS) / SHIFTS
+    grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
+    for step in grid @ tiling.group.lattice.T:
+        moved = (box.left - step[0], box.top - step[1], box.right - step[0], box.bottom - step[1])
+        count = len(copies_inside(tiling, moved))
+        if count > best:
+            best, shift = count, step
+    return shift
+
+
+def longer_side(ring: Array) -> float:
+    """Return the longer side of the smallest rectangle, however turned, around a ring."""
+    return rectangle_sides(ring)[1]
+
+
+def rectangle_sides(ring: Array) -> tuple[float, float]:
+    """Return the sides of the smallest rectangle by area around a ring, the shorter first.
+
+    Of the same area, as around a regular hexagon, the shortest: rounding does not choose.
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
+    >>> [round(side, 6) for side in rectangle_sides(square)]
+    [1.414214, 1.414214]
+    """
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(ring)))
+    steps = np.diff(hull, axis=0)  # a smallest rectangle lies along one of the hull's sides
+    along = steps / np.linalg.norm(steps, axis=1)[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    sides = np.sort(np.stack([np.ptp(hull @ way.T, axis=0) for way in (along, across)]), axis=0)
+    areas = sides.prod(axis=0)
+    smallest = np.flatnonzero(areas <= (1 + 1e-6) * areas.min())
+    best = smallest[sides[1, smallest].argmin()]
+    return float(sides[0, best]), float(sides[1, best])

@@ -219,10 +219,6 @@ class Uses:
         low, high = images.min(axis=1), images.max(axis=1)
         return (high > box[:2]).all(axis=1) & (low < box[2:]).all(axis=1)
 
-    def of(self, symbol: str) -> Uses:
-        """Return the same copies of another symbol or motif."""
-        return replace(self, symbol=symbol)
-
     def select(self, keep: Booleans | slice) -> Uses:
         """Return the copies where `keep` is true, or in a slice."""
         return replace(self, which=self.which[keep], offsets=self.offsets[keep])

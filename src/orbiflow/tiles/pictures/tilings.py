@@ -11,7 +11,7 @@ from orbiflow.arguments import as_whole
 from orbiflow.arrays import Window
 from orbiflow.drawing import DEFAULT_PALETTE, Sheet, font, palette, palette_png
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.page import Curve, Layer, Page, Style
+from orbiflow.tiles.page import Layer, Page, Style
 from orbiflow.tiles.pictures.sketch import LEAST_LINE, ScenePicture
 from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, default_window
 from orbiflow.tiles.write import INCH, scene_image
@@ -30,7 +30,7 @@ def tile_picture(
     window = (*(low - margin).tolist(), *(high + margin).tolist())
     page = Page.of_window(tile, window, sheet.width * INCH, y_down=y_down)
     style = Style(chosen.fill(1), chosen.outline, 0.003 * page.size[0])
-    layers = (Layer("tile", "tiles", style, (Curve.polyline(page.ring, closed=True),)),)
+    layers = (Layer("tile", "tiles", style, tuple(page.polygons)),)
     note = "A tile of the plane, made with orbiflow"
     return ScenePicture(page.empty(layers, title=title or _name(tile), notes=(note,)), sheet)
 
@@ -72,9 +72,8 @@ def tiling_picture(
         f"{what} of the plane ({_name(tile)}), made with orbiflow. "
         "Each path is one tile; groups collect the tiles of one colour."
     )
-    outlines = [Curve.polyline(own.polygon, closed=True) for own in page.tiling.prototiles]
     named = {"title": title or f"Tiling {_name(tile)}", "notes": (note,)}
-    return ScenePicture(page.scene(outlines, chosen, line, clipped=True, **named), sheet)
+    return ScenePicture(page.scene(chosen, line, clipped=True, **named), sheet)
 
 
 PANEL_ASPECT = 1.25  # width over height of the part of a tiling that a panel of `tilings_png` shows
@@ -122,10 +121,9 @@ def _panel(tiles: Tiles, width_px: int) -> Image.Image:
     x, y = tiling.center.tolist()
     window = (x - half, y - half / PANEL_ASPECT, x + half, y + half / PANEL_ASPECT)
     page = Page.of_window(tiling, window, float(width_px))
-    outlines = [Curve.polyline(own.polygon, closed=True) for own in page.tiling.prototiles]
-    scene = page.scene(outlines, chosen, Style(None, chosen.outline, 1.0), clipped=True)
+    scene = page.scene(chosen, Style(None, chosen.outline, 1.0), clipped=True)
     thick = Style(None, chosen.outline, max(2.0, 0.013 * width_px))
-    return scene_image(scene.with_layers(Layer("prototiles", "tiles", thick, tuple(outlines))))
+    return scene_image(scene.with_layers(Layer("prototiles", "tiles", thick, tuple(page.polygons))))
 
 
 def _name(tile: Tiles) -> str:

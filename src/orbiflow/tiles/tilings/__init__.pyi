@@ -6,8 +6,8 @@ from .isohedral import CLASSES as CLASSES
 from .isohedral import ISOHEDRAL_TYPES as ISOHEDRAL_TYPES
 from .isohedral import IsohedralClass as IsohedralClass
 from .isohedral import PaperOperator as PaperOperator
+from .isohedral import commutant as commutant
 from .isohedral import isohedral_class as isohedral_class
-from .lattice_freedom import commutant as commutant
 from .prototile import Prototile as Prototile
 from .prototile import Stabiliser as Stabiliser
 from .prototile import free_subgroup as free_subgroup

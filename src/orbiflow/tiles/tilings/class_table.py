@@ -33,106 +33,76 @@ OperatorRow: TypeAlias = RotationRow | TransflectionRow
 
 
 class ClassRow(NamedTuple):
-    """A row of the table.
+    """A row of the table; operators are in the order in which the paper nests them, outermost first."""
 
-    Operators are in the order in which the paper nests them, outermost first. Edges are identified
-    in pairs, equal where an edge is its own partner; the group has the isometry.
-    """
-
-    group: str
     template: TemplateKind
     lattice: tuple[LatticeVector, LatticeVector]
     operators: tuple[OperatorRow, ...]
-    edges: tuple[tuple[int, int], ...]
 
 
 _HEXAGON_CELL = LatticeVector({0: 3}), LatticeVector({1: 1, 2: 1})
 
 # source: the paper, table "The Symmetrization for the nine isohedral classes"
 CLASS_TABLE: dict[str, ClassRow] = {
-    "IH1": ClassRow(
-        group="p1",
-        template="hexagon",
-        lattice=(LatticeVector({0: 1, 1: 1}), LatticeVector({1: 1, 2: 1})),
-        operators=(),
-        edges=((0, 3), (1, 4), (2, 5)),
-    ),
+    "IH1": ClassRow("hexagon", (LatticeVector({0: 1, 1: 1}), LatticeVector({1: 1, 2: 1})), ()),
     "IH2": ClassRow(
-        group="pg",
-        template="hexagon",
-        lattice=_HEXAGON_CELL,
-        operators=(
+        "hexagon",
+        _HEXAGON_CELL,
+        (
             TransflectionRow({0: 1 / 2, 1: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
             TransflectionRow({0: 5 / 2, 2: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
         ),
-        edges=((0, 5), (1, 4), (2, 3)),
     ),
     "IH3": ClassRow(
-        group="pg",
-        template="hexagon",
-        lattice=_HEXAGON_CELL,
-        operators=(
+        "hexagon",
+        _HEXAGON_CELL,
+        (
             TransflectionRow({0: 1 / 2, 1: 1 / 2}, {0: 1}, {0: 3 / 2}),
             TransflectionRow({1: 3 / 4, 2: 3 / 4}, {0: 1}, {0: 3 / 2}),
         ),
-        edges=((0, 2), (1, 4), (3, 5)),
     ),
     "IH4": ClassRow(
-        group="p2",
-        template="hexagon",
-        lattice=_HEXAGON_CELL,
-        operators=(
+        "hexagon",
+        _HEXAGON_CELL,
+        (
             RotationRow({0: 3 / 2, 1: 3 / 2}, 2),
             RotationRow({0: 1 / 2, 1: 1, 2: 1 / 2}, 2),
             RotationRow({0: 1 / 2, 1: 1 / 2}, 2),
             RotationRow({0: 3 / 2, 1: 1, 2: -1 / 2}, 2),
         ),
-        edges=((0, 0), (1, 4), (2, 2), (3, 3), (5, 5)),
     ),
     "IH5": ClassRow(
-        group="pgg",
-        template="hexagon",
-        lattice=(LatticeVector({0: 6}), LatticeVector({1: 1, 2: 1})),
-        operators=(
+        "hexagon",
+        (LatticeVector({0: 6}), LatticeVector({1: 1, 2: 1})),
+        (
             RotationRow({0: 11 / 2, 2: 1 / 2}, 2),
             RotationRow({0: 11 / 2, 1: 1 / 2, 2: 1}, 2),
             TransflectionRow({1: 1}, {0: 1}, {0: 3}),
             TransflectionRow({0: 7 / 2, 1: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
         ),
-        edges=((0, 5), (1, 4), (2, 2), (3, 3)),
     ),
     "IH6": ClassRow(
-        group="pgg",
-        template="hexagon",
-        lattice=(LatticeVector({0: 3}), LatticeVector({1: 2, 2: 2})),
-        operators=(
+        "hexagon",
+        (LatticeVector({0: 3}), LatticeVector({1: 2, 2: 2})),
+        (
             RotationRow({0: 1 / 2, 1: 2, 2: 3 / 2}, 2),
             RotationRow({0: 5 / 2, 1: 3 / 2, 2: 2}, 2),
             TransflectionRow({}, {1: 1, 2: 1}, {1: 1, 2: 1}),
             TransflectionRow({1: 5 / 4, 2: 5 / 4}, {0: 1}, {0: 3 / 2}),
         ),
-        edges=((0, 2), (1, 4), (3, 3), (5, 5)),
     ),
     "IH7": ClassRow(
-        group="p3",
-        template="hexagon",
-        lattice=(LatticeVector({0: 3}), LatticeVector({1: 3})),
-        operators=(RotationRow({0: 2, 1: 1}, 3),),
-        edges=((0, 5), (1, 2), (3, 4)),
+        "hexagon", (LatticeVector({0: 3}), LatticeVector({1: 3})), (RotationRow({0: 2, 1: 1}, 3),)
     ),
     "IH21": ClassRow(
-        group="p6",
-        template="floret",
-        lattice=(LatticeVector({3: 1, 4: 1}), LatticeVector({3: 1, 4: 1}, degrees=60)),
-        operators=(RotationRow({2: 1}, 3), RotationRow({0: 1}, 6)),
-        edges=((0, 4), (1, 2), (3, 3)),
+        "floret",
+        (LatticeVector({3: 1, 4: 1}), LatticeVector({3: 1, 4: 1}, degrees=60)),
+        (RotationRow({2: 1}, 3), RotationRow({0: 1}, 6)),
     ),
     "IH28": ClassRow(
-        group="p4",
-        template="cairo",
-        lattice=(LatticeVector({2: 2}), LatticeVector({3: 1, 4: 1})),
-        operators=(RotationRow({2: 1}, 4), RotationRow({0: 1}, 4)),
-        edges=((0, 4), (1, 2), (3, 3)),
+        "cairo",
+        (LatticeVector({2: 2}), LatticeVector({3: 1, 4: 1})),
+        (RotationRow({2: 1}, 4), RotationRow({0: 1}, 4)),
     ),
 }
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -85,9 +85,8 @@ class Colouring:
 
     def colours(self, copies: Copies) -> Integers:
         """Return the colour (M,) of each copy, in `tiling` or one with the same group and aspects."""
-        a, b, c = self.sublattice
-        wraps, second = np.divmod(copies.cells[:, 1], c)
-        return self.table[copies.aspects, (copies.cells[:, 0] - wraps * b) % a, second]
+        first, second = reduce_cell(copies.cells.T, self.sublattice)
+        return self.table[copies.aspects, first, second]
 
 
 def colouring(tile: Tiles) -> Colouring:
@@ -120,8 +119,8 @@ def colouring(tile: Tiles) -> Colouring:
     raise RuntimeError("unreachable: maximal degree + 1 colours always suffice")
 
 
-def reduce_cell(cell: Cell, sublattice: Sublattice) -> Cell:
-    """Return the representative (0 <= m < a, 0 <= n < c) of a cell modulo the sublattice."""
+def reduce_cell(cell: Any, sublattice: Sublattice) -> tuple[Any, Any]:
+    """Return the representatives (0 <= m < a, 0 <= n < c) of cells modulo the sublattice."""
     a, b, c = sublattice
     wraps, second = divmod(cell[1], c)
     return (cell[0] - wraps * b) % a, second

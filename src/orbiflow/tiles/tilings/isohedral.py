@@ -4,7 +4,8 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, cast, overload
+from operator import attrgetter
+from typing import Any, NamedTuple, TypeVar, cast, overload
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from orbiflow.symmetry import (
     Line,
     Points,
     cast_like,
-    identity,
     reduced_basis,
     rotation,
     rotation_matrix,
@@ -31,11 +31,9 @@ from orbiflow.tiles.tilings.class_table import (
     Coefficients,
     OperatorRow,
     RotationRow,
-    TemplateKind,
     TypeRow,
 )
 from orbiflow.tiles.tilings.incidence import IncidenceSymbol
-from orbiflow.tiles.tilings.lattice_freedom import array_functions, commutant, stretch_matrix
 from orbiflow.tiles.tilings.tile_edges import (
     EdgeClass,
     EdgeIdentification,
@@ -44,7 +42,7 @@ from orbiflow.tiles.tilings.tile_edges import (
     edge_classes,
     edges,
 )
-from orbiflow.tiles.tilings.tiling import Tile
+from orbiflow.tiles.tilings.tiling import Tile, coset_and_cell
 
 
 class PentagonGauge(NamedTuple):
@@ -116,12 +114,75 @@ def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
     return functions.stack([p0, p1, p2, p3, p4], -2)
 
 
-def template_vertices(kind: TemplateKind, shape: Points) -> Points:
-    """Return vertices (..., K, 2) for shape parameters, (..., 2) of a pentagon or (..., 0)."""
-    if kind == "hexagon":
-        vertices = cast_like(hexagon(), shape)
-        return array_functions(shape).broadcast_to(vertices, (*shape.shape[:-1], 6, 2))
-    return pentagon(PENTAGONS[kind], shape)
+_ROUNDING_ERROR = 1e-9
+
+
+def commutant(linear_parts: Array) -> Array:
+    """Return an orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a group.
+
+    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as
+    far. The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group;
+    saved parameters are coordinates in it.
+
+    >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
+    [[1.0, 0.0]]
+    """
+    units = np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]])
+    turned = np.einsum("gij,kjl,gml->kim", linear_parts, units, linear_parts) / len(linear_parts)
+    basis: list[Array] = []
+    for a, b in turned[:, 0]:
+        rest = np.array([a, b])
+        for known in basis:
+            rest = rest - (rest @ known) * known
+        if np.linalg.norm(rest) > _ROUNDING_ERROR:
+            rest = rest / np.linalg.norm(rest)
+            # exact for a group in the frame of its axes
+            near = np.round(rest)
+            basis.append(near if np.abs(rest - near).max() < _ROUNDING_ERROR else rest)
+    return np.array(basis).reshape(-1, 2)
+
+
+def stretch_matrix(basis: Array, parameters: Points) -> Points:
+    """Return unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
+
+    exp [[a, b], [b, -a]], where (a, b) = parameters @ basis. Differentiable, at zero too.
+    """
+    both = parameters @ cast_like(basis, parameters)
+    a, b = both[..., 0], both[..., 1]
+    cosh, sinhc = _cosh_sinhc(a * a + b * b)
+    rows = [cosh + sinhc * a, sinhc * b, sinhc * b, cosh - sinhc * a]
+    return array_functions(parameters).stack(rows, -1).reshape(*parameters.shape[:-1], 2, 2)
+
+
+def array_functions(values: Any) -> Any:
+    """Return the library that these values belong to, of which functions of both are used."""
+    if not is_tensor(values):
+        return np
+    import torch
+
+    return torch
+
+
+# of NumPy arrays, rounded as torch rounds them
+_cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
+
+
+def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
+    """Return cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
+    own = array_functions(square)
+    hyperbolic_cosh, hyperbolic_sinh = (own.cosh, own.sinh) if is_tensor(square) else (_cosh, _sinh)
+    small = square < 1e-2
+    root = own.sqrt(own.where(small, own.ones_like(square), square))
+    s = own.where(small, square, own.zeros_like(square))
+    cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
+    sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
+    return (
+        own.where(small, cosh, hyperbolic_cosh(root)),
+        own.where(small, sinhc, hyperbolic_sinh(root) / root),
+    )
+
+
+EdgePair = TypeVar("EdgePair", EdgeIdentification, EdgeImage)
 
 
 class PaperOperator(NamedTuple):
@@ -182,7 +243,7 @@ class IsohedralClass:
     @cached_property
     def identified_edges(self) -> tuple[EdgeIdentification, ...]:
         """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which, and by what."""
-        return self._edges.identifications
+        return tuple(sorted(self._edges.identifications, key=attrgetter("first")))
 
     @cached_property
     def edge_classes(self) -> tuple[EdgeClass, ...]:
@@ -309,49 +370,40 @@ class PaperClass(IsohedralClass):
     @cached_property
     def identified_edges(self) -> tuple[EdgeIdentification, ...]:
         """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which, and by what."""
-        return tuple(
-            EdgeIdentification(first, second, self._edge_isometry(first, second))
-            for first, second in self.paper.edges
-        )
+        return tuple(map(self._exact, super().identified_edges))
 
     @cached_property
     def edge_classes(self) -> tuple[EdgeClass, ...]:
         """The template's edges, those that are images of each other together."""
-        found: list[EdgeClass] = []
-        for pair in self.identified_edges:
-            image = EdgeImage(pair.second, pair.isometry, pair.reversed)
-            both = ((image,), ()) if pair.folded else ((), (image,))
-            found.append(EdgeClass(pair.first, *both))
-        return tuple(found)
+        return tuple(
+            EdgeClass(
+                own.edge, tuple(map(self._exact, own.folds)), tuple(map(self._exact, own.images))
+            )
+            for own in super().edge_classes
+        )
+
+    def _exact(self, pair: EdgePair) -> EdgePair:
+        """Return an image with the isometry that the group has: searches feel the last digits."""
+        coset, cell = coset_and_cell(self._group, pair.isometry)
+        shift = np.array(cell) @ self._group.lattice.T + self._group.translations[coset]
+        return pair._replace(isometry=Isometry(self._group.linear_parts[coset], shift))
 
     @property
     def shape_dim(self) -> int:
         """Number of shape parameters of the template: 0 for hexagons, 2 for pentagons."""
-        return 0 if self.paper.template == "hexagon" else 2
+        return 2 if self._gauge else 0
 
     @property
-    def stabiliser(self) -> tuple[Isometry, ...]:
-        """The elements of the group that take the template onto itself: the identity."""
-        return (identity(2),)
+    def _gauge(self) -> PentagonGauge | None:
+        return PENTAGONS.get(self.paper.template)
 
     def paper_operators(self) -> tuple[PaperOperator, ...]:
         """Return the paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
         return tuple(self._operator(row) for row in self.paper.operators)
 
-    def _edge_isometry(self, first: int, second: int) -> Isometry:
-        """Return the element that takes an edge onto another, and the tile to its other side."""
-        vertices = self._default
-        start, end = vertices[first], vertices[(first + 1) % len(vertices)]
-        ends = vertices[second], vertices[(second + 1) % len(vertices)]
-        for sign, goal, goal_end in ((-1, *ends), (1, *ends[::-1])):
-            for element in self._group.elements_near(goal, 1e-6, source=start):
-                if element.determinant == sign and np.allclose(element(end), goal_end, atol=1e-6):
-                    return element
-        raise RuntimeError(f"{self.name}: no element takes edge {first} onto edge {second}")
-
     @cached_property
     def _default(self) -> Array:
-        return np.array(template_vertices(self.paper.template, np.zeros(self.shape_dim)))
+        return pentagon(self._gauge, np.zeros(2)) if self._gauge else hexagon()
 
     @cached_property
     def _group(self) -> CrystallographicGroup:
@@ -362,10 +414,10 @@ class PaperClass(IsohedralClass):
         # another basis of the paper's lattice: with the shortest, |k_i| <= Omega is isotropic
         basis = reduced_basis(np.stack(columns, axis=1))
         generators = [operator.isometry for operator in self.paper_operators()]
-        return CrystallographicGroup.generate(basis, generators, name=self.paper.group)
+        return CrystallographicGroup.generate(basis, generators, name=self.row.group)
 
     def _shaped(self, shape: Any) -> Any:
-        return template_vertices(self.paper.template, shape)
+        return pentagon(self._gauge, shape) if self._gauge else super()._shaped(shape)
 
     def _point(self, coefficients: Coefficients) -> Array:
         terms = [c * self._default[k] for k, c in coefficients.items()]
