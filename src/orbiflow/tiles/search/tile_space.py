@@ -51,6 +51,12 @@ def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placem
     The outline has n points x + iy, counter-clockwise, evenly spaced; n is at least 4 times the
     number of the template's edges.
     """
+    return _best_placements(kind, np.ascontiguousarray(outline).tobytes(), keep)
+
+
+@lru_cache(maxsize=8)  # bodies of the same outline ask one after another
+def _best_placements(kind: IsohedralClass, points: bytes, keep: int) -> Placements:
+    outline = np.frombuffer(points, dtype=complex)
     n = len(outline)
     parts = _multiplicities(kind)
     units = (u for u in range(1, n + 1) if n % u == 0)
