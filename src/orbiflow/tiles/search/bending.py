@@ -61,20 +61,31 @@ class Bent(NamedTuple):
     """A bent silhouette that is a tile."""
 
     orientation: Orientation  # what was bent
+    body: Elastic  # as which body
     ring: Complex  # (n,) the vertices of the tile, up to a similarity
     points: Complex  # (N,) of the fine body; its outline lies on the tile
     corners: Integers  # (K,) which of these lie at the tile's corners
     linear: Array  # with `offset`: the map from the group's own frame, of `ring`
     offset: Array
     placement: Placements  # one, of the fine outline
-    relaxed: Complex  # (n,) the outline let go a little: bent as it would like to be near this tile
-    fidelity: Fidelity  # what is left of the outline, and what bending costs
+    fidelity: Fidelity  # what is left of the outline; without the cost
     factor: float  # of its score: 1, less where a neck is too thin, 0 if it crosses itself
 
     @property
     def score(self) -> float:
         """What finalists are ordered by."""
         return self.fidelity.score * self.factor
+
+    @property
+    def cost(self) -> float:
+        """What bending costs."""
+        return float(self.orientation.fine.cost(self.points[:, None])[0])
+
+    @property
+    def relaxed(self) -> Complex:
+        """The outline (n,) let go a little: bent as it would like to be near this tile."""
+        points, n = self.points[:, None], self.body.size
+        return self.body.pulled(points, points[:n], RELAXED_STRENGTH, 3)[:n, 0]
 
 
 def bent_tiles(
@@ -286,14 +297,14 @@ def _bent(
     )
     return Bent(
         side,
+        body,
         tile.ring,
         points[:, 0],
         tile.corners,
         tile.linear,
         tile.offset,
         placement,
-        body.pulled(points, outline, RELAXED_STRENGTH, 3)[: body.size, 0],
-        kept_of(body.measures, outline[:, 0], float(side.fine.cost(points)[0])),
+        kept_of(body.measures, outline[:, 0], 0.0),
         neck_factor(neck_up_to(polygon, min_neck), min_neck) if simple else 0.0,
     )
 

@@ -109,7 +109,7 @@ def _with_bent(
     target: Target, result: EscherTile, placed: PlacedBent, original: Target
 ) -> EscherTile:
     rest, outline, ends = (target.frame.to_input(ring) for ring in placed.outlines)
-    kept = placed.bent.fidelity
+    kept = replace(placed.bent.fidelity, cost=placed.bent.cost)
     if smoothed := result.likeness.smoothed:
         near = smoothed * float(np.ptp(original.normal, axis=0).max())
         rings = original.without_fur, original.to_normal(rest), original.to_normal(ends)

@@ -16,8 +16,9 @@ Points are complex numbers x + iy throughout.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
-from functools import cached_property
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,12 @@ def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placem
     The outline has n points x + iy, counter-clockwise, evenly spaced; n is at least 4 times the
     number of the template's edges.
     """
+    return _best_placements(kind, np.ascontiguousarray(outline).tobytes(), keep)
+
+
+@lru_cache(maxsize=8)  # bodies of the same outline ask one after another
+def _best_placements(kind: IsohedralClass, points: bytes, keep: int) -> Placements:
+    outline = np.frombuffer(points, dtype=complex)
     n = len(outline)
     parts = _multiplicities(kind)
     units = (u for u in range(1, n + 1) if n % u == 0)
@@ -164,29 +171,17 @@ class NearestTiles(NamedTuple):
         return self._make(part[index] for part in self)
 
 
-class _Fit(NamedTuple):
-    """How offset and linear part move vertices, orbits' means and residuals; the solution's matrix."""
-
-    columns: Complex
-    means: Complex
-    basis: Complex
-    solve: Complex
-
-
 class TileSpace:
     """The tiles of C placements of one class, all of n steps."""
 
     def __init__(self, kind: IsohedralClass, placements: Placements) -> None:
         self.kind, self.placements = kind, placements
         self.count, self.size = len(placements.starts), int(placements.lengths[0].sum())
-        self._orbits = Orbits(kind, placements.lengths)
-        self.corners = self._orbits.corners  # (C, K) vertices at the template's corners
+        self._rows = table_of(kind, self.size).rows(placements.lengths)
+        # (C, K) vertices at the template's corners
+        self.corners = np.cumsum(placements.lengths, axis=1) - placements.lengths
         # (C, n) the outline's point at each vertex
         self.order = (np.arange(self.size) + placements.starts[:, None]) % self.size
-        self._place = np.argsort(self.order, axis=1)
-        flat = self._orbits.source + np.arange(self.count)[:, None] * self.size
-        self._flat = flat.ravel()
-        self._total = np.maximum(np.bincount(self._flat, minlength=flat.size), 1).astype(float)
         self.turn(placements.turns)
 
     @property
@@ -197,26 +192,8 @@ class TileSpace:
     def turn(self, turns: Array) -> None:
         """Set the directions (C,) of the glide axes, in radians; no effect without glides."""
         self.turns = np.asarray(turns, dtype=np.float64)
-        unit, orbits = np.exp(1j * self.turns)[:, None], self._orbits
-        # the group's linear parts in the placed frame
-        self._factor: Complex = np.where(orbits.flips, orbits.factor * unit**2, orbits.factor)
-        self._mirror: Complex = orbits.mirror * unit**2
-        self.__dict__.pop("_fit", None)
-
-    @cached_property
-    def _fit(self) -> _Fit:
-        """What a least squares fit needs: made when it is first asked for, as turns may change."""
-        unit, orbits = np.exp(1j * self.turns)[:, None], self._orbits
-        columns = _columns(self.kind, orbits, self._factor, self._mirror, unit)
-        pulled = _unturn(self._factor, orbits.flips, columns)
-        means = self._orbit_means(pulled)
-        basis = self._residual(pulled, means)
-        adjoint = np.swapaxes(np.conj(basis), 1, 2)
-        matrix = np.real(adjoint @ basis)
-        # IH1 does not care about the offset: the least solution
-        size = matrix.shape[-1]
-        ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
-        return _Fit(columns, means, basis, np.linalg.inv(matrix + ridge) @ adjoint)
+        # outlines are turned back instead of the group, so that tables serve all directions
+        self._unit: Complex = np.exp(1j * self.turns * self.glides)
 
     def best_turns(self, outlines: Complex) -> Array:
         """Return directions (C,) of the glide axes that suit outlines (C, n) best; 0 without glides."""
@@ -240,130 +217,222 @@ class TileSpace:
 
     def nearest(self, outlines: Complex) -> NearestTiles:
         """Return the tile of each placement that is nearest to its own outline (C, n)."""
-        orbits, (columns, images, *_) = self._orbits, self._fit
-        means, solution, left = self._fitted(outlines)
-        free = means[..., 0] - (images @ solution[..., None])[..., 0]
-        image = _turn(self._factor, orbits.flips, np.take_along_axis(free, orbits.source, axis=1))
-        moved = (columns @ solution[..., None])[..., 0]
-        vertices = np.where(orbits.fixed, 0, image) + moved
+        rows = self._rows
+        at_source, solution, distance = self._fitted(outlines)
+        moved = (rows.moved @ solution[..., None])[..., 0].view(complex)
+        vertices = np.where(rows.fixed, 0, _turn(rows.factor, rows.flips, at_source)) + moved
         return NearestTiles(
-            vertices,
-            _linear(self.kind, solution[:, 2:], self.turns),
-            solution[:, :2],
-            self.corners,
-            (abs(left) ** 2).sum(axis=1),
+            vertices * self._unit[:, None], *self._groups(solution), self.corners, distance
         )
 
     def distances(self, outlines: Complex) -> Array:
         """Return `distance` (C,) of the nearest tiles."""
-        return (abs(self._fitted(outlines)[2]) ** 2).sum(axis=1)
+        return self._fitted(outlines)[2]
 
-    def _fitted(self, outlines: Complex) -> tuple[Complex, Array, Complex]:
-        """Return orbits' means, parameters (C, m) of the nearest tile, and the outline's residual."""
-        goal = np.take_along_axis(outlines, self.order, axis=1)[..., None]
-        pulled = _unturn(self._factor, self._orbits.flips, goal)
-        means = self._orbit_means(pulled)
-        rest = self._residual(pulled, means)
-        solution: Array = np.real(self._fit.solve @ rest)[..., 0]
-        return means, solution, rest[..., 0] - (self._fit.basis @ solution[..., None])[..., 0]
+    def _fitted(self, outlines: Complex) -> tuple[Complex, Array, Array]:
+        """Return orbits' means, parameters (C, m) of the nearest tile, and its squared distance."""
+        rows = self._rows
+        goal = np.take_along_axis(outlines, self.order, axis=1) * np.conj(self._unit)[:, None]
+        pulled = _unturn(rows.factor, rows.flips, goal)
+        at_source = rows.means(pulled)
+        rest = np.where(rows.fixed, pulled, pulled - at_source)
+        flat = rest.view(np.float64)
+        along = (rows.along @ flat[..., None])[..., 0]
+        distance = (flat**2).sum(axis=1) - (along**2).sum(axis=1)
+        return at_source, (rows.root @ along[..., None])[..., 0], np.maximum(distance, 0)
 
     def in_order(self, vertices: Complex) -> Complex:
         """Return vertices (C, n), as of tiles, in the order of the outline's points."""
-        return np.take_along_axis(vertices, self._place, axis=1)
+        back = (np.arange(self.size) - self.placements.starts[:, None]) % self.size
+        return np.take_along_axis(vertices, back, axis=1)
 
     def matrices(self, index: int) -> tuple[Array, Array]:
         """Return real and imaginary part, (n, d) each, of the map from parameters (d,) to one tile.
 
         Rows are in the order of the outline; `group` reads the last columns, offset and lattice.
         """
-        orbits, n = self._orbits, self.size
-        source, fixed = orbits.source[index], orbits.fixed[index]
-        mirror = self._mirror[index]
+        rows, n = self._rows, self.size
+        source, fixed, mirror = rows.source[index], rows.fixed[index], rows.mirror[index]
         free = np.flatnonzero((source == np.arange(n)) & ~fixed)
         position = np.zeros(n, dtype=np.int64)
         width = np.where(mirror[free] == 0, 2, 1)
         position[free] = np.cumsum(width) - width
-        columns, count = self._fit.columns[index], int(width.sum())
+        columns, count = rows.columns[index], int(width.sum())
         whole: Complex = np.zeros((n, count + columns.shape[1]), dtype=complex)
         v = np.flatnonzero(~fixed)
-        factor, flips, on_line = self._factor[index, v], orbits.flips[index, v], mirror[v] != 0
+        factor, flips, on_line = rows.factor[index, v], rows.flips[index, v], mirror[v] != 0
         along = np.where(on_line, np.sqrt(mirror[v]), 1.0)
         whole[v, position[source[v]]] = _turn(factor, flips, along)
         across = _turn(factor, flips, np.full(len(v), 1j))
         whole[v[~on_line], position[source[v]][~on_line] + 1] = across[~on_line]
         whole[:, count:] = columns
-        real: Array = whole.real
-        imaginary: Array = whole.imag
-        return real[self._place[index]], imaginary[self._place[index]]
+        whole = np.roll(whole * self._unit[index], int(self.placements.starts[index]), axis=0)
+        return whole.real, whole.imag
 
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
         """Return linear part (2, 2) and offset (2,) of the map from the group's frame."""
-        own = parameters[-self._fit.columns.shape[2] :][None]
-        return _linear(self.kind, own[:, 2:], self.turns[[index]])[0], own[0, :2]
+        own = parameters[-self._rows.columns.shape[2] :]
+        linear, offset = self._groups(np.tile(own, (self.count, 1)))
+        return linear[index], offset[index]
 
-    def _residual(self, pulled: Complex, means: Complex) -> Complex:
-        """Take out what the free vertices can do."""
-        at_source = np.take_along_axis(means, self._orbits.source[..., None], axis=1)
-        return np.where(self._orbits.fixed[..., None], pulled, pulled - at_source)
-
-    def _orbit_means(self, values: Complex) -> Complex:
-        """Return means of values (C, n, m) over each orbit, at its free vertex."""
-        count, n, m = values.shape
-        means: Complex = np.empty((count * n, m), dtype=complex)
-        for column in range(m):
-            part = values[..., column].ravel()
-            for own, sums in ((part.real, means.real), (part.imag, means.imag)):
-                sums[:, column] = np.bincount(self._flat, own, minlength=count * n) / self._total
-        means = means.reshape(count, n, m)
-        if self._orbits.has_lines:
-            mirror = self._mirror[..., None]
-            means = np.where(mirror == 0, means, (means + mirror * np.conj(means)) / 2)
-        return means
+    def _groups(self, solution: Array) -> tuple[Array, Array]:
+        """Return linear parts (C, 2, 2) and offsets (C, 2) of the maps from the group's frame."""
+        cos, sin = self._unit.real, self._unit.imag
+        turn = np.stack([cos, -sin, sin, cos], axis=-1).reshape(-1, 2, 2)
+        offset = (turn @ solution[:, :2, None])[..., 0]
+        return turn @ _linear(self.kind, solution[:, 2:]), offset
 
 
-def _columns(
-    kind: IsohedralClass, orbits: Orbits, factor: Complex, mirror: Complex, turn: Complex
-) -> Complex:
+class Rows(NamedTuple):
+    """What the nearest tiles of R lengths of edges are found by, with the glide axes along x.
+
+    A point x + iy is two numbers in `along` and `moved`.
+    """
+
+    source: Integers  # with the next four: (R, n), as of `Orbits`
+    factor: Complex
+    flips: NDArray[np.bool_]
+    fixed: NDArray[np.bool_]
+    mirror: Complex
+    total: Array  # (R, n) how many vertices each vertex is the source of, at least 1
+    columns: Complex  # (R, n, m) how offset and linear part move vertices whose free ones are held
+    moved: Array  # (R, 2n, m) the same with free vertices where they are nearest
+    along: Array  # (R, m, 2n) orthonormal: what an outline's residual is projected by
+    root: Array  # (R, m, m) takes what is projected to offset and linear part
+
+    @classmethod
+    def of(cls, kind: IsohedralClass, lengths: Integers) -> Rows:
+        """Work out those of lengths (R, K)."""
+        orbits = Orbits(kind, lengths)
+        count, n = orbits.source.shape
+        flat = orbits.source + np.arange(count)[:, None] * n
+        total = np.maximum(np.bincount(flat.ravel(), minlength=count * n), 1).reshape(count, n)
+        columns = _columns(kind, orbits)
+        m = columns.shape[2]
+        none = np.zeros((count, 0))
+        known = orbits.source, orbits.factor, orbits.flips, orbits.fixed, orbits.mirror
+        rows = cls(*known, total.astype(float), columns, none, none, none)
+        moved, basis = columns.copy(), columns.copy()
+        for k in range(m):
+            pulled = _unturn(orbits.factor, orbits.flips, columns[..., k])
+            at_source = np.where(orbits.fixed, 0, rows.means(pulled))
+            basis[..., k] = pulled - at_source
+            moved[..., k] -= _turn(orbits.factor, orbits.flips, at_source)
+        moved = moved.view(np.float64).reshape(count, n, m, 2).swapaxes(2, 3)
+        basis = basis.view(np.float64).reshape(count, n, m, 2).transpose(0, 2, 1, 3)
+        basis = basis.reshape(count, m, 2 * n)
+        matrix = basis @ basis.swapaxes(1, 2)
+        # IH1 does not care about the offset: the least solution
+        ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(m)
+        root = np.linalg.inv(np.linalg.cholesky(matrix + ridge))
+        return rows._replace(
+            moved=np.ascontiguousarray(moved.reshape(count, 2 * n, m)),
+            along=root @ basis,
+            root=np.ascontiguousarray(root.swapaxes(1, 2)),
+        )
+
+    def means(self, values: Complex) -> Complex:
+        """Return at each vertex the mean of values (R, n) over its orbit, pulled to its source."""
+        count, n = values.shape
+        flat = (self.source + np.arange(count)[:, None] * n).ravel()
+        means = np.empty((count * n, 2))
+        for k, part in enumerate((values.real, values.imag)):
+            means[:, k] = np.bincount(flat, part.ravel(), minlength=count * n)
+        found = means.view(complex).reshape(count, n) / self.total
+        if self.mirror.any():
+            found = np.where(self.mirror == 0, found, (found + self.mirror * np.conj(found)) / 2)
+        return np.take_along_axis(found, self.source, axis=1)
+
+
+MAX_TABLE_BYTES = 64 * 2**20  # of the rows that are kept of a class and a number of vertices
+
+
+class TileTable:
+    """The rows of a class's tiles with n vertices, each worked out once: most are asked for often."""
+
+    def __init__(self, kind: IsohedralClass) -> None:
+        self._kind, self._lock = kind, threading.Lock()
+        self._places: dict[bytes, int] = {}
+        self._kept: Rows | None = None
+
+    def rows(self, lengths: Integers) -> Rows:
+        """Return the rows of lengths (C, K)."""
+        lengths = np.ascontiguousarray(lengths, dtype=np.int64)
+        keys = [own.tobytes() for own in lengths]
+        with self._lock:
+            fresh = {key: k for k, key in enumerate(keys) if key not in self._places}
+            if fresh:
+                made = Rows.of(self._kind, lengths[list(fresh.values())])
+                row = sum(part.nbytes for part in made) // len(fresh)
+                if row * (len(self._places) + len(fresh)) > MAX_TABLE_BYTES:
+                    self._places.clear()
+                    fresh = {key: k for k, key in enumerate(keys)}
+                    made = Rows.of(self._kind, lengths[list(fresh.values())])
+                self._keep(list(fresh), made)
+            assert self._kept is not None
+            at = [self._places[key] for key in keys]
+            return Rows(*(part[at] for part in self._kept))
+
+    def _keep(self, keys: list[bytes], made: Rows) -> None:
+        """Add rows, in arrays that have twice the room when they are full."""
+        first, count = len(self._places), len(self._places) + len(keys)
+        if self._kept is None or not first or count > len(self._kept.total):
+            room = [np.empty((2 * count, *part.shape[1:]), part.dtype) for part in made]
+            for old, new in zip(self._kept or (), room, strict=False):
+                new[:first] = old[:first]
+            self._kept = Rows(*room)
+        for kept, part in zip(self._kept, made, strict=True):
+            kept[first:count] = part
+        self._places.update(zip(keys, range(first, count), strict=True))
+
+
+@lru_cache(maxsize=4)  # of the class that is searched: few points, more and all
+def table_of(kind: IsohedralClass, size: int) -> TileTable:  # noqa: ARG001
+    """Return the rows that are known of a class's tiles with so many vertices."""
+    return TileTable(kind)
+
+
+def _columns(kind: IsohedralClass, orbits: Orbits) -> Complex:
     """Return (C, n, 2 + m): how offset and linear part move each vertex, its free vertex held."""
-    one = np.ones_like(factor)
+    factor, mirror, one = orbits.factor, orbits.mirror, np.ones_like(orbits.factor)
     offsets = [z * one for z in (1, 1j)]
     columns = [
         np.where(orbits.fixed, z, z - _turn(factor, orbits.flips, z)) for z in offsets
-    ] + _along_lattice(kind, orbits.shift, turn)
+    ] + _along_lattice(kind, orbits.shift)
     if orbits.has_lines:  # a mirror takes its vertices along
-        held = offsets + _along_lattice(kind, orbits.foot, turn)
+        held = offsets + _along_lattice(kind, orbits.foot)
         for column, z in zip(columns, held, strict=True):
             across = np.where(mirror == 0, 0, (z - mirror * np.conj(z)) / 2)
             column += _turn(factor, orbits.flips, across)
     return np.stack(columns, axis=-1)
 
 
-def _along_lattice(kind: IsohedralClass, z: Complex, turn: Complex) -> list[Complex]:
+def _along_lattice(kind: IsohedralClass, z: Complex) -> list[Complex]:
     """Return how the coefficients of the linear part move points (C, n) of the group's own frame."""
     match kind.stretch_dim, kind.has_reflections:
         case 2, _:
             return [z, 1j * z, np.conj(z), 1j * np.conj(z)]
         case 1, _:  # along the glides, which are the axes of the group's own frame
-            return [turn * np.real(z), 1j * turn * np.imag(z)]
+            return [np.real(z).astype(complex), 1j * np.imag(z)]
         case _, True:
-            return [turn * z]
+            return [z]
         case _:
             return [z, 1j * z]
 
 
-def _linear(kind: IsohedralClass, solution: Array, turns: Array) -> Array:
+def _linear(kind: IsohedralClass, solution: Array) -> Array:
     """Return (C, 2, 2) from the coefficients of `_along_lattice`."""
-    cos, sin = np.cos(turns), np.sin(turns)
+    zero = np.zeros(len(solution))
     match kind.stretch_dim, kind.has_reflections:
         case 2, _:
             a, b, c, d = solution.T
             rows = [a + c, d - b, b + d, a - c]
         case 1, _:  # along the glides, which are the axes of the group's own frame
             p, q = solution.T
-            rows = [cos * p, -sin * q, sin * p, cos * q]
+            rows = [p, zero, zero, q]
         case _, True:
             (p,) = solution.T
-            rows = [cos * p, -sin * p, sin * p, cos * p]
+            rows = [p, zero, zero, p]
         case _:
             a, b = solution.T
             rows = [a, -b, b, a]
@@ -375,7 +444,5 @@ def _turn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
 
 
 def _unturn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
-    """Return the inverse of `_turn` on (C, n, m)."""
-    return np.where(
-        flips[..., None], factor[..., None] * np.conj(z), np.conj(factor)[..., None] * z
-    )
+    """Return the inverse of `_turn`."""
+    return np.where(flips, factor * np.conj(z), np.conj(factor) * z)
