@@ -170,7 +170,8 @@ class LikenessSearch(Settings, SearchMethod):
     def _alone(self) -> list[LikenessSearch]:
         """Return the levels below, least first, and this one, each without those below it.
 
-        A body that a later level bends from more placements is left to that, unless it judges otherwise.
+        A body that a later level bends from more placements is left to that, unless it judges
+        otherwise.
         """
         normal = {name: getattr(LikenessSearch, name) for name in {**FAST, **BEST}}
         below: list[dict[str, Any]] = [{**normal, **FAST}, normal][: self.below]
