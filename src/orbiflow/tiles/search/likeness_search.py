@@ -168,23 +168,10 @@ class LikenessSearch(Settings, SearchMethod):
         return tuple(found)
 
     def _alone(self) -> list[LikenessSearch]:
-        """Return the levels below, least first, and this one, each without those below it.
-
-        A body that a later level bends from more placements is left to that, unless it judges
-        otherwise.
-        """
+        """Return the levels below, least first, and this one, each without those below it."""
         normal = {name: getattr(LikenessSearch, name) for name in {**FAST, **BEST}}
         below: list[dict[str, Any]] = [{**normal, **FAST}, normal][: self.below]
-        levels = [replace(self, below=0, **own) for own in (*below, {})]
-        for k, own in enumerate(levels):
-            later = {
-                body
-                for level in levels[k + 1 :]
-                if level.judged == own.judged
-                for body in level.bodies
-            }
-            levels[k] = replace(own, bodies=tuple(body for body in own.bodies if body not in later))
-        return [own for own in levels if own.bodies]
+        return [replace(self, below=0, **own) for own in (*below, {})]
 
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
         """Return the sketch, the levels of effort below, and what this one has beyond them."""

@@ -218,28 +218,32 @@ class TileSpace:
     def nearest(self, outlines: Complex) -> NearestTiles:
         """Return the tile of each placement that is nearest to its own outline (C, n)."""
         rows = self._rows
-        at_source, solution, distance = self._fitted(outlines)
+        at_source, rest, along = self._fitted(outlines)
+        left = rest - (rows.along.swapaxes(1, 2) @ along[..., None])[..., 0]
+        solution = (rows.root @ along[..., None])[..., 0]
         moved = (rows.moved @ solution[..., None])[..., 0].view(complex)
         vertices = np.where(rows.fixed, 0, _turn(rows.factor, rows.flips, at_source)) + moved
         return NearestTiles(
-            vertices * self._unit[:, None], *self._groups(solution), self.corners, distance
+            vertices * self._unit[:, None],
+            *self._groups(solution),
+            self.corners,
+            (left**2).sum(axis=1),
         )
 
     def distances(self, outlines: Complex) -> Array:
-        """Return `distance` (C,) of the nearest tiles."""
-        return self._fitted(outlines)[2]
+        """Return `distance` (C,) of the nearest tiles, as a difference: less exact if it is small."""
+        _, rest, along = self._fitted(outlines)
+        return (rest**2).sum(axis=1) - (along**2).sum(axis=1)
 
     def _fitted(self, outlines: Complex) -> tuple[Complex, Array, Array]:
-        """Return orbits' means, parameters (C, m) of the nearest tile, and its squared distance."""
+        """Return orbits' means (C, n), what these leave of outlines (C, 2n), and its shares (C, m)."""
         rows = self._rows
         goal = np.take_along_axis(outlines, self.order, axis=1) * np.conj(self._unit)[:, None]
         pulled = _unturn(rows.factor, rows.flips, goal)
         at_source = rows.means(pulled)
         rest = np.where(rows.fixed, pulled, pulled - at_source)
         flat = rest.view(np.float64)
-        along = (rows.along @ flat[..., None])[..., 0]
-        distance = (flat**2).sum(axis=1) - (along**2).sum(axis=1)
-        return at_source, (rows.root @ along[..., None])[..., 0], np.maximum(distance, 0)
+        return at_source, flat, (rows.along @ flat[..., None])[..., 0]
 
     def in_order(self, vertices: Complex) -> Complex:
         """Return vertices (C, n), as of tiles, in the order of the outline's points."""
