@@ -87,7 +87,11 @@ class VonMisesNetwork(Density, kind="network"):
 
     def log_chart(self, points: Tensor) -> Tensor:
         def log_product(some: Tensor) -> Tensor:
-            logs = [log_conditional(chains, some[:, list(axes)]) for axes, chains in self.factors]
+            angles = some.unbind(dim=1)
+            logs = [
+                log_conditional(chains, torch.stack([angles[axis] for axis in axes], dim=1))
+                for axes, chains in self.factors
+            ]
             return torch.stack(logs).sum(dim=0)
 
         return in_blocks(log_product, points, BLOCK_POINTS)
