@@ -240,7 +240,7 @@ class TileSpace:
         rows = self._rows
         goal = np.take_along_axis(outlines, self.order, axis=1) * np.conj(self._unit)[:, None]
         pulled = _unturn(rows.factor, rows.flips, goal)
-        at_source = rows.means(pulled)
+        at_source = _means(rows, pulled)
         rest = np.where(rows.fixed, pulled, pulled - at_source)
         flat = rest.view(np.float64)
         return at_source, flat, (rows.along @ flat[..., None])[..., 0]
@@ -304,48 +304,49 @@ class Rows(NamedTuple):
     along: Array  # (R, m, 2n) orthonormal: what an outline's residual is projected by
     root: Array  # (R, m, m) takes what is projected to offset and linear part
 
-    @classmethod
-    def of(cls, kind: IsohedralClass, lengths: Integers) -> Rows:
-        """Work out those of lengths (R, K)."""
-        orbits = Orbits(kind, lengths)
-        count, n = orbits.source.shape
-        flat = orbits.source + np.arange(count)[:, None] * n
-        total = np.maximum(np.bincount(flat.ravel(), minlength=count * n), 1).reshape(count, n)
-        columns = _columns(kind, orbits)
-        m = columns.shape[2]
-        none = np.zeros((count, 0))
-        known = orbits.source, orbits.factor, orbits.flips, orbits.fixed, orbits.mirror
-        rows = cls(*known, total.astype(float), columns, none, none, none)
-        moved, basis = columns.copy(), columns.copy()
-        for k in range(m):
-            pulled = _unturn(orbits.factor, orbits.flips, columns[..., k])
-            at_source = np.where(orbits.fixed, 0, rows.means(pulled))
-            basis[..., k] = pulled - at_source
-            moved[..., k] -= _turn(orbits.factor, orbits.flips, at_source)
-        moved = moved.view(np.float64).reshape(count, n, m, 2).swapaxes(2, 3)
-        basis = basis.view(np.float64).reshape(count, n, m, 2).transpose(0, 2, 1, 3)
-        basis = basis.reshape(count, m, 2 * n)
-        matrix = basis @ basis.swapaxes(1, 2)
-        # IH1 does not care about the offset: the least solution
-        ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(m)
-        root = np.linalg.inv(np.linalg.cholesky(matrix + ridge))
-        return rows._replace(
-            moved=np.ascontiguousarray(moved.reshape(count, 2 * n, m)),
-            along=root @ basis,
-            root=np.ascontiguousarray(root.swapaxes(1, 2)),
-        )
 
-    def means(self, values: Complex) -> Complex:
-        """Return at each vertex the mean of values (R, n) over its orbit, pulled to its source."""
-        count, n = values.shape
-        flat = (self.source + np.arange(count)[:, None] * n).ravel()
-        means = np.empty((count * n, 2))
-        for k, part in enumerate((values.real, values.imag)):
-            means[:, k] = np.bincount(flat, part.ravel(), minlength=count * n)
-        found = means.view(complex).reshape(count, n) / self.total
-        if self.mirror.any():
-            found = np.where(self.mirror == 0, found, (found + self.mirror * np.conj(found)) / 2)
-        return np.take_along_axis(found, self.source, axis=1)
+def _rows_of(kind: IsohedralClass, lengths: Integers) -> Rows:
+    """Work out those of lengths (R, K)."""
+    orbits = Orbits(kind, lengths)
+    count, n = len(lengths), int(lengths[0].sum())
+    flat: Integers = orbits.source + np.arange(count)[:, None] * n
+    total = np.maximum(np.bincount(flat.ravel(), minlength=count * n), 1).reshape(count, n)
+    columns = _columns(kind, orbits)
+    m = int(columns.shape[2])
+    none = np.zeros((count, 0))
+    known = orbits.source, orbits.factor, orbits.flips, orbits.fixed, orbits.mirror
+    rows = Rows(*known, total.astype(float), columns, none, none, none)
+    moved, basis = columns.copy(), columns.copy()
+    for k in range(m):
+        pulled = _unturn(orbits.factor, orbits.flips, columns[..., k])
+        at_source = np.where(orbits.fixed, 0, _means(rows, pulled))
+        basis[..., k] = pulled - at_source
+        moved[..., k] -= _turn(orbits.factor, orbits.flips, at_source)
+    moved = moved.view(np.float64).reshape(count, n, m, 2).swapaxes(2, 3)
+    basis = basis.view(np.float64).reshape(count, n, m, 2).transpose(0, 2, 1, 3)
+    basis = basis.reshape(count, m, 2 * n)
+    matrix: Array = basis @ basis.swapaxes(1, 2)
+    # IH1 does not care about the offset: the least solution
+    ridge: Array = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(m)
+    root: Array = np.linalg.inv(np.linalg.cholesky(matrix + ridge))
+    return rows._replace(
+        moved=np.ascontiguousarray(moved.reshape(count, 2 * n, m)),
+        along=root @ basis,
+        root=np.ascontiguousarray(root.swapaxes(1, 2)),
+    )
+
+
+def _means(rows: Rows, values: Complex) -> Complex:
+    """Return at each vertex the mean of values (R, n) over its orbit, pulled to its source."""
+    count, n = len(values), int(values.shape[1])
+    flat: Integers = rows.source + np.arange(count)[:, None] * n
+    means: Complex = np.empty(count * n, dtype=complex)
+    for part, sums in ((values.real, means.real), (values.imag, means.imag)):
+        sums[:] = np.bincount(flat.ravel(), part.ravel(), minlength=count * n)
+    found: Complex = means.reshape(count, n) / rows.total
+    if rows.mirror.any():
+        found = np.where(rows.mirror == 0, found, (found + rows.mirror * np.conj(found)) / 2)
+    return np.take_along_axis(found, rows.source, axis=1)
 
 
 MAX_TABLE_BYTES = 64 * 2**20  # of the rows that are kept of a class and a number of vertices
@@ -366,16 +367,16 @@ class TileTable:
         with self._lock:
             fresh = {key: k for k, key in enumerate(keys) if key not in self._places}
             if fresh:
-                made = Rows.of(self._kind, lengths[list(fresh.values())])
+                made = _rows_of(self._kind, lengths[list(fresh.values())])
                 row = sum(part.nbytes for part in made) // len(fresh)
                 if row * (len(self._places) + len(fresh)) > MAX_TABLE_BYTES:
                     self._places.clear()
                     fresh = {key: k for k, key in enumerate(keys)}
-                    made = Rows.of(self._kind, lengths[list(fresh.values())])
+                    made = _rows_of(self._kind, lengths[list(fresh.values())])
                 self._keep(list(fresh), made)
             assert self._kept is not None
             at = [self._places[key] for key in keys]
-            return Rows(*(part[at] for part in self._kept))
+            return Rows._make(part[at] for part in self._kept)
 
     def _keep(self, keys: list[bytes], made: Rows) -> None:
         """Add rows, in arrays that have twice the room when they are full."""
@@ -384,7 +385,7 @@ class TileTable:
             room = [np.empty((2 * count, *part.shape[1:]), part.dtype) for part in made]
             for old, new in zip(self._kept or (), room, strict=False):
                 new[:first] = old[:first]
-            self._kept = Rows(*room)
+            self._kept = Rows._make(room)
         for kept, part in zip(self._kept, made, strict=True):
             kept[first:count] = part
         self._places.update(zip(keys, range(first, count), strict=True))
@@ -417,9 +418,9 @@ def _along_lattice(kind: IsohedralClass, z: Complex) -> list[Complex]:
         case 2, _:
             return [z, 1j * z, np.conj(z), 1j * np.conj(z)]
         case 1, _:  # along the glides, which are the axes of the group's own frame
-            return [np.real(z).astype(complex), 1j * np.imag(z)]
+            return [z.real.astype(np.complex128), (1j * z.imag).astype(np.complex128)]
         case _, True:
-            return [z]
+            return [z.copy()]
         case _:
             return [z, 1j * z]
 
