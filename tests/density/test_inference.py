@@ -103,6 +103,34 @@ def test_even_chains_need_no_fine_grid() -> None:
     assert len(found.centers) <= 24**2  # pyright: ignore[reportAttributeAccessIssue]
 
 
+@given(seeds, st.sampled_from([{}, {3: 0.1}]))
+@settings(deadline=None, max_examples=3)
+def test_few_nodes_do_where_hidden_angles_move_others_far(
+    seed: int, known: dict[int, float]
+) -> None:
+    """By six deviations of their own noise, so that the nodes alone leave bumps apart."""
+    rng = np.random.default_rng(seed)
+    means = torch.zeros(1, 4, 9).double()
+    means[0, 2, 1:3] = means[0, 3, 1:3] = torch.tensor(rng.uniform(0.7, 1.3, 2))
+    means[0, 3, 1] *= -1
+    kappa = torch.tensor([[30.0, 30.0, 900.0, 900.0]]).double()
+    logs = torch.tensor([[0.98, 0.01, 0.01]]).double().log()
+    chains = VonMisesChains(Torus(4), logs, means, kappa)
+    kept = [axis for axis in (2, 3) if axis not in known]
+    split = Split(4, tuple(kept), tuple(known), tuple(known.values()))
+    parts = chains.approximated(split, Torus(len(kept)), 1, lambda: None)
+    points = chains.sample(10, torch.Generator().manual_seed(seed % 100))[:, kept]
+    found = torch.stack([log + own.log_prob(points) for log, own in parts]).logsumexp(dim=0)
+    line = torch.arange(240, dtype=torch.float64) / 240
+    nodes = torch.cartesian_prod(line, line)
+    whole = points.new_empty(len(points), len(nodes), 4)
+    whole[:, :, :2], whole[:, :, kept] = nodes, points[:, None]
+    for axis, value in known.items():
+        whole[:, :, axis] = value
+    truth = chains.log_prob(whole).logsumexp(dim=1) - math.log(len(nodes))
+    assert float((found - truth).square().mean().sqrt()) < 0.8  # nodes alone: 1 to 5
+
+
 @given(seeds, st.data())
 @settings(deadline=None, max_examples=4)
 def test_an_error_is_at_least_the_true_one(seed: int, data: st.DataObject) -> None:
@@ -129,7 +157,7 @@ def test_a_rough_error_is_seen(seed: int) -> None:
     density = sharp(seed, 4, "chains")
     found = marginal(density, [0, 1], accuracy=0.3)
     assert 1e-3 < found.error < 0.3
-    assert 0.1 * found.error < off(found, density, [0, 1], {}) < 1.1 * found.error + 5e-4
+    assert 0.1 * found.error < off(found, density, [0, 1], {}) < 1.1 * found.error
 
 
 def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import torch
@@ -62,7 +63,7 @@ def nodes_of(
         size = [min(int(s), MAX_NODES_ALONE) for s in size]
         fits = len(size) == 1 or math.prod(size) <= MAX_NODES
         own = kappa[chosen][:, hidden]
-        rule = _trapezoidal(own, reach[chosen], size) if fits else _sobol(own, MAX_NODES, seed)
+        rule = _trapezoidal(own, reach[chosen], size) if fits else _sobol(own, seed)
         yield chosen, rule[0], dict(zip(hidden, rule[1], strict=True))
 
 
@@ -100,23 +101,13 @@ def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor
     return total, [spread(value, i) for i, value in enumerate(offsets)]
 
 
-def _sobol(kappa: Tensor, count: int, seed: int) -> tuple[Tensor, list[Tensor]]:
-    """Return quasi-random nodes of equal weights, by von Mises quantiles."""
-    axes = kappa.shape[1]
+def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
+    """Return `MAX_NODES` quasi-random nodes of equal weights, by von Mises quantiles."""
+    count, axes = kappa.shape
     engine = torch.quasirandom.SobolEngine(axes, scramble=True, seed=seed)
-    even = engine.draw(count, dtype=torch.float64)
-    logs = kappa.new_full((len(kappa), count), -math.log(count))
+    even = engine.draw(MAX_NODES, dtype=torch.float64)
+    logs = kappa.new_full((count, MAX_NODES), -math.log(MAX_NODES))
     return logs, [quantiles(kappa[:, i], even[:, i]) for i in range(axes)]
-
-
-def _nodes(kappa: Tensor, count: int, seed: int) -> tuple[Tensor, list[Tensor]]:
-    """Return log weights (C, Q) and offsets (C, Q) of nodes of angles of concentrations (C, H)."""
-    if kappa.shape[1] != 1:
-        return (
-            _sobol(kappa, count, seed) if kappa.shape[1] else (kappa.new_zeros(len(kappa), 1), [])
-        )
-    reach = (REACH_DEVIATIONS / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
-    return _trapezoidal(kappa, reach, [count])
 
 
 def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
@@ -143,8 +134,16 @@ MAX_GRID_SIZES = {1: 3072, 2: 768}
 FAINTEST_LOG = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-FIRST_NODES = 24
-"""Nodes of hidden angles at first. Each level has twice as many of one angle, four times of several."""
+NODES_ALONE, NODES_OF_SEVERAL = 24, (2, 8, 32, 128, 512, 2048)
+"""The fewest nodes of an angle that is the only one hidden, and those of several: for light and wide
+components, for others, and for heavy and narrow ones, each level beginning with the next number."""
+
+NOISE_LEFT, GENTLE_CONCENTRATION = (0.9, 0.7, 0.3, 0.1, 0.05), 20.0
+"""Share of hidden noise that is left about quasi-random nodes, level by level and for more nodes as
+one level later, and the concentration below which it is less."""
+
+SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
+"""Concentrations by which quasi-random nodes are spread."""
 
 BLOCK_ENTRIES = 2**18
 """Entries worked on at a time: few enough for the cache."""
@@ -173,10 +172,26 @@ def chain_tables(
         walks.append(_Walk(order[: last + 1], split, logs[own], means[own], kappa[own]))
     top = max(float(walk.likely.max()) for walk in walks)
     tables: dict[tuple[int, ...], Tensor] = {}
-    for walk in walks:
+    for walk, more in zip(walks, _more_nodes(walks, top), strict=True):
         tick()
-        walk.add_to(tables, top, level, start)
+        for step in (-1, 0, 1):
+            walk.add_to(tables, more == step, top, (level, step), start)
     return top, [*tables.values()]
+
+
+def _more_nodes(walks: list[_Walk], top: float) -> list[Tensor]:
+    """Return which components (C,) of each walk have more nodes, 1, and which fewer, -1.
+
+    For as much work, errors are least where nodes are as the root of weight over work. Others are far
+    too faint to count: 2.
+    """
+    weight = torch.cat([walk.likely for walk in walks]) - top
+    work = torch.cat([walk.widths.prod(dim=1) for walk in walks]).double()
+    counts = weight > -FAINTEST_LOG
+    wanted = (weight.exp() / work).sqrt() * counts
+    wanted *= (work * counts).sum() / (wanted * work).sum()
+    steps = (wanted.log2() / 2).round().clamp(-1, 1).masked_fill_(~counts, 2)
+    return [*torch.split(steps, [len(walk.likely) for walk in walks])]
 
 
 class _Walk:
@@ -246,23 +261,30 @@ class _Walk:
         self.widths = torch.minimum(2 * reach + 1, self.wanted)
 
     def add_to(
-        self, tables: dict[tuple[int, ...], Tensor], top: float, level: int, start: float
+        self,
+        tables: dict[tuple[int, ...], Tensor],
+        some: Tensor,
+        top: float,
+        level: tuple[int, int],
+        start: float,
     ) -> None:
-        """Add the densities of components, relative to exp(top), to tables of their sizes."""
-        likely = torch.nonzero(self.likely > top - FAINTEST_LOG)[:, 0]
+        """Add the densities of some components (C,), relative to exp(top), to tables of their sizes."""
+        likely = torch.nonzero(some)[:, 0]
+        last = max(self.order.index(axis) for axis in self.split.kept)
+        early = all(self.order.index(axis) < last for axis in self.hidden)
+        rule = _Rule(len(self.hidden), *level, early=early)
         sizes, number = unique(self.wanted[likely], dim=0, return_inverse=True)
         for k, size in enumerate(listed(sizes)):
             table = tables.setdefault(tuple(size), torch.zeros(*size, dtype=torch.float64))
-            self._add(table, likely[number == k], top, level, start)
+            self._add(table, likely[number == k], top, rule, start)
 
-    def _add(self, table: Tensor, chosen: Tensor, top: float, level: int, start: float) -> None:
-        count = (1, FIRST_NODES * 2**level, FIRST_NODES * 4**level)[min(len(self.hidden), 2)]
+    def _add(self, table: Tensor, chosen: Tensor, top: float, rule: _Rule, start: float) -> None:
         kept, sizes = list(self.split.kept), torch.tensor(table.shape)
         middle = self.middle[:, kept] / (2 * math.pi) - start
         middle = (middle * sizes).round().long()
         chosen = chosen[self.widths[chosen].prod(dim=1).argsort()]
         while len(chosen):
-            block = max(1, BLOCK_ENTRIES // (count * int(self.widths[chosen[-1]].prod())))
+            block = max(1, BLOCK_ENTRIES // (rule.count * int(self.widths[chosen[-1]].prod())))
             some, chosen = chosen[-block:], chosen[:-block]
             at, widths = middle[some], self.widths[some].amax(dim=0)
             places = [
@@ -273,36 +295,34 @@ class _Walk:
                 2 * math.pi * (p.double() / size + start)
                 for p, size in zip(places, table.shape, strict=True)
             ]
-            nodes = _nodes(self.kappa[some][:, self.hidden], count, level)
-            values = self._values(some, angles, top, nodes, table.shape)
+            values = self._values(some, angles, top, rule, table.shape)
             flat = places[0]
             if len(places) > 1:
                 flat = flat[:, :, None] * table.shape[1] + places[1][:, None]
             table.view(-1).index_add_(0, flat.flatten(), values.flatten())
 
     def _values(
-        self,
-        rows: Tensor,
-        angles: list[Tensor],
-        top: float,
-        nodes: tuple[Tensor, list[Tensor]],
-        shape: tuple[int, ...],
+        self, rows: Tensor, angles: list[Tensor], top: float, rule: _Rule, shape: tuple[int, ...]
     ) -> Tensor:
         """Return the densities (C, A) or (C, A, B), relative to exp(top), of components at angles."""
         kept, given = self.split.kept, dict(zip(self.split.given, self.split.values, strict=True))
         first_last = sorted(kept, key=self.order.index)
-        total = ((self.logs[rows] - top)[:, None] + nodes[0])[:, :, None, None]
+        total = (self.logs[rows] - top)[:, None, None, None]
         # sines and cosines over components, nodes and grids
         seen = dict[int, tuple[Tensor, Tensor]]()
+        near = _Near()
         for axis in self.order:
             kappa = self.kappa[rows, axis, None, None, None]
-            own = self.means[rows, axis][:, :, None, None, None]
-            mean = own[:, 0]
-            for j, (sin, cos) in seen.items():
-                mean = mean + own[:, 1 + j] * sin + own[:, 1 + self.split.dim + j] * cos
+            mean, lean = self._mean(rows, axis, seen, near)
             if axis in self.hidden:
-                at = mean + nodes[1][self.hidden.index(axis)][:, :, None, None]
-                seen[axis] = at.sin(), at.cos()
+                number, left = self.hidden.index(axis), rule.left / (kappa + GENTLE_CONCENTRATION)
+                offset, logs = rule.nodes(number, (kappa / (1 - kappa * left))[:, :, 0, 0])
+                at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
+                if rule.left:
+                    lean = lean + left.sqrt() * _unit(len(self.hidden), number)
+                    near[axis] = lean, torch.zeros_like(left)
+                mean_sine = (-lean.square().sum(dim=0) / 2).exp()
+                seen[axis] = mean_sine * at.sin(), mean_sine * at.cos()
                 continue
             if axis in given:
                 at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
@@ -310,6 +330,9 @@ class _Walk:
                 at = angles[kept.index(axis)][:, None, :, None]
             if axis == first_last[-1]:
                 at = at.mT
+            if axis != self.order[-1]:
+                _observe(near, at - mean, kappa, lean)
+            kappa = kappa / (1 + kappa * lean.square().sum(dim=0))
             if axis in kept:
                 kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
             if axis == first_last[-1]:
@@ -325,3 +348,78 @@ class _Walk:
         if len(kept) == 1:
             return values[:, 0]
         return values if first_last[0] == kept[0] else values.mT
+
+    def _mean(
+        self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]], near: _Near
+    ) -> tuple[Tensor, Tensor]:
+        """Return the mean of an angle given those before it, whose sines and cosines are seen.
+
+        And how far it leans (H, ...) with what is left about nodes.
+        """
+        own = self.means[rows, axis][:, :, None, None, None]
+        mean, lean = own[:, 0], own.new_zeros(len(self.hidden), 1, 1, 1, 1)
+        for j, (sin, cos) in seen.items():
+            along, across = own[:, 1 + j], own[:, 1 + self.split.dim + j]
+            mean = mean + along * sin + across * cos
+            if j in near:
+                slope = along * cos - across * sin
+                mean, lean = mean + slope * near[j][1], lean + slope * near[j][0]
+        return mean, lean
+
+
+_Near = dict[int, tuple[Tensor, Tensor]]
+"""What is left of hidden angles' noise about quasi-random nodes, in terms of H normal numbers.
+
+How far (H, ...) each angle leans with them, and its shift by what was observed. To first order all
+angles after it move in proportion: bumps become wider and aslant, in closed form.
+"""
+
+
+def _unit(size: int, number: int) -> Tensor:
+    return torch.eye(size, dtype=torch.float64)[number].reshape(-1, 1, 1, 1, 1)
+
+
+def _observe(near: _Near, off: Tensor, kappa: Tensor, lean: Tensor) -> None:
+    """Learn from an angle that is off its mean (Kalman, 1960; of the covariance the square root)."""
+    wider = 1 + kappa * lean.square().sum(dim=0)
+    off = (torch.remainder(off + math.pi, 2 * math.pi) - math.pi) * kappa / wider
+    less = kappa / (wider + wider.sqrt())
+    for axis, (own, shift) in near.items():
+        told = (own * lean).sum(dim=0)
+        near[axis] = own - less * told * lean, shift + told * off
+
+
+class _Rule:
+    """Nodes of hidden angles: even ones of a single angle, quasi-random ones of several."""
+
+    def __init__(self, hidden: int, level: int, step: int, *, early: bool) -> None:
+        own = 1 + level + step
+        # of angles after those kept, it would have to be known at each point of the grid
+        self.left = NOISE_LEFT[level + max(step, 0)] if early and hidden > 1 else 0.0
+        self.count = (1, NODES_ALONE * 2**level, NODES_OF_SEVERAL[own])[min(hidden, 2)]
+        self.tables = _quasi_random(hidden, self.count, level) if hidden > 1 else []
+
+    def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
+        """Return offsets (C, Q) of a hidden angle from its mean, and the logarithms of their weights.
+
+        For concentrations (C, 1).
+        """
+        if self.tables:
+            kappa = kappa.clamp(float(SHARPNESS[0]), float(SHARPNESS[-2]))
+            row = torch.searchsorted(SHARPNESS, kappa[:, 0], right=True) - 1
+            part = (kappa / SHARPNESS[row, None] - 1) / (SHARPNESS[1] / SHARPNESS[0] - 1)
+            offset = torch.lerp(self.tables[number][row], self.tables[number][row + 1], part)
+            weight = -math.log(self.count) if number == 0 else 0.0
+            return offset / kappa.sqrt(), kappa.new_tensor([[weight]])
+        reach = (REACH_DEVIATIONS / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+        offset = reach * ((2 * torch.arange(self.count) + 1) / self.count - 1)
+        return offset, torch.log_softmax(kappa * (offset.cos() - 1), dim=1)
+
+
+@lru_cache(maxsize=16)
+def _quasi_random(hidden: int, count: int, seed: int) -> list[Tensor]:
+    """Return nodes (S, Q) of each hidden angle by `SHARPNESS`, in deviations."""
+    with torch.inference_mode(False):
+        even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=seed)
+        nodes = even.draw(count, dtype=torch.float64)
+        return [quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT]
