@@ -225,7 +225,7 @@ class TileSpace:
         vertices = np.where(rows.fixed, 0, _turn(rows.factor, rows.flips, at_source)) + moved
         return NearestTiles(
             vertices * self._unit[:, None],
-            *self._groups(solution),
+            *self._groups(solution, self._unit),
             self.corners,
             (left**2).sum(axis=1),
         )
@@ -276,12 +276,12 @@ class TileSpace:
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
         """Return linear part (2, 2) and offset (2,) of the map from the group's frame."""
         own = parameters[-self._rows.columns.shape[2] :]
-        linear, offset = self._groups(np.tile(own, (self.count, 1)))
-        return linear[index], offset[index]
+        linear, offset = self._groups(own[None], self._unit[[index]])
+        return linear[0], offset[0]
 
-    def _groups(self, solution: Array) -> tuple[Array, Array]:
-        """Return linear parts (C, 2, 2) and offsets (C, 2) of the maps from the group's frame."""
-        cos, sin = self._unit.real, self._unit.imag
+    def _groups(self, solution: Array, unit: Complex) -> tuple[Array, Array]:
+        """Return linear parts (M, 2, 2) and offsets (M, 2) of maps from the group's frame, turned."""
+        cos, sin = unit.real, unit.imag
         turn = np.stack([cos, -sin, sin, cos], axis=-1).reshape(-1, 2, 2)
         offset = (turn @ solution[:, :2, None])[..., 0]
         return turn @ _linear(self.kind, solution[:, 2:]), offset
@@ -350,30 +350,31 @@ def _means(rows: Rows, values: Complex) -> Complex:
 
 
 MAX_TABLE_BYTES = 64 * 2**20  # of the rows that are kept of a class and a number of vertices
+MOST_BYTES_PER_VERTEX = 340  # of a row, whose offset and linear part have six parameters at most
 
 
 class TileTable:
     """The rows of a class's tiles with n vertices, each worked out once: most are asked for often."""
 
-    def __init__(self, kind: IsohedralClass) -> None:
+    def __init__(self, kind: IsohedralClass, size: int) -> None:
         self._kind, self._lock = kind, threading.Lock()
+        self._most = max(1, MAX_TABLE_BYTES // (MOST_BYTES_PER_VERTEX * size))
         self._places: dict[bytes, int] = {}
         self._kept: Rows | None = None
 
     def rows(self, lengths: Integers) -> Rows:
-        """Return the rows of lengths (C, K)."""
+        """Return the rows of lengths (C, K); more than are kept are worked out for this call alone."""
+        if len(lengths) > self._most:
+            return _rows_of(self._kind, lengths)
         lengths = np.ascontiguousarray(lengths, dtype=np.int64)
         keys = [own.tobytes() for own in lengths]
         with self._lock:
             fresh = {key: k for k, key in enumerate(keys) if key not in self._places}
             if fresh:
-                made = _rows_of(self._kind, lengths[list(fresh.values())])
-                row = sum(part.nbytes for part in made) // len(fresh)
-                if row * (len(self._places) + len(fresh)) > MAX_TABLE_BYTES:
+                if len(self._places) + len(fresh) > self._most:
                     self._places.clear()
                     fresh = {key: k for k, key in enumerate(keys)}
-                    made = _rows_of(self._kind, lengths[list(fresh.values())])
-                self._keep(list(fresh), made)
+                self._keep(list(fresh), _rows_of(self._kind, lengths[list(fresh.values())]))
             assert self._kept is not None
             at = [self._places[key] for key in keys]
             return Rows._make(part[at] for part in self._kept)
@@ -382,7 +383,9 @@ class TileTable:
         """Add rows, in arrays that have twice the room when they are full."""
         first, count = len(self._places), len(self._places) + len(keys)
         if self._kept is None or not first or count > len(self._kept.total):
-            room = [np.empty((2 * count, *part.shape[1:]), part.dtype) for part in made]
+            room = [
+                np.empty((min(2 * count, self._most), *part.shape[1:]), part.dtype) for part in made
+            ]
             for old, new in zip(self._kept or (), room, strict=False):
                 new[:first] = old[:first]
             self._kept = Rows._make(room)
@@ -392,9 +395,9 @@ class TileTable:
 
 
 @lru_cache(maxsize=4)  # of the class that is searched: few points, more and all
-def table_of(kind: IsohedralClass, size: int) -> TileTable:  # noqa: ARG001
+def table_of(kind: IsohedralClass, size: int) -> TileTable:
     """Return the rows that are known of a class's tiles with so many vertices."""
-    return TileTable(kind)
+    return TileTable(kind, size)
 
 
 def _columns(kind: IsohedralClass, orbits: Orbits) -> Complex:
