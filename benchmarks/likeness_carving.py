@@ -23,7 +23,7 @@ from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, LikenessSearch, Target
 from orbiflow.tiles.geometry import best_similarity
 from orbiflow.tiles.search import bending
-from orbiflow.tiles.search.co_deformation import orientations
+from orbiflow.tiles.search.search_method import Goal
 
 NAMES = ("penguin_80", "squirrel_80", "hollow-cat_80", "flamingo_80", "squid_80", "dolphin_60")
 KINDS = ("IH4", "IH5", "IH6")
@@ -37,7 +37,9 @@ def before_and_after(name: str) -> tuple[Ring, Ring, Ring]:
     found: list[tuple[str, bending.Bent]] = []
     for kind in KINDS:
         with one_blas_thread():
-            bents, _ = bending.bent_tiles(orientations(target, settings), CLASSES[kind], settings)
+            bents, _ = bending.bent_tiles(
+                settings.orientations(Goal(target)), CLASSES[kind], settings
+            )
         found += [(kind, bent) for bent in bents[:1]]
     kind, plain = max(found, key=lambda one: one[1].score)
     body = plain.orientation.fine

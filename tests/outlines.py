@@ -29,7 +29,8 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.search.bending import Bent, PlacedBent, bent_tiles, placed_best, prototile
-from orbiflow.tiles.search.co_deformation import Orientation, orientations
+from orbiflow.tiles.search.co_deformation import Orientation
+from orbiflow.tiles.search.search_method import Goal
 
 FOLDER = Path(__file__).parent.parent / "examples" / "silhouettes"
 ANIMALS = ("squirrel.dat", "nagata/spider_120.dat", "nagata/octpus_94.dat", "nagata/camel_60.dat")
@@ -138,14 +139,16 @@ def animal(name: str) -> Target:
     return Target.read(FOLDER / name)
 
 
-SMALL = LikenessSearch(placements=40, held=8, starts=4, finalists=1, rounds=8, multiples=(4,))
+SMALL = LikenessSearch(
+    phases=1, placements=40, held=8, starts=4, finalists=2, rounds=8, multiples=(4,)
+)
 """A search of a fraction of a second a class."""
 
 
 @lru_cache(maxsize=1)
 def squirrel_orientations() -> tuple[Orientation, Orientation]:
     """The bundled squirrel and its mirror image, ready to be bent."""
-    return orientations(animal("squirrel.dat"), SMALL)
+    return SMALL.orientations(Goal(animal("squirrel.dat")))
 
 
 class BentTile(NamedTuple):

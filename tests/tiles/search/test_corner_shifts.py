@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import CLASSES, complex_points, plane_points, resampled, signed_area
-from orbiflow.tiles.likeness import Elastic, fidelity
-from orbiflow.tiles.search.co_deformation import CROSSING_COST, _moves, shifted
+from orbiflow.tiles.likeness import Elastic
+from orbiflow.tiles.search.co_deformation import _moves, shifted
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import seeds
@@ -66,7 +66,7 @@ def test_corners_find_back_to_a_tile(name: str, seed: int) -> None:
     away = own._replace(
         lengths=own.lengths + lengths[way], starts=(own.starts + starts[way]) % body.size
     )
-    found = shifted(body, CLASSES[name], away, at_rest(body, 1), [(1, 1)], share=1.0)
+    found = shifted(body, CLASSES[name], away, at_rest(body, 1), 1, share=1.0)
     assert (found.placements.lengths == own.lengths).all()
     assert found.placements.starts == own.starts
 
@@ -76,10 +76,10 @@ def test_corners_find_back_to_a_tile(name: str, seed: int) -> None:
 def test_no_placement_becomes_worse(name: str, share: float) -> None:
     kind = CLASSES[name]
     placements = best_placements(kind, complex_points(RING), 12)
-    stay = shifted(BODY, kind, placements, at_rest(BODY, 12), [], share=share)
-    stages = [(2, 12), (1, 3)]
-    gone = shifted(BODY, kind, placements, at_rest(BODY, 12), stages, share=share)
-    assert len(gone.costs) <= 3
+    far = BODY.size  # no edge can become so much longer
+    stay = shifted(BODY, kind, placements, at_rest(BODY, 12), far, share=share)
+    gone = shifted(BODY, kind, placements, at_rest(BODY, 12), 2, share=share)
+    gone = shifted(BODY, kind, gone.placements, gone.points, 1, share=share)
     assert (np.diff(gone.costs) >= 0).all()
     assert gone.costs[0] <= stay.costs[0]
     assert gone.costs[0] < 0.999 * stay.costs[0] or name in ("IH1", "IH2", "IH3", "IH7", "IH28")
@@ -88,25 +88,9 @@ def test_no_placement_becomes_worse(name: str, share: float) -> None:
     assert len(np.unique(corners, axis=0)) == len(corners)
 
 
-@pytest.mark.parametrize("name", ["IH4", "IH6"])
-def test_what_is_judged_moves_to_better_marks(name: str) -> None:
-    kind = CLASSES[name]
-    own = (BODY, kind, best_placements(kind, complex_points(RING), 6), at_rest(BODY, 6))
-    stay = shifted(*own, [], share=0.3, judged=True)
-    gone = shifted(*own, [(2, 6), (1, 6)], share=0.3, judged=True)
-    sound = gone.costs < CROSSING_COST
-    marks = [fidelity(BODY.rest[: BODY.size], z[: BODY.size], 0.0).mark for z in gone.points.T]
-    assert np.allclose(np.log(gone.costs[sound]), -np.array(marks)[sound])
-    assert (np.diff(gone.costs) >= 0).all()
-    assert gone.costs[0] <= stay.costs[0]
-    assert (gone.costs < 0.99 * stay.costs[: len(gone.costs)]).any()
-
-
 def test_it_can_be_cancelled() -> None:
     cancel = Cancel()
     cancel.cancel()
     placements = best_placements(CLASSES["IH4"], complex_points(RING), 2)
     with pytest.raises(Cancelled):
-        shifted(
-            BODY, CLASSES["IH4"], placements, at_rest(BODY, 2), [(1, 2)], share=1.0, cancel=cancel
-        )
+        shifted(BODY, CLASSES["IH4"], placements, at_rest(BODY, 2), 1, share=1.0, cancel=cancel)

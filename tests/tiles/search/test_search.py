@@ -2,7 +2,8 @@
 
 import multiprocessing
 import threading
-from dataclasses import replace
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,10 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.likeness import mutual_iou
-from orbiflow.tiles.search.likeness_search import FAST, SKETCH
+from orbiflow.tiles.search.candidates import Fit
+from orbiflow.tiles.search.likeness_search import SKETCH
+from orbiflow.tiles.search.search_method import Goal
+from orbiflow.tiles.tilings import IsohedralClass
 from outlines import animal, searched
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
@@ -268,30 +272,49 @@ def test_several_of_a_class_differ(settings: LikenessSearch | OverlapSearch) -> 
     assert all(alike(i, j) < 0.9 for i in range(len(own)) for j in range(i))
 
 
-def test_more_effort_never_scores_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Through the search itself, also where several tiles of a class are asked for.
-
-    What a level adds to the one below is next to nothing here, and scores less alone.
-    """
-    least = {"placements": 20, "held": 4, "starts": 2, "finalists": 1, "rounds": 4}
-    for name, value in least.items():
-        monkeypatch.setitem(FAST, name, value)
-    fast = replace(LikenessSearch.for_effort("fast"), multiples=(2,))
-    alone = replace(fast, placements=2, held=1, starts=1, finalists=1, rounds=1)
-    more = replace(alone, below=LikenessSearch.for_effort("normal").below)
+def test_more_effort_never_scores_less() -> None:
+    """In a class, also where several of its tiles are asked for, and in the whole search."""
+    least = LikenessSearch(
+        placements=20, held=4, starts=2, finalists=1, rounds=4, carved=0, multiples=(2,), phases=1
+    )
 
     def score(settings: LikenessSearch, per_class: int) -> float:
         tile = escherize_class(SQUIRREL, "IH7", settings, per_class=per_class)
         assert isinstance(tile, EscherTile)
         return tile.score
 
-    assert score(alone, 1) < score(fast, 1)
     for per_class in (1, 2):
-        assert score(more, per_class) >= score(fast, per_class)
+        scores = [score(replace(least, phases=count), per_class) for count in (1, 2, 4)]
+        assert scores == sorted(scores)
+        assert scores[0] < scores[-1]
+    names = ["IH4", "IH5", "IH6"]
+    one, more = (searched(SQUIRREL, names, replace(least, phases=k))[0] for k in (1, 3))
+    assert more[0].score > one[0].score
+    scores = [{tile.name: tile.score for tile in tiles} for tiles in (one, more)]
+    assert all(scores[1][name] >= scores[0][name] for name in names)
+
+
+def test_later_phases_are_of_promising_classes() -> None:
+    """A class far behind the best is searched in the first phase alone."""
+    method = replace(LikenessSearch(**SKETCH), multiples=(2,), phases=2)
+    asked: list[tuple[str, int]] = []
+
+    class Watched(type(method)):
+        def fit(self, goal: Goal, kind: IsohedralClass, *rest: Any) -> Fit:
+            asked.append((kind.name, self.passed))
+            return super().fit(goal, kind, *rest)
+
+    names = ["IH1", "IH3", "IH4", "IH5"]
+    tiles, _ = searched(SQUIRREL, names, Watched(**asdict(method)))
+    assert [name for name, passed in asked if passed == 0][1:] == names  # after a first look
+    first = [tile for tile in tiles if tile.likeness.fidelity]
+    again = {name for name, passed in asked if passed}
+    assert again < set(names)
+    assert first[0].name in again
 
 
 def test_a_first_look_is_one_small_search() -> None:
-    own = replace(LikenessSearch.for_effort("best"), below=0, **SKETCH)
-    assert own.searches() == (own,)
+    own = replace(LikenessSearch.for_effort("best"), passed=0, **SKETCH)
+    assert [level for _, level in own.levels()] == [own]
     assert own.finalists == own.starts <= 2
     assert len(own.bodies) == 1

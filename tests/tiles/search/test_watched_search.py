@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -105,14 +106,15 @@ def test_levels_are_the_whole_search(
     kind: type[LikenessSearch] | type[OverlapSearch], effort: str
 ) -> None:
     method = kind.for_effort(effort)
-    (_, sketch), *levels = method.levels()
-    assert math.isclose(sum(share for share, _ in method.levels()), 1)
-    assert type(sketch).__name__ == "Sketches"
-    alone = tuple(level for _, level in levels)
-    if isinstance(method, LikenessSearch):
-        assert alone == method.searches()
-    else:
-        assert alone == (method,)
+    shares, levels = zip(*method.levels(), strict=True)
+    assert math.isclose(sum(shares), 1)
+    if not isinstance(method, LikenessSearch):
+        assert levels == (method,)
+        return
+    own = [level for level in levels if isinstance(level, LikenessSearch)]
+    assert [level.passed for level in own] == [0, *(level.phases for level in own[:-1])]
+    assert replace(own[-1], passed=0) == method
+    assert own[0] == LikenessSearch.for_effort("fast")
 
 
 def test_the_better_of_two_outcomes_is_kept() -> None:

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import LikenessSearch, Target, resampled, ring_length
-from orbiflow.tiles.search.co_deformation import BODIES, orientations
+from orbiflow.tiles.search.co_deformation import BODIES
+from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.silhouette import sampled
 from orbiflow.tiles.silhouette.outlines import (
     CORNER_DEPTH,
@@ -90,7 +91,9 @@ def test_simplification_keeps_what_stands_out() -> None:
 
 @pytest.mark.parametrize("seed", [0, 5])
 def test_the_mirror_image_is_read_backwards(seed: int) -> None:
-    own, other = orientations(animal("squirrel.dat"), LikenessSearch(seed=seed, multiples=(4,)))
+    own, other = LikenessSearch(seed=seed, multiples=(4,)).orientations(
+        Goal(animal("squirrel.dat"))
+    )
     assert (own.mirrored, other.mirrored) == (False, True)
     for mine, theirs in zip(own.samples, other.samples, strict=True):
         assert np.array_equal(theirs[0], mine[0] * (1, -1))
@@ -111,7 +114,7 @@ def test_the_mirror_image_is_read_backwards(seed: int) -> None:
 def test_hairs_give_bodies_or_a_reason(ring: Array) -> None:
     said = ""
     try:
-        both = orientations(Target.from_polygon(ring), LikenessSearch(multiples=(4,)))
+        both = LikenessSearch(multiples=(4,)).orientations(Goal(Target.from_polygon(ring)))
     except OrbiflowError as error:
         both, said = (), str(error)
     assert not said or "too thin" in said or "too ragged" in said

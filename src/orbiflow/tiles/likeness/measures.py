@@ -8,12 +8,12 @@ make of the measures.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.tiles.geometry import apart, best_similarity, plane_points, signed_area
 
 PIECE_LENGTHS = (0.08, 0.25)  # the lengths of the pieces, as shares of the outline
 # the offset of widths, in square roots of the area, below which differences matter little
@@ -34,6 +34,7 @@ class Measures:
 
     def __init__(self, rest: Complex) -> None:
         _, self.rest = _normal(rest)
+        self._centered = self.rest - self.rest.mean()
         self.sides = abs(_steps(self.rest, 1))
         self.length = float(self.sides.sum())
         self._weight = (self.sides + _shifted(self.sides, 1)) / (2 * self.length)
@@ -45,23 +46,25 @@ class Measures:
         self._turns = abs(_turns(self.rest, self._step))
         self._fine_turns = [_turns(self.rest, step) for step in WRINKLE_STEPS]
         n = len(rest)
-        halves = (round(length * n / 2) for length in PIECE_LENGTHS)
-        self._pieces = [_Pieces(self.rest, min(max(3, h), (n - 1) // 2)) for h in halves]
+        short, long = (min(max(3, round(length * n / 2)), (n - 1) // 2) for length in PIECE_LENGTHS)
+        self._pieces = _Pieces(self.rest, (short, long))
 
     def values(self, bent: Complex) -> Array:
         """Return the seven values of an outline, in the order of `Fidelity`."""
         _, z = _normal(bent)
-        return np.array([value for value, _ in self._measured(z)])
+        pieces, _ = self._pieces.misfits(z, self._share)
+        return np.array([*pieces, *(value for value, _ in self._measured(z))])
 
     def gradients(self, bent: Complex) -> tuple[Array, Complex]:
         """Return the seven values of an outline, and their gradients (7, n)."""
         size, z = _normal(bent)
+        pieces, of_pieces = self._pieces.misfits(z, self._share)
         found = self._measured(z)
-        along = np.array([gradient() for _, gradient in found])
+        along = np.vstack([of_pieces(), *(gradient() for _, gradient in found)])
         # a larger outline is made smaller again
         grows = (np.conj(along) @ z).real
         along = (along - grows[:, None] * _area_gradient(z) / 2) / size
-        return np.array([value for value, _ in found]), along
+        return np.array([*pieces, *(value for value, _ in found)]), along
 
     def wrinkles(self, ring: Complex, places: Array) -> tuple[float, Complex, Array]:
         """Return by how many radians a ring turns elsewhere than the outline at rest.
@@ -93,10 +96,10 @@ class Measures:
         return total, along, sliding
 
     def _measured(self, z: Complex) -> tuple[Measured, ...]:
-        short, long = (piece.misfit(z, self._share) for piece in self._pieces)
+        """Return the values that follow those of pieces."""
         inside, outside = _discs(z)
         thinned, merged = self._thinned(z, inside), self._merged(z, outside)
-        return short, long, self._stretched(z), thinned, self._blunted(z), self._moved(z), merged
+        return self._stretched(z), thinned, self._blunted(z), self._moved(z), merged
 
     def _stretched(self, z: Complex) -> Measured:
         step = _steps(z, 1)
@@ -135,12 +138,14 @@ class Measures:
         return float(np.maximum(less, 0).sum() / self._step), gradient
 
     def _moved(self, z: Complex) -> Measured:
-        def gradient() -> Complex:
-            own, goal = z - z.mean(), self.rest - self.rest.mean()
-            factor = complex(best_similarity(z, self.rest))
-            return 2 / len(z) * (abs(factor) ** 2 * own - np.conj(factor) * goal)
+        own, goal, n = z - z.mean(), self._centered, len(z)
+        factor = complex(np.vdot(own, goal)) / float(np.vdot(own, own).real)
+        missed = factor * own - goal
 
-        return apart(z, self.rest), gradient
+        def gradient() -> Complex:
+            return 2 / n * (abs(factor) ** 2 * own - np.conj(factor) * goal)
+
+        return float(np.vdot(missed, missed).real) / n, gradient
 
 
 class _Discs(NamedTuple):
@@ -173,25 +178,38 @@ class _Discs(NamedTuple):
 
 
 class _Pieces:
-    """The pieces of an outline about each of its points, `half` points to either side."""
+    """The pieces of an outline about each of its points, short and long: `halves` points each way."""
 
-    def __init__(self, rest: Complex, half: int) -> None:
-        self.rest, self.half, self.count = rest, half, 2 * half + 1
-        self.sum = self.windows(rest)
-        self.square = self.windows(abs(rest) ** 2) - abs(self.sum) ** 2 / self.count
+    def __init__(self, rest: Complex, halves: tuple[int, int]) -> None:
+        self.rest, self.halves = rest, halves
+        self.count = 2.0 * np.array(halves)[:, None] + 1
+        self.sum, square = self.windows(np.stack([rest, abs(rest) ** 2])[:, None])
+        self.square = square.real - abs(self.sum) ** 2 / self.count
 
-    def windows(self, values: Array | Complex) -> Any:
-        """Return the sum (n,) of values over the piece about each point."""
-        n, half = len(values), self.half
-        total = np.cumsum(np.concatenate([values[-half - 1 :], values, values[:half]]))
-        return total[self.count :] - total[:n]
+    def windows(self, values: Complex) -> Complex:
+        """Return sums (K, 2, n) over short and long pieces, of values (K, 2, n) or (K, 1, n)."""
+        n, most = values.shape[-1], max(self.halves)
+        padded = [values[..., -most - 1 :], values, values[..., :most]]
+        total = np.cumsum(np.concatenate(padded, axis=-1), axis=-1)
+        found = np.empty((len(values), 2, n), dtype=complex)
+        for k, half in enumerate(self.halves):
+            own, middle = total[:, k % total.shape[1]], most + 1
+            high, low = own[:, middle + half :], own[:, middle - half - 1 :]
+            np.subtract(high[:, :n], low[:, :n], out=found[:, k])
+        return found
 
-    def misfit(self, z: Complex, share: Array) -> Measured:
-        """Return the mean, with weights (n,), of the roots of the misfits after the best motions."""
-        own = self.windows(z)
-        square = self.windows(abs(z) ** 2) - abs(own) ** 2 / self.count
-        common = self.windows(np.conj(self.rest) * z) - np.conj(self.sum) * own / self.count
-        sizes, size = self.square + square, abs(common)
+    def misfits(self, z: Complex, share: Array) -> tuple[Array, Callable[[], Complex]]:
+        """Return means (2,), with weights (n,), of roots of misfits after the best motions.
+
+        And what computes their gradients (2, n).
+        """
+        rest, count = self.rest, self.count
+        own, square, common = self.windows(
+            np.stack([z, z.real**2 + z.imag**2, np.conj(rest) * z])[:, None]
+        )
+        common -= np.conj(self.sum) * own / count
+        sizes = self.square + square.real - (own.real**2 + own.imag**2) / count
+        size = abs(common)
         misfit = np.maximum(1 - 2 * size / sizes, 0.0)
         root = np.sqrt(misfit + SMALL_MISFIT)
 
@@ -199,17 +217,17 @@ class _Pieces:
             slope = share * (misfit + 2 * SMALL_MISFIT) / root**3  # of half the misfit
             turned = -slope / sizes * common / np.maximum(size, 1e-300)
             larger = slope * size / sizes**2
-            along = self.rest * self.windows(turned) - self.windows(turned * self.sum) / self.count
-            more = z * self.windows(larger) - self.windows(larger * own) / self.count
-            return along + 2 * more
+            parts = self.windows(np.stack([turned, turned * self.sum, larger, larger * own]))
+            along = rest * parts[0] - parts[1] / count
+            return along + 2 * (z * parts[2] - parts[3] / count)
 
-        return float((misfit / root) @ share), gradient
+        return (misfit / root) @ share, gradient
 
 
 def _normal(z: Complex) -> tuple[float, Complex]:
     """Return the root of the area, and the outline about the origin with area 1."""
     about = z - z.mean()
-    size = float(np.sqrt(abs(signed_area(plane_points(about)))))
+    size = float(np.sqrt(abs(np.vdot(about, _shifted(about, -1)).imag) / 2))
     return size, about / size
 
 
@@ -253,21 +271,27 @@ def _discs(z: Complex) -> tuple[_Discs, _Discs]:
     own = np.arange(n)
     inward = 1j * (_shifted(z, -1) - _shifted(z, 1))
     inward /= np.maximum(abs(inward), 1e-300)
-    x, y = z.real, z.imag
-    depth = np.outer(inward.real, x) + np.outer(inward.imag, y)
-    depth -= (inward.real * x + inward.imag * y)[:, None]
-    square = np.subtract.outer(x, x) ** 2
-    square += np.subtract.outer(y, y) ** 2
+    x, y, one, far = z.real, z.imag, np.ones(n), (z * z.conj()).real
+    # by products of matrices: sums of outer ones take four times as long
+    level = (np.conj(inward) * z).real
+    depth = np.column_stack([inward.real, inward.imag, -level]) @ np.stack([x, y, one])
+    square = np.column_stack([-2 * x, -2 * y, far, one]) @ np.stack([x, y, one, far])
     np.maximum(square, 1e-300, out=square)  # points may coincide
     curvature = np.divide(depth, square, out=square)  # half of that of the disc
-    for near in range(-2, 3):
-        curvature[own, (own + near) % n] = 0
+    curvature.ravel()[_near(n)] = 0
 
     def largest(ends: Integers, side: int) -> _Discs:
         least = np.maximum(side * curvature[own, ends], 0.5 / LARGEST_WIDTH)
         return _Discs(ends, side * inward, side * depth[own, ends], 0.5 / least, side)
 
     return largest(curvature.argmax(axis=1), 1), largest(curvature.argmin(axis=1), -1)
+
+
+@lru_cache(maxsize=16)
+def _near(n: int) -> Integers:
+    """Return where in a flat (n, n) matrix pairs of points are that are two steps apart at most."""
+    own = np.arange(n)[:, None]
+    return (own * n + (own + np.arange(-2, 3)) % n).ravel()
 
 
 def _smooth(values: Array) -> Array:

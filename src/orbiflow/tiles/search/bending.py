@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -20,18 +20,16 @@ from orbiflow.tiles.likeness import (
     Elastic,
     Fidelity,
     Overlap,
-    Stiffness,
     best_overlay,
     kept_of,
     least_neck,
     neck_factor,
     neck_up_to,
 )
-from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles, silent
+from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles
 from orbiflow.tiles.search.carving import Carved, carved
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
-    Drawn,
     Orientation,
     drawn_to_tiles,
     held_on_tiles,
@@ -50,8 +48,10 @@ FIRST_ROUNDS = 6  # steps of the minimisation for all that are held
 FOLLOWING_STRENGTH = 60.0  # strength of the springs by which a finer body follows a coarser one
 RELAXED_STRENGTH = 1500.0  # strength of the springs that keep a relaxed outline near its tile
 FOLLOW_ROUNDS = 3  # the number of times that the inside follows a carved outline
-MAX_REPAIRED = 1  # the most tiles of a class that cross themselves and are carved apart
-MAX_MARK_BEHIND = 0.25  # below the best mark: a tile that crosses itself may be carved apart
+# The most tiles of a class that cross themselves and are carved apart; twice as many if all do
+MAX_REPAIRED = 1
+MAX_MARK_BEHIND = 0.25  # below the best mark of tiles that are not carved yet: what is carved, too
+CROSSING_MARKS = 0.5  # less for a shape that crosses itself, while it is one of many
 MIN_CARVED_GAP = 0.012  # the gaps that carving apart leaves at least, in square roots of the area
 
 Item = TypeVar("Item")
@@ -92,30 +92,19 @@ def bent_tiles(
     both: Sequence[Orientation],
     kind: IsohedralClass,
     settings: LikenessSearch,
-    progress: OnProgress = silent,
+    tell: Callable[[float], None] = lambda _: None,
     cancel: Cancel = NEVER,
     *,
     wanted: int = 1,
 ) -> tuple[list[Bent], int]:
-    """Return finalists, at best `wanted` of each orientation, without twins, and how many crossed."""
-    found: list[Bent] = []
-    done = 0
+    """Return finalists, best first and without twins, and how many crossed themselves."""
     used = both[:1] if template_symmetries(kind)[1] else both
-    searches = settings.searches(wanted, symmetric=len(kind.stabiliser) > 1)
-    tasks = [(side, own, body) for own in searches for body in own.bodies for side in used]
-    never_soft = all("soft" not in own.bodies for own in searches)
-    work = sum(own.starts for _, own, _ in tasks)
-    for side, own, body in tasks:
-        finalists = _finalists(side, BODIES[body], kind, own, cancel)
-        if never_soft and 2 * sum(bent.factor > 0 for bent in finalists) < own.finalists:
-            progress(0.9 * (done + 0.5 * own.starts) / work, math.nan)
-            finalists += _finalists(side, BODIES["soft"], kind, own, cancel)
-        found, done = found + finalists, done + own.starts
-        progress(0.9 * done / work, math.nan)
+    own = settings.of_class(wanted, symmetric=len(kind.stabiliser) > 1)
+    found = _finalists(used, kind, own, tell, cancel)
     simple = _best_first([bent for bent in found if bent.factor])
     crossed = [bent for bent in found if not bent.factor]
-    if settings.carved and both[0].plain:
-        simple = _all_carved(kind, simple, crossed, max(wanted, settings.carved), settings, cancel)
+    if own.carved and both[0].plain:
+        simple = _all_carved(kind, simple, crossed, own, cancel)
     return simple, len(crossed)
 
 
@@ -123,22 +112,20 @@ def _all_carved(
     kind: IsohedralClass,
     simple: list[Bent],
     crossed: list[Bent],
-    count: int,
     settings: LikenessSearch,
     cancel: Cancel,
 ) -> list[Bent]:
-    """Carve the first simple tiles, and those that cross themselves but are worth it."""
+    """Carve the first simple tiles, and those that cross themselves, that may become the best."""
     least = max((bent.fidelity.mark for bent in simple), default=-math.inf) - MAX_MARK_BEHIND
-    worth = sorted(
-        (bent for bent in crossed if bent.fidelity.mark > least),
-        key=lambda bent: -bent.fidelity.mark,
-    )
-    chosen = simple[:count] + _unlike(worth, MAX_REPAIRED, _twins)
+    first = [bent for bent in simple[: settings.carved] if bent.fidelity.mark >= least]
+    worth = [bent for bent in crossed if bent.fidelity.mark > least]
+    worth.sort(key=lambda bent: -bent.fidelity.mark)
+    chosen = first + _unlike(worth, MAX_REPAIRED * (1 if simple else 2), _twins)
     done: list[Bent] = []
     for bent in chosen:
         cancel.check()
         done.append(_carved(kind, bent, settings.min_neck))
-    return _best_first([bent for bent in done if bent.factor] + simple[count:])
+    return _best_first([bent for bent in done if bent.factor] + simple[len(first) :])
 
 
 def _best_first(found: list[Bent]) -> list[Bent]:
@@ -150,71 +137,93 @@ def _twins(a: Bent, b: Bent) -> bool:
     return a.orientation is b.orientation and apart(a.ring, b.ring) <= TWIN_DISTANCE
 
 
+class _Lot(NamedTuple):
+    """Shapes of one orientation and stiffness that are nearly tiles."""
+
+    side: Orientation
+    bodies: tuple[Elastic, Elastic, Elastic]  # with few points, more and all
+    level: int  # which of them is bent
+    placements: Placements  # C of them
+    points: Complex  # (N, C)
+
+    @property
+    def body(self) -> Elastic:
+        return self.bodies[self.level]
+
+    @property
+    def marks(self) -> list[float]:
+        """The marks (C,) that people would give, less where a shape crosses itself."""
+        rings = self.points[: self.body.size].T
+        simple = shapely.is_valid(shapely.polygons(plane_points(rings))).tolist()
+        marks = [kept_of(self.body.measures, ring, 0.0).mark for ring in rings]
+        return [mark - CROSSING_MARKS * (not own) for mark, own in zip(marks, simple, strict=True)]
+
+    def take(self, index: Integers) -> _Lot:
+        """Return those at `index`."""
+        return self._replace(placements=self.placements.take(index), points=self.points[:, index])
+
+    def finer(self, level: int) -> _Lot:
+        """Return the same with the points of a level."""
+        body, finer = self.body, self.bodies[level]
+        if finer is body:
+            return self._replace(level=level)
+        placements, points = _finer(body, finer, self.placements, self.points)
+        return _Lot(self.side, self.bodies, level, placements, points)
+
+
 def _finalists(
-    side: Orientation,
-    stiffness: Stiffness,
+    used: Sequence[Orientation],
     kind: IsohedralClass,
     settings: LikenessSearch,
+    tell: Callable[[float], None],
     cancel: Cancel,
 ) -> list[Bent]:
-    """Work out the best of one orientation and stiffness; some cross themselves."""
-    best = _best_placements(side, stiffness, kind, settings, cancel)
-    _, _, fine = side.bodies(stiffness)
+    """Work out the best of some orientations, with all stiffnesses; some cross themselves.
+
+    All begin with few points; the best marks among them all go on to more points, and corners move.
+    """
+    lots: list[_Lot] = []
+    for body in settings.bodies:
+        for side in used:
+            cancel.check()
+            bodies = side.bodies(BODIES[body])
+            placements, points = _best_coarse(bodies[0], kind, settings)
+            lots.append(_Lot(side, bodies, 0, placements, points))
+    tell(0.3)
+    step = lots[0].bodies[1].size // lots[0].body.size  # from one of the few points to the next
+    few, fewer = 2 * settings.finalists, settings.finalists
+    steps = [(1, step, settings.starts), (1, max(1, step // 2), few), (2, 1, fewer)]
+    for k, (level, step, keep) in enumerate(steps):
+        going_on = _best_marked(lots, keep)
+        lots = [_shifted(kind, lot, level, step, settings, cancel) for lot in going_on]
+        tell(0.3 + 0.2 * (k + 1))
     found: list[Bent] = []
-    for k in range(len(best.costs)):
-        cancel.check()
-        one = best.take(np.array([k]))
-        bent = _detailed(side, fine, kind, one, settings)
-        found += [] if bent is None else [bent]
+    for lot in _best_marked(lots, settings.finalists):
+        for k in range(len(lot.placements.starts)):
+            cancel.check()
+            bent = _detailed(lot.take(np.array([k])), kind, settings)
+            found += [] if bent is None else [bent]
     return found
 
 
-def _best_placements(
-    side: Orientation,
-    stiffness: Stiffness,
-    kind: IsohedralClass,
-    settings: LikenessSearch,
-    cancel: Cancel,
-) -> Drawn:
-    """Return placements of the fine outline whose tiles cost least: few points, then more and more."""
-    coarse, middle, fine = side.bodies(stiffness)
-    placements, points = _best_coarse(coarse, kind, settings)
-    share = settings.share
-    if middle is not fine:
-        placements, points = _finer(coarse, middle, placements, points)
-        if settings.judged:
-            drawn = _judged(middle, kind, placements, points, settings, cancel)
-        else:
-            stages = [(2, settings.starts), (1, 2 * settings.finalists)]
-            drawn = shifted(middle, kind, placements, points, stages, share=share, cancel=cancel)
-        drawn = drawn.take(np.arange(min(len(drawn.costs), settings.finalists)))
-        placements, points = _finer(middle, fine, drawn.placements, drawn.points)
-        stages = [(1, settings.finalists)]
-    else:
-        placements, points = _finer(coarse, fine, placements, points)
-        stages = [(4, settings.starts), (2, 2 * settings.finalists), (1, settings.finalists)]
-    return shifted(fine, kind, placements, points, stages, share=share, cancel=cancel)
+def _shifted(
+    kind: IsohedralClass, lot: _Lot, level: int, step: int, settings: LikenessSearch, cancel: Cancel
+) -> _Lot:
+    """Give a lot the points of a level, and move its corners by so many of them."""
+    lot = lot.finer(level)
+    own = lot.body, kind, lot.placements, lot.points
+    drawn = shifted(*own, step, share=settings.share, cancel=cancel)
+    return lot._replace(placements=drawn.placements, points=drawn.points)
 
 
-def _judged(
-    body: Elastic,
-    kind: IsohedralClass,
-    placements: Placements,
-    points: Complex,
-    settings: LikenessSearch,
-    cancel: Cancel,
-) -> Drawn:
-    """Return placements of the best marks, without twins.
-
-    Corners move as long as bending costs less, and those of the best marks as long as these rise.
-    """
-    moved = partial(shifted, body, kind, share=settings.share, cancel=cancel)
-    drawn, many = moved(placements, points, [(2, settings.starts)]), 2 * settings.finalists
-    for stages in ([], [(2, many), (1, many)]):
-        drawn = moved(drawn.placements, drawn.points, stages, judged=True)
-        outlines = drawn.points[: body.size].T
-        drawn = drawn.take(_unlike_outlines(outlines, range(len(outlines)), many))
-    return drawn
+def _best_marked(lots: Sequence[_Lot], count: int) -> list[_Lot]:
+    """Return so many of the best marks, of all lots together."""
+    every = [(mark, lot, k) for lot, own in enumerate(lots) for k, mark in enumerate(own.marks)]
+    every.sort(key=lambda one: -one[0])
+    kept: dict[int, list[int]] = {}
+    for _, lot, k in every[:count]:
+        kept.setdefault(lot, []).append(k)
+    return [lots[lot].take(np.array(own)) for lot, own in sorted(kept.items())]
 
 
 def _best_coarse(
@@ -250,16 +259,14 @@ def _finer(
     return more, finer.pulled(rest, outline, FOLLOWING_STRENGTH, 6)
 
 
-def _detailed(
-    side: Orientation, body: Elastic, kind: IsohedralClass, one: Drawn, settings: LikenessSearch
-) -> Bent | None:
-    """Work out one placement of the fine outline with a body; None if nothing is left of it."""
-    space = TileSpace(kind, one.placements)
-    tiles = held_on_tiles(body, space, one.points, settings.rounds)
+def _detailed(lot: _Lot, kind: IsohedralClass, settings: LikenessSearch) -> Bent | None:
+    """Work out the one shape of a lot, with all points; None if nothing is left of it."""
+    body, space = lot.body, TileSpace(kind, lot.placements)
+    tiles = held_on_tiles(body, space, lot.points, settings.rounds)
     ring, own = tiles.points[: body.size, 0], tiles.placements
     corners = (np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0]) % body.size
     as_bent = Carved(ring, np.arange(body.size), corners, tiles.linear[0], tiles.offset[0])
-    return _bent(side, body, as_bent, tiles.points, own, settings.min_neck)
+    return _bent(lot.side, body, as_bent, tiles.points, own, settings.min_neck)
 
 
 def _carved(kind: IsohedralClass, bent: Bent, min_neck: float) -> Bent:
@@ -368,23 +375,62 @@ def fit_bending(
     target: Target,
     kind: IsohedralClass,
     settings: LikenessSearch,
-    both: Sequence[Orientation],
+    phases: Iterable[Sequence[Orientation]],
+    count: int,
     per_class: int,
     progress: OnProgress,
     cancel: Cancel,
 ) -> Fit:
-    """Fit tiles of one class to a target by letting the silhouette bend (design point 15)."""
+    """Fit tiles of one class to a target by letting the silhouette bend (design point 15).
+
+    Each of so many phases is the silhouette and its mirror image.
+    """
     enough = 1 if per_class == 1 else 3 * per_class
     settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
-    found, dropped = bent_tiles(both, kind, settings, progress, cancel, wanted=enough)
+    found: list[Bent] = []
+    dropped = 0
+    for phase, both in enumerate(phases):
+
+        def tell(share: float, phase: int = phase) -> None:
+            progress(0.9 * (phase + share) / count, math.nan)
+
+        tiles, crossed = bent_tiles(both, kind, settings, tell, cancel, wanted=enough)
+        found, dropped = found + tiles, dropped + crossed
     if not found:
         raise CertificationError("all tiles near the silhouette cross themselves")
-    found = found[: enough + 1]  # one to spare, if one is not certified
-    overlaps = [Overlap(target.normal * (1.0, -1.0 if side.mirrored else 1.0)) for side in both]
-    placed = [placed_best(bent, overlaps[bent.orientation.mirrored]) for bent in found]
-    starts = Prototiles.joined([prototile(kind, one) for one in placed])
-    candidates = StillTiles(kind, starts)
-    return Fit(candidates, settings.placements, dropped, enough, tuple(placed))
+    # one to spare, if one is not certified
+    candidates = PlacedTiles(kind, target.normal, _best_first(found)[: enough + 1])
+    return Fit(candidates, settings.placements, dropped, enough)
+
+
+class PlacedTiles(StillTiles):
+    """Bent tiles over their silhouette (N, 2), each laid there when it is first asked for."""
+
+    def __init__(self, kind: IsohedralClass, silhouette: Array, tiles: Sequence[Bent]) -> None:
+        self.kind, self.tiles = kind, tiles
+        self._overlap = cache(lambda side: Overlap(silhouette * (1.0, -1.0 if side else 1.0)))
+        self._placed: dict[int, PlacedBent] = {}
+
+    @property
+    def prototiles(self) -> Prototiles:
+        """All of them."""
+        return Prototiles.joined([self.prototile(k) for k in range(self.size)])
+
+    @property
+    def size(self) -> int:
+        """The number of tiles."""
+        return len(self.tiles)
+
+    def prototile(self, index: int) -> Prototiles:
+        """Return the start tile of one."""
+        return prototile(self.kind, self.bent(index))
+
+    def bent(self, index: int) -> PlacedBent:
+        """Return the bent silhouette of one."""
+        if index not in self._placed:
+            tile = self.tiles[index]
+            self._placed[index] = placed_best(tile, self._overlap(tile.orientation.mirrored))
+        return self._placed[index]
 
 
 def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:

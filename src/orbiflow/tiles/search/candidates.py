@@ -213,6 +213,10 @@ class Candidates(ABC):
             CertificationError: if it has folded, unless `force` is set.
         """
 
+    def bent(self, index: int) -> PlacedBent | None:  # noqa: ARG002
+        """Return the bent silhouette of a candidate, after a search for likeness."""
+        return None
+
 
 class Fit(NamedTuple):
     """Finalists of one class, not certified yet.
@@ -221,31 +225,37 @@ class Fit(NamedTuple):
     - `starts`: The number of candidates that the method began with.
     - `crossed`: The number of those that were dropped because their boundary crossed itself.
     - `enough`: Certified finalists after which the others need not be looked at.
-    - `bent`: After a search for likeness, the bent silhouette of each finalist.
     """
 
     candidates: Candidates
     starts: int
     crossed: int
     enough: int
-    bent: tuple[PlacedBent, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
 class StillTiles(Candidates):
     """Start tiles as candidates: no flow moves them, and torch is not needed."""
 
-    kind: IsohedralClass
-    prototiles: Prototiles
+    def __init__(self, kind: IsohedralClass, prototiles: Prototiles) -> None:
+        self.kind, self._prototiles = kind, prototiles
+
+    @property
+    def prototiles(self) -> Prototiles:
+        """All of them."""
+        return self._prototiles
 
     @property
     def size(self) -> int:
         """The number of candidates."""
-        return len(self.prototiles)
+        return len(self._prototiles)
+
+    def prototile(self, index: int) -> Prototiles:
+        """Return the start tile of one."""
+        return self._prototiles.take([index])
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
         """Return the polygon of a candidate with its group, and a map without a flow."""
-        own = self.prototiles.take([index])
+        own = self.prototile(index)
         c, s = np.cos(own.angle[0]), np.sin(own.angle[0])
         sign = -1.0 if own.mirrored[0] else 1.0
         turn = np.exp(own.log_scale[0]) * np.array([[c, -s * sign], [s, c * sign]])

@@ -26,7 +26,7 @@ from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.likeness import Elastic, mark_gradient, missing_gaps
 from orbiflow.tiles.search.tile_space import TileSpace
 
-MAX_STEPS = 60  # the largest number of steps while points slide, and again once they have slid
+SLIDING_STEPS, LAST_STEPS = 60, 20  # the largest numbers of steps while points slide, and after it
 WRINKLE_COST = 0.12  # in marks a radian by which the tile turns elsewhere than the silhouette
 GAP_COST = 1.0  # in marks for each point that has no gap at all
 UNEVEN_COST = 0.1  # in marks for a mean square of 1 of how much nearer points lie than vertices
@@ -66,10 +66,12 @@ def carved(
     """
     basis, root = _basis(body, space)
     spline = _spline_basis(body, ring)
-    adjoint, count, own = basis.conj().T, basis.shape[1], np.arange(body.size)
+    count, own = basis.shape[1], np.arange(body.size)
+    whole = np.stack([basis.real, basis.imag], axis=1).reshape(-1, count)  # x and y of each vertex
+    across = np.ascontiguousarray(whole.T)
 
     def lost(parameters: Array, fixed: Array | None = None) -> tuple[float, Array]:
-        ring = basis @ parameters[:count]
+        ring = (whole @ parameters[:count]).view(complex)
         slide = spline @ parameters[count:]
         places = own + slide if fixed is None else fixed
         laid = _Laid.smoothly(places) if fixed is None else _Laid.straight(places)
@@ -79,7 +81,7 @@ def carved(
         if room:
             missing, apart = missing_gaps(ring, room)
             cost, down = cost + GAP_COST * missing, down + GAP_COST * apart
-        steep = (adjoint @ down).real
+        steep = across @ down.view(float)
         if fixed is not None:
             return cost, np.append(steep, np.zeros(SLIDES))
         uneven = np.roll(slide, -1) - slide
@@ -95,11 +97,10 @@ def carved(
             (fixed,),
             jac=True,
             method="L-BFGS-B",
-            options={"maxiter": MAX_STEPS, "maxcor": 20},
+            options={"maxiter": SLIDING_STEPS if fixed is None else LAST_STEPS, "maxcor": 20},
         ).x
 
-    whole = np.concatenate([basis.real, basis.imag])
-    start = scipy.linalg.lstsq(whole, np.concatenate([ring.real, ring.imag]))[0]
+    start = scipy.linalg.lstsq(whole, ring.view(float), lapack_driver="gelsy")[0]
     best = climbed(np.append(start, np.zeros(SLIDES)))
     places, points = _cornered(own + _calmed(spline @ best[count:]), corners)
     best = climbed(best, places)[:count]

@@ -13,12 +13,12 @@ near the present outline are worked out, by springs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from itertools import permutations
 from math import gcd
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -28,16 +28,14 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import plane_points, reverse, signed_area
-from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness, kept_of
+from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
 
-if TYPE_CHECKING:
-    from orbiflow.tiles.search.likeness_search import LikenessSearch
-
 SPRING_STRENGTHS = tuple(np.geomspace(1.2, 3000.0, 3))  # strengths of the springs, stage by stage
-ROUNDS = 3  # steps of choosing rotations and solving: in each stage, and of each neighbour
+ROUNDS = 3  # steps of choosing rotations and solving in each stage
+NEIGHBOUR_ROUNDS = 2  # the same of each neighbour
 
 
 class BentTiles(NamedTuple):
@@ -110,13 +108,11 @@ class _Reduced:
 
 # Thin parts of a soft body are as stiff as others, and it may leave its pose: long limbs find a way
 # where those of firmer bodies cross. In firmer ones bodies and heads are stiff, thin parts are not, and
-# all keep their places, the more the stiffer; a rigid one hardly bends. docs/likeness.md has the
-# comparison.
+# all keep their places, the more the stiffer. docs/likeness.md has the comparison.
 BODIES = {
     "soft": Stiffness(salience=0.0),
     "firm": Stiffness(salience=-0.5, pose=60.0),
     "stiff": Stiffness(salience=-0.5, pose=600.0),
-    "rigid": Stiffness(salience=-0.5, pose=6000.0),
 }
 
 
@@ -145,16 +141,19 @@ class Orientation:
 @lru_cache(maxsize=4)  # one serves most classes
 def orientations(
     target: Target,
-    settings: LikenessSearch,
+    multiples: tuple[int, ...],
+    phase: float,
     *,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
     step: int = 6,
 ) -> tuple[Orientation, Orientation]:
-    """Return the silhouette and its mirror image in the x axis, with a multiple of `step` points."""
-    phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
+    """Return the silhouette and its mirror image in the x axis, with a multiple of `step` points.
+
+    The points begin at a `phase`, a share of the distance of two.
+    """
     outline = np.asarray(target.normal)
-    samples = sampled(outline, phase, settings.multiples, step)
+    samples = sampled(outline, phase, multiples, step)
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
     mirror = Samples(*(reverse(part) * (1.0, -1.0) for part in samples))
 
@@ -189,7 +188,7 @@ class Drawn(NamedTuple):
 
     placements: Placements  # C of them
     points: Complex  # (N, C)
-    # (C,) energy, springs and displacement, or exp(-mark); `CROSSING_COST` more of what crosses itself
+    # (C,) energy, springs and displacement; `CROSSING_COST` more of what crosses itself
     costs: Array
 
     def take(self, index: Integers) -> Drawn:
@@ -202,34 +201,28 @@ def shifted(
     kind: IsohedralClass,
     placements: Placements,
     points: Complex,
-    stages: Sequence[tuple[int, int]],
+    step: int,
     *,
     share: float,
-    judged: bool = False,
     cancel: Cancel = NEVER,
 ) -> Drawn:
-    """Move the corners of placements of shapes (N, C) until none of the `share` nearest is better.
+    """Move the corners of placements of shapes (N, C) until none of the `share` nearest costs less.
 
-    Each stage is the points by which corners move and how many of the best go on, no two the same.
-    Better is what costs less, or, if `judged`, what people would give the higher mark.
+    Corners move by so many points in a `step`. Of those that have come to one placement, one is left.
     """
-    drawn = _drawn(body, kind, placements, points, judged)
-    for step, keep in stages:
-        drawn = _distinct(drawn, keep)
-        live = np.arange(len(drawn.costs))
-        for _ in range(MAX_MOVES):
-            cancel.check()
-            owners, options = _neighbours(body, kind, drawn, live, step, share)
-            if not len(owners):
-                break
-            tried = _drawn(body, kind, options, drawn.points[:, owners], judged)
-            live = _take_better(drawn, owners, tried)
-    return _distinct(drawn, len(drawn.costs))
+    drawn = _drawn(body, kind, placements, points)
+    live = np.arange(len(drawn.costs))
+    for _ in range(MAX_MOVES):
+        cancel.check()
+        owners, options = _neighbours(body, kind, drawn, live, step, share)
+        if not len(owners):
+            break
+        tried = _drawn(body, kind, options, drawn.points[:, owners])
+        live = _take_better(drawn, owners, tried)
+    return _distinct(drawn)
 
 
-def _drawn(
-    body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex, judged: bool
-) -> Drawn:
+def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex) -> Drawn:
     space, n = TileSpace(kind, placements), body.size
     if space.glides:
         space.turn(space.best_turns(points[:n].T))
@@ -237,30 +230,24 @@ def _drawn(
     def tiles() -> Complex:
         return space.in_order(space.nearest(points[:n].T).vertices).T
 
-    for _ in range(ROUNDS):
+    for _ in range(NEIGHBOUR_ROUNDS):
         points = body.pulled(points, tiles(), COMPARISON_STRENGTH, 1)
     rings = plane_points(points[:n].T)
-    if judged:
-        costs = np.exp([-kept_of(body.measures, z[:n], 0.0).mark for z in points.T])
-    else:
-        apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
-        area = np.maximum(signed_area(rings), 0.1)
-        costs = (body.lenient_energy(points) + COMPARISON_STRENGTH * apart) / area
-        costs += body.stiffness.pose * body.displacement(points)
+    apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
+    area = np.maximum(signed_area(rings), 0.1)
+    costs = (body.lenient_energy(points) + COMPARISON_STRENGTH * apart) / area
+    costs += body.stiffness.pose * body.displacement(points)
     costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSING_COST
     return Drawn(placements._replace(turns=space.turns), points, costs)
 
 
-def _distinct(drawn: Drawn, count: int) -> Drawn:
-    """Return the best `count` at most, best first, no placement twice."""
-    seen: set[tuple[int, ...]] = set()
-    kept: list[int] = []
-    for k in np.argsort(drawn.costs, kind="stable"):
+def _distinct(drawn: Drawn) -> Drawn:
+    """Return them best first, no placement twice."""
+    seen: dict[tuple[int, ...], int] = {}
+    for k in np.argsort(drawn.costs, kind="stable").tolist():
         corners = (int(drawn.placements.starts[k]), *drawn.placements.lengths[k].tolist())
-        if corners not in seen:
-            seen.add(corners)
-            kept.append(int(k))
-    return drawn.take(np.array(kept[:count], dtype=np.int64))
+        seen.setdefault(corners, k)
+    return drawn.take(np.array(list(seen.values()), dtype=np.int64))
 
 
 def _neighbours(

@@ -41,7 +41,7 @@ from orbiflow.tiles.search.finished_tiles import (
     rated,
 )
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.search_method import SYMMETRIC_CLASSES, Goal, SearchMethod
+from orbiflow.tiles.search.search_method import SYMMETRIC_CLASSES, Goal, SearchMethod, Sketches
 from orbiflow.tiles.search.search_record import OnTile, Outcome, Record, without_twins
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
@@ -262,40 +262,44 @@ def _rating(on_tile: OnTile, target: Target) -> OnTile:
     return lambda tile, stage: on_tile(rated([tile], target)[0], stage)
 
 
+SKETCHING = 0.1  # the share of the work that first looks are, if somebody watches
+
+
 def _search_by_levels(
     task: _Task, names: Sequence[str], workers: int, record: Record, cancel: Cancel
 ) -> None:
-    """Do the task for each class; if somebody watches, one level of effort after another."""
-    if record.on_tile is None:
-        _search(task, names, workers, record, cancel)
-        return
-    *first, (_, last) = task.method.levels()
-    for share, method in first:
-        own = replace(task, method=method, per_class=1)
-        _search(own, names, workers, record.next_level(share), cancel)
-    rest = 1 - sum(share for share, _ in first)
-    _search(replace(task, method=last), names, workers, record.next_level(rest, last=True), cancel)
-
-
-def _search(
-    task: _Task, names: Sequence[str], workers: int, record: Record, cancel: Cancel
-) -> None:
-    """Do the task for each class, here or in processes."""
+    """Do the task for each class, one level of effort after another, each for the promising ones."""
     # asked before torch is limited here: a limit makes no fork safe
     preload = ("orbiflow.tiles.search.escherizing", type(task.method).__module__)
     context = process_context(preload) if workers > 1 else None
-    if record.on_tile is None:
+
+    def search(names: Sequence[str], method: SearchMethod, per_class: int) -> None:
+        own = replace(task, method=method, per_class=per_class)
+        if context is not None and len(names) > 1:
+            _search_in_processes(own, names, workers, context, record, cancel)
+            return
+        for name in names:
+            cancel.check()
+            progress = functools.partial(record.progress, name)
+            record.level_outcome(_outcome(own, isohedral_class(name), progress, cancel))
+
+    method, rest = task.method, 1.0
+    if record.on_tile is not None:
+        rest -= SKETCHING
+        record.next_level("sketch", SKETCHING)
+        search(names, Sketches(method), 1)
+    else:
         with one_thread(), one_blas_thread():
-            first = task.method.preview(task.goal, names, cancel)
+            first = method.preview(task.goal, names, cancel)
         if first is not None:
             record.first_look(first)
-    if context is not None:
-        _search_in_processes(task, names, workers, context, record, cancel)
-        return
-    for name in names:
-        cancel.check()
-        progress = functools.partial(record.progress, name)
-        record.level_outcome(_outcome(task, isohedral_class(name), progress, cancel))
+    levels = method.levels()
+    for share, own in levels:
+        is_last = own is levels[-1][1]
+        record.next_level("final" if is_last else "better", share * rest)
+        search(names, own, task.per_class)
+        if not is_last:
+            names = record.settled(names, method.is_promising)
 
 
 def _search_in_processes(

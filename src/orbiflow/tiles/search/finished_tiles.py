@@ -66,8 +66,8 @@ def best_tiles(
             result = result.changed(likeness=known)
             if not force:
                 result.certificate.require()
-            if fit.bent:
-                result = _with_bent(target, result, fit.bent[index], original)
+            if bent := fit.candidates.bent(index):
+                result = _with_bent(target, result, bent, original)
             found.append(result)
         except CertificationError as error:
             reasons.append(str(error))

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 from math import lcm
 from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
@@ -15,45 +18,28 @@ from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.bending import fit_bending
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.co_deformation import Orientation, orientations
-from orbiflow.tiles.search.search_method import Goal, SearchMethod, Sketches
+from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass
 
-Body = Literal["soft", "firm", "stiff", "rigid"]
-ALL_BODIES: tuple[Body, ...] = ("soft", "firm", "stiff")
+Body = Literal["soft", "firm", "stiff"]
 
 # Settings of the preview; a soft body crosses itself least often, and one takes half as long as two
 SKETCH = {
+    "phases": 1,
     "placements": 60,
     "held": 6,
     "starts": 2,
     "share": 0.1,
     "finalists": 2,
-    "rounds": 10,
     "carved": 0,
     "bodies": ("soft",),
-    "judged": False,
 }
-
-FAST = {
-    "placements": 80,
-    "held": 10,
-    "starts": 4,
-    "share": 0.15,
-    "finalists": 2,
-    "rounds": 10,
-    "bodies": ALL_BODIES,
-}
-BEST = {
-    "placements": 400,
-    "held": 80,
-    "starts": 40,
-    "share": 0.4,
-    "finalists": 8,
-    "carved": 6,
-    "bodies": (*ALL_BODIES, "rigid"),
-    "judged": True,
-}
+# The number of phases of each level of effort: the first in all classes, more in the promising ones
+EFFORTS = {"fast": 1, "normal": 3, "best": 24}
+PROMISING = 0.5  # marks behind the best class up to which a class is searched in more phases
+GOLDEN = (5**0.5 - 1) / 2  # successive multiples, modulo 1, lie far from each other
 # Widths, in lengths of the silhouette, below which parts are rounded off in classes without a tile
 ROUNDED_SHARES = (0.02, 0.04)
 HALVED_SETTINGS = ("placements", "held", "starts")  # in a search for symmetric tiles
@@ -69,21 +55,23 @@ def rounded_off(target: Target, share: float) -> Target:
 
 
 class LikenessSearch(Settings, SearchMethod):
-    """The search for likeness; the defaults are effort "normal" without the levels below.
+    """The search for likeness; the defaults are effort "normal".
 
-    - `placements`: ways to lay the outline along the template's edges that are tried, a class.
+    - `phases`: how often the outline's points are laid along it anew, shifted by a part of their
+      distance; each time gives other tiles, so that more effort never finds less.
+    - `passed`: of these, the first that are left out, as they have been searched.
+    - `placements`: ways to lay the outline along the template's edges that are tried, in a class, for
+      each orientation and body.
     - `held`: of these, the best after the springs, whose energy is minimised among tiles.
-    - `starts`: of these, the best whose corners are moved along the outline, step by step.
+    - `starts`: of all together, those of the best marks, whose corners are moved along the outline,
+      step by step.
     - `share`: of all such steps that are worked out, those that look best.
-    - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
-      a class and orientation.
+    - `finalists`: of what comes of it, the best marks that are worked out with all of the outline's
+      detail.
     - `rounds`: steps of the minimisation for finalists.
-    - `carved`: of these, the best of a class that are moved to the highest mark among the tiles of
-      their placements; none where a user says which parts matter.
-    - `judged`: whether finalists are chosen, and their corners moved, by the mark that people would
-      give rather than by what bending costs; not where hairs need all of the outline's points.
-    - `bodies`: how stiff the silhouette is, from soft to rigid; each is searched.
-    - `below`: levels of effort below that are searched, too, so that more effort never finds less.
+    - `carved`: of these, the best that are moved to the highest mark among the tiles of their
+      placements; none where a user says which parts matter.
+    - `bodies`: how stiff the silhouette is, from soft to stiff; each is searched.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
       above 0, a part of the silhouette's own narrowest if more, see `likeness.thinnest.least_neck`.
@@ -94,21 +82,19 @@ class LikenessSearch(Settings, SearchMethod):
     takes_pins: ClassVar[bool] = True
     takes_symmetric: ClassVar[bool] = True
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "fast": FAST,
-        "normal": {"below": 1},
-        "best": {**BEST, "below": 2},
+        effort: {"phases": phases} for effort, phases in EFFORTS.items()
     }
 
-    placements: Count = 200
-    held: Count = 32
-    starts: Count = 12
-    share: Annotated[float, Range(above=0, most=1)] = 0.2
-    finalists: Count = 4
-    rounds: Count = 20
-    carved: Annotated[int, Range(0)] = 1
-    judged: bool = False
-    bodies: tuple[Body, ...] = ("firm", "stiff")
-    below: Annotated[int, Range(0, 2)] = 0
+    phases: Count = EFFORTS["normal"]
+    passed: Annotated[int, Range(0)] = 0
+    placements: Count = 80
+    held: Count = 10
+    starts: Count = 6
+    share: Annotated[float, Range(above=0, most=1)] = 0.15
+    finalists: Count = 2
+    rounds: Count = 10
+    carved: Annotated[int, Range(0)] = 2
+    bodies: tuple[Body, ...] = ("soft", "firm", "stiff")
     multiples: tuple[Count, ...] = (4, 6)
     min_neck: Annotated[float, Range(0, 0.2)] = 0.01
     seed: Seed = 0
@@ -117,14 +103,13 @@ class LikenessSearch(Settings, SearchMethod):
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
-        both = self.orientations(goal, kind.divisor)
-        return fit_bending(goal.target, kind, self, both, per_class, progress, cancel)
+        phases = range(min(self.passed, self.phases - 1), self.phases)
+        both = (self.orientations(goal, kind.divisor, phase) for phase in phases)
+        return fit_bending(goal.target, kind, self, both, len(phases), per_class, progress, cancel)
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Let the silhouette bend in haste."""
-        quick = replace(self, below=0, **SKETCH)
-        both = self.orientations(goal, kind.divisor)
-        return fit_bending(goal.target, kind, quick, both, 1, silent, cancel)
+        return replace(self, passed=0, **SKETCH).fit(goal, kind, 1, silent, cancel)
 
     def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
         """Return the silhouette and, without emphasis and pins, it with thin parts rounded off."""
@@ -137,45 +122,50 @@ class LikenessSearch(Settings, SearchMethod):
         """Triangulate the silhouette and its mirror image."""
         self.orientations(goal)
 
-    def orientations(self, goal: Goal, divisor: int = 1) -> tuple[Orientation, Orientation]:
+    def orientations(
+        self, goal: Goal, divisor: int = 1, phase: int = 0
+    ) -> tuple[Orientation, Orientation]:
         """Return the silhouette and its mirror image, with a multiple of `divisor` points."""
-        step = lcm(divisor, 6)
-        return orientations(goal.target, self, emphasis=goal.emphasis, pins=goal.pins, step=step)
+        first = float(np.random.default_rng(self.seed).random()) if self.seed else 0.0
+        return orientations(
+            goal.target,
+            self.multiples,
+            (first + phase * GOLDEN) % 1.0,
+            emphasis=goal.emphasis,
+            pins=goal.pins,
+            step=lcm(divisor, 6),
+        )
 
     def least_neck(self, goal: Goal) -> float:
         """Return `min_neck`, or a part of the silhouette's own narrowest neck."""
         return least_neck(goal.target.normal, self.min_neck)
 
-    def searches(self, wanted: int = 1, *, symmetric: bool = False) -> tuple[LikenessSearch, ...]:
-        """Return the levels below, least first, and this one, with so many finalists `wanted`.
+    def of_class(self, wanted: int = 1, *, symmetric: bool = False) -> LikenessSearch:
+        """Return the search in a class of which so many tiles are `wanted`.
 
-        Each has twice as many starts as finalists at least, where more are wanted. For symmetric tiles,
+        It has twice as many starts as finalists at least, where more are wanted. For symmetric tiles,
         which have half the freedom, half as much is tried.
 
-        >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-        [4, 12, 40]
-        >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
-        [2, 6, 20]
+        >>> LikenessSearch(starts=8).of_class(symmetric=True).starts
+        4
         """
-        found: list[LikenessSearch] = []
-        for own in self._alone():
-            if symmetric:
-                fewer = {name: -(-getattr(own, name) // 2) for name in HALVED_SETTINGS}
-                own = replace(own, **fewer)
-            if own.finalists < wanted:
-                own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))
-            found.append(own)
-        return tuple(found)
-
-    def _alone(self) -> list[LikenessSearch]:
-        """Return the levels below, least first, and this one, each without those below it."""
-        normal = {name: getattr(LikenessSearch, name) for name in {**FAST, **BEST}}
-        below: list[dict[str, Any]] = [{**normal, **FAST}, normal][: self.below]
-        return [replace(self, below=0, **own) for own in (*below, {})]
+        own = self
+        if symmetric:
+            own = replace(own, **{name: -(-getattr(own, name) // 2) for name in HALVED_SETTINGS})
+        if own.finalists < wanted:
+            own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))
+        return replace(own, carved=max(own.carved, wanted)) if own.carved else own
 
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
-        """Return the sketch, the levels of effort below, and what this one has beyond them."""
-        alone = self._alone()
-        work = [float(own.starts * len(own.bodies)) for own in alone]
-        shares = [0.9 * own / sum(work) for own in work]
-        return [(0.1, Sketches(self)), *zip(shares, alone, strict=True)]
+        """Return the phases of each level of effort that this one holds."""
+        ends = sorted({*(own for own in EFFORTS.values() if own < self.phases), self.phases})
+        parts = [own for own in pairwise([0, *ends]) if own[1] > self.passed]
+        methods = [replace(self, passed=max(a, self.passed), phases=b) for a, b in parts]
+        # later phases are of a few classes
+        work = [1.0 if own.passed == 0 else (own.phases - own.passed) / 3 for own in methods]
+        return [(part / sum(work), own) for part, own in zip(work, methods, strict=True)]
+
+    def is_promising(self, tile: EscherTile, best: EscherTile) -> bool:
+        """Return whether the tile is at most `PROMISING` marks behind the best one."""
+        own, other = tile.likeness.fidelity, best.likeness.fidelity
+        return own is None or other is None or own.mark >= other.mark - PROMISING

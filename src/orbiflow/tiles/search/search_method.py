@@ -122,10 +122,14 @@ class SearchMethod(ABC):
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
         """Return methods that find more and more, each with its share of the work.
 
-        Who watches a search sees the tiles of all classes by the first, then by the second, and so on;
-        together they find what this one does.
+        A search takes one after another, each for the classes that are promising; together they find
+        what this one does.
         """
-        return [(0.05, Sketches(self)), (0.95, self)]
+        return [(1.0, self)]
+
+    def is_promising(self, tile: EscherTile, best: EscherTile) -> bool:  # noqa: ARG002
+        """Return whether a class whose best tile this is may give the best of all at the next level."""
+        return True
 
     def in_order(self, names: Sequence[str]) -> list[str]:
         """Return classes in the order in which worker processes take them: the longest first."""

@@ -17,6 +17,8 @@ TWIN_IOU = 0.9  # mutual IoU from which two tiles are one to the eye
 INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
 Outcome = EscherTile | ClassFailure
 OnTile = Callable[[EscherTile, str], object]
+IsPromising = Callable[[EscherTile, EscherTile], bool]
+"""Whether a class may give the best tile yet, from its own best and that of all."""
 STAGE_WORDS = {
     "sketch": "sketching a tile of each kind",
     "better": "improving the tiles",
@@ -39,22 +41,23 @@ class Record:
         self, names: Sequence[str], on_event: Sink, on_tile: OnTile | None = None, most: int = 1
     ) -> None:
         self.shares = dict.fromkeys(names, 0.0)
+        self.looks: dict[str, EscherTile] = {}  # for who stops the search before there is better
         self.firsts: dict[str, Outcome] = {}  # what the search is going to improve on
         self.outcomes: dict[str, Outcome] = {}
         self.on_event, self.on_tile, self.most = on_event, on_tile, most
         self.begin = time.perf_counter()
-        self._done, self._share, self._last = 0.0, 1.0, True  # of the level
+        self.stage = "final"  # how good the tiles are that are found now
+        self._done, self._share = 0.0, 0.0  # of the level
         on_event(Progress(0.0, "fitting"))
 
-    def next_level(self, share: float, *, last: bool = False) -> Record:
-        """Go on to work that has this share of the whole."""
-        self._done, self._last = 0.0 if self._last else self._done + self._share, last
-        self._share = share
+    def next_level(self, stage: str, share: float) -> Record:
+        """Go on to work that has this share of the whole, and gives tiles of a stage."""
+        self._done, self._share, self.stage = self._done + self._share, share, stage
         return self
 
     def first_look(self, tile: EscherTile) -> None:
         """Keep a tile that the search is going to improve on."""
-        self.firsts[tile.name] = tile
+        self.looks[tile.name] = tile
         seconds = time.perf_counter() - self.begin
         self.on_event(Preview(tile.name, tile.likeness.metrics.iou, seconds))
 
@@ -67,26 +70,42 @@ class Record:
         self.on_event(Progress(whole, self._what, name, share, known))
 
     @property
-    def stage(self) -> str:
-        """How good the tiles are that are found now."""
-        return "final" if self._last else "better" if self._done else "sketch"
-
-    @property
     def _what(self) -> str:
         return STAGE_WORDS[self.stage] if self.on_tile else "fitting"
 
     def level_outcome(self, found: Outcome) -> None:
         """Keep what a level of effort gave for a class, unless an earlier one gave better."""
-        whole = found
-        if self.on_tile:
-            count = self.most if self._last else 1
-            whole = self.firsts[found.name] = best_of(self.firsts.get(found.name), found, count)
-        if self._last:
-            self.outcome(whole)
-        else:
-            self.progress(found.name, 1.0)
-        if self.on_tile and isinstance(whole, EscherTile) and (self._last or whole is found):
-            for tile in whole.family():
+        sketching = self.stage == "sketch"
+        whole = best_of(self.firsts.get(found.name), found, 1 if sketching else self.most)
+        self.firsts[found.name] = whole
+        if self.stage == "final":
+            self._finish(whole)
+            return
+        self.progress(found.name, 1.0)
+        if whole is found:
+            self._show(whole)
+
+    def settled(self, names: Sequence[str], is_promising: IsPromising) -> list[str]:
+        """Finish classes that are not promising, and return the others, if there are tiles at all."""
+        tiles = {name: tile for name in names if isinstance(tile := self.firsts[name], EscherTile)}
+        if not tiles:
+            return list(names)
+        best = max(tiles.values(), key=lambda tile: tile.score)
+        kept = [name for name, tile in tiles.items() if is_promising(tile, best)]
+        self.stage = "final"
+        for name in names:
+            if name not in kept:
+                self._finish(self.firsts[name])
+        return kept
+
+    def _finish(self, found: Outcome) -> None:
+        self.shares[found.name] = 1.0
+        self.outcome(found)
+        self._show(found)
+
+    def _show(self, found: Outcome) -> None:
+        if self.on_tile and isinstance(found, EscherTile):
+            for tile in found.family():
                 if tile.certificate.valid:
                     self.on_tile(tile, self.stage)
 
@@ -108,7 +127,7 @@ class Record:
         names = list(self.shares)
         left = [name for name in names if name not in self.outcomes]
         for name in left:
-            first = self.firsts.get(name)
+            first = self.firsts.get(name) or self.looks.get(name)
             is_tile = isinstance(first, EscherTile)
             self.outcome(first if is_tile else ClassFailure(name, INTERRUPTED), 0.0)
         outcomes = self.outcomes.values()

@@ -206,9 +206,10 @@ class _Distortion:
         self.mesh, self.images = mesh, points.copy()
         self.fixed = mesh.size + len(mesh.sides)
         edges = triangle_sides(mesh.points, mesh.triangles)
-        self.inverse = np.linalg.inv(edges)
         self.area = np.linalg.det(edges) / 2
         self.area /= self.area.sum()
+        self.slopes = _slopes(mesh, np.linalg.inv(edges))
+        self.back = self.slopes.T.tocsr()
         self.start = points[self.fixed :].ravel()
         self.epsilon = 1.0
         self.sharpen(self.smallest(self.start))
@@ -219,33 +220,49 @@ class _Distortion:
         return images
 
     def smallest(self, x: Array) -> float:
-        return float(np.linalg.det(self._jacobians(x)).min())
+        (a, c), (b, d) = self._jacobians(x)
+        return float((a * d - b * c).min())
 
     def sharpen(self, smallest: float) -> None:
         """Bound the determinants less far from 0, so that the smallest still has an effect."""
         self.epsilon = min(0.5 * self.epsilon, 0.1 * abs(min(smallest, 0.0)) + 1e-6)
 
     def _jacobians(self, x: Array) -> Array:
-        return triangle_sides(self.points(x), self.mesh.triangles) @ self.inverse
+        """Return the derivatives (2, 2, M) of the map's x and y, first those along x."""
+        return (self.slopes @ self.points(x)).reshape(2, -1, 2).swapaxes(1, 2)
 
     def value(self, x: Array) -> tuple[float, Array]:
-        j = self._jacobians(x)
-        det: Array = np.linalg.det(j)
+        (a, c), (b, d) = self._jacobians(x)
+        det = a * d - b * c
         root = np.sqrt(det**2 + self.epsilon**2)
         # (det + root) / 2 without cancellation
         bounded = np.where(det > 0, det + root, self.epsilon**2 / (root + abs(det))) / 2
-        norm = (j**2).sum(axis=(1, 2))
-        cofactor = np.stack(
-            [np.stack([j[:, 1, 1], -j[:, 1, 0]], -1), np.stack([-j[:, 0, 1], j[:, 0, 0]], -1)], 1
-        )
-        energy = self.area * norm / bounded
-        slope = -norm / (bounded * root)
-        by_j = self.area[:, None, None] * (
-            2 * j / bounded[:, None, None] + slope[:, None, None] * cofactor
-        )
-        by_edge = by_j @ np.swapaxes(self.inverse, 1, 2)
-        gradient = np.zeros_like(self.images)
-        for corner, part in ((1, by_edge[:, :, 0]), (2, by_edge[:, :, 1])):
-            np.add.at(gradient, self.mesh.triangles[:, corner], part)
-            np.add.at(gradient, self.mesh.triangles[:, 0], -part)
+        energy = self.area * (a**2 + b**2 + c**2 + d**2) / bounded
+        larger, slope = 2 * self.area / bounded, -energy / root
+        by_j = [
+            [larger * a + slope * d, larger * c - slope * b],
+            [larger * b - slope * c, larger * d + slope * a],
+        ]
+        gradient = self.back @ np.array(by_j).swapaxes(1, 2).reshape(-1, 2)
         return float(energy.sum()), gradient[self.fixed :].ravel()
+
+
+def _slopes(mesh: Mesh, inverse: Array) -> Any:
+    """Return the matrix (2 M, N) of the derivatives along x, then y, of what is linear on triangles.
+
+    `inverse` (M, 2, 2) is of the triangles' sides.
+    """
+    import scipy.sparse
+
+    count = len(mesh.triangles)
+    weights = np.stack(
+        [-inverse.sum(axis=1), inverse[:, 0], inverse[:, 1]]
+    )  # of corners, (3, M, 2)
+    rows = np.arange(2 * count).reshape(2, -1)
+    at = (
+        np.broadcast_to(rows, (3, 2, count)),
+        np.broadcast_to(mesh.triangles.T[:, None], (3, 2, count)),
+    )
+    shape = (2 * count, len(mesh.points))
+    flat = tuple(part.ravel() for part in at)
+    return scipy.sparse.csr_matrix((weights.swapaxes(1, 2).ravel(), flat), shape=shape)
