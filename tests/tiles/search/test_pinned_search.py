@@ -10,7 +10,7 @@ import pytest
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Call, Event, call_from_json
-from orbiflow.tiles.search.likeness_search import FAST
+from orbiflow.tiles import LikenessSearch
 from runtime.searches import check_order, run
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -34,8 +34,7 @@ def pinned_call(folder: Path, pin: str) -> Call:
 
 def test_what_was_pinned_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     small = {"placements": 20, "held": 4, "starts": 2, "rounds": 4, "multiples": (2,)}
-    for name, few in small.items():
-        monkeypatch.setitem(FAST, name, few)
+    monkeypatch.setitem(LikenessSearch.efforts, "fast", {**small, "phases": 1})  # pyright: ignore
     events: list[Event] = []
     run(pinned_call(tmp_path, HEAD), events.append)
     check_order(events, "IH4")

@@ -139,13 +139,13 @@ class Measures:
 
     def _moved(self, z: Complex) -> Measured:
         own, goal, n = z - z.mean(), self._centered, len(z)
-        factor = complex(np.vdot(own, goal)) / float(np.vdot(own, own).real)
+        factor = _product(own, goal) / _product(own, own).real
         missed = factor * own - goal
 
         def gradient() -> Complex:
             return 2 / n * (abs(factor) ** 2 * own - np.conj(factor) * goal)
 
-        return float(np.vdot(missed, missed).real) / n, gradient
+        return _product(missed, missed).real / n, gradient
 
 
 class _Discs(NamedTuple):
@@ -183,7 +183,7 @@ class _Pieces:
     def __init__(self, rest: Complex, halves: tuple[int, int]) -> None:
         self.rest, self.halves = rest, halves
         self.count = 2.0 * np.array(halves)[:, None] + 1
-        self.sum, square = self.windows(np.stack([rest, abs(rest) ** 2])[:, None])
+        self.sum, square = self.windows(np.stack([rest, rest * np.conj(rest)])[:, None])
         self.square = square.real - abs(self.sum) ** 2 / self.count
 
     def windows(self, values: Complex) -> Complex:
@@ -205,7 +205,7 @@ class _Pieces:
         """
         rest, count = self.rest, self.count
         own, square, common = self.windows(
-            np.stack([z, z.real**2 + z.imag**2, np.conj(rest) * z])[:, None]
+            np.stack([z, z * np.conj(z), np.conj(rest) * z])[:, None]
         )
         common -= np.conj(self.sum) * own / count
         sizes = self.square + square.real - (own.real**2 + own.imag**2) / count
@@ -227,8 +227,13 @@ class _Pieces:
 def _normal(z: Complex) -> tuple[float, Complex]:
     """Return the root of the area, and the outline about the origin with area 1."""
     about = z - z.mean()
-    size = float(np.sqrt(abs(np.vdot(about, _shifted(about, -1)).imag) / 2))
+    size = float(np.sqrt(abs(_product(about, _shifted(about, -1)).imag) / 2))
     return size, about / size
+
+
+def _product(a: Complex, b: Complex) -> complex:
+    """Return the sum of conj(a) b."""
+    return complex(np.vdot(a, b))  # pyright: ignore[reportUnknownArgumentType]
 
 
 def _area_gradient(z: Complex) -> Complex:

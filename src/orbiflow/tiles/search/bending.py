@@ -154,7 +154,7 @@ class _Lot(NamedTuple):
     def marks(self) -> list[float]:
         """The marks (C,) that people would give, less where a shape crosses itself."""
         rings = self.points[: self.body.size].T
-        simple = shapely.is_valid(shapely.polygons(plane_points(rings))).tolist()
+        simple = np.asarray(shapely.is_valid(shapely.polygons(plane_points(rings)))).tolist()
         marks = [kept_of(self.body.measures, ring, 0.0).mark for ring in rings]
         return [mark - CROSSING_MARKS * (not own) for mark, own in zip(marks, simple, strict=True)]
 
@@ -408,7 +408,12 @@ class PlacedTiles(StillTiles):
 
     def __init__(self, kind: IsohedralClass, silhouette: Array, tiles: Sequence[Bent]) -> None:
         self.kind, self.tiles = kind, tiles
-        self._overlap = cache(lambda side: Overlap(silhouette * (1.0, -1.0 if side else 1.0)))
+
+        @cache
+        def overlap(mirrored: bool) -> Overlap:
+            return Overlap(silhouette * (1.0, -1.0 if mirrored else 1.0))
+
+        self._overlap = overlap
         self._placed: dict[int, PlacedBent] = {}
 
     @property

@@ -26,7 +26,7 @@ from orbiflow.tiles.tilings import IsohedralClass
 Body = Literal["soft", "firm", "stiff"]
 
 # Settings of the preview; a soft body crosses itself least often, and one takes half as long as two
-SKETCH = {
+SKETCH: dict[str, Any] = {
     "phases": 1,
     "placements": 60,
     "held": 6,
@@ -37,7 +37,7 @@ SKETCH = {
     "bodies": ("soft",),
 }
 # The number of phases of each level of effort: the first in all classes, more in the promising ones
-EFFORTS = {"fast": 1, "normal": 3, "best": 24}
+EFFORTS = {"fast": 1, "normal": 2, "best": 24}
 PROMISING = 0.5  # marks behind the best class up to which a class is searched in more phases
 GOLDEN = (5**0.5 - 1) / 2  # successive multiples, modulo 1, lie far from each other
 # Widths, in lengths of the silhouette, below which parts are rounded off in classes without a tile

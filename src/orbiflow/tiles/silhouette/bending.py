@@ -236,14 +236,15 @@ class _Distortion:
         det = a * d - b * c
         root = np.sqrt(det**2 + self.epsilon**2)
         # (det + root) / 2 without cancellation
-        bounded = np.where(det > 0, det + root, self.epsilon**2 / (root + abs(det))) / 2
-        energy = self.area * (a**2 + b**2 + c**2 + d**2) / bounded
-        larger, slope = 2 * self.area / bounded, -energy / root
+        bounded: Array = np.where(det > 0, det + root, self.epsilon**2 / (root + abs(det))) / 2
+        energy: Array = self.area * (a**2 + b**2 + c**2 + d**2) / bounded
+        larger: Array = 2 * self.area / bounded
+        slope: Array = -energy / root
         by_j = [
             [larger * a + slope * d, larger * c - slope * b],
             [larger * b - slope * c, larger * d + slope * a],
         ]
-        gradient = self.back @ np.array(by_j).swapaxes(1, 2).reshape(-1, 2)
+        gradient: Array = self.back @ np.array(by_j).swapaxes(1, 2).reshape(-1, 2)
         return float(energy.sum()), gradient[self.fixed :].ravel()
 
 
@@ -255,14 +256,10 @@ def _slopes(mesh: Mesh, inverse: Array) -> Any:
     import scipy.sparse
 
     count = len(mesh.triangles)
-    weights = np.stack(
-        [-inverse.sum(axis=1), inverse[:, 0], inverse[:, 1]]
-    )  # of corners, (3, M, 2)
-    rows = np.arange(2 * count).reshape(2, -1)
-    at = (
-        np.broadcast_to(rows, (3, 2, count)),
-        np.broadcast_to(mesh.triangles.T[:, None], (3, 2, count)),
-    )
-    shape = (2 * count, len(mesh.points))
-    flat = tuple(part.ravel() for part in at)
-    return scipy.sparse.csr_matrix((weights.swapaxes(1, 2).ravel(), flat), shape=shape)
+    # of the corners (3, M, 2)
+    weights = np.stack([-inverse.sum(axis=1), inverse[:, 0], inverse[:, 1]])
+    rows = np.broadcast_to(np.arange(2 * count).reshape(2, -1), (3, 2, count))
+    columns = np.broadcast_to(mesh.triangles.T[:, None], (3, 2, count))
+    own = weights.swapaxes(1, 2).ravel(), (rows.ravel(), columns.ravel())
+    made: Any = scipy.sparse.csr_matrix
+    return made(own, shape=(2 * count, len(mesh.points)))
