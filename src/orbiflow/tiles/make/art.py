@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from orbiflow import __version__
 from orbiflow.arrays import Array
 from orbiflow.drawing import palette, png_bytes
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Outcome
+from orbiflow.runtime import Cancel, Outcome, SideBySide, Tell
 from orbiflow.tiles.make.art_settings import ArtSettings
 from orbiflow.tiles.make.repeats import repeating_page
 from orbiflow.tiles.motifs import (
@@ -243,9 +244,9 @@ def render_page(
     rings = np.array(every.rings()) * (pixels * samples)
     page_width, page_height = (round(side * pixels) for side in page.size)
     low, high = rings[..., 1].min(axis=1), rings[..., 1].max(axis=1)
-    result = np.empty((page_height, page_width, 3), dtype=np.uint8)
     step = max(1, BAND // (page_width * samples * samples))
-    for top in range(0, page_height, step):
+
+    def band(top: int, _tell: Tell) -> np.ndarray:
         cancel.check()
         rows = min(step, page_height - top)
         first = top * samples
@@ -255,8 +256,11 @@ def render_page(
         named = found._replace(label=np.where(unpainted, NOWHERE, near[found.label]))
         colours = look(named, first).reshape(rows * samples, page_width * samples, 3)
         mean = _pooled(colours, samples) * 255 + 0.5
-        result[top : top + rows] = mean.clip(0, 255).astype(np.uint8)
-    return result
+        return mean.clip(0, 255).astype(np.uint8)
+
+    with SideBySide() as beside:
+        bands = [beside.begin(partial(band, top)) for top in range(0, page_height, step)]
+        return np.concatenate([finished() for finished in bands])
 
 
 def _with_hidden(page: Page) -> tuple[Page, NDArray[np.bool_]]:

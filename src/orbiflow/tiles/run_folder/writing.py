@@ -13,6 +13,7 @@ from orbiflow.drawing import Sheet
 from orbiflow.runtime import (
     Note,
     ResultFolder,
+    SideBySide,
     Sink,
     Written,
     ignore,
@@ -102,7 +103,7 @@ def write_gallery(
     """Write each tile's folder, `overview.png` and `index.html`.
 
     As many processes as searched draw `figures`; without these, starting one would take longer than
-    drawing. There is at least one tile. `shown_out` is what the page's commands call the folder.
+    drawing, and threads do. There is at least one tile. `shown_out` is what the page's commands call the folder.
 
     Raises:
         OutputError: If a file cannot be written.
@@ -113,8 +114,9 @@ def write_gallery(
     draw = functools.partial(_draw, target, figures)
     items = list(zip(tiles, colours, (out / name for name in names), strict=True))
     if result.workers == 1 or len(tiles) == 1 or not figures:
-        for item in items:
-            draw(item)
+        with SideBySide() as beside:
+            for drawn in [beside.begin(functools.partial(draw, item)) for item in items]:
+                drawn()
     else:
         with contextlib.closing(work(draw, items, result.workers)) as news:
             for _ in news:
