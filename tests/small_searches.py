@@ -12,7 +12,7 @@ from orbiflow.tiles import LikenessSearch
 from orbiflow.tiles.search.likeness_search import SKETCH
 
 FEW: dict[str, Any] = {
-    "placements": 10, "held": 3, "starts": 2, "finalists": 1, "rounds": 2, "carved": 0,
+    "phases": 1, "placements": 10, "held": 3, "starts": 2, "finalists": 1, "rounds": 2, "carved": 0,
     "bodies": ("firm",), "multiples": (2,),
 }  # fmt: skip
 

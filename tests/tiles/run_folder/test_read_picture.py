@@ -91,7 +91,7 @@ def test_a_failed_search_leaves_the_earlier_run(
         assert (out / "read-next.png").is_file()  # before the search
         raise RuntimeError
 
-    monkeypatch.setattr("orbiflow.tiles.search.escherizing._search", fail)
+    monkeypatch.setattr("orbiflow.tiles.search.escherizing._search_by_levels", fail)
     with pytest.raises(RuntimeError):
         operations.escherize(picture, out, on_event=told.append)
     note = f"read-next.png, and in {out / 'read.png'} once this run replaces the earlier one"

@@ -232,9 +232,10 @@ class _Distortion:
         return (self.slopes @ self.points(x)).reshape(2, -1, 2).swapaxes(1, 2)
 
     def value(self, x: Array) -> tuple[float, Array]:
-        (a, c), (b, d) = self._jacobians(x)
-        det = a * d - b * c
-        root = np.sqrt(det**2 + self.epsilon**2)
+        jacobians: list[list[Array]] = list(map(list, self._jacobians(x)))
+        (a, c), (b, d) = jacobians
+        det: Array = a * d - b * c
+        root: Array = np.sqrt(det**2 + self.epsilon**2)
         # (det + root) / 2 without cancellation
         bounded: Array = np.where(det > 0, det + root, self.epsilon**2 / (root + abs(det))) / 2
         energy: Array = self.area * (a**2 + b**2 + c**2 + d**2) / bounded
