@@ -1,22 +1,34 @@
 """Tiles for the paper's nine goals, beside published figures and the tiles of EST and ARAP.
 
     python benchmarks/escherization.py [--effort fast|normal|best] [--distorted] [--quick] [GOAL ...]
+    python benchmarks/escherization.py --against CHECKOUT [--effort ...] [GOAL or FILE ...]
 
 True-aspect polygons, or with --distorted the PNGs that the paper used, each axis stretched to a
 square. The rows of EST and ARAP are the best of their twenty tiles by our metrics after the best
 similarity (`baseline_tiles.py`). Bars: IoU at least EST's best, Dice at least the best of the paper's
 two columns and EST's.
+
+With --against, the search for likeness instead, and that of another checkout: the whole command with
+one worker, one after the other for each goal. Printed are seconds by the clock and of the processor,
+the marks of the first tiles, whether all is certified, and the ratios' medians.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import math
 import os
+import resource
+import subprocess
+import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 import torch
-from common import DATA, GOALS, goal, needed, published
+from common import BUNDLED, DATA, GOALS, ROOT, goal, needed, published
 
 from orbiflow.tiles import CLASSES, EscherizeSettings, EscherTile, OverlapSearch, Target, escherize
 
@@ -44,6 +56,47 @@ def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], fl
     return sorted(found.tiles, key=lambda r: -r.likeness.metrics.iou), time.perf_counter() - begin
 
 
+def command(tree: Path, picture: Path, effort: str) -> tuple[float, float, float, bool]:
+    """Seconds by the clock and of the processor, the first tile's mark, whether all is certified."""
+    with tempfile.TemporaryDirectory() as folder:
+        own = [str(picture), "--effort", effort, "--workers", "1", "--out", f"{folder}/run"]
+        begin, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(
+            [sys.executable, "-m", "orbiflow", "escherize", *own],
+            env={**os.environ, "PYTHONPATH": str(tree / "src"), "OMP_NUM_THREADS": "1"},
+            check=True,
+            capture_output=True,
+        )
+        clock, after = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
+        tiles = json.loads(Path(folder, "run", "result.json").read_text())["tiles"]
+    score = min(max(tiles[0]["score"], 1e-9), 1 - 1e-9)
+    mark = 6.1 + math.log(score / (1 - score)) / 1.6  # as `Fidelity.score` is made
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return clock, spent, mark, all(tile["certificate"]["valid"] for tile in tiles)
+
+
+def compare(tree: Path, effort: str, goals: list[str]) -> None:
+    """Print the table of this checkout's search and another's."""
+    rows = []
+    print(f"effort {effort:19} clock: before  now   processor: before  now   marks: before  now")
+    for name in goals:
+        picture = Path(name) if Path(name).is_file() else BUNDLED / "nagata" / f"{name}.dat"
+        before, now = (command(own, picture, effort) for own in (tree, ROOT))
+        rows.append((before, now))
+        marks = f"{before[2]:15.2f}{now[2]:6.2f}{'' if now[3] else '  NOT CERTIFIED'}"
+        print(
+            f"{picture.stem:26}{before[0]:9.1f}{now[0]:7.1f}{before[1]:19.1f}{now[1]:7.1f}{marks}",
+            flush=True,
+        )
+    table = np.array([[before[:3], now[:3]] for before, now in rows])
+    clock, spent, _ = np.median(table[:, 1] / table[:, 0], axis=0)
+    gains = table[:, 1, 2] - table[:, 0, 2]
+    print(
+        f"medians of ratios: clock {clock:.2f}, processor {spent:.2f}; "
+        f"marks {gains.mean():+.3f} in the mean, {gains.min():+.2f} at least"
+    )
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -51,8 +104,12 @@ def main() -> None:
     parser.add_argument("--effort", choices=("fast", "normal", "best"), default="normal")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--distorted", action="store_true")
+    parser.add_argument("--against", type=Path, help="another checkout")
     parser.add_argument("--quick", action="store_true", help="one goal, effort fast")
     options = parser.parse_args()
+    if options.against:
+        compare(options.against, options.effort, options.goals or [*GOALS])
+        return
     torch.set_num_threads(1)
     figures = published("nine_goals")
     goals = options.goals or (["dolphin_60"] if options.quick else GOALS)

@@ -103,7 +103,8 @@ def write_gallery(
     """Write each tile's folder, `overview.png` and `index.html`.
 
     As many processes as searched draw `figures`; without these, starting one would take longer than
-    drawing, and threads do. There is at least one tile. `shown_out` is what the page's commands call the folder.
+    drawing, and threads do. There is at least one tile. `shown_out` is what the page's commands call
+    the folder.
 
     Raises:
         OutputError: If a file cannot be written.

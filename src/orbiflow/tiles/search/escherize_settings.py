@@ -59,7 +59,7 @@ class SearchSettings(Settings, group="Search"):
     the silhouette."""
 
     effort: Annotated[Literal["fast", "normal", "best"], OnlyWith(method="descent")] = "normal"
-    """How long the search takes: seconds, a quarter of a minute, or minutes."""
+    """How long the search takes: seconds, a quarter of a minute, or a minute and more."""
 
     objective: Annotated[Literal["likeness", "overlap"], OnlyWith(method="descent")] = "likeness"
     """With likeness, the silhouette bends until it is a tile, and every limb is kept. With overlap,

@@ -6,7 +6,7 @@ export const EFFORTS = { fast: "Quick", normal: "Careful", best: "Thorough" };
 export const EFFORT_TIMES = {
   fast: "Half a minute or so.",
   normal: "About a minute: usually better.",
-  best: "Several minutes: the best we can do.",
+  best: "A minute or two: the best we can do.",
 };
 
 export const OBJECTIVES = { likeness: "Looks alike", overlap: "Covers it best" };
