@@ -74,7 +74,7 @@ class SearchChoice(Settings, group="Search"):
     """How tiles are searched for in the studio."""
 
     effort: Literal["fast", "normal", "best"] = "normal"
-    """How long the search takes: seconds, a quarter of a minute, or minutes."""
+    """How long the search takes: seconds, a quarter of a minute, or a minute and more."""
 
     objective: Literal["likeness", "overlap"] = "likeness"
     """With likeness, the picture bends until it is a tile; with overlap, the tile covers the picture
