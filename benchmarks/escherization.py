@@ -31,6 +31,7 @@ import torch
 from common import BUNDLED, DATA, GOALS, ROOT, goal, needed, published
 
 from orbiflow.tiles import CLASSES, EscherizeSettings, EscherTile, OverlapSearch, Target, escherize
+from orbiflow.tiles.likeness.faithful import GOOD_MARK, STEEPNESS
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}
 
@@ -70,7 +71,7 @@ def command(tree: Path, picture: Path, effort: str) -> tuple[float, float, float
         clock, after = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
         tiles = json.loads(Path(folder, "run", "result.json").read_text())["tiles"]
     score = min(max(tiles[0]["score"], 1e-9), 1 - 1e-9)
-    mark = 6.1 + math.log(score / (1 - score)) / 1.6  # as `Fidelity.score` is made
+    mark = GOOD_MARK + math.log(score / (1 - score)) / STEEPNESS  # as `Fidelity.score` is made
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return clock, spent, mark, all(tile["certificate"]["valid"] for tile in tiles)
 

@@ -34,7 +34,7 @@ def pinned_call(folder: Path, pin: str) -> Call:
 
 def test_what_was_pinned_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     small = {"placements": 20, "held": 4, "starts": 2, "rounds": 4, "multiples": (2,)}
-    monkeypatch.setitem(LikenessSearch.efforts, "fast", {**small, "phases": 1})  # pyright: ignore
+    monkeypatch.setitem(LikenessSearch.efforts, "fast", {**small, "phases": 1})  # pyright: ignore[reportArgumentType]
     events: list[Event] = []
     run(pinned_call(tmp_path, HEAD), events.append)
     check_order(events, "IH4")

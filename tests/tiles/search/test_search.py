@@ -313,6 +313,11 @@ def test_later_phases_are_of_promising_classes() -> None:
     assert first[0].name in again
 
 
+def test_a_search_that_leaves_no_phase_is_refused() -> None:
+    with pytest.raises(OrbiflowError, match="passed 2 of 2 phases leaves none to search"):
+        LikenessSearch(phases=2, passed=2)
+
+
 def test_a_first_look_is_one_small_search() -> None:
     own = replace(LikenessSearch.for_effort("best"), passed=0, **SKETCH)
     assert [level for _, level in own.levels()] == [own]

@@ -114,7 +114,10 @@ def write_gallery(
     colours = [colouring(tile.tile) for tile in tiles]
     draw = functools.partial(_draw, target, figures)
     items = list(zip(tiles, colours, (out / name for name in names), strict=True))
-    if result.workers == 1 or len(tiles) == 1 or not figures:
+    if result.workers == 1 or len(tiles) == 1:
+        for item in items:
+            draw(item)
+    elif not figures:
         with SideBySide() as beside:
             for drawn in [beside.begin(functools.partial(draw, item)) for item in items]:
                 drawn()

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.likeness import least_neck
@@ -99,11 +99,18 @@ class LikenessSearch(Settings, SearchMethod):
     min_neck: Annotated[float, Range(0, 0.2)] = 0.01
     seed: Seed = 0
 
+    def check(self) -> None:
+        super().check()
+        if self.passed >= self.phases:
+            raise SettingError(
+                f"passed {self.passed} of {self.phases} phases leaves none to search; choose fewer"
+            )
+
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
-        phases = range(min(self.passed, self.phases - 1), self.phases)
+        phases = range(self.passed, self.phases)
         both = (self.orientations(goal, kind.divisor, phase) for phase in phases)
         return fit_bending(goal.target, kind, self, both, len(phases), per_class, progress, cancel)
 
@@ -119,8 +126,8 @@ class LikenessSearch(Settings, SearchMethod):
         return [(0.0, goal), *rounded]
 
     def prepare(self, goal: Goal) -> None:
-        """Triangulate the silhouette and its mirror image."""
-        self.orientations(goal)
+        """Triangulate the silhouette and its mirror image, as the first phase has them."""
+        self.orientations(goal, phase=self.passed)
 
     def orientations(
         self, goal: Goal, divisor: int = 1, phase: int = 0
