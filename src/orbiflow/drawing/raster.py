@@ -21,7 +21,7 @@ from orbiflow.arrays import Array, Window
 FINER = 3
 """Factor by which each side of a pixel is drawn finer."""
 
-MAX_FINE_PIXELS = 2**22
+MAX_FINE_PIXELS = 2**20
 """Pixels of a band that is drawn at once, which bounds the memory; the fastest power of two."""
 
 MIN_DIFFERENCE = 16
@@ -77,8 +77,10 @@ def draw_line(
     steps = np.diff(path, axis=0)
     cross = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
     turn = np.abs(np.arctan2(cross, (steps[:-1] * steps[1:]).sum(axis=1)))
-    for point in (*path[1:-1][turn > SHARP_TURN], path[0], path[-1]):
-        pen.circle(tuple(point.tolist()), (whole - 1) / 2, fill=colour)
+    round_ones = np.concatenate([path[1:-1][turn > SHARP_TURN], path[[0, -1]]])
+    shown = abs(round_ones[:, 1] - pen.im.size[1] / 2) < pen.im.size[1] / 2 + whole
+    for x, y in round_ones[shown].tolist():
+        pen.circle((x, y), (whole - 1) / 2, fill=colour)
 
 
 def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:

@@ -76,6 +76,8 @@ class Curve:
 
         The ends of the pieces are among them; a closed curve's first point is not repeated.
         """
+        if self.straight.all():
+            return self.pieces[:, 0] if self.closed else np.vstack([self.pieces[:, 0], self.end])
         second = np.diff(self.pieces, n=2, axis=1)
         bend = 6 * np.linalg.norm(second, axis=2).max(axis=1)
         count = np.maximum(1, np.ceil(np.sqrt(bend / 8 / tolerance)).astype(int))

@@ -140,14 +140,17 @@ class Sketch:
         on_page: bool = False,
     ) -> None:
         """Draw a line with round ends along points (N, 2) of the plane, or of the page."""
-        width = max(width, LEAST_LINE) if self.sheet.printed else width
-        curve = Curve.polyline(points if on_page else self.on_page(points), closed=closed)
-        self.items.append(Part((curve,), Style(None, colour, width)))
+        own = points if on_page else self.on_page(points)
+        self._stroke([Curve.polyline(own, closed=closed)], colour, width)
 
     def dashed(self, points: Array, colour: str, width: float, unit: float) -> None:
         """Draw a dashed line along points (N, 2) of the page, with dashes in proportion to a unit."""
-        for piece in dashes(points, 0.009 * unit, 0.006 * unit):
-            self.line(piece, colour, width, on_page=True)
+        pieces = dashes(points, 0.009 * unit, 0.006 * unit)
+        self._stroke([Curve.polyline(piece) for piece in pieces], colour, width)
+
+    def _stroke(self, curves: Sequence[Curve], colour: str, width: float) -> None:
+        width = max(width, LEAST_LINE) if self.sheet.printed else width
+        self.items.append(Part(tuple(curves), Style(None, colour, width)))
 
     def arrow(self, start: Array, end: Array, colour: str, width: float) -> None:
         """Draw an arrow from a point (2,) of the plane to another, with its head at the end."""
@@ -196,8 +199,14 @@ def dashes(points: Array, on: float, off: float) -> list[Array]:
     >>> [piece[:, 0].tolist() for piece in dashes(np.array([[0.0, 0.0], [5.0, 0.0]]), 2, 1)]
     [[0.0, 2.0], [3.0, 5.0]]
     """
-    from shapely.ops import substring
-
-    line = shapely.LineString(points)
-    starts = np.arange(0.0, line.length, on + off).tolist()
-    return [np.asarray(substring(line, start, start + on).coords) for start in starts]
+    at = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    starts = np.arange(0.0, at[-1], on + off)
+    ends = np.minimum(starts + on, at[-1])
+    first, last = (
+        np.stack([np.interp(own, at, points[:, k]) for k in (0, 1)], axis=1)
+        for own in (starts, ends)
+    )
+    within = zip(np.searchsorted(at, starts, "right"), np.searchsorted(at, ends), strict=True)
+    return [
+        np.vstack([first[k], points[low:high], last[k]]) for k, (low, high) in enumerate(within)
+    ]

@@ -80,7 +80,7 @@ def write_tile_folder(
     contents: dict[str, Callable[[], str | bytes]] = {
         "tile.svg": lambda: tile_picture(tile, y_down=y_down, title=title).svg(),
         "tiling.svg": lambda: tiling(Sheet.column(300.0)).svg(),
-        "tiling.png": lambda: tiling().png(),
+        "tiling.png": lambda: tiling(Sheet.screen(1200)).png(),
         "overlay.png": lambda: comparison(result, target, label=label).png(),
         "tiling.pdf": lambda: tiling(printed).file(),
         "overlay.pdf": lambda: comparison(result, target, sheet=printed).file(),

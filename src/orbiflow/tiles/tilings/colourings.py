@@ -1,7 +1,9 @@
 """Colourings in which tiles that share an edge differ: periodic, with few colours."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -54,7 +56,7 @@ def colour_graph(graph: Graph, count: int) -> list[int] | None:
 # (a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c
 Sublattice: TypeAlias = tuple[int, int, int]
 
-_MAX_INDEX = 9
+_INDICES = range(1, 10)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,18 +107,26 @@ def colouring(tile: Tiles) -> Colouring:
     3
     """
     tiling = as_tiling(tile)
-    graphs = _loop_free_quotients(_links(tiling))
-    most = max(len(near) for _, graph in graphs for near in graph) + 1
-    for count in range(1, most + 1):
-        for sublattice, graph in graphs:
-            colours = colour_graph(graph, count)
-            if colours is not None:
-                shape = (len(tiling.aspects), sublattice[0], sublattice[2])
-                # the most frequent colour first
-                order = np.argsort(-np.bincount(colours), kind="stable")
-                table = np.argsort(order)[np.array(colours)].reshape(shape)
-                return Colouring(tiling, count, sublattice, table)
-    raise RuntimeError("unreachable: maximal degree + 1 colours always suffice")
+    links = _links(tiling)
+    graph_of = cache(partial(_quotient, links))  # few are needed
+
+    def is_loop_free(sublattice: Sublattice) -> bool:
+        return all(node not in near for node, near in enumerate(graph_of(sublattice)))
+
+    sublattices, size = [h for index in _INDICES for h in _sublattices(index)], max(_INDICES)
+    while not any(is_loop_free(own) for own in sublattices):
+        size *= 2
+        sublattices = [(size, 0, size)]
+    tries = (
+        (count, sublattice, colour_graph(graph_of(sublattice), count))
+        for count in itertools.count(_least_colours(links))  # one more than neighbours is enough
+        for sublattice in filter(is_loop_free, sublattices)
+    )
+    count, sublattice, colours = next(own for own in tries if own[2] is not None)
+    shape = (len(tiling.aspects), sublattice[0], sublattice[2])
+    order = np.argsort(-np.bincount(colours), kind="stable")  # the most frequent colour first
+    table = np.argsort(order)[np.array(colours)].reshape(shape)
+    return Colouring(tiling, count, sublattice, table)
 
 
 def reduce_cell(cell: Any, sublattice: Sublattice) -> tuple[Any, Any]:
@@ -141,16 +151,15 @@ def _links(tiling: Tiling) -> _Links:
     return links
 
 
-def _loop_free_quotients(links: _Links) -> list[tuple[Sublattice, Graph]]:
-    sublattices = [h for index in range(1, _MAX_INDEX + 1) for h in _sublattices(index)]
-    size = _MAX_INDEX
-    while True:
-        graphs = [(h, _quotient(links, h)) for h in sublattices]
-        usable = [(h, g) for h, g in graphs if all(i not in near for i, near in enumerate(g))]
-        if usable:
-            return usable
-        size *= 2
-        sublattices = [(size, 0, size)]
+def _least_colours(links: _Links) -> int:
+    """Return 1 without neighbours, 3 where three tiles are neighbours of each other, else 2."""
+    near = [set(own) for own in links]
+    triangle = any(
+        (other, (u - a, v - b)) in near[one]
+        for own in links
+        for (one, (a, b)), (other, (u, v)) in itertools.combinations(own, 2)
+    )
+    return 3 if triangle else 2 if any(links) else 1
 
 
 def _sublattices(index: int) -> Iterator[Sublattice]:

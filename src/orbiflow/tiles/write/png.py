@@ -193,22 +193,28 @@ def _draw_sheet(
     table: Mapping[str, Colour],
 ) -> None:
     """Draw a layer on a band, FINER times as fine, of so many rows of pixels from `top` on."""
-    below = None if sheet.window is None else band.copy()
+    outside = [] if sheet.window is None else _outside(band, sheet.window, top)
+    kept = [(box, band.crop(box)) for box in outside]
     for item in sheet.items:
         if isinstance(item, Raster):
             _draw_raster(band, item, pictures[item.png], top)
             continue
         if item.low <= top + rows and item.high >= top:
             _draw_shape(band, item, top, table)
-    if sheet.window is not None and below is not None:
-        left, upper, right, lower = (
-            round(FINER * (side - shift))
-            for side, shift in zip(sheet.window, (0, top, 0, top), strict=True)
-        )
-        inside = Image.new("1", band.size)
-        ImageDraw.Draw(inside).rectangle([left, upper, right - 1, lower - 1], fill=1)
-        below.paste(band, (0, 0), inside)
-        band.paste(below, (0, 0))
+    for box, before in kept:
+        band.paste(before, box)
+
+
+def _outside(band: Image.Image, window: Box, top: int) -> list[tuple[int, int, int, int]]:
+    """Return the rectangles of a band, which begins at a row, that a window leaves out."""
+    (left, upper), (right, lower) = (
+        np.rint((np.array(corner) - (0, top)) * FINER).astype(int).clip(0, band.size).tolist()
+        for corner in (window[:2], window[2:])
+    )
+    width, height = band.size
+    sides = (0, 0, width, upper), (0, lower, width, height), (0, upper, left, lower)
+    boxes = (*sides, (right, upper, width, lower))
+    return [box for box in boxes if box[2] > box[0] and box[3] > box[1]]
 
 
 def _draw_shape(band: Image.Image, shape: Shape, top: int, table: Mapping[str, Colour]) -> None:
