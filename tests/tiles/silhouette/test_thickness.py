@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles import resampled
-from orbiflow.tiles.silhouette import local_thickness, triangulate
+from orbiflow.tiles.silhouette import triangulate
 from outlines import bar, comb, disc, dumbbell
 
 
 def thickness(ring: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """At the triangles' middles, with these."""
     mesh = triangulate(resampled(ring, count))
-    return mesh.points[mesh.triangles].mean(axis=1), local_thickness(mesh)
+    return mesh.points[mesh.triangles].mean(axis=1), mesh.local_thickness
 
 
 def test_a_disc_is_as_thick_everywhere() -> None:

@@ -24,7 +24,7 @@ from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.tiles.likeness.measures import Measures
-from orbiflow.tiles.silhouette import Mesh, local_thickness, triangulate
+from orbiflow.tiles.silhouette import Mesh, triangulate
 
 # the bounds of the weights of areas, which are negative for obtuse triangles
 COTANGENT_BOUNDS = (0.05, 40.0)
@@ -284,7 +284,7 @@ class Elastic:
     def _salience(self) -> Array:
         if not self.stiffness.salience:
             return np.ones(len(self.mesh.triangles))
-        thinness = THICK_RADIUS / local_thickness(self.mesh)
+        thinness = THICK_RADIUS / self.mesh.local_thickness
         return np.clip(thinness**self.stiffness.salience, *SALIENCE_BOUNDS)
 
     def _bending(self, stiff: Array | None) -> tuple[scipy.sparse.csr_matrix, Array]:

@@ -7,34 +7,48 @@ odd crossings.
 """
 
 import numpy as np
+import scipy.sparse
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.tiles.likeness.necks import MIN_OUTLINE
 
+REACH = 2.0  # widths up to which parts are near each other: they may come nearer
 OFFSET = 1e-7  # how far beside the outline its outer side is tried, in square roots of the area
 
 
-def missing_gaps(ring: Complex, width: float) -> tuple[float, Complex]:
-    """Return how much is missing to a width everywhere, and its gradient (n,) in the points.
+class Gaps:
+    """How much is missing to a width everywhere, near a ring (n,) x + iy, counter-clockwise.
 
-    This is the sum over the points (n,), counter-clockwise, of h(d), where d is how much nearer than
-    the `width` the nearest other part is, in widths; h(d) is d^2 up to 1, and 2 d - 1 beyond. Other
-    parts are those that are at least `MIN_OUTLINE` away along the outline. The unit is that of a ring
-    of area 1. The gradient of f is the g for which f grows by Re(conj(g) dz).
+    This is the sum over the points of h(d), where d is how much nearer than the `width` the nearest
+    other part is, in widths; h(d) is d^2 up to 1, and 2 d - 1 beyond. Other parts are those that are
+    at least `MIN_OUTLINE` away along the outline. Which parts are near which, and which way leads
+    apart, is as it is on this ring, so that the sum is smooth on others. The unit is that of a ring
+    of area 1.
     """
-    steps = np.roll(ring, -1) - ring
-    beyond = _is_beyond(ring)
-    own, other, share = _nearest_others(ring, steps, beyond, width)
-    towards = ring[other] + share * steps[other] - ring[own]
-    apart = np.maximum(abs(towards), 1e-12)
-    sign = np.where(beyond[own], -1.0, 1.0)
-    missing = np.maximum(1 - sign * apart / width, 0.0)
-    steep = -2 * np.minimum(missing, 1.0) * sign / width * towards / apart
-    along = np.zeros(len(ring), dtype=complex)
-    for at, part in ((own, -1.0), (other, 1 - share), ((other + 1) % len(ring), share)):
-        np.add.at(along, at, part * steep)
-    total = np.where(missing < 1, missing**2, 2 * missing - 1).sum()
-    return float(total), along
+
+    def __init__(self, ring: Complex, width: float) -> None:
+        self.width, n = width, len(ring)
+        steps = np.roll(ring, -1) - ring
+        beyond = _is_beyond(ring)
+        own, other, share = _nearest_others(ring, steps, beyond, REACH * width)
+        towards = ring[other] + share * steps[other] - ring[own]
+        sign = np.where(beyond[own], -1.0, 1.0)
+        self._way = sign * towards / np.maximum(abs(towards), 1e-12)
+        rows = np.tile(np.arange(len(own)), 3)
+        columns = np.concatenate([own, other, (other + 1) % n])
+        parts = np.concatenate([np.full(len(own), -1.0), 1 - share, share])
+        self._differences = scipy.sparse.csr_array((parts, (rows, columns)), shape=(len(own), n))
+
+    def missing(self, ring: Complex) -> tuple[float, Complex]:
+        """Return what is missing on a ring (n,), and its gradient (n,) in the points.
+
+        The gradient of f is the g for which f grows by Re(conj(g) dz).
+        """
+        gap = (np.conj(self._way) * (self._differences @ ring)).real
+        missing = np.maximum(1 - gap / self.width, 0.0)
+        steep = -2 * np.minimum(missing, 1.0) / self.width * self._way
+        total = np.where(missing < 1, missing**2, 2 * missing - 1).sum()
+        return float(total), self._differences.T @ steep
 
 
 def _is_beyond(ring: Complex) -> Array:

@@ -88,14 +88,21 @@ class Overlap:
         ends = np.roll(ring, -1, axis=0)
         sides = ends - ring
         lines = shapely.linestrings(np.stack([ring, ends], axis=1))
+        # cutting takes longer than looking what there is to cut
+        whole = np.asarray(shapely.contains_properly(self.region, lines))
+        cut = np.flatnonzero(~whole & np.asarray(shapely.intersects(self.region, lines)))
         pieces, owner = shapely.get_parts(
-            shapely.intersection(lines, self.region), return_index=True
+            shapely.intersection(lines[cut], self.region), return_index=True
         )
         lengths = shapely.length(pieces)
-        pieces, owner = pieces[lengths > 0], owner[lengths > 0]  # not where they only touch
+        pieces, owner = pieces[lengths > 0], cut[owner[lengths > 0]]  # not where they only touch
         first, last = (
-            shapely.get_coordinates(shapely.get_point(pieces, index)) for index in (0, -1)
+            np.concatenate(
+                [end[whole], shapely.get_coordinates(shapely.get_point(pieces, index))]
+            )
+            for end, index in ((ring, 0), (ends, -1))
         )
+        owner = np.concatenate([np.flatnonzero(whole), owner])
         square = np.maximum((sides**2).sum(axis=1), 1e-300)[owner]
         start, stop = (
             ((p - ring[owner]) * sides[owner]).sum(axis=1) / square for p in (first, last)

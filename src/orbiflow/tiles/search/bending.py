@@ -27,7 +27,7 @@ from orbiflow.tiles.likeness import (
     neck_up_to,
 )
 from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles
-from orbiflow.tiles.search.carving import Carved, carved
+from orbiflow.tiles.search.carving import BehindError, Carved, Race, carved
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
     Orientation,
@@ -122,9 +122,10 @@ def _all_carved(
     worth.sort(key=lambda bent: -bent.fidelity.mark)
     chosen = first + _unlike(worth, MAX_REPAIRED * (1 if simple else 2), _twins)
     done: list[Bent] = []
+    race = Race()
     for bent in chosen:
         cancel.check()
-        done.append(_carved(kind, bent, settings.min_neck))
+        done.append(_carved(kind, bent, settings.min_neck, race))
     return _best_first([bent for bent in done if bent.factor] + simple[len(first) :])
 
 
@@ -269,13 +270,17 @@ def _detailed(lot: _Lot, kind: IsohedralClass, settings: LikenessSearch) -> Bent
     return _bent(lot.side, body, as_bent, tiles.points, own, settings.min_neck)
 
 
-def _carved(kind: IsohedralClass, bent: Bent, min_neck: float) -> Bent:
+def _carved(kind: IsohedralClass, bent: Bent, min_neck: float, race: Race) -> Bent:
     """Carve a tile, with room between its parts if it needs that; return it as it is if no better."""
     body, space = bent.orientation.fine, TileSpace(kind, bent.placement)
     own = bent.placement._replace(turns=space.turns)
     found = [bent]
     for room in (0.0,) * (bent.factor > 0) + (max(MIN_CARVED_GAP, 1.2 * min_neck),):
-        tile = carved(body, space, bent.ring, bent.corners, room=room)
+        try:
+            own_race = None if room else race  # what lacks room costs more
+            tile = carved(body, space, bent.ring, bent.corners, room=room, race=own_race)
+        except BehindError:
+            break
         points = bent.points[:, None]
         for _ in range(FOLLOW_ROUNDS):
             points = body.condensed.whole(tile.outline[:, None], body.forces(points))

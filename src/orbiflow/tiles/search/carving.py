@@ -16,6 +16,9 @@ the mark has a gradient everywhere, and then they stay where they are, on its si
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,10 +26,12 @@ import scipy.linalg
 import scipy.optimize
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.tiles.likeness import Elastic, mark_gradient, missing_gaps
+from orbiflow.tiles.likeness import Elastic, Gaps, mark_gradient
 from orbiflow.tiles.search.tile_space import TileSpace
 
 SLIDING_STEPS, LAST_STEPS = 60, 20  # the largest numbers of steps while points slide, and after it
+STEPS_APART = 20  # of these, those after which it is looked anew where gaps are missing
+RACE_STEPS, MAX_BEHIND = 20, 0.05  # steps of carving, and marks behind another, after which it ends
 WRINKLE_COST = 0.12  # in marks a radian by which the tile turns elsewhere than the silhouette
 GAP_COST = 1.0  # in marks for each point that has no gap at all
 UNEVEN_COST = 0.1  # in marks for a mean square of 1 of how much nearer points lie than vertices
@@ -56,13 +61,44 @@ class Carved(NamedTuple):
         return _Laid.straight(self.places).points(self.ring)
 
 
+class BehindError(Exception):
+    """A tile is so far behind another, early in its carving, that it would hardly win."""
+
+
+class Race:
+    """Gives up tiles that are far behind another after as many steps (`RACE_STEPS`)."""
+
+    def __init__(self) -> None:
+        self._best = math.inf
+
+    def watch(self) -> Callable[[scipy.optimize.OptimizeResult], None]:
+        """Return what is called after each step of one more tile; it raises `BehindError`."""
+        steps = itertools.count(1)
+
+        def watch(intermediate_result: scipy.optimize.OptimizeResult) -> None:
+            if next(steps) == RACE_STEPS:
+                cost = float(intermediate_result.fun)
+                if cost > self._best + MAX_BEHIND:
+                    raise BehindError
+                self._best = min(self._best, cost)
+
+        return watch
+
+
 def carved(
-    body: Elastic, space: TileSpace, ring: Complex, corners: Integers, *, room: float = 0.0
+    body: Elastic,
+    space: TileSpace,
+    ring: Complex,
+    corners: Integers,
+    *,
+    room: float = 0.0,
+    race: Race | None = None,
 ) -> Carved:
     """Return the tile of the highest mark near a tile (n,) of the space's only placement.
 
     It may cross itself. With `room`, in square roots of the area, parts of the outline move apart until
-    there is so much between them. `corners` are the vertices at the tile's corners.
+    there is so much between them. `corners` are the vertices at the tile's corners. Raises
+    `BehindError` if it falls behind in a race.
     """
     basis, root = _basis(body, space)
     spline = _spline_basis(body, ring)
@@ -70,7 +106,7 @@ def carved(
     whole = np.stack([basis.real, basis.imag], axis=1).reshape(-1, count)  # x and y of each vertex
     across = np.ascontiguousarray(whole.T)
 
-    def lost(parameters: Array, fixed: Array | None = None) -> tuple[float, Array]:
+    def lost(parameters: Array, fixed: Array | None, gaps: Gaps | None) -> tuple[float, Array]:
         ring = (whole @ parameters[:count]).view(complex)
         slide = spline @ parameters[count:]
         places = own + slide if fixed is None else fixed
@@ -78,8 +114,8 @@ def carved(
         mark, rise = mark_gradient(body.measures, laid.points(ring))
         wrinkles, bumpy, shifted = body.measures.wrinkles(ring, places)
         cost, down = WRINKLE_COST * wrinkles - mark, WRINKLE_COST * bumpy - laid.gradient(rise)
-        if room:
-            missing, apart = missing_gaps(ring, room)
+        if gaps is not None:
+            missing, apart = gaps.missing(ring)
             cost, down = cost + GAP_COST * missing, down + GAP_COST * apart
         steep = across @ down.view(float)
         if fixed is not None:
@@ -91,14 +127,20 @@ def carved(
         return cost, np.concatenate([steep, spline.T @ sliding])
 
     def climbed(start: Array, fixed: Array | None = None) -> Array:
-        return scipy.optimize.minimize(
-            lost,
-            start,
-            (fixed,),
-            jac=True,
-            method="L-BFGS-B",
-            options={"maxiter": SLIDING_STEPS if fixed is None else LAST_STEPS, "maxcor": 20},
-        ).x
+        steps = SLIDING_STEPS if fixed is None else LAST_STEPS
+        rounds = steps // STEPS_APART if room else 1
+        for _ in range(rounds):
+            gaps = Gaps((whole @ start[:count]).view(complex), room) if room else None
+            start = scipy.optimize.minimize(
+                lost,
+                start,
+                (fixed, gaps),
+                jac=True,
+                method="L-BFGS-B",
+                callback=race.watch() if race and fixed is None else None,
+                options={"maxiter": steps // rounds, "maxcor": 20},
+            ).x
+        return start
 
     start = scipy.linalg.lstsq(whole, ring.view(float), lapack_driver="gelsy")[0]
     best = climbed(np.append(start, np.zeros(SLIDES)))

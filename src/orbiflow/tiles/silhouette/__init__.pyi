@@ -7,7 +7,6 @@ from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
 from .mesh import Mesh as Mesh
 from .mesh import harmonic as harmonic
-from .mesh import local_thickness as local_thickness
 from .mesh import triangulate as triangulate
 from .outlines import DISC_OVERREACH as DISC_OVERREACH
 from .outlines import Samples as Samples

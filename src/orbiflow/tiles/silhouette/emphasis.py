@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import scipy
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_filter, map_coordinates
 
 from orbiflow.arguments import as_array, as_instance, as_number
 from orbiflow.arrays import Array, Window
@@ -96,7 +96,7 @@ class Emphasis:
         box = _normal_box(target, covered, overhang)
         pixel = np.array([box[3] - box[1], box[2] - box[0]]) / levels.shape
         sigma = np.minimum(EDGE_SIGMA / pixel, MAX_EDGE_SIGMA_PIXELS)
-        smooth = np.clip(gaussian_filter(levels, tuple(sigma), mode="nearest"), 0, 1)
+        smooth = np.clip(scipy.ndimage.gaussian_filter(levels, tuple(sigma), mode="nearest"), 0, 1)
         plain = cls(smooth.astype(np.float32), box, strength, str(path))
         share = _share_of(plain, target)
         notes = (*picture.notes, *placed, *_warnings(levels, share, plain.strength))
@@ -130,7 +130,7 @@ class Emphasis:
         height, width = self.mask.shape
         column = (inside[..., 0] - xmin) / (xmax - xmin) * width - 0.5
         row = (ymax - inside[..., 1]) / (ymax - ymin) * height - 0.5
-        level = map_coordinates(
+        level = scipy.ndimage.map_coordinates(
             self.mask, [row.ravel(), column.ravel()], output=np.float64, order=1, mode="nearest"
         ).reshape(row.shape)
         beyond = np.minimum(np.linalg.norm(at - inside, axis=-1) / FADE_WIDTH, 1.0)

@@ -3,7 +3,9 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from typing import Any, NamedTuple, cast
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 import shapely
@@ -18,7 +20,12 @@ MAX_HALVINGS = 24  # the number of times that missing sides of the outline are h
 FLAT_AREA = 1e-12  # twice the area, in areas of the polygon, below which a triangle counts as flat
 
 
-class Mesh(NamedTuple):
+PIECES_PER_SIDE = 3  # number of parts of each side of the outline: more make the medial axis finer
+DISC_OVERREACH = 1.02  # the factor of the discs' radii that makes up for the size of triangles
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
     """The triangles (M, 3), counter-clockwise, that fill a polygon of `size` n.
 
     `points` (N, 2) are the polygon's n vertices, then points on its `sides` (k,) at `shares` (k,) of
@@ -30,6 +37,38 @@ class Mesh(NamedTuple):
     sides: Integers
     shares: Array
     size: int
+
+    @cached_property
+    def local_thickness(self) -> Array:
+        """The radius (M,) of the largest disc inside that covers each triangle's middle.
+
+        This is the local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
+        vertices of points on the outline, which lie near the medial axis.
+        """
+        ring = self.points[: self.size]
+        outline = shapely.LinearRing(ring)
+        shapely.prepare(outline)
+
+        def radii(centers: Array) -> Array:
+            return shapely.distance(cast(NDArray[np.object_], shapely.points(centers)), outline)
+
+        centers = Voronoi(subdivided(ring, PIECES_PER_SIDE)).vertices
+        centers = centers[shapely.contains_xy(shapely.Polygon(ring), centers[:, 0], centers[:, 1])]
+        middle = self.points[self.triangles].mean(axis=1)
+        found = radii(middle)
+        if not len(centers):
+            return found
+        radius = radii(centers)
+        largest = np.argsort(-radius)
+        centers, radius = centers[largest], radius[largest]
+        square = (DISC_OVERREACH * radius) ** 2 - (centers**2).sum(axis=1)
+        for part in np.array_split(np.arange(len(middle)), len(middle) // 512 + 1):  # bounds memory
+            own = middle[part]
+            covers = (own**2).sum(axis=1)[:, None] - 2 * own @ centers.T <= square
+            first = covers.argmax(axis=1)
+            covering = np.where(covers[np.arange(len(part)), first], radius[first], 0.0)
+            found[part] = np.maximum(found[part], covering)
+        return found
 
 
 def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
@@ -110,7 +149,7 @@ def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
     used[: mesh.size + len(mesh.sides)] = True
     used[triangles] = True
     index = np.cumsum(used) - 1
-    return mesh._replace(points=mesh.points[used], triangles=index[triangles])
+    return replace(mesh, points=mesh.points[used], triangles=index[triangles])
 
 
 def _without_flat(triangles: Integers, flat: Integers) -> Integers:
@@ -135,7 +174,7 @@ def _divided(mesh: Mesh) -> Mesh:
     if len(mesh.points) == 3:  # no side crosses, and yet nothing could follow
         middle = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]])
         points = np.concatenate([mesh.points, mesh.points.mean(axis=0, keepdims=True)])
-        return mesh._replace(points=points, triangles=middle)
+        return replace(mesh, points=points, triangles=middle)
     directed = {(t[k - 1], t[k]) for t in mesh.triangles.tolist() for k in range(3)}
     crossing = sorted((a, b) for a, b in directed if a < b < on_outline and (b, a) in directed)
     middle = {pair: len(mesh.points) + k for k, pair in enumerate(crossing)}
@@ -146,7 +185,7 @@ def _divided(mesh: Mesh) -> Mesh:
             (a, b, c), [middle.get((min(u, v), max(u, v))) for u, v in ((a, b), (b, c), (c, a))]
         )
     points = np.concatenate([mesh.points, mesh.points[ends].mean(axis=1)])
-    return mesh._replace(points=points, triangles=np.array(triangles, dtype=np.int64))
+    return replace(mesh, points=points, triangles=np.array(triangles, dtype=np.int64))
 
 
 def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tuple[int, int, int]]:
@@ -180,33 +219,3 @@ def harmonic(mesh: Mesh, outline: Array) -> Array:
     laplacian: Any = (degrees - links).tocsc()[fixed:]
     inner: Any = solvers.spsolve(laplacian[:, fixed:], -(laplacian[:, :fixed] @ outline))
     return np.concatenate([outline, np.reshape(inner, (-1, 2))])
-
-
-PIECES_PER_SIDE = 3  # number of parts of each side of the outline: more make the medial axis finer
-DISC_OVERREACH = 1.02  # the factor of the discs' radii that makes up for the size of triangles
-
-
-def local_thickness(mesh: Mesh) -> Array:
-    """Return the radius (M,) of the largest disc inside that covers each triangle's middle.
-
-    This is the local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
-    vertices of points on the outline, which lie near the medial axis.
-    """
-    polygon = shapely.Polygon(mesh.points[: mesh.size])
-    dense = subdivided(mesh.points[: mesh.size], PIECES_PER_SIDE)
-    centers = Voronoi(dense).vertices
-    centers = centers[shapely.contains_xy(polygon, centers[:, 0], centers[:, 1])]
-    middle = mesh.points[mesh.triangles].mean(axis=1)
-    outline = polygon.exterior
-    shapely.prepare(outline)
-    own: Array = shapely.distance(cast(NDArray[np.object_], shapely.points(middle)), outline)
-    if not len(centers):
-        return own
-    radius = shapely.distance(shapely.points(centers), outline)
-    found = own.copy()
-    for start in range(0, len(middle), 512):  # bounds the memory
-        part = middle[start : start + 512]
-        apart = np.hypot(*(part[:, None] - centers[None]).transpose(2, 0, 1))
-        covering = np.where(apart <= DISC_OVERREACH * radius, radius, 0.0).max(axis=1)
-        found[start : start + 512] = np.maximum(own[start : start + 512], covering)
-    return found

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from PIL import Image
-from scipy import ndimage
 
 from orbiflow.arrays import Array
 
@@ -37,7 +37,7 @@ def without_frame(channel: Array, above: _Mask) -> tuple[Array, list[str]]:
         return channel, []
     # the innermost: a margin around a frame is one, too
     frame = min(found, key=lambda frame: np.prod([s.stop - s.start for s in frame.box]))
-    line = ndimage.binary_dilation(frame.line, _TOGETHER)  # with its own blurred edges
+    line = scipy.ndimage.binary_dilation(frame.line, _TOGETHER)  # with its own blurred edges
     if frame.has_marks:
         beyond = np.ones(line.shape, bool)
         beyond[frame.box] = False
@@ -60,8 +60,8 @@ class _Frame(NamedTuple):
 
 def _frames(part: _Mask) -> Iterator[_Frame]:
     """Yield the frames in one part of a picture."""
-    labels = np.asarray(ndimage.label(part, _TOGETHER)[0])
-    for number, outer in enumerate(ndimage.find_objects(labels), start=1):
+    labels = np.asarray(scipy.ndimage.label(part, _TOGETHER)[0])
+    for number, outer in enumerate(scipy.ndimage.find_objects(labels), start=1):
         sides = [side.stop - side.start for side in outer]
         if any(a < MIN_FRAME_SHARE * b for a, b in zip(sides, part.shape, strict=True)):
             continue
@@ -109,7 +109,7 @@ def _line_width(line: _Mask) -> int | None:
 
 def _is_drawn_on(inside: _Mask) -> bool:
     """Whether what is drawn inside a frame is no speck."""
-    boxes = ndimage.find_objects(inside.astype(int))
+    boxes = scipy.ndimage.find_objects(inside.astype(int))
     if not boxes:
         return False
     sides = [side.stop - side.start for side in boxes[0]]
@@ -133,7 +133,8 @@ def without_card(image: Image.Image) -> Image.Image | None:
     is_margin = not is_cut_out and colour and abs(rgb[0, 0] - colour).max() <= MAX_CARD_DISTANCE
     if colour is None or is_margin:
         return None
-    inside = Image.fromarray(ndimage.binary_erosion(opaque, iterations=2))  # without a blurred edge
+    # without a blurred edge
+    inside = Image.fromarray(scipy.ndimage.binary_erosion(opaque, iterations=2))
     ground = Image.new("RGB", image.size, colour)
     ground.paste(image.convert("RGB"), mask=inside.resize(image.size, Image.Resampling.NEAREST))
     return ground if image.mode != "L" else ground.convert("L")
@@ -143,7 +144,7 @@ def _margin(rgb: NDArray[np.int_]) -> _Mask:
     """Return what is joined to the border and has its usual colour (H, W); nothing, if it is thin."""
     border = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
     alike = abs(rgb - np.median(border, axis=0)).max(axis=2) <= MAX_CARD_DISTANCE
-    labels = np.asarray(ndimage.label(alike)[0])
+    labels = np.asarray(scipy.ndimage.label(alike)[0])
     at_border = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
     margin = np.isin(labels, at_border[at_border > 0])
     width = int(MAX_LINE_SHARE * min(margin.shape)) + 1
@@ -155,12 +156,12 @@ def _card_colour(rgb: NDArray[np.int_], opaque: _Mask) -> tuple[int, ...] | None
     """Return the colour of the card that a part of a picture is, or None if it is none."""
     if opaque.all() or not opaque.any():
         return None
-    box = ndimage.find_objects(opaque.astype(int))[0]
+    box = scipy.ndimage.find_objects(opaque.astype(int))[0]
     sides = zip(opaque[box].shape, opaque.shape, strict=True)
     if opaque[box].mean() < MIN_CARD_COVERAGE or any(a < MIN_CARD_SHARE * b for a, b in sides):
         return None
-    inside = ndimage.binary_erosion(opaque[box], iterations=2)
-    rim = inside & ~ndimage.binary_erosion(inside, iterations=2)
+    inside = scipy.ndimage.binary_erosion(opaque[box], iterations=2)
+    rim = inside & ~scipy.ndimage.binary_erosion(inside, iterations=2)
     if not rim.any():
         return None
     colour = np.median(rgb[box][rim], axis=0).astype(int)
@@ -173,11 +174,11 @@ def _card_colour(rgb: NDArray[np.int_], opaque: _Mask) -> tuple[int, ...] | None
 
 def _is_drawing(drawn: _Mask) -> bool:
     """Return whether the largest part of what is drawn on a card is neither a speck nor a rectangle."""
-    labels = np.asarray(ndimage.label(drawn, _TOGETHER)[0])
+    labels = np.asarray(scipy.ndimage.label(drawn, _TOGETHER)[0])
     if not drawn.any():
         return False
     largest = int(np.bincount(labels.ravel())[1:].argmax()) + 1
-    box = ndimage.find_objects(labels)[largest - 1]
-    part = np.asarray(ndimage.binary_fill_holes(labels[box] == largest))
+    box = scipy.ndimage.find_objects(labels)[largest - 1]
+    part = np.asarray(scipy.ndimage.binary_fill_holes(labels[box] == largest))
     sides = zip(part.shape, drawn.shape, strict=True)
     return bool(all(a > MIN_DRAWN_SHARE * b for a, b in sides) and part.mean() < MIN_CARD_COVERAGE)

@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from orbiflow.arrays import Array
 
@@ -49,7 +49,7 @@ def label_mask(
     )
     if n > MAX_LABELS or not (are_few or (n > 2 and low <= 1 and high - low == n - 1)):
         return None
-    even = ndimage.maximum_filter(numbers, 3) == ndimage.minimum_filter(numbers, 3)
+    even = scipy.ndimage.maximum_filter(numbers, 3) == scipy.ndimage.minimum_filter(numbers, 3)
     filling = np.bincount(numbers[even], minlength=len(counts)) > 0
     if not are_labels and counts[~filling].sum() > MAX_STRAY_SHARE * (~even).sum():
         return None

@@ -5,9 +5,8 @@ one factor, its gain, so that a background in shadow lies on the ray from the or
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
-from scipy.cluster.vq import vq
 
 from orbiflow.arrays import Array
 
@@ -49,7 +48,7 @@ def is_photograph(rgb: Array) -> bool:
     """Whether an image (H, W, 3), 0 to 1, has more in it than two flat colours and their edges."""
     grey = rgb @ LUMINANCE
     light = grey > threshold_of(grey)
-    flat = ndimage.maximum_filter(light, 5) == ndimage.minimum_filter(light, 5)
+    flat = scipy.ndimage.maximum_filter(light, 5) == scipy.ndimage.minimum_filter(light, 5)
     lab = _lab(rgb)
     parts = [lab[part] for part in (flat & light, flat & ~light) if part.any()]
     colours = [np.median(part, axis=0) for part in parts]
@@ -69,7 +68,7 @@ def shape_in(rgb: Array) -> Array:
     scale = min(SEARCH_SIDE_PIXELS / max(rgb.shape), 1)
     size = tuple(round(scale * side) for side in rgb.shape[:2])
     lab = _lab(resized(rgb, size))
-    region = _sharpest(ndimage.gaussian_filter(lab, (1, 1, 0)))
+    region = _sharpest(scipy.ndimage.gaussian_filter(lab, (1, 1, 0)))
     region = resized(region.astype(float), rgb.shape[:2]) > 0.5
     return _matte(_lab(rgb), region, round(EDGE_PIXELS / scale))
 
@@ -84,8 +83,8 @@ def _sharpest(lab: Array) -> _Mask:
     border = np.ones(lab.shape[:2], dtype=bool)
     border[margin:-margin, margin:-margin] = False
     surprise = _surprise(lab, border)
-    slopes = [ndimage.gaussian_gradient_magnitude(band, 1) for band in np.moveaxis(lab, 2, 0)]
-    slope = ndimage.maximum_filter(np.linalg.norm(slopes, axis=0), 3)
+    slopes = [scipy.ndimage.gaussian_gradient_magnitude(band, 1) for band in np.moveaxis(lab, 2, 0)]
+    slope = scipy.ndimage.maximum_filter(np.linalg.norm(slopes, axis=0), 3)
     regions = [_differing(surprise, deepest, border) for deepest in DEEPEST_GAINS]
     return max(regions, key=lambda region: _steepness(slope, region, regions[0]))
 
@@ -94,14 +93,16 @@ def _steepness(slope: Array, region: _Mask, whole: _Mask) -> float:
     """Return the slope that three quarters of a region's outline exceed."""
     if 3 * region.sum() < whole.sum() or not region.any():
         return 0.0
-    return float(np.quantile(slope[region & ~ndimage.binary_erosion(region, border_value=1)], 0.25))
+    return float(
+        np.quantile(slope[region & ~scipy.ndimage.binary_erosion(region, border_value=1)], 0.25)
+    )
 
 
 def _surprise(lab: Array, background: _Mask) -> Array:
     """Return squared distances (gains, H, W) from the background, in its standard deviations."""
     lab = lab / _light(lab[..., 0], background)[..., None]
     colours = lab[background]
-    label, _ = vq(colours, np.quantile(colours, QUANTILES, axis=0))
+    label, _ = scipy.cluster.vq.vq(colours, np.quantile(colours, QUANTILES, axis=0))
     distances: list[Array] = []
     for colour in (colours[label == k] for k in range(len(QUANTILES))):
         if len(colour) > MIN_COLOUR_SHARE * len(colours):
@@ -125,7 +126,7 @@ def _differing(surprise: Array, deepest: float, border: _Mask) -> _Mask:
     shadows = deepest - 0.01 < GAINS
     cost = SHADOW_SIGMAS * (1 - GAINS[shadows, None, None])
     far = np.sqrt(np.min(surprise[shadows] + cost**2, axis=0))
-    far = ndimage.gaussian_filter(np.minimum(far, MAX_SIGMAS), 0.7)
+    far = scipy.ndimage.gaussian_filter(np.minimum(far, MAX_SIGMAS), 0.7)
     split = far > threshold_of(far)
     level = (np.median(far[split]) + np.median(far[~split])) / 2
     return far > max(level, 1.2 * np.quantile(far[border], 0.95))
@@ -133,8 +134,8 @@ def _differing(surprise: Array, deepest: float, border: _Mask) -> _Mask:
 
 def _matte(lab: Array, region: _Mask, width: int) -> Array:
     """Return 1 inside and 0 outside; near the edge, where a colour lies between those on both sides."""
-    inside = ndimage.binary_erosion(region, iterations=width, border_value=1)
-    outside = ~ndimage.binary_dilation(region, iterations=width)
+    inside = scipy.ndimage.binary_erosion(region, iterations=width, border_value=1)
+    outside = ~scipy.ndimage.binary_dilation(region, iterations=width)
     shape, ground = (_average(lab, part, 2 * width) for part in (inside, outside))
     apart = shape - ground
     share = np.sum((lab - ground) * apart, axis=2) / (np.sum(apart**2, axis=2) + 1e-9)
@@ -144,8 +145,8 @@ def _matte(lab: Array, region: _Mask, width: int) -> Array:
 def _average(lab: Array, part: _Mask, width: int) -> Array:
     """Return the colours of a part, averaged and carried on beyond it."""
     weights = part.astype(float)[..., None]
-    total = ndimage.gaussian_filter(weights, (width, width, 0)) + 1e-9
-    return ndimage.gaussian_filter(lab * weights, (width, width, 0)) / total
+    total = scipy.ndimage.gaussian_filter(weights, (width, width, 0)) + 1e-9
+    return scipy.ndimage.gaussian_filter(lab * weights, (width, width, 0)) / total
 
 
 def threshold_of(values: Array) -> float:
@@ -180,6 +181,6 @@ def resized(values: Array, size: tuple[int, ...]) -> Array:
     rest = [0.0] * (values.ndim - 2)
     if (factors > 1).any():
         blur = [*np.maximum(0, (factors - 1) / 2), *rest]
-        values = ndimage.gaussian_filter(values, blur, mode="mirror")
+        values = scipy.ndimage.gaussian_filter(values, blur, mode="mirror")
     zoom = [*(1 / factors), *(1.0 for _ in rest)]
-    return np.asarray(ndimage.zoom(values, zoom, order=1, mode="mirror", grid_mode=True))
+    return np.asarray(scipy.ndimage.zoom(values, zoom, order=1, mode="mirror", grid_mode=True))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.spatial import KDTree
 from shapely.affinity import scale as scaled
 from shapely.geometry import MultiPoint, Polygon, box
@@ -96,7 +96,7 @@ def _is_cut_off(shape: _Mask) -> bool:
 
 def _labelled(mask: _Mask, structure: NDArray[np.int_] | None = None) -> tuple[Integers, Integers]:
     """Return the number of each pixel's component (H, W), and the sizes of these, 0 for none."""
-    labels = np.asarray(ndimage.label(mask, structure)[0], dtype=np.int64)
+    labels = np.asarray(scipy.ndimage.label(mask, structure)[0], dtype=np.int64)
     sizes = np.bincount(labels.ravel())
     sizes[0] = 0
     return labels, sizes
@@ -111,7 +111,7 @@ def _without_dust(mask: _Mask) -> tuple[_Mask, list[str]]:
         labels, sizes = _labelled(part, structure)
         return ((sizes > 0) & (sizes <= limit))[labels]
 
-    filled = ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS)
+    filled = scipy.ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS)
     specks, pinholes = small(mask), small(filled & ~mask, _ACROSS_CORNERS)
     note = ["left out specks of dust"] * bool(specks.any() or pinholes.any())
     return (mask & ~specks) | pinholes, note
@@ -119,10 +119,10 @@ def _without_dust(mask: _Mask) -> tuple[_Mask, list[str]]:
 
 def _largest(mask: _Mask) -> tuple[_Mask, list[str]]:
     """Return the component that is largest with its holes filled."""
-    labels, areas = _labelled(ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS))
+    labels, areas = _labelled(scipy.ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS))
     shape = labels == areas.argmax()
     holes = shape & ~mask
-    n_holes = ndimage.label(holes, structure=_ACROSS_CORNERS)[1]
+    n_holes = scipy.ndimage.label(holes, structure=_ACROSS_CORNERS)[1]
     kept, bare = areas.max() / max(areas.sum(), 1), holes.sum() / max(shape.sum(), 1)
     return shape, left_out(len(areas) - 1, kept, n_holes, bare)
 
@@ -176,13 +176,13 @@ def middle_of_line(level: Level, *, is_given: bool) -> tuple[Level, float] | Non
     """
     cut = level.cut if is_given else _faint_cut(level)
     mask = level.values > cut
-    labels, areas = _labelled(ndimage.binary_fill_holes(mask), _ACROSS_CORNERS)
+    labels, areas = _labelled(scipy.ndimage.binary_fill_holes(mask), _ACROSS_CORNERS)
     shape = labels == areas.argmax()
     line = _line_of(shape & mask)
-    inside = ndimage.binary_fill_holes(line) & ~line
+    inside = scipy.ndimage.binary_fill_holes(line) & ~line
     if inside.sum() < MIN_BARE_SHARE * areas.max() or shape.all():
         return None
-    drawn = _labelled(ndimage.binary_fill_holes(mask & inside), _ACROSS_CORNERS)[1].max()
+    drawn = _labelled(scipy.ndimage.binary_fill_holes(mask & inside), _ACROSS_CORNERS)[1].max()
     if drawn > MAX_INSIDE_SHARE * areas.max() and _is_frame(shape):
         return None
     outer, inner = _borders(level.values, cut)
@@ -196,7 +196,7 @@ def middle_of_line(level: Level, *, is_given: bool) -> tuple[Level, float] | Non
 
 def _is_frame(shape: _Mask) -> bool:
     """Whether a filled shape is all but convex, as frames are."""
-    border = np.argwhere(shape & ~ndimage.binary_erosion(shape))
+    border = np.argwhere(shape & ~scipy.ndimage.binary_erosion(shape))
     return int(shape.sum()) > MIN_CONVEX_SHARE * MultiPoint(border).convex_hull.area
 
 
@@ -210,8 +210,8 @@ def _faint_cut(level: Level) -> float:
 
 def _line_of(drawn: _Mask) -> _Mask:
     """Return the longest connected part of a drawing: the line without what is drawn inside it."""
-    labels = np.asarray(ndimage.label(drawn, structure=_ACROSS_CORNERS)[0])
-    boxes = ndimage.find_objects(labels)
+    labels = np.asarray(scipy.ndimage.label(drawn, structure=_ACROSS_CORNERS)[0])
+    boxes = scipy.ndimage.find_objects(labels)
     spans = [max(part.stop - part.start for part in box) for box in boxes]
     return labels == 1 + int(np.argmax(spans))
 
@@ -237,7 +237,7 @@ def _from_middle(line: _Mask, inside: _Mask, borders: tuple[Array, Array], width
     What is farther from the inside than the line is wide, and long, is a limb, and inside.
     """
     values = np.where(inside, width, -width)
-    near = ndimage.binary_dilation(line, iterations=2)
+    near = scipy.ndimage.binary_dilation(line, iterations=2)
     at = np.argwhere(near)
     to_outer, to_inner = (np.full(line.shape, 2 * width) for _ in borders)
     for distances, border in zip((to_outer, to_inner), borders, strict=True):
@@ -247,7 +247,7 @@ def _from_middle(line: _Mask, inside: _Mask, borders: tuple[Array, Array], width
     values = np.where(near, apart, values)
     limbs = _limbs(line & (to_inner > LIMB_DISTANCE_WIDTHS * width), MIN_LIMB_WIDTHS * width)
     if limbs.any():
-        limbs = ndimage.binary_dilation(
+        limbs = scipy.ndimage.binary_dilation(
             limbs, _ACROSS_CORNERS, round(LIMB_DISTANCE_WIDTHS * width) + 2
         )
         own = np.where(line, to_outer, -to_outer)
@@ -265,7 +265,7 @@ def _distances(points: NDArray[np.integer[Any]], border: Array) -> Array:
 
 def _limbs(candidates: _Mask, length: float) -> _Mask:
     """Return the components that are at least so long."""
-    labels = np.asarray(ndimage.label(candidates, structure=_ACROSS_CORNERS)[0])
-    boxes = ndimage.find_objects(labels)
+    labels = np.asarray(scipy.ndimage.label(candidates, structure=_ACROSS_CORNERS)[0])
+    boxes = scipy.ndimage.find_objects(labels)
     sizes = [0.0, *(np.hypot(*(part.stop - part.start for part in box)) for box in boxes)]
     return (np.array(sizes) >= length)[labels]
