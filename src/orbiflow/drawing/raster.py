@@ -74,12 +74,14 @@ def draw_line(
     pen.line(path.ravel().tolist(), fill=colour, width=whole)
     if whole < 3:
         return
-    steps = np.diff(path, axis=0)
-    cross = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
-    turn = np.abs(np.arctan2(cross, (steps[:-1] * steps[1:]).sum(axis=1)))
-    round_ones = np.concatenate([path[1:-1][turn > SHARP_TURN], path[[0, -1]]])
-    shown = abs(round_ones[:, 1] - pen.im.size[1] / 2) < pen.im.size[1] / 2 + whole
-    for x, y in round_ones[shown].tolist():
+    joints = path[[0, -1]]
+    if len(path) > 2:
+        steps = np.diff(path, axis=0)
+        cross = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
+        turn = np.abs(np.arctan2(cross, (steps[:-1] * steps[1:]).sum(axis=1)))
+        joints = np.concatenate([joints, path[1:-1][turn > SHARP_TURN]])
+    height = pen.im.size[1]
+    for x, y in joints[abs(joints[:, 1] - height / 2) < height / 2 + whole].tolist():
         pen.circle((x, y), (whole - 1) / 2, fill=colour)
 
 

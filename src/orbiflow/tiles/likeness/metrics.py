@@ -97,9 +97,7 @@ class Overlap:
         lengths = shapely.length(pieces)
         pieces, owner = pieces[lengths > 0], cut[owner[lengths > 0]]  # not where they only touch
         first, last = (
-            np.concatenate(
-                [end[whole], shapely.get_coordinates(shapely.get_point(pieces, index))]
-            )
+            np.concatenate([end[whole], shapely.get_coordinates(shapely.get_point(pieces, index))])
             for end, index in ((ring, 0), (ends, -1))
         )
         owner = np.concatenate([np.flatnonzero(whole), owner])

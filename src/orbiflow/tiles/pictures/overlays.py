@@ -187,8 +187,7 @@ def _arrows(
     for k in np.argsort(-moved):
         if moved[k] < STILL or len(taken) == 24:
             break
-        near = [np.linalg.norm(rest[k] - rest[other]) < 0.16 * size for other in taken]
-        if not any(near):
+        if not (np.linalg.norm(rest[taken] - rest[k], axis=1) < 0.16 * size).any():
             taken.append(int(k))
     for k in taken:
         sketch.arrow(rest[k], bent[k], GHOST, width)

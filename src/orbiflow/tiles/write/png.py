@@ -130,7 +130,8 @@ def _items(scene: Scene, layer: Layer, scale: float) -> Iterator[Shape | Raster]
         if isinstance(item, Raster):
             yield item.moved(scale * np.eye(2), np.zeros(2))
         elif isinstance(item, Part):
-            yield shape_of(item.moved(scale * np.eye(2), np.zeros(2)), least_width=1.0)
+            shape = shape_of(item.moved(scale * np.eye(2), np.zeros(2)), least_width=1.0)
+            yield from _lines(shape) if not shape.rings and shape.opacity >= 1 else [shape]
         else:
             curves = [item] if isinstance(item, Curve) else item.curves(scene.symbols[item.symbol])
             for curve in curves:
@@ -145,9 +146,21 @@ def shape_of(part: Part, *, least_width: float = 0.0) -> Shape:
     lines = [np.concatenate([p, p[:1]]) if c else p for p, c in zip(points, closed, strict=True)]
     width = max(part.style.width, least_width) if part.style.stroke else 0.0
     rings = tuple(ring for ring in points if len(ring) > 2) if part.style.fill else ()
+    return Shape(
+        rings, tuple(lines), part.style._replace(width=width), part.opacity, *_reach(lines, width)
+    )
+
+
+def _lines(shape: Shape) -> Iterator[Shape]:
+    """Yield each line of a shape that is lines alone: most bands have few of many dashes."""
+    for line in shape.lines:
+        low, high = _reach([line], shape.style.width)
+        yield shape._replace(lines=(line,), low=low, high=high)
+
+
+def _reach(lines: Sequence[Array], width: float) -> tuple[float, float]:
     heights = np.concatenate([line[:, 1] for line in lines])
-    reach = float(heights.min() - width), float(heights.max() + width)
-    return Shape(rings, tuple(lines), part.style._replace(width=width), part.opacity, *reach)
+    return float(heights.min() - width), float(heights.max() + width)
 
 
 def painted(
