@@ -29,7 +29,7 @@ from orbiflow.tiles.silhouette import Bending, Mesh, harmonic, triangulate, unfo
 from orbiflow.tiles.tilings import Tile
 
 SAME_PLACE = 1e-9  # distance along the outline, in outlines, below which points are one
-SHARPENINGS = 40  # most tries to follow the outline's finest parts
+SHARPENINGS = 80  # most tries to follow the outline's finest parts
 
 
 def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:

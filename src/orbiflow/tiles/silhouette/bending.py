@@ -25,7 +25,7 @@ MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 # twice the area of a triangle, in squares of the whole's extent, that rounding can turn over
 MIN_DOUBLED_AREA = 1e-18
 
-MAX_SHARPENINGS = 30  # the largest number of times that the penalty on folds is sharpened
+MAX_SHARPENINGS = 60  # the largest number of times that the penalty on folds is sharpened
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ def _untangled(work: _Distortion, sharpenings: int) -> Array | None:
     x = work.start
     for _ in range(sharpenings):
         found = scipy.optimize.minimize(
-            work.value, x, jac=True, method="L-BFGS-B", options={"maxiter": 60, "maxcor": 20}
+            work.value, x, jac=True, method="L-BFGS-B", options={"maxiter": 30, "maxcor": 20}
         )
         x = found.x
         smallest = work.smallest(x)
