@@ -283,16 +283,14 @@ def _search_by_levels(
             progress = functools.partial(record.progress, name)
             record.level_outcome(_outcome(own, isohedral_class(name), progress, cancel))
 
-    method, rest = task.method, 1.0
+    method, rest = task.method, 1.0 - SKETCHING * (record.on_tile is not None)
+    record.next_level("sketch", 1.0 - rest)
+    with one_thread(), one_blas_thread():
+        first = method.preview(task.goal, names, cancel)
+    if first is not None:
+        record.first_look(first)
     if record.on_tile is not None:
-        rest -= SKETCHING
-        record.next_level("sketch", SKETCHING)
-        search(names, Sketches(method), 1)
-    else:
-        with one_thread(), one_blas_thread():
-            first = method.preview(task.goal, names, cancel)
-        if first is not None:
-            record.first_look(first)
+        search([name for name in names if name not in record.looks], Sketches(method), 1)
     levels = method.levels()
     for share, own in levels:
         is_last = own is levels[-1][1]

@@ -60,6 +60,8 @@ class Record:
         self.looks[tile.name] = tile
         seconds = time.perf_counter() - self.begin
         self.on_event(Preview(tile.name, tile.likeness.metrics.iou, seconds))
+        if self.on_tile is not None:
+            self.level_outcome(tile)
 
     def progress(self, name: str, share: float, loss: float = math.nan) -> None:
         """Report how far a class is, which never falls."""
