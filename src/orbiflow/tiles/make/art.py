@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from orbiflow import __version__
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import palette, png_bytes
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Outcome, SideBySide, Tell
@@ -24,7 +25,6 @@ from orbiflow.tiles.motifs import (
     Over,
     Paint,
     Picture,
-    Runs,
     bilinear,
     carried_raster,
     drawn_motif,
@@ -236,7 +236,8 @@ def render_page(
     """Return the picture of a page (height, width, 3) in 8 bits, with so many `pixels` in a mm.
 
     Every sample belongs to exactly one copy of the tile, and has its colour in the raster (colours,
-    height, width, 3) that `Paint.coloured` returns; a pixel is the mean of `samples` x `samples`.
+    height, width, 3) that `Paint.coloured` returns. A pixel within a copy is one sample, and one that
+    copies share is the mean of `samples` x `samples`.
     """
     cancel = cancel or Cancel()
     every, shown = _with_hidden(page)
@@ -253,13 +254,22 @@ def render_page(
         near = np.flatnonzero((high > first) & (low < first + rows * samples))
         found = runs(ring_sides(rings[near]), first, rows * samples, page_width * samples)
         unpainted = (found.label < 0) | ~shown[near[found.label]]
-        named = found._replace(label=np.where(unpainted, NOWHERE, near[found.label]))
-        colours = look(named, first).reshape(rows * samples, page_width * samples, 3)
-        mean = _pooled(colours, samples) * 255 + 0.5
-        return mean.clip(0, 255).astype(np.uint8)
+        named = np.where(unpainted, NOWHERE, near[found.label]).astype(np.int32)
+        labels = found.spread(named).reshape(rows, samples, page_width, samples)
+        middle = labels[:, samples // 2, :, samples // 2]
+        parts = itertools.product(range(samples), range(samples))
+        differ = (labels[:, i, :, j] != middle for i, j in parts)
+        shared = np.nonzero(functools.reduce(np.logical_or, differ))
+        x, y = (samples * (np.arange(side) + 0.5) for side in (page_width, rows))
+        colours = look(middle, x, y[:, None] + first)
+        within = np.arange(samples) + 0.5
+        x, y = (samples * own[:, None, None] for own in shared[::-1])
+        finer = look(labels.swapaxes(1, 2)[shared], x + within, y + within[:, None] + first)
+        colours[shared] = finer.mean(axis=(1, 2))
+        return (colours * 255 + 0.5).clip(0, 255).astype(np.uint8)
 
     with SideBySide() as beside:
-        bands = [beside.begin(partial(band, top)) for top in range(0, page_height, step)]
+        bands = [beside.begin(functools.partial(band, top)) for top in range(0, page_height, step)]
         return np.concatenate([finished() for finished in bands])
 
 
@@ -274,16 +284,10 @@ def _with_hidden(page: Page) -> tuple[Page, NDArray[np.bool_]]:
     return every, np.array([key in known for key in keys])
 
 
-def _pooled(colours: Array, samples: int) -> Array:
-    """Return the mean of `samples` x `samples` colours for each pixel."""
-    parts = [colours[i::samples, j::samples] for i in range(samples) for j in range(samples)]
-    return sum(parts[1:], parts[0]) / len(parts)
-
-
 def _lookup(
     page: Page, samples: float, grid: Grid, coloured: Array, paper: str
-) -> Callable[[Runs, int], Array]:
-    """Return a function for the colours (samples, 3), row by row, of samples in copies of the tile."""
+) -> Callable[[Integers, Array, Array], Array]:
+    """Return a function for colours (..., 3) in copies of the tile, by their number, at x and y."""
     copies = page.copies
     count, height, width = coloured.shape[:3]
     # all colours in one tall raster, and a strip of paper under them
@@ -301,18 +305,12 @@ def _lookup(
     # nowhere, the last: the middle of the strip
     linears = np.concatenate([inverse * grid.density, np.zeros((1, 2, 2))])
     offsets = np.concatenate([start, [[width / 2, count * height + 4.0]]])
+    maps = np.concatenate([linears.reshape(-1, 4), offsets], axis=1).astype(np.float32).T.copy()
 
-    def look(found: Runs, top: int) -> Array:
-        kept = found.length > 0
-        own = Runs(*(part[kept] for part in found))
-        linear, offset = linears[own.label], offsets[own.label]
-        y = own.row + top + 0.5
-        # texel = start + step * column
-        start = offset + linear[:, :, 1] * y[:, None] + linear[:, :, 0] * (own.start + 0.5)[:, None]
-        at = np.concatenate([start, linear[:, :, 0]], axis=1).astype(np.float32)
-        first = np.cumsum(own.length) - own.length
-        along = np.arange(own.length.sum()) - own.spread(first)
-        spread = own.spread(at)
-        return bilinear(raster, spread[:, :2] + along[:, None].astype(np.float32) * spread[:, 2:])
+    def look(labels: Integers, x: Array, y: Array) -> Array:
+        a, b, c, d, right, below = (part.take(labels) for part in maps)
+        x, y = x.astype(np.float32), y.astype(np.float32)
+        places = np.stack([a * x + b * y + right, c * x + d * y + below], axis=-1)
+        return bilinear(raster, places.reshape(-1, 2)).reshape(*labels.shape, 3)
 
     return look

@@ -9,7 +9,6 @@ from .carried import with_map as with_map
 from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid
 from .raster import Paint as Paint
-from .raster import Runs as Runs
 from .raster import bilinear as bilinear
 from .raster import rgb_of as rgb_of
 from .raster import ring_sides as ring_sides
