@@ -110,7 +110,9 @@ def main() -> None:
         out = Path(folder)
         terminal = [in_terminal(options.picture, options.effort, out / f"run{k}") for k in range(3)]
         alone, beside = in_studio(options.picture, options.effort, out / "studio")
-    print(f"{options.picture.name}, effort {options.effort}: seconds until the first certified tile")
+    print(
+        f"{options.picture.name}, effort {options.effort}: seconds until the first certified tile"
+    )
     print(f"terminal, from Enter (best of three) {min(terminal):6.1f}")
     print(f"studio, from asking                  {alone:6.1f}")
     print(f"studio, while another one searches   {beside:6.1f}")

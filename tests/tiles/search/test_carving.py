@@ -8,13 +8,23 @@ from itertools import product
 import numpy as np
 import pytest
 import shapely
+from scipy.optimize import OptimizeResult
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.tiles import CLASSES, Pins, complex_points, isohedral_class, plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, kept_of
 from orbiflow.tiles.search import bending, carving
 from orbiflow.tiles.search.bending import Bent, bent_tiles
-from orbiflow.tiles.search.carving import WRINKLE_COST, Carved, _Laid, carved
+from orbiflow.tiles.search.carving import (
+    MAX_BEHIND,
+    RACE_STEPS,
+    WRINKLE_COST,
+    BehindError,
+    Carved,
+    Race,
+    _Laid,
+    carved,
+)
 from orbiflow.tiles.search.co_deformation import BentTiles, held_on_tiles
 from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.search.tile_space import TileSpace, best_placements
@@ -147,3 +157,32 @@ def test_parts_that_are_pinned_are_not_carved() -> None:
         for own in (PLAIN, SMALL)
     ]
     assert np.array_equal(found[0][0].points, found[1][0].points)
+
+
+def run(race: Race, costs: list[float]) -> int:
+    """Return how many steps a tile with these costs takes in a race."""
+    watch = race.watch()
+    for k, cost in enumerate(costs):
+        try:
+            watch(OptimizeResult(fun=cost))
+        except BehindError:
+            return k + 1
+    return len(costs)
+
+
+def test_who_is_far_behind_after_so_many_steps_is_given_up() -> None:
+    race, whole = Race(), RACE_STEPS + 10
+    assert run(race, [1.0] * whole) == whole
+    assert run(race, [1.0 + 2 * MAX_BEHIND] * whole) == RACE_STEPS
+    assert run(race, [9.0] * (RACE_STEPS - 1) + [1.0 + MAX_BEHIND / 2] * 11) == whole
+    assert run(race, [0.5] * whole) == whole
+    assert run(race, [1.0] * whole) == RACE_STEPS  # behind the best of all
+
+
+def test_a_race_changes_nothing_for_who_is_not_behind() -> None:
+    body, space, tiles = bend("IH4")
+    before, own = tiles.points[: body.size, 0], tiles.placements
+    corners = (np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0]) % body.size
+    race = Race()
+    alone, *others = (carved(body, space, before, corners, race=own) for own in (None, race, race))
+    assert all((other.ring == alone.ring).all() for other in others)

@@ -68,6 +68,8 @@ def test_all_classes_are_sketched_before_any_is_finished(workers: int) -> None:
     assert stages == sorted(stages, key=["sketch", "better", "final"].index)
     assert {tile.name for stage, tile in shown if stage == "final"} == set(NAMES)
     assert stages.count("final") == len(NAMES)
+    sketches = [tile.name for stage, tile in shown if stage == "sketch"]
+    assert len(set(sketches)) == len(sketches)  # the first look is one of them
     assert all(tile.certificate.valid and tile.rating for _, tile in shown)
     last = {tile.name: tile for stage, tile in shown if stage == "final"}
     assert {tile.name: tile.score for tile in result.tiles} == {
