@@ -131,7 +131,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--effort", choices=("fast", "normal", "best"), default="fast")
+    parser.add_argument("--effort", choices=("fast", "normal"), default="fast")
     parser.add_argument("--classes", default="IH4,IH6")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="six silhouettes, one class")

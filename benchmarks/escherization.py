@@ -1,6 +1,6 @@
 """Tiles for the paper's nine goals, beside published figures and the tiles of EST and ARAP.
 
-    python benchmarks/escherization.py [--effort fast|normal|best] [--distorted] [--quick] [GOAL ...]
+    python benchmarks/escherization.py [--effort fast|normal] [--distorted] [--quick] [GOAL ...]
     python benchmarks/escherization.py --against CHECKOUT [--effort ...] [GOAL or FILE ...]
 
 True-aspect polygons, or with --distorted the PNGs that the paper used, each axis stretched to a
@@ -102,7 +102,7 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("goals", nargs="*")
-    parser.add_argument("--effort", choices=("fast", "normal", "best"), default="normal")
+    parser.add_argument("--effort", choices=("fast", "normal"), default="normal")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--distorted", action="store_true")
     parser.add_argument("--against", type=Path, help="another checkout")

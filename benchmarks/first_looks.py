@@ -1,6 +1,6 @@
 """How long somebody waits for the first certified tile: in a terminal, and in the studio.
 
-    python benchmarks/first_looks.py [--effort fast|normal|best] [FILE]
+    python benchmarks/first_looks.py [--effort fast|normal] [FILE]
 
 In the studio from the moment a search is asked for, alone and while another project searches.
 """
@@ -104,7 +104,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("picture", nargs="?", type=Path, default=BUNDLED / "squirrel.dat")
-    parser.add_argument("--effort", choices=("fast", "normal", "best"), default="normal")
+    parser.add_argument("--effort", choices=("fast", "normal"), default="normal")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)

@@ -1,7 +1,7 @@
 """A blind comparison of methods: sheets without names for a judge, and what the answers say.
 
     python benchmarks/likeness_blind.py make --out FOLDER [--seed N] [--rounds 3]
-        [--effort fast|normal|best] [--tiles FOLDER] [--methods METHOD ...] [NAME ...]
+        [--effort fast|normal] [--tiles FOLDER] [--methods METHOD ...] [NAME ...]
     python benchmarks/likeness_blind.py score --out FOLDER ANSWERS.json ...
 
 `make` writes FOLDER/sheets, which is all that a judge is given: INSTRUCTIONS.md, and in a folder for
@@ -284,7 +284,7 @@ def main() -> None:
     maker.add_argument("--out", type=Path, default=Path("out/blind"))
     maker.add_argument("--seed", type=int, default=0)
     maker.add_argument("--rounds", type=int, default=3)
-    maker.add_argument("--effort", choices=("fast", "normal", "best"), default="normal")
+    maker.add_argument("--effort", choices=("fast", "normal"), default="normal")
     maker.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS[:-1]))
     maker.add_argument("--tiles", type=Path, default=Path("out/likeness"), help="kept there")
     maker.set_defaults(command=make)

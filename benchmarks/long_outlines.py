@@ -1,6 +1,6 @@
 """How the search's time grows with the number of an outline's vertices, and with its length.
 
-    OMP_NUM_THREADS=1 python benchmarks/long_outlines.py [--effort fast|normal|best] [--quick]
+    OMP_NUM_THREADS=1 python benchmarks/long_outlines.py [--effort fast|normal] [--quick]
 
 The bundled turtle with 60 to 240 vertices evenly along its outline, then a squirrel and a spider with
 long thin legs. Processor seconds of the search alone, in one process, in all nine classes.
@@ -32,7 +32,7 @@ def seconds(target: Target, effort: str) -> float:
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--effort", choices=("fast", "normal", "best"), default="fast")
+    parser.add_argument("--effort", choices=("fast", "normal"), default="fast")
     parser.add_argument("--quick", action="store_true", help="the fewest vertices alone")
     options = parser.parse_args()
     turtle = Target.read(BUNDLED / "turtle.png").outline

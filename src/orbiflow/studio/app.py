@@ -109,7 +109,7 @@ async def about(here: Studio) -> dict[str, Any]:
             for name, title in ANIMALS.items()
         ],
         "palettes": [{"name": name, **own._asdict()} for name, own in PALETTES.items()],
-        "efforts": ["fast", "normal", "best"],
+        "efforts": ["fast", "normal"],
     }
 
 

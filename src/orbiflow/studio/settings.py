@@ -73,8 +73,8 @@ class Limits(Settings):
 class SearchChoice(Settings, group="Search"):
     """How tiles are searched for in the studio."""
 
-    effort: Literal["fast", "normal", "best"] = "normal"
-    """How long the search takes: seconds, a quarter of a minute, or a minute and more."""
+    effort: Literal["fast", "normal"] = "normal"
+    """How long the search takes: some seconds, or about twice as long."""
 
     objective: Literal["likeness", "overlap"] = "likeness"
     """With likeness, the picture bends until it is a tile; with overlap, the tile covers the picture
@@ -84,7 +84,7 @@ class SearchChoice(Settings, group="Search"):
     """Ways that the copies may lie, such as IH4 and IH6. Default: all that suit the picture."""
 
     like: Annotated[int | None, Range(1)] = None
-    """Number of a tile: look longer, for more tiles whose copies lie like its copies."""
+    """Number of a tile: look for more tiles whose copies lie like its copies."""
 
     seed: Seed = 0
     """Start of the random numbers: another one gives other tiles."""

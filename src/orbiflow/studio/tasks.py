@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 
 PER_CLASS = 50  # numbers that a class has for its tiles
 MORE_TILES = 4  # tiles of a class, for "more like this one"
-LONGER_EFFORT = {"fast": "normal", "normal": "best", "best": "best"}
 
 
 @operation("studio read")
@@ -128,7 +127,7 @@ def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
         return settings.replace(classes=choice.classes) if choice.classes else settings
     return settings.replace(
         classes=_classes_like(project, choice.like),
-        effort=LONGER_EFFORT[choice.effort],
+        effort="normal",
         per_class=MORE_TILES,
         seed=choice.seed + 1,
     )

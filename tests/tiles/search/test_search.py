@@ -319,7 +319,7 @@ def test_a_search_that_leaves_no_phase_is_refused() -> None:
 
 
 def test_a_first_look_is_one_small_search() -> None:
-    own = replace(LikenessSearch.for_effort("best"), passed=0, **SKETCH)
+    own = replace(LikenessSearch(phases=12), passed=0, **SKETCH)
     assert [level for _, level in own.levels()] == [own]
     assert own.finalists == own.starts <= 2
     assert len(own.bodies) == 1

@@ -102,7 +102,7 @@ def test_what_was_shown_is_kept_when_the_search_is_cancelled() -> None:
     assert result.interrupted == set(NAMES)
 
 
-@pytest.mark.parametrize("effort", ["fast", "normal", "best"])
+@pytest.mark.parametrize("effort", ["fast", "normal"])
 @pytest.mark.parametrize("kind", [LikenessSearch, OverlapSearch])
 def test_levels_are_the_whole_search(
     kind: type[LikenessSearch] | type[OverlapSearch], effort: str

@@ -42,17 +42,6 @@ EFFORTS: Mapping[str, Mapping[str, Any]] = {
         "finalists": 1,
     },
     "normal": {},
-    "best": {
-        "max_frequency": 15,
-        "candidates": 400,
-        "resolutions": (30, 48, 96, 120),
-        "boundary": 480,
-        "projected": 4000,
-        "measured": 1000,
-        "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),
-        "polish": 100,
-        "finalists": 4,
-    },
 }
 """What each level changes."""
 

@@ -58,8 +58,8 @@ class SearchSettings(Settings, group="Search"):
     """Isohedral classes, such as IH4,IH6. With all, classes with symmetric tiles are searched whatever
     the silhouette."""
 
-    effort: Annotated[Literal["fast", "normal", "best"], OnlyWith(method="descent")] = "normal"
-    """How long the search takes: seconds, a quarter of a minute, or a minute and more."""
+    effort: Annotated[Literal["fast", "normal"], OnlyWith(method="descent")] = "normal"
+    """How long the search takes: some seconds, or about twice as long."""
 
     objective: Annotated[Literal["likeness", "overlap"], OnlyWith(method="descent")] = "likeness"
     """With likeness, the silhouette bends until it is a tile, and every limb is kept. With overlap,
@@ -75,11 +75,7 @@ class SearchSettings(Settings, group="Search"):
     """Tiles with necks thinner than this rank lower; in square roots of the tile's area."""
 
     max_frequency: Annotated[
-        int | None,
-        Range(0, 60),
-        OnlyWith(objective="overlap"),
-        OVERLAP,
-        DefaultText("10, or 15 for effort best"),
+        int | None, Range(0, 60), OnlyWith(objective="overlap"), OVERLAP, DefaultText("10")
     ] = None
     """Largest frequency of the deformation (Omega in the paper)."""
 

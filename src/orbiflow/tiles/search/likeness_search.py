@@ -37,7 +37,7 @@ SKETCH: dict[str, Any] = {
     "bodies": ("soft",),
 }
 # The number of phases of each level of effort: the first in all classes, more in the promising ones
-EFFORTS = {"fast": 1, "normal": 2, "best": 12}
+EFFORTS = {"fast": 1, "normal": 2}
 PROMISING = 0.5  # marks behind the best class up to which a class is searched in more phases
 GOLDEN = (5**0.5 - 1) / 2  # successive multiples, modulo 1, lie far from each other
 # Widths, in lengths of the silhouette, below which parts are rounded off in classes without a tile

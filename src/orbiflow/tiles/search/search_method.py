@@ -57,7 +57,7 @@ class SearchMethod(ABC):
 
     @classmethod
     def for_effort(cls, effort: str, **changes: Any) -> Self:
-        """Return the settings of a level of effort, "fast", "normal" or "best", with changes by name.
+        """Return the settings of a level of effort, "fast" or "normal", with changes by name.
 
         Raises:
             OrbiflowError: for an unknown level or setting.

@@ -2,7 +2,7 @@
 
 export const STAGES = { sketch: "first sketch", better: "getting better", final: "finished" };
 
-export const EFFORTS = { fast: "Quick", normal: "Careful", best: "Thorough" };
+export const EFFORTS = { fast: "Quick", normal: "Careful" };
 export const EFFORT_TIMES = {
   fast: "Half a minute or so.",
   normal: "About a minute: usually better.",
