@@ -23,6 +23,7 @@ from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, LikenessSearch, Target
 from orbiflow.tiles.geometry import best_similarity
 from orbiflow.tiles.search import bending
+from orbiflow.tiles.search.carving import Race
 from orbiflow.tiles.search.search_method import Goal
 
 NAMES = ("penguin_80", "squirrel_80", "hollow-cat_80", "flamingo_80", "squid_80", "dolphin_60")
@@ -43,7 +44,7 @@ def before_and_after(name: str) -> tuple[Ring, Ring, Ring]:
         found += [(kind, bent) for bent in bents[:1]]
     kind, plain = max(found, key=lambda one: one[1].score)
     body = plain.orientation.fine
-    both = plain, bending._carved(CLASSES[kind], plain, settings.min_neck)
+    both = plain, bending._carved(CLASSES[kind], plain, settings.min_neck, Race())
     marks = "".join(f"{bent.fidelity.mark:8.2f}" for bent in both)
     rings = body.rest[: body.size], *(bent.ring for bent in both)
     turning = "".join(f"{_turning(ring):9.1f}" for ring in rings)

@@ -164,7 +164,7 @@ def run(race: Race, costs: list[float]) -> int:
     watch = race.watch()
     for k, cost in enumerate(costs):
         try:
-            watch(OptimizeResult(fun=cost))
+            watch(OptimizeResult({"fun": cost}))
         except BehindError:
             return k + 1
     return len(costs)

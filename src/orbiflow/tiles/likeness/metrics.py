@@ -87,7 +87,7 @@ class Overlap:
         """Return the gradient (N, 2) of the area of the ring's part inside the region."""
         ends = np.roll(ring, -1, axis=0)
         sides = ends - ring
-        lines = shapely.linestrings(np.stack([ring, ends], axis=1))
+        lines = np.asarray(shapely.linestrings(np.stack([ring, ends], axis=1)), dtype=np.object_)
         # cutting takes longer than looking what there is to cut
         whole = np.asarray(shapely.contains_properly(self.region, lines))
         cut = np.flatnonzero(~whole & np.asarray(shapely.intersects(self.region, lines)))

@@ -71,7 +71,7 @@ class Race:
     def __init__(self) -> None:
         self._best = math.inf
 
-    def watch(self) -> Callable[[scipy.optimize.OptimizeResult], None]:
+    def watch(self) -> Callable[..., None]:
         """Return what is called after each step of one more tile; it raises `BehindError`."""
         steps = itertools.count(1)
 

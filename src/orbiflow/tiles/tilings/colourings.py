@@ -117,12 +117,12 @@ def colouring(tile: Tiles) -> Colouring:
     while not any(is_loop_free(own) for own in sublattices):
         size *= 2
         sublattices = [(size, 0, size)]
-    tries = (
-        (count, sublattice, colour_graph(graph_of(sublattice), count))
+    count, sublattice, colours = next(
+        (count, sublattice, colours)
         for count in itertools.count(_least_colours(links))  # one more than neighbours is enough
         for sublattice in filter(is_loop_free, sublattices)
+        if (colours := colour_graph(graph_of(sublattice), count)) is not None
     )
-    count, sublattice, colours = next(own for own in tries if own[2] is not None)
     shape = (len(tiling.aspects), sublattice[0], sublattice[2])
     order = np.argsort(-np.bincount(colours), kind="stable")  # the most frequent colour first
     table = np.argsort(order)[np.array(colours)].reshape(shape)
