@@ -44,12 +44,12 @@ class Gaps:
 
         The gradient of f is the g for which f grows by Re(conj(g) dz).
         """
-        apart: Complex = self._differences @ ring
+        apart: Complex = np.asarray(self._differences @ ring)
         gap: Array = (np.conj(self._way) * apart).real
         missing = np.maximum(1 - gap / self.width, 0.0)
         steep = -2 * np.minimum(missing, 1.0) / self.width * self._way
         total = np.where(missing < 1, missing**2, 2 * missing - 1).sum()
-        return float(total), self._differences.T @ steep
+        return float(total), np.asarray(self._differences.T @ steep)
 
 
 def _is_beyond(ring: Complex) -> Array:
