@@ -81,14 +81,17 @@ def escherize(
     target = reading.read(image, called)
     run_folder.result_folder(out)
     check_output_folder(out, image, settings.emphasis, *map(Path, settings.pin or ()))
-    picture = run_folder.read_png(target, image)
-    show = functools.partial(run_folder.show_reading, target, picture, out, on_event)
+    picture = functools.cache(functools.partial(run_folder.read_png, target, image))
+
+    def show() -> None:
+        run_folder.show_reading(target, picture(), out, on_event)
+
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
     result = search.escherize(target, settings, on_checked=show, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
     written = run_folder.write_run(
-        result, out, picture, figures=figures, shown_out=shown_out, on_event=on_event
+        result, out, picture(), figures=figures, shown_out=shown_out, on_event=on_event
     )
     tiles = result.tiles if written else ()
     summary = {

@@ -99,7 +99,8 @@ def escherize(
         method: A method of one's own, or with settings of its own, instead of the settings'.
         emphasis: What must survive, instead of the settings' mask.
         pins: What must not bend, instead of the settings'.
-        on_checked: Called when all arguments have been checked, before the search.
+        on_checked: Called when all arguments have been checked and there is a first look, before the
+            search.
         on_tile: Called in this thread with each certified tile and its stage, as soon as it is found:
             "sketch" for all classes first, "better" and, once for each class, "final". The
             search then takes a level of effort for all classes before the next.
@@ -127,8 +128,6 @@ def escherize(
     with one_blas_thread():
         near = near_symmetry(target.normal) if method.takes_symmetric else None
     names = _class_names(settings.classes, near)
-    if on_checked is not None:
-        on_checked()
     for source in (emphasis, pins):
         for note in source.notes if source else ():
             on_event(Note(note))
@@ -138,6 +137,9 @@ def escherize(
     shown = None if on_tile is None else _rating(on_tile, target)
     record = Record(names, on_event, shown, most=settings.per_class)
     with contextlib.suppress(Cancelled):
+        _look_first(task, names, record, cancel)
+        if on_checked is not None:
+            on_checked()
         _search_by_levels(task, names, workers, record, cancel)
     tiles, failures, left = record.finish()
     seconds = time.perf_counter() - begin
@@ -265,6 +267,15 @@ def _rating(on_tile: OnTile, target: Target) -> OnTile:
 SKETCHING = 0.1  # the share of the work that first looks are, if somebody watches
 
 
+def _look_first(task: _Task, names: Sequence[str], record: Record, cancel: Cancel) -> None:
+    """Show a certified tile of one of the classes in a moment, if the method can."""
+    record.next_level("sketch", SKETCHING * (record.on_tile is not None))
+    with one_thread(), one_blas_thread():
+        first = task.method.preview(task.goal, names, cancel)
+    if first is not None:
+        record.first_look(first)
+
+
 def _search_by_levels(
     task: _Task, names: Sequence[str], workers: int, record: Record, cancel: Cancel
 ) -> None:
@@ -283,13 +294,9 @@ def _search_by_levels(
             progress = functools.partial(record.progress, name)
             record.level_outcome(_outcome(own, isohedral_class(name), progress, cancel))
 
-    method, rest = task.method, 1.0 - SKETCHING * (record.on_tile is not None)
-    record.next_level("sketch", 1.0 - rest)
-    with one_thread(), one_blas_thread():
-        first = method.preview(task.goal, names, cancel)
-    if first is not None:
-        record.first_look(first)
+    method, rest = task.method, 1.0
     if record.on_tile is not None:
+        rest -= SKETCHING
         search([name for name in names if name not in record.looks], Sketches(method), 1)
     levels = method.levels()
     for share, own in levels:
