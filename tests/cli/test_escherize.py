@@ -136,7 +136,7 @@ def test_the_model_reproduces_the_polygon(folder: Path, document: dict[str, Any]
 def test_pictures_open(folder: Path) -> None:
     out = folder / "new" / "out"
     for name in ("IH4", "IH6"):
-        for file, width in {"tiling.png": 1600, "overlay.png": 1200}.items():
+        for file, width in {"tiling.png": 1200, "overlay.png": 1200}.items():
             with Image.open(out / name / file) as image:
                 image.load()
                 assert image.width == width
