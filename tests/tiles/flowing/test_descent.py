@@ -243,7 +243,7 @@ def test_efforts_are_valid_settings(effort: str) -> None:
 def test_settings_are_checked(changes: dict[str, object], message: str) -> None:
     with pytest.raises(OrbiflowError, match=message):
         OverlapSearch(**changes)  # type: ignore[arg-type]
-    with pytest.raises(OrbiflowError, match="effort must be fast, normal or best"):
+    with pytest.raises(OrbiflowError, match="effort must be fast or normal"):
         OverlapSearch.for_effort("heroic")
     with pytest.raises(OrbiflowError, match="has no setting 'magic'"):
         OverlapSearch.for_effort("fast", magic=1)

@@ -128,11 +128,9 @@ def escherize(
     with one_blas_thread():
         near = near_symmetry(target.normal) if method.takes_symmetric else None
     names = _class_names(settings.classes, near)
-    for source in (emphasis, pins):
-        for note in source.notes if source else ():
-            on_event(Note(note))
+    notes = [note for source in (emphasis, pins) if source for note in source.notes]
     if near is not None and near.stabiliser in SYMMETRIC_CLASSES:
-        on_event(Note(_symmetry_note(near, names)))
+        notes.append(_symmetry_note(near, names))
     workers = min(settings.workers or 1, len(names))
     shown = None if on_tile is None else _rating(on_tile, target)
     record = Record(names, on_event, shown, most=settings.per_class)
@@ -140,6 +138,8 @@ def escherize(
         _look_first(task, names, record, cancel)
         if on_checked is not None:
             on_checked()
+        for note in notes:
+            on_event(Note(note))
         _search_by_levels(task, names, workers, record, cancel)
     tiles, failures, left = record.finish()
     seconds = time.perf_counter() - begin
