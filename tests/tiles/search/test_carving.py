@@ -21,8 +21,8 @@ from orbiflow.tiles.search.carving import (
     WRINKLE_COST,
     BehindError,
     Carved,
+    Laid,
     Race,
-    _Laid,
     carved,
 )
 from orbiflow.tiles.search.co_deformation import BentTiles, held_on_tiles
@@ -107,7 +107,7 @@ def test_gradients_of_laid_points(smooth: bool) -> None:
     rng = np.random.default_rng(3)
     ring, along = (complex_points(rng.normal(size=(12, 2))) for _ in range(2))
     places = np.arange(12) + rng.uniform(-0.4, 0.4, 12)
-    lay = _Laid.smoothly if smooth else _Laid.straight
+    lay = Laid.smoothly if smooth else Laid.straight
 
     def value(ring: Complex, places: Array) -> float:
         return float((np.conj(along) * lay(places).points(ring)).sum().real)

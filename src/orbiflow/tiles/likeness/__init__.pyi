@@ -1,4 +1,5 @@
 from .bending_onto import bent_onto as bent_onto
+from .elastic import Body as Body
 from .elastic import Elastic as Elastic
 from .elastic import Stiffness as Stiffness
 from .faithful import Fidelity as Fidelity

@@ -12,6 +12,7 @@ corners. Points are complex numbers x + iy; a batch of C shapes is (N, C).
 from __future__ import annotations
 
 import copy
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -55,7 +56,70 @@ class Stiffness:
     forgiven: tuple[float, float] = (0.1, 0.15)
 
 
-class Elastic:
+class Body(ABC):
+    """What springs can pull: N points, of which the first n are an outline, and a quadratic energy.
+
+    Subclasses have the points at rest (N,), the number `size` n, the stiffness matrix (N, N), and the
+    forces of shapes.
+    """
+
+    rest: Complex
+    size: int
+
+    def __init__(self) -> None:
+        self._solvers: dict[float, Array] = {}
+
+    def __len__(self) -> int:
+        return len(self.rest)
+
+    @cached_property
+    @abstractmethod
+    def matrix(self) -> Array:
+        """The dense stiffness matrix (N, N)."""
+
+    @abstractmethod
+    def forces(self, z: Complex) -> Complex:
+        """Return the right side b (N, C) of matrix z = b, for rotations and pose of shapes (N, C)."""
+
+    def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
+        """Return shapes (N, C), from `z`, whose outline springs pull towards points (n, C).
+
+        All springs together have `strength`, in the unit of the energy. Each of the rounds chooses
+        rotations and solves.
+        """
+        mu = strength / self.size
+        solve = self._pulled_solver(mu)
+        for _ in range(rounds):
+            right = self.forces(z)
+            right[: self.size] += mu * towards
+            z = _times(solve, right)
+        return z
+
+    @cached_property
+    def condensed(self) -> Condensed:
+        """The body with its inner points eliminated, so that only the outline is free."""
+        n = self.size
+        inner = self.matrix[n:, n:]
+        if not len(inner):
+            none = np.zeros((0, n))
+            return Condensed(self.matrix, none, none[:, :0])
+        inverse = _inverse(inner)
+        follow = -inverse @ self.matrix[n:, :n]
+        return Condensed(self.matrix[:n, :n] + self.matrix[:n, n:] @ follow, follow, inverse)
+
+    def _pulled_solver(self, mu: float) -> Array:
+        solver = self._solvers.get(mu)  # looked up once: another thread may clear them
+        if solver is None:
+            matrix = self.matrix.copy()
+            matrix[np.arange(self.size), np.arange(self.size)] += mu
+            solver = _inverse(matrix)
+            if len(self._solvers) >= 16:
+                self._solvers.clear()
+            self._solvers[mu] = solver
+        return solver
+
+
+class Elastic(Body):
     """A triangulated silhouette of area about 1 and its energies.
 
     Its first n points are the counter-clockwise outline `ring` (n, 2). Where some should deform less,
@@ -70,6 +134,7 @@ class Elastic:
         stiff: Array | None = None,
         mesh: Mesh | None = None,
     ) -> None:
+        super().__init__()
         self.mesh = mesh or triangulate(ring)
         self.stiffness = stiffness or Stiffness()
         self.size = len(ring)
@@ -91,10 +156,7 @@ class Elastic:
         self._conjugate: scipy.sparse.csr_matrix = self._sums.conjugate().tocsr()
         self._own = np.asarray(self._sums.sum(axis=1)).ravel()
         self._own_conjugate = np.conj(self._own)
-        self._solvers: dict[float, Array] = {}
-
-    def __len__(self) -> int:
-        return len(self.rest)
+        self._solvers = {}
 
     @cached_property
     def measures(self) -> Measures:
@@ -145,7 +207,7 @@ class Elastic:
         strain, bent = self._forgiven_misfits(z.reshape(-1, 1))
         body = copy.copy(self)
         for name in ("matrix", "condensed"):
-            body.__dict__.pop(name, None)
+            vars(body).pop(name, None)
         body._weigh(self._w / np.sqrt(1 + strain[:, 0]), self._rod_cost / np.sqrt(1 + bent[:, 0]))
         return body
 
@@ -219,43 +281,6 @@ class Elastic:
         rod = self._rod.T @ scipy.sparse.diags(self._rod_cost) @ self._rod
         matrix[: self.size, : self.size] += rod.toarray()
         return matrix
-
-    def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
-        """Return shapes (N, C), from `z`, whose outline springs pull towards points (n, C).
-
-        All springs together have `strength`, in the unit of the energy. Each of the rounds chooses
-        rotations and solves.
-        """
-        mu = strength / self.size
-        solve = self._pulled_solver(mu)
-        for _ in range(rounds):
-            right = self.forces(z)
-            right[: self.size] += mu * towards
-            z = _times(solve, right)
-        return z
-
-    @cached_property
-    def condensed(self) -> Condensed:
-        """The body with its inner points eliminated, so that only the outline is free."""
-        n = self.size
-        inner = self.matrix[n:, n:]
-        if not len(inner):
-            none = np.zeros((0, n))
-            return Condensed(self.matrix, none, none[:, :0])
-        inverse = _inverse(inner)
-        follow = -inverse @ self.matrix[n:, :n]
-        return Condensed(self.matrix[:n, :n] + self.matrix[:n, n:] @ follow, follow, inverse)
-
-    def _pulled_solver(self, mu: float) -> Array:
-        solver = self._solvers.get(mu)  # looked up once: another thread may clear them
-        if solver is None:
-            matrix = self.matrix.copy()
-            matrix[np.arange(self.size), np.arange(self.size)] += mu
-            solver = _inverse(matrix)
-            if len(self._solvers) >= 16:
-                self._solvers.clear()
-            self._solvers[mu] = solver
-        return solver
 
     def copies(self, z: Complex) -> tuple[Complex, Complex]:
         """Return best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""

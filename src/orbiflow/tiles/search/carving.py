@@ -58,7 +58,7 @@ class Carved(NamedTuple):
     @property
     def outline(self) -> Complex:
         """The silhouette's points (n,) on the tile."""
-        return _Laid.straight(self.places).points(self.ring)
+        return Laid.straight(self.places).points(self.ring)
 
 
 class BehindError(Exception):
@@ -101,7 +101,7 @@ def carved(
     `BehindError` if it falls behind in a race.
     """
     basis, root = _basis(body, space)
-    spline = _spline_basis(body, ring)
+    spline = spline_basis(body, ring)
     count, own = basis.shape[1], np.arange(body.size)
     whole = np.stack([basis.real, basis.imag], axis=1).reshape(-1, count)  # x and y of each vertex
     across = np.ascontiguousarray(whole.T)
@@ -110,7 +110,7 @@ def carved(
         ring = (whole @ parameters[:count]).view(complex)
         slide = spline @ parameters[count:]
         places = own + slide if fixed is None else fixed
-        laid = _Laid.smoothly(places) if fixed is None else _Laid.straight(places)
+        laid = Laid.smoothly(places) if fixed is None else Laid.straight(places)
         mark, rise = mark_gradient(body.measures, laid.points(ring))
         wrinkles, bumpy, shifted = body.measures.wrinkles(ring, places)
         cost, down = WRINKLE_COST * wrinkles - mark, WRINKLE_COST * bumpy - laid.gradient(rise)
@@ -144,7 +144,7 @@ def carved(
 
     start = scipy.linalg.lstsq(whole, ring.view(float), lapack_driver="gelsy")[0]
     best = climbed(np.append(start, np.zeros(SLIDES)))
-    places, points = _cornered(own + _calmed(spline @ best[count:]), corners)
+    places, points = _cornered(own + calmed(spline @ best[count:]), corners)
     best = climbed(best, places)[:count]
     parameters = scipy.linalg.solve_triangular(root, best, lower=True, trans="T")
     return Carved(basis @ best, places, points, *space.group(0, parameters))
@@ -158,7 +158,7 @@ def _basis(body: Elastic, space: TileSpace) -> tuple[Complex, Array]:
     return scipy.linalg.solve_triangular(root, columns.T, lower=True).T, root
 
 
-def _spline_basis(body: Elastic, ring: Complex) -> Array:
+def spline_basis(body: Elastic, ring: Complex) -> Array:
     """Return splines (n, `SLIDES`) of unit stiffness, if points slide by so many vertices."""
     n = body.size
     at = np.arange(n)[:, None] * SLIDES / n - np.arange(SLIDES)
@@ -178,7 +178,7 @@ def _stiffness(body: Elastic, columns: Complex, least: float) -> Array:
     return stiff
 
 
-class _Laid(NamedTuple):
+class Laid(NamedTuple):
     """Points of the silhouette on a ring (n,): means of its vertices."""
 
     at: Integers  # (n, k) of which vertices
@@ -186,18 +186,18 @@ class _Laid(NamedTuple):
     slopes: Array  # (n, k) how the weights change with the place
 
     @classmethod
-    def straight(cls, places: Array) -> _Laid:
+    def straight(cls, places: Array) -> Laid:
         """Lay points on the sides of the ring."""
         return cls._of(places, np.array([[1.0, -1.0], [0.0, 1.0]]), 0)
 
     @classmethod
-    def smoothly(cls, places: Array) -> _Laid:
+    def smoothly(cls, places: Array) -> Laid:
         """Lay points on Catmull and Rom's cubics through the vertices, which have no kinks."""
         cubics = [[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]
         return cls._of(places, np.array(cubics) / 2, -1)
 
     @classmethod
-    def _of(cls, places: Array, polynomials: Array, first: int) -> _Laid:
+    def _of(cls, places: Array, polynomials: Array, first: int) -> Laid:
         below = np.floor(places).astype(np.int64)
         powers = np.vander(places - below, polynomials.shape[1], increasing=True)
         at = (below[:, None] + np.arange(first, first + len(polynomials))) % len(places)
@@ -219,7 +219,7 @@ class _Laid(NamedTuple):
         return (np.conj(along) * (self.slopes * ring[self.at]).sum(axis=1)).real
 
 
-def _calmed(slide: Array) -> Array:
+def calmed(slide: Array) -> Array:
     """Return slides (n,) in proportion, so small that points keep their order and a distance."""
     return slide * min(
         1.0, (1 - MIN_POINT_DISTANCE) / max((slide - np.roll(slide, -1)).max(), 1e-9)

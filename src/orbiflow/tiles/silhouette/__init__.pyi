@@ -10,8 +10,10 @@ from .mesh import harmonic as harmonic
 from .mesh import triangulate as triangulate
 from .outlines import DISC_OVERREACH as DISC_OVERREACH
 from .outlines import Samples as Samples
+from .outlines import important_vertices as important_vertices
 from .outlines import opened as opened
 from .outlines import sampled as sampled
+from .outlines import with_corners as with_corners
 from .pins import Pins as Pins
 from .readers.files import read_outline as read_outline
 from .readers.image_files import open_image as open_image

@@ -1,0 +1,367 @@
+"""How two figures bend, as rigidly as they can, until their union is a tile (design point 21).
+
+All is as for one silhouette (`co_deformation`), with a body of two parts. A pair costs what both
+figures do and, once more, what the worse one does: nobody looks at a pair of which one is spoilt.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import product
+from typing import Any, TypeVar
+
+import numpy as np
+
+from orbiflow.arrays import Array, Complex, Integers
+from orbiflow.tiles.geometry import apart, best_similarity, reverse, ring_length
+from orbiflow.tiles.likeness import Elastic, kept_of
+from orbiflow.tiles.search.co_deformation import (
+    BODIES,
+    COMPARISON_STRENGTH,
+    drawn_to_tiles,
+    held_on_tiles,
+)
+from orbiflow.tiles.search.gluing import Placement
+from orbiflow.tiles.search.pair_body import Glue, PairBody
+from orbiflow.tiles.search.tile_space import Placements, TileSpace
+from orbiflow.tiles.silhouette import important_vertices, with_corners
+from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
+
+MULTIPLES = (1, 2, 4)  # points of each level for each point of the first
+CORNER_DEPTH = (
+    0.004  # the least height of a corner, in square roots of the area, that a point lies at
+)
+CROSSING_COST = 100.0  # more than anything sound costs
+FOLLOWING_STRENGTH = 60.0  # strength of the springs by which a finer body follows a coarser one
+HELD_ROUNDS = 5  # steps of the minimisation among tiles
+SPRUNG_ROUNDS = 3  # steps of springs that compare neighbours
+TWIN_DISTANCE = 4e-4  # mean squared distance of both outlines below which pairs are twins
+MOST_CHANGED = 3  # steps by which lengths of edges change at a time, in all
+BEST_OF_GLUE = 5  # neighbours of each neighbouring glue that are worked out
+BETTER = 0.998  # what a neighbour costs at most, for each unit of what there is
+
+
+Pair = TypeVar("Pair", bound="BentPair")
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Two silhouettes that are to share a tiling, with a mean area of 1, at three levels of points."""
+
+    rings: tuple[bytes, bytes]  # (M, 2) each, float64, counter-clockwise, of area 1
+    ratio: float = 1.0  # the area of the second one over that of the first
+    mirrored: bool = False  # whether the second one is mirrored
+    count: int = 64  # of points of both on the first level, in proportion to their lengths
+
+    @classmethod
+    def of(
+        cls, one: Array, two: Array, ratio: float = 1.0, *, mirrored: bool = False, count: int = 64
+    ) -> Figures:
+        """Return those of two rings (M, 2)."""
+        rings = np.ascontiguousarray(one, np.float64), np.ascontiguousarray(two, np.float64)
+        return cls((rings[0].tobytes(), rings[1].tobytes()), ratio, mirrored, count)
+
+    def parts(self, level: int) -> tuple[Elastic, Elastic]:
+        """Return the bodies of both, with the points of a level."""
+        return _parts(self, level)
+
+
+@lru_cache(maxsize=64)
+def _parts(figures: Figures, level: int) -> tuple[Elastic, Elastic]:
+    areas = 2 / (1 + figures.ratio), 2 * figures.ratio / (1 + figures.ratio)
+    one, two = (
+        np.frombuffer(ring).reshape(-1, 2) * np.sqrt(area)
+        for ring, area in zip(figures.rings, areas, strict=True)
+    )
+    lengths = ring_length(one), ring_length(two)
+    first = round(figures.count * lengths[0] / sum(lengths))
+
+    def body(ring: Array, count: int, mirrored: bool) -> Elastic:
+        fine = with_corners(ring, important_vertices(ring, CORNER_DEPTH), MULTIPLES[-1] * count)
+        fine = reverse(fine) * (1.0, -1.0) if mirrored else fine
+        return Elastic(fine[:: MULTIPLES[-1] // MULTIPLES[level]], BODIES["firm"])
+
+    return body(one, first, False), body(two, figures.count - first, figures.mirrored)
+
+
+@lru_cache(maxsize=256)
+def glued_body(figures: Figures, level: int, glue: Glue) -> PairBody:
+    """Return both figures, glued, with the points of a level."""
+    return PairBody(figures.parts(level), glue)
+
+
+@dataclass(frozen=True, eq=False)
+class BentPair:
+    """Two figures that are bent so that their union is, nearly, a tile."""
+
+    figures: Figures
+    level: int
+    glue: Glue
+    kind: IsohedralClass
+    placement: Placements  # one, of the union
+    points: Complex  # (N,) of the body
+
+    @property
+    def body(self) -> PairBody:
+        """Both figures, glued."""
+        return glued_body(self.figures, self.level, self.glue)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a process tells another, with costs and marks, which it would work out again."""
+        known = {"_costs": self._costs, "marks": self.marks}
+        return {**vars(self), **known, "kind": self.kind.name}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, kind=isohedral_class(state["kind"]))
+
+    @cached_property
+    def _costs(self) -> tuple[Array, bool]:
+        costs, sound = self.body.costs(self.points[:, None])
+        return costs[:, 0], bool(sound[0])
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing crosses or overlaps."""
+        return self._costs[1]
+
+    @property
+    def cost(self) -> float:
+        """What bending costs, by which pairs are compared before they are carved."""
+        return float(together(self._costs[0])) + CROSSING_COST * (not self.sound)
+
+    @cached_property
+    def marks(self) -> tuple[float, float]:
+        """The marks that people would give to both figures."""
+        rings = self.body.rings(self.points)
+        one, two = (
+            kept_of(part.measures, ring, 0.0).mark
+            for part, ring in zip(self.body.parts, rings, strict=True)
+        )
+        return one, two
+
+    @property
+    def space(self) -> TileSpace:
+        """The tiles of the placement."""
+        return TileSpace(self.kind, self.placement)
+
+    def is_twin(self, other: BentPair) -> bool:
+        """Whether both figures are as in another pair of the same figures."""
+        rings = zip(self.body.rings(self.points), other.body.rings(other.points), strict=True)
+        return self.figures == other.figures and all(apart(a, b) < TWIN_DISTANCE for a, b in rings)
+
+
+def together(costs: Array) -> Array:
+    """Return what pairs (C,) cost whose figures cost (2, C)."""
+    return costs.sum(axis=0) + costs.max(axis=0)
+
+
+def unlike(pairs: Iterable[Pair], count: int) -> list[Pair]:
+    """Return the first so many, without twins of earlier ones."""
+    kept: list[Pair] = []
+    for pair in pairs:
+        if len(kept) == count:
+            break
+        if not any(pair.is_twin(other) for other in kept):
+            kept.append(pair)
+    return kept
+
+
+def _as_placements(found: Sequence[Placement]) -> Placements:
+    return Placements(
+        np.array([own.lengths for own in found]),
+        np.array([own.start for own in found]),
+        np.array([own.turn for own in found], dtype=float),
+        np.array([-own.residual for own in found], dtype=float),
+    )
+
+
+def bent(figures: Figures, placements: Sequence[Placement], count: int) -> list[BentPair]:
+    """Bend coarse pairs by springs for each placement; the best of these are held among tiles."""
+    groups: defaultdict[tuple[Glue, IsohedralClass], list[Placement]] = defaultdict(list)
+    for own in placements:
+        groups[own.glue, own.kind].append(own)
+    rough: list[tuple[float, BentPair]] = []
+    for (glue, kind), found in groups.items():
+        own, body = _as_placements(found), glued_body(figures, 0, glue)
+        z, space = drawn_to_tiles(body, kind, own)
+        costs, _ = body.costs(z)
+        own = own._replace(turns=space.turns)
+        rough += [
+            (cost, BentPair(figures, 0, glue, kind, own.take(np.array([k])), z[:, k]))
+            for k, cost in enumerate(together(costs).tolist())
+        ]
+    rough.sort(key=lambda own: own[0])
+    return [held(pair, HELD_ROUNDS) for _, pair in rough[:count]]
+
+
+def held(pair: BentPair, rounds: int) -> BentPair:
+    """Return the shape of least energy among the tiles of a pair's placement, in so many rounds."""
+    tiles = held_on_tiles(pair.body, pair.space, pair.points[:, None], rounds)
+    return replace(pair, placement=tiles.placements, points=tiles.points[:, 0])
+
+
+def finer(pair: BentPair, level: int, *, rounds: int = HELD_ROUNDS) -> BentPair:
+    """Return the same with the points of a finer level, in so many steps of the minimisation."""
+    multiple = MULTIPLES[level] // MULTIPLES[pair.level]
+    glue, own = pair.glue.times(multiple), pair.placement
+    body = glued_body(pair.figures, level, glue)
+    one, two = (
+        _followed(part, old, pair.points[places], multiple)
+        for part, old, places in zip(body.parts, pair.body.parts, pair.body.places, strict=True)
+    )
+    own = own._replace(lengths=own.lengths * multiple, starts=own.starts * multiple)
+    space = TileSpace(pair.kind, own)
+    z = _sprung(body, space, body.joined((one, two)), 2)
+    if not rounds:
+        z[: body.size] = _tiles(body, space, z)
+    own = own._replace(turns=space.turns)
+    found = BentPair(pair.figures, level, glue, pair.kind, own, z[:, 0])
+    return held(found, rounds) if rounds else found
+
+
+def _followed(body: Elastic, old: Elastic, z: Complex, multiple: int) -> Complex:
+    """Return the shape (N, 1) of a finer body whose outline is that of a coarser one's shape."""
+    outline = z[: old.size]
+    at, part = np.divmod(np.arange(body.size), multiple)
+    share = part / multiple
+    goal = (1 - share) * outline[at] + share * outline[(at + 1) % old.size]
+    turn = np.exp(1j * np.angle(best_similarity(old.rest, z)))
+    start = body.rest * turn + goal.mean()
+    return body.pulled(start[:, None], goal[:, None], FOLLOWING_STRENGTH, 6)
+
+
+def _tiles(body: PairBody, space: TileSpace, z: Complex) -> Complex:
+    """Return the nearest tiles (n, C), point by point."""
+    return space.in_order(space.nearest(z[: body.size].T).vertices).T
+
+
+def _sprung(body: PairBody, space: TileSpace, z: Complex, rounds: int) -> Complex:
+    """Return shapes (N, C) that strong springs pull to tiles, whose glide axes turn to suit them."""
+    if space.glides:
+        space.turn(space.best_turns(z[: body.size].T))
+    for _ in range(rounds):
+        z = body.pulled(z, _tiles(body, space, z), COMPARISON_STRENGTH, 1)
+    return z
+
+
+# How the ends of the path move along the first outline, along the second, and how much longer it is
+PATH_MOVES = (
+    *((0, 0, 0), (-1, 0, 1), (1, 0, -1), (0, -1, 1), (0, 1, -1)),
+    *((1, -1, 0), (-1, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)),
+)
+
+
+@lru_cache(maxsize=256)
+def _changes(kind: IsohedralClass, total: int) -> Integers:
+    """Return changes (M, K) of edges' lengths with a sum, by few steps."""
+    edges = [own.edges for own in kind.edge_classes]
+    found: list[Integers] = []
+    for steps in product(range(-2, 3), repeat=len(edges)):
+        if sum(map(abs, steps)) <= MOST_CHANGED:
+            change = np.zeros(len(kind.template()), dtype=np.int64)
+            for own, step in zip(edges, steps, strict=True):
+                change[own] = step
+            if change.sum() == total:
+                found.append(change)
+    return np.array(found, dtype=np.int64).reshape(-1, len(kind.template()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sprung:
+    """Shapes drawn to tiles by springs, for comparison."""
+
+    body: PairBody
+    placements: Placements
+    points: Complex  # (N, C)
+    costs: Array  # (C,)
+
+    @classmethod
+    def of(
+        cls, body: PairBody, kind: IsohedralClass, placements: Placements, z: Complex
+    ) -> _Sprung:
+        space = TileSpace(kind, placements)
+        z = _sprung(body, space, z, SPRUNG_ROUNDS)
+        costs, sound = body.costs(z)
+        away = (abs(z[: body.size] - _tiles(body, space, z)) ** 2).mean(axis=0)
+        whole = together(costs) + COMPARISON_STRENGTH * away + CROSSING_COST * ~sound
+        return cls(body, placements._replace(turns=space.turns), z, whole)
+
+    @property
+    def best(self) -> _Sprung:
+        k = np.array([self.costs.argmin()])
+        return replace(
+            self, placements=self.placements.take(k), points=self.points[:, k], costs=self.costs[k]
+        )
+
+
+def moved(pair: BentPair, step: int = 1, *, most: int = 6, tried: int = 12) -> BentPair:
+    """Move corners and the path's ends by so many points until no neighbour costs less."""
+    parts = pair.body.parts
+    here = _Sprung.of(pair.body, pair.kind, pair.placement, pair.points[:, None])
+    for _ in range(most):
+        options: list[tuple[float, Glue, Placements, Complex]] = []
+        for first, second, longer in PATH_MOVES:
+            glue = here.body.glue
+            glue = Glue(
+                (glue.first + step * first) % parts[0].size,
+                (glue.second + step * second) % parts[1].size,
+                glue.length + step * longer,
+            )
+            if 3 <= glue.length < min(part.size for part in parts) - 3:
+                body = glued_body(pair.figures, pair.level, glue)
+                options += _neighbours(pair.kind, here, body, (first, second, longer), step)
+        options.sort(key=lambda own: own[0])
+        better = here
+        for glue in {own[1]: None for own in options[:tried]}:
+            mine = [own for own in options[:tried] if own[1] == glue]
+            joined = Placements(
+                *(np.concatenate(part) for part in zip(*(own[2] for own in mine), strict=True))
+            )
+            z = np.repeat(mine[0][3], len(mine), axis=1)
+            body = glued_body(pair.figures, pair.level, glue)
+            found = _Sprung.of(body, pair.kind, joined, z).best
+            better = min(better, found, key=lambda own: float(own.costs[0]))
+        if better.costs[0] > BETTER * here.costs[0]:
+            break
+        here = better
+    own = here.placements, here.points[:, 0]
+    return held(BentPair(pair.figures, pair.level, here.body.glue, pair.kind, *own), HELD_ROUNDS)
+
+
+def _neighbours(
+    kind: IsohedralClass, here: _Sprung, body: PairBody, move: tuple[int, int, int], step: int
+) -> list[tuple[float, Glue, Placements, Complex]]:
+    """Return placements of a glue near those of the present one, with how far their tiles are."""
+    first, second, longer = move
+    one, two = (here.points[places] for places in here.body.places)
+    z = body.joined((one, two))
+    change = _changes(kind, -2 * longer) * step
+    if not len(change):
+        return []
+    ends = np.concatenate([np.zeros((len(change), 1), np.int64), np.cumsum(change, axis=1)], axis=1)
+    zero, rows = np.zeros(len(change), dtype=np.int64), list[Integers]()
+    # the first corner keeps its place on the first or on the second figure, or another corner does
+    for shift in {-(first + longer) * step, -(second + 2 * longer) * step}:
+        for start in (zero, -ends.min(axis=1), -ends.max(axis=1), zero + step, zero - step):
+            starts = (here.placements.starts[0] + shift + start) % body.size
+            rows.append(np.column_stack([here.placements.lengths[0] + change, starts]))
+    own = np.unique(np.concatenate(rows), axis=0)
+    own = own[(own[:, :-1] >= 2).all(axis=1)]
+    if move == (0, 0, 0):
+        present = np.append(here.placements.lengths[0], here.placements.starts[0])
+        own = own[(own != present).any(axis=1)]
+    if not len(own):
+        return []
+    turns, gains = (np.full(len(own), part[0]) for part in here.placements[2:])
+    found = Placements(own[:, :-1], own[:, -1], turns, gains)
+    away = TileSpace(kind, found).distances(np.repeat(z[: body.size].T, len(own), axis=0))
+    # the path may not have been one
+    torn = sum(
+        float((abs(shape - z[places]) ** 2).sum())
+        for shape, places in zip((one, two), body.places, strict=True)
+    )
+    near = np.argsort(away, kind="stable")[:BEST_OF_GLUE].tolist()
+    return [(float(away[k]) + torn, body.glue, found.take(np.array([k])), z) for k in near]
