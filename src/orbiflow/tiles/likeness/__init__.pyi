@@ -8,6 +8,7 @@ from .faithful import fidelity as fidelity
 from .faithful import fidelity_to_original as fidelity_to_original
 from .faithful import kept_of as kept_of
 from .faithful import mark_gradient as mark_gradient
+from .faithful import score_of as score_of
 from .gaps import Gaps as Gaps
 from .likeness import Likeness as Likeness
 from .measures import Measures as Measures

@@ -120,7 +120,12 @@ class Fidelity:
     @property
     def score(self) -> float:
         """How probably people call it a good likeness, 0 to 1: a mark of 6.5 or more."""
-        return 1 / (1 + math.exp(min(STEEPNESS * (GOOD_MARK - self.mark), 700.0)))
+        return score_of(self.mark)
+
+
+def score_of(mark: float) -> float:
+    """Return how probably people call what has this mark a good likeness, 0 to 1."""
+    return 1 / (1 + math.exp(min(STEEPNESS * (GOOD_MARK - mark), 700.0)))
 
 
 def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -17,7 +17,15 @@ import scipy.optimize
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import plane_points
-from orbiflow.tiles.likeness import Gaps, Measures, kept_of, mark_gradient
+from orbiflow.tiles.likeness import (
+    Gaps,
+    Measures,
+    kept_of,
+    mark_gradient,
+    neck_factor,
+    neck_up_to,
+    score_of,
+)
 from orbiflow.tiles.search.carving import (
     SLIDES,
     STEPS_APART,
@@ -31,6 +39,7 @@ from orbiflow.tiles.search.pair_bending import BentPair
 from orbiflow.tiles.tilings import Tiling
 
 SOFTNESS = 0.4  # marks by which one figure may be better before the other one alone counts
+MIN_NECK = 0.01  # the width of necks, in square roots of the mean area, below which scores fall
 ROOM = 0.012  # the gaps that carving apart leaves, in square roots of the mean area
 
 
@@ -58,6 +67,23 @@ class CarvedPair(BentPair):
         return Tiling(group, [plane_points(ring) for ring in self.body.rings(self.points)])
 
     @cached_property
+    def factor(self) -> float:
+        """What is left of its score: 1, less where a neck is too thin, 0 if something crosses."""
+        if not self.sound:
+            return 0.0
+        polygons = [plane_points(ring) for ring in self.body.rings(self.points)]
+        return min(neck_factor(neck_up_to(own, MIN_NECK), MIN_NECK) for own in polygons)
+
+    @property
+    def scores(self) -> tuple[float, float]:
+        """What pairs are ordered by: how probably people like the worse figure, and the better."""
+        low, high = sorted(score_of(mark) for mark in self.marks)
+        return low * self.factor, high * self.factor
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "factor": self.factor}
+
+    @cached_property
     def marks(self) -> tuple[float, float]:
         one, two = (
             kept_of(part.measures, ring, 0.0).mark
@@ -67,9 +93,16 @@ class CarvedPair(BentPair):
 
 
 def carved_pair(pair: BentPair, steps: int) -> CarvedPair:
-    """Carve a pair, by so many steps while points slide and after it; apart, if something crosses."""
+    """Carve a pair, by so many steps while points slide and after it.
+
+    If something crosses, or a neck is thin, it is carved apart.
+    """
     found = _carved(pair, steps, 0.0)
-    return found if found.sound else _carved(pair, steps, ROOM)
+    return found if found.factor == 1 else max(found, _carved(pair, steps, ROOM), key=_score)
+
+
+def _score(pair: CarvedPair) -> tuple[float, float]:
+    return pair.scores
 
 
 def _carved(pair: BentPair, steps: int, room: float) -> CarvedPair:

@@ -81,7 +81,7 @@ def search_pair(
 ) -> list[CarvedPair]:
     """Search for tilings of two silhouettes, of which the second may be mirrored.
 
-    What is returned is certified, and comes by the mark of the worse figure, best first. The figures
+    What is returned is certified, and comes by the score of the worse figure, best first. The figures
     have a mean area of 1.
 
     Args:
@@ -197,5 +197,5 @@ def _detailed(pair: CarvedPair) -> CarvedPair:
 
 
 def _ranked(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
-    """Return pairs by the worse of their marks, then by the better; what is not sound comes last."""
-    return sorted(pairs, key=lambda own: (not own.sound, -min(own.marks), -max(own.marks)))
+    """Return pairs by the worse of their scores, then by the better."""
+    return sorted(pairs, key=lambda own: own.scores, reverse=True)
