@@ -36,7 +36,7 @@ from orbiflow.tiles import (
 from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.run_folder import writing
-from orbiflow.tiles.run_folder.writing import FIGURE_FILES
+from orbiflow.tiles.run_folder.files import FIGURE_FILES
 from orbiflow.tiles.search import candidates
 from orbiflow.tiles.search.finished_tiles import best_tiles
 

@@ -23,7 +23,7 @@ from orbiflow.runtime import (
     Written,
     find,
 )
-from orbiflow.tiles.run_folder.writing import TILE_FILES
+from orbiflow.tiles.run_folder.files import TILE_FILES
 from runtime.searches import boot_call, check_order, run
 
 pytestmark = pytest.mark.usefixtures("small_searches")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import faithfulness, plane_points
-from orbiflow.tiles.likeness import bending_onto, faithful
+from orbiflow.tiles.likeness import any_shape, bending_onto
 from outlines import animal, bent_squirrel, limb
 
 ALL_STARTS = bending_onto.STARTS
@@ -22,7 +22,7 @@ SQUIRREL = np.asarray(animal("squirrel.dat").normal)
 def _one_turn() -> Iterator[None]:
     """Of all rotations and both hands the best is refined, from one correspondence."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(faithful, "REFINED_TURNS", 1)
+        patch.setattr(any_shape, "REFINED_TURNS", 1)
         patch.setattr(bending_onto, "STARTS", bending_onto.STARTS[1:2])
         yield
 

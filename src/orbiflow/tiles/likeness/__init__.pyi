@@ -1,9 +1,9 @@
+from .any_shape import faithfulness as faithfulness
 from .bending_onto import bent_onto as bent_onto
 from .elastic import Body as Body
 from .elastic import Elastic as Elastic
 from .elastic import Stiffness as Stiffness
 from .faithful import Fidelity as Fidelity
-from .faithful import faithfulness as faithfulness
 from .faithful import fidelity as fidelity
 from .faithful import fidelity_to_original as fidelity_to_original
 from .faithful import kept_of as kept_of

@@ -10,7 +10,7 @@ shapely polygon or multipolygon.
 from dataclasses import asdict, dataclass
 
 import numpy as np
-import scipy.optimize
+import scipy
 import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry import MultiPolygon, Polygon, box

@@ -17,9 +17,8 @@ from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 import shapely
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.distance import cdist
 from shapely.geometry.polygon import orient
 
 from orbiflow.arrays import Array, Integers
@@ -95,7 +94,7 @@ class Recogniser:
         """Compare `tile`, in the target's frame, with the target."""
         own = _features(self._rings(as_region(tile, "tile")), self._spacing, self._start)
         agreement = _agreement(self._target, own)
-        goal_points, own_points = linear_sum_assignment(agreement, maximize=True)
+        goal_points, own_points = scipy.optimize.linear_sum_assignment(agreement, maximize=True)
         found = agreement[goal_points, own_points]
         total = float(found.sum())
         return Recognisability(
@@ -146,10 +145,12 @@ def _agreement(goal: _Features, own: _Features) -> Array:
     A point of the tile stands for its piece of the outline, a third of the way to its neighbours,
     so that it does not matter where on an outline the first point falls.
     """
-    squared = cdist(goal.lifted, own.lifted, "sqeuclidean")
+    squared = scipy.spatial.distance.cdist(goal.lifted, own.lifted, "sqeuclidean")
     for neighbour in (own.before, own.after):
         third = own.lifted + (own.lifted[neighbour] - own.lifted) / 3
-        np.minimum(squared, cdist(goal.lifted, third, "sqeuclidean"), out=squared)
+        np.minimum(
+            squared, scipy.spatial.distance.cdist(goal.lifted, third, "sqeuclidean"), out=squared
+        )
     # flat at the top, so that small displacements do not matter
     return np.exp(-squared * squared)
 
@@ -197,7 +198,7 @@ def _inscribed_radius(points: Array, normals: Array) -> Array:
     unit = normals / np.maximum(np.hypot(*normals.T), 1e-9)[:, None]
     planes = np.column_stack([-unit, (points * unit).sum(axis=1)])
     depth = planes @ np.vstack([points.T, np.ones(len(points))])
-    squared = cdist(points, points, "sqeuclidean")
+    squared = scipy.spatial.distance.cdist(points, points, "sqeuclidean")
     np.fill_diagonal(squared, np.inf)
     depth /= np.maximum(squared, 1e-18, out=squared)
     return 1 / np.maximum(2 * depth.max(axis=1), 1 / MAX_THICKNESS)

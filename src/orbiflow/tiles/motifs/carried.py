@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 import shapely
 from PIL import Image
-from scipy.ndimage import distance_transform_edt
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
@@ -18,13 +18,13 @@ from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, png_bytes
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import search
 from orbiflow.tiles.geometry import polygons_in, triangle_sides
 from orbiflow.tiles.motifs.engraving import engraved, eye
 from orbiflow.tiles.motifs.raster import Grid, Paint, bilinear, inside_ring, region_sides, runs
 from orbiflow.tiles.motifs.settings import MotifSettings
 from orbiflow.tiles.page import INK, Curve, Motif, Part, Raster, Style, boundary
 from orbiflow.tiles.result_file import as_tile
-from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import (
     Covered,
     Drawing,
@@ -69,7 +69,7 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
                 "there is no map of the silhouette; give the search's target as well"
             )
         frame = target.frame
-        bending = matched(target.normal, frame.to_normal(tile.tile.polygon))
+        bending = search.matched(target.normal, frame.to_normal(tile.tile.polygon))
         note = "the search left no map of the silhouette; its outline was matched with the tile's"
         said["notes"] = (*tile.notes, note)
     except OrbiflowError as error:
@@ -163,16 +163,16 @@ def _spread(colours: Array, outline: Array) -> Array:
     """
     inside = inside_ring(outline, *colours.shape[:2])
     # beyond the picture is outside, too
-    depth = np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
+    depth = np.asarray(scipy.ndimage.distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
     kept = depth > FRINGE
     if kept.any():
-        kept |= (depth > 1) & (np.asarray(distance_transform_edt(~kept)) > THIN)
+        kept |= (depth > 1) & (np.asarray(scipy.ndimage.distance_transform_edt(~kept)) > THIN)
     else:
         kept = inside
     if not kept.any():
         return colours
     rows, columns = np.asarray(
-        distance_transform_edt(~kept, return_distances=False, return_indices=True)
+        scipy.ndimage.distance_transform_edt(~kept, return_distances=False, return_indices=True)
     )
     return colours[rows, columns]
 

@@ -8,14 +8,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 import shapely
-from scipy.ndimage import (
-    convolve1d,
-    distance_transform_edt,
-    gaussian_filter,
-    map_coordinates,
-    median_filter,
-)
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette
@@ -50,12 +44,14 @@ class Body:
     @cached_property
     def _depth(self) -> Array:
         grid = self._grid
-        return np.asarray(distance_transform_edt(grid.inside(self.ring))) / grid.density
+        return (
+            np.asarray(scipy.ndimage.distance_transform_edt(grid.inside(self.ring))) / grid.density
+        )
 
     @cached_property
     def _slope(self) -> tuple[Array, Array]:
         # along x, along y
-        smooth = gaussian_filter(self._depth, 6.0)
+        smooth = scipy.ndimage.gaussian_filter(self._depth, 6.0)
         return np.gradient(smooth, axis=1), np.gradient(smooth, axis=0)
 
     def depth(self, points: Array) -> Array:
@@ -90,7 +86,9 @@ class Body:
     def _at(self, values: Array, points: Array) -> Array:
         place = self._grid.texels(points) - 0.5
         flat = place.reshape(-1, 2)
-        found = map_coordinates(values, [flat[:, 1], flat[:, 0]], order=1, mode="nearest")
+        found = scipy.ndimage.map_coordinates(
+            values, [flat[:, 1], flat[:, 0]], order=1, mode="nearest"
+        )
         return found.reshape(points.shape[:-1])
 
 
@@ -189,11 +187,11 @@ def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Arra
     points = resampled(body.ring, count)
     step = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     inward = np.stack([-step[:, 1], step[:, 0]], axis=1) * np.sign(signed_area(body.ring))
-    inward = gaussian_filter(inward, (2, 0), mode="wrap")
+    inward = scipy.ndimage.gaussian_filter(inward, (2, 0), mode="wrap")
     n = inward / np.maximum(np.linalg.norm(inward, axis=1), 1e-12)[:, None]
     own = body.half_thickness(points, n)
     dark = shade(n)
-    half = median_filter(own, 9, mode="wrap")  # no single spikes out of notches
+    half = scipy.ndimage.median_filter(own, 9, mode="wrap")  # no single spikes out of notches
     length = np.minimum(half, 1.15 * own) * (0.22 + 0.62 * dark)
     # around a point of a neighbour they fan out: short, or they make a star
     bend = np.roll(n, -1, axis=0) - np.roll(n, 1, axis=0)
@@ -242,7 +240,7 @@ def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
     dark = shade(body.inward(points))
     # in the light only the first lines run on
     width = 0.0085 * fade**0.7 * np.clip(1.25 * dark + 1.1 * fade - 0.85, 0, 1)
-    width = convolve1d(width, SMOOTHING / SMOOTHING.sum(), mode="wrap")
+    width = scipy.ndimage.convolve1d(width, SMOOTHING / SMOOTHING.sum(), mode="wrap")
     # shorter ones look like strays
     arcs = [own for own in _arcs(width > 0.0012) if len(own) >= min(ECHO_LEAST_STEPS, count)]
     return [stroke(points[own], width[own]) for own in arcs]

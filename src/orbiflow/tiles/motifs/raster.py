@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, rgb
@@ -210,7 +210,9 @@ class Paint:
         """Copy colours from just inside to the texels around, which lookups blend in."""
         known = inside.copy()
         for _ in range(MARGIN - 1):
-            wider = np.asarray(binary_dilation(known, np.ones((3, 3), dtype=int)), dtype=bool)
+            wider = np.asarray(
+                scipy.ndimage.binary_dilation(known, np.ones((3, 3), dtype=int)), dtype=bool
+            )
             rows, columns = np.nonzero(wider & ~known)
             for down, right in _AROUND:
                 there = rows + down, columns + right

@@ -1,3 +1,4 @@
+from .files import written_files as written_files
 from .html_page import index_page as index_page
 from .overview import overview_png as overview_png
 from .overview import read_png as read_png
@@ -6,4 +7,3 @@ from .writing import show_reading as show_reading
 from .writing import write_gallery as write_gallery
 from .writing import write_run as write_run
 from .writing import write_tile_folder as write_tile_folder
-from .writing import written_files as written_files

@@ -17,14 +17,12 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, rendered, window_of
 from orbiflow.tiles.page import Page
 from orbiflow.tiles.pictures import RAMP, STRIP
+from orbiflow.tiles.run_folder.files import TILE_FILES
 from orbiflow.tiles.run_folder.overview import FILLED, LEFT_OUT, OUTLINE
 from orbiflow.tiles.search import ClassFailure, rounded_for, why_poor
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring, colouring, default_window
-
-# The files in every tile's folder
-TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
 
 TRIED = ("delft", "lagoon", "ochre", "dusk", "forest", "ink")
 """The palettes that the page shows."""

@@ -15,6 +15,7 @@ from orbiflow.arrays import Window
 from orbiflow.drawing import Sheet, font, png_bytes, window_of
 from orbiflow.tiles.likeness import MOST_STARS
 from orbiflow.tiles.pictures import Sketch, comparison, tiling_picture
+from orbiflow.tiles.run_folder.files import SOFTWARE
 from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out
 from orbiflow.tiles.tile import EscherTile
@@ -24,7 +25,6 @@ LONGER_SIDE = 1200  # pixels
 OUTLINE, LEFT_OUT, FILLED, DRAWING = "#e6007e", "#ff8c00", "#0078ff", "#444444"
 LEAST_WIDTH, STRIP, LETTERS = 580, 44, 22  # pixels
 LINE = 2.0  # pixels: half of the outline's width
-SOFTWARE = "orbiflow"
 
 
 def read_png(target: Target, source: Path) -> bytes:
@@ -88,15 +88,6 @@ def _source(path: Path) -> Image.Image:
     image = open_image(path, enough=LONGER_SIDE)[0].convert("RGBA")
     white = Image.new("RGBA", image.size, "white")
     return Image.alpha_composite(white, image).convert("RGB")
-
-
-def is_read_png(path: Path) -> bool:
-    """Whether a file is a picture that `read_png` made."""
-    try:
-        with path.open("rb") as file:
-            return b"Software\0" + SOFTWARE.encode() in file.read(100)
-    except OSError:
-        return False
 
 
 INK, FAINT, WARNING = "#1a1a1a", "#5b6570", "#b0413e"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,17 +23,23 @@ from orbiflow.runtime import (
 )
 from orbiflow.tiles.pictures import ScenePicture, comparison, tile_picture, tiling_picture
 from orbiflow.tiles.result_file import RESULT, folder_names
-from orbiflow.tiles.run_folder.html_page import TILE_FILES, index_page
-from orbiflow.tiles.run_folder.overview import is_read_png, overview_png
+from orbiflow.tiles.run_folder.files import (
+    FIELD_FILES,
+    FIGURE_FILES,
+    INDEX,
+    OVERVIEW,
+    READ,
+    READ_NEXT,
+    TILE_FILES,
+    written_files,
+)
+from orbiflow.tiles.run_folder.html_page import index_page
+from orbiflow.tiles.run_folder.overview import overview_png
 from orbiflow.tiles.search import SearchResult, report
 from orbiflow.tiles.silhouette import Target, doubts
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
-
-FIELD_FILES = ("field.png", "field.pdf")
-# The further files, for print, if figures were asked for; the field if a flow made the tile
-FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
 
 
 def figure_files(result: EscherTile) -> tuple[str, ...]:
@@ -92,11 +97,6 @@ def write_tile_folder(
     return [write_atomic(folder / name, contents[name]()) for name in names]
 
 
-OVERVIEW, INDEX, READ = "overview.png", "index.html", "read.png"
-# what was read for a search that has not replaced an earlier run yet
-READ_NEXT = "read-next.png"
-
-
 def write_gallery(
     result: SearchResult, out: Path, *, figures: bool = False, shown_out: str = "."
 ) -> None:
@@ -138,24 +138,6 @@ def _draw(
     """Write the folder of one tile; this may run in a worker process."""
     tile, colours, folder = item
     write_tile_folder(tile, target, folder, colours=colours, figures=figures)
-
-
-def written_files(folder: Path) -> set[str]:
-    """Return the paths of the files that an earlier search wrote into a folder, by its result.json.
-
-    They are relative, with slashes; there are none if there is no such run.
-    """
-    try:
-        document = json.loads((folder / RESULT).read_text(encoding="utf-8"))
-        classes = [str(entry["class"]) for entry in document["tiles"]]
-        ours = isinstance(document["schema_version"], int)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        ours, classes = False, []
-    if not ours:
-        return {READ} if is_read_png(folder / READ) else set()
-    files = (*TILE_FILES, *FIGURE_FILES)
-    inside = {f"{name}/{file}" for name in folder_names(classes) for file in files}
-    return {RESULT, OVERVIEW, INDEX, READ, READ_NEXT} | inside
 
 
 def result_folder(out: str | Path) -> ResultFolder:

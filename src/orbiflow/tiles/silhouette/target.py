@@ -17,6 +17,7 @@ from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import centroid, orient, polygons_in, signed_area
+from orbiflow.tiles.silhouette import readers  # read when a file is
 from orbiflow.tiles.silhouette.outlines import (
     clean_ring,
     closed,
@@ -25,13 +26,7 @@ from orbiflow.tiles.silhouette.outlines import (
     percent,
     rounded,
 )
-from orbiflow.tiles.silhouette.readers import (
-    MAX_BYTES,
-    FileContent,
-    Reading,
-    read_mask_array,
-    read_outline,
-)
+from orbiflow.tiles.silhouette.readers import FileContent, Reading
 from orbiflow.tiles.silhouette.thickening import thickened
 
 if TYPE_CHECKING:
@@ -240,7 +235,7 @@ class Target(Reading):
         Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
         """
         where = path if isinstance(path, str | os.PathLike) else _held(path)
-        reading = read_outline(where, threshold=threshold, invert=invert)
+        reading = readers.read_outline(where, threshold=threshold, invert=invert)
         return cls(**vars(reading), source=str(where))
 
     @classmethod
@@ -262,7 +257,7 @@ class Target(Reading):
                 f"data must be bytes, got {described(data)}; Target.read takes paths"
             )
         held = FileContent(bytes(data), str(name))
-        reading = read_outline(held, threshold=threshold, invert=invert)
+        reading = readers.read_outline(held, threshold=threshold, invert=invert)
         return cls(**vars(reading), source=held.name)
 
     @classmethod
@@ -288,7 +283,7 @@ class Target(Reading):
         >>> round(Target.from_mask(mask).area)
         2000
         """
-        reading = read_mask_array(mask, source, threshold=threshold, invert=invert)
+        reading = readers.read_mask_array(mask, source, threshold=threshold, invert=invert)
         return cls(**vars(reading), source=source)
 
     @classmethod
@@ -418,7 +413,7 @@ def _held(stream: Any) -> FileContent:
     name = getattr(stream, "name", None)
     name = name if isinstance(name, str) else "stream"
     try:
-        data = stream.read(MAX_BYTES + 1)
+        data = stream.read(readers.MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         raise InputFileError(f"{name}: cannot be read ({error})") from error
     if not isinstance(data, bytes):
