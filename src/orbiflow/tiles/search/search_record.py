@@ -50,10 +50,9 @@ class Record:
         self._done, self._share = 0.0, 0.0  # of the level
         on_event(Progress(0.0, "fitting"))
 
-    def next_level(self, stage: str, share: float) -> Record:
+    def next_level(self, stage: str, share: float) -> None:
         """Go on to work that has this share of the whole, and gives tiles of a stage."""
         self._done, self._share, self.stage = self._done + self._share, share, stage
-        return self
 
     def first_look(self, tile: EscherTile) -> None:
         """Keep a tile that the search is going to improve on."""
