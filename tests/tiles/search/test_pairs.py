@@ -16,6 +16,7 @@ from orbiflow.runtime import Cancel, Cancelled, Event, Progress
 from orbiflow.tiles import CLASSES, IsohedralClass, Tiling, certify, isohedral_class
 from orbiflow.tiles.geometry import complex_points, plane_points, resampled
 from orbiflow.tiles.likeness import Elastic
+from orbiflow.tiles.search import gluing
 from orbiflow.tiles.search.gluing import Glued, _gains, _Tables, glues, placements, sums_along
 from orbiflow.tiles.search.pair_bending import BentPair, Figures, bent, finer, moved, unlike
 from orbiflow.tiles.search.pair_body import Glue, PairBody
@@ -149,6 +150,11 @@ def test_processes_find_what_one_does() -> None:
     assert [pair.glue for pair in found] == [pair.glue for pair in pairs()]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+
+
+def test_nothing_is_found_where_no_glue_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gluing, "MOST_OVERLAP", -1.0)
+    assert search_pair(animal(NAMES[0]), animal(NAMES[1]), SMALL) == []
 
 
 def test_a_pair_search_can_be_cancelled() -> None:

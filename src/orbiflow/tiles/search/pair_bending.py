@@ -18,30 +18,27 @@ import numpy as np
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import apart, best_similarity, reverse, ring_length
 from orbiflow.tiles.likeness import Elastic, kept_of
+from orbiflow.tiles.search.bending import FOLLOWING_STRENGTH
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
     COMPARISON_STRENGTH,
+    CROSSING_COST,
+    MAX_COST_RATIO,
     drawn_to_tiles,
     held_on_tiles,
 )
 from orbiflow.tiles.search.gluing import Placement
 from orbiflow.tiles.search.pair_body import Glue, PairBody
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
-from orbiflow.tiles.silhouette import important_vertices, with_corners
+from orbiflow.tiles.silhouette import CORNER_DEPTH, important_vertices, with_corners
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 MULTIPLES = (1, 2, 4)  # points of each level for each point of the first
-CORNER_DEPTH = (
-    0.004  # the least height of a corner, in square roots of the area, that a point lies at
-)
-CROSSING_COST = 100.0  # more than anything sound costs
-FOLLOWING_STRENGTH = 60.0  # strength of the springs by which a finer body follows a coarser one
 HELD_ROUNDS = 5  # steps of the minimisation among tiles
 SPRUNG_ROUNDS = 3  # steps of springs that compare neighbours
 TWIN_DISTANCE = 4e-4  # mean squared distance of both outlines below which pairs are twins
 MOST_CHANGED = 3  # steps by which lengths of edges change at a time, in all
 BEST_OF_GLUE = 5  # neighbours of each neighbouring glue that are worked out
-BETTER = 0.998  # what a neighbour costs at most, for each unit of what there is
 
 
 Pair = TypeVar("Pair", bound="BentPair")
@@ -132,13 +129,17 @@ class BentPair:
         """What bending costs, by which pairs are compared before they are carved."""
         return float(together(self._costs[0])) + CROSSING_COST * (not self.sound)
 
+    @property
+    def outlines(self) -> tuple[Complex, Complex]:
+        """Where the points (n_k,) of both figures' outlines are."""
+        return self.body.rings(self.points)
+
     @cached_property
     def marks(self) -> tuple[float, float]:
         """The marks that people would give to both figures."""
-        rings = self.body.rings(self.points)
         one, two = (
             kept_of(part.measures, ring, 0.0).mark
-            for part, ring in zip(self.body.parts, rings, strict=True)
+            for part, ring in zip(self.body.parts, self.outlines, strict=True)
         )
         return one, two
 
@@ -324,7 +325,7 @@ def moved(pair: BentPair, step: int = 1, *, most: int = 6, tried: int = 12) -> B
             body = glued_body(pair.figures, pair.level, glue)
             found = _Sprung.of(body, pair.kind, joined, z).best
             better = min(better, found, key=lambda own: float(own.costs[0]))
-        if better.costs[0] > BETTER * here.costs[0]:
+        if better.costs[0] > MAX_COST_RATIO * here.costs[0]:
             break
         here = better
     own = here.placements, here.points[:, 0]

@@ -17,15 +17,7 @@ import scipy.optimize
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import plane_points
-from orbiflow.tiles.likeness import (
-    Gaps,
-    Measures,
-    kept_of,
-    mark_gradient,
-    neck_factor,
-    neck_up_to,
-    score_of,
-)
+from orbiflow.tiles.likeness import Gaps, Measures, mark_gradient, neck_factor, neck_up_to, score_of
 from orbiflow.tiles.search.carving import (
     SLIDES,
     STEPS_APART,
@@ -83,13 +75,9 @@ class CarvedPair(BentPair):
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "factor": self.factor}
 
-    @cached_property
-    def marks(self) -> tuple[float, float]:
-        one, two = (
-            kept_of(part.measures, ring, 0.0).mark
-            for part, ring in zip(self.body.parts, self.laid, strict=True)
-        )
-        return one, two
+    @property
+    def outlines(self) -> tuple[Complex, Complex]:
+        return self.laid
 
 
 def carved_pair(pair: BentPair, steps: int) -> CarvedPair:
@@ -98,11 +86,11 @@ def carved_pair(pair: BentPair, steps: int) -> CarvedPair:
     If something crosses, or a neck is thin, it is carved apart.
     """
     found = _carved(pair, steps, 0.0)
-    return found if found.factor == 1 else max(found, _carved(pair, steps, ROOM), key=_score)
-
-
-def _score(pair: CarvedPair) -> tuple[float, float]:
-    return pair.scores
+    return (
+        found
+        if found.factor == 1
+        else max(found, _carved(pair, steps, ROOM), key=lambda own: own.scores)
+    )
 
 
 def _carved(pair: BentPair, steps: int, room: float) -> CarvedPair:

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import product
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -99,17 +99,17 @@ def search_pair(
     ]
     team = _Team(own.workers, on_event, cancel)
     found = team.each(partial(_placed, own), figures, "gluing", 0.3)
-    residuals = sorted(placement.residual for placed in found for placement in placed)
-    most = residuals[min(own.placed, len(residuals)) - 1]
-    best = [[p for p in placed if p.residual <= most] for placed in found]
+    kept = sorted(placement.residual for placed in found for placement in placed)[: own.placed]
+    best = [[p for p in placed if p.residual <= kept[-1]] for placed in found]
     jobs = list(zip(figures, best, strict=True))
     pairs = [pair for some in team.each(partial(_bent, own), jobs, "bending", 0.5) for pair in some]
     pairs.sort(key=lambda pair: pair.cost)
-    middle = team.each(_finer, unlike(pairs, own.starts), "refining", 0.55)
+    middle = team.each(partial(finer, level=1), unlike(pairs, own.starts), "refining", 0.55)
     middle.sort(key=lambda pair: pair.cost)
-    tries = team.each(_tried, unlike(middle, own.carved), "carving", 0.75)
-    before = {id(try_.carved): try_.bent for try_ in tries}
-    ranked = unlike(_ranked([try_.carved for try_ in tries]), own.ranked)
+    starts = unlike(middle, own.carved)
+    carved = team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
+    before = dict(zip(map(id, carved), starts, strict=True))
+    ranked = unlike(_ranked(carved), own.ranked)
     nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "moving corners", 0.9)
     last = unlike(_ranked([*ranked, *nearby]), own.finalists)
     done = team.each(_detailed, last, "carving with all detail", 1.0)
@@ -173,19 +173,6 @@ def _placed(settings: PairSearch, figures: Figures) -> list[Placement]:
 
 def _bent(settings: PairSearch, job: tuple[Figures, list[Placement]]) -> list[BentPair]:
     return bent(*job, settings.held)
-
-
-def _finer(pair: BentPair) -> BentPair:
-    return finer(pair, 1)
-
-
-class _Try(NamedTuple):
-    bent: BentPair
-    carved: CarvedPair
-
-
-def _tried(pair: BentPair) -> _Try:
-    return _Try(pair, carved_pair(pair, FIRST_STEPS))
 
 
 def _moved(pair: BentPair) -> CarvedPair:

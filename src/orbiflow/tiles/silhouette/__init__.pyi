@@ -8,6 +8,7 @@ from .emphasis import Emphasis as Emphasis
 from .mesh import Mesh as Mesh
 from .mesh import harmonic as harmonic
 from .mesh import triangulate as triangulate
+from .outlines import CORNER_DEPTH as CORNER_DEPTH
 from .outlines import DISC_OVERREACH as DISC_OVERREACH
 from .outlines import Samples as Samples
 from .outlines import important_vertices as important_vertices

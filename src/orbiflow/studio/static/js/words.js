@@ -4,9 +4,8 @@ export const STAGES = { sketch: "first sketch", better: "getting better", final:
 
 export const EFFORTS = { fast: "Quick", normal: "Careful" };
 export const EFFORT_TIMES = {
-  fast: "Half a minute or so.",
-  normal: "About a minute: usually better.",
-  best: "A minute or two: the best we can do.",
+  fast: "Ten seconds or so.",
+  normal: "A quarter of a minute or so: usually better.",
 };
 
 export const OBJECTIVES = { likeness: "Looks alike", overlap: "Covers it best" };
