@@ -47,10 +47,10 @@ from orbiflow.tiles.motifs.carried import Picture
 def print_files(found: SearchResult, *, figures: bool) -> None:
     """Print how long the files of a run take."""
     target, results = found.target, found.tiles
-    colours = [colouring(result.tile) for result in results]
+    colours = [colouring(result.tiling) for result in results]
     both, y_down = list(zip(results, colours, strict=True)), target.y_down
     print(f"{len(results)} tiles of {target.source}; CPU seconds for all of them")
-    row("colouring", lambda: [colouring(result.tile) for result in results])
+    row("colouring", lambda: [colouring(result.tiling) for result in results])
     row("tile.svg", lambda: [tile_picture(r.tile, y_down=y_down).svg() for r in results])
     row(
         "tiling.svg",
@@ -62,7 +62,7 @@ def print_files(found: SearchResult, *, figures: bool) -> None:
     )
     row("overlay.png", lambda: [overlay_picture(r.tile, target.outline).png() for r in results])
     row("model", lambda: [(r.map or TileMap()).to_bytes() for r in results])
-    row("overview.png", lambda: overview_png(results, target, colours))
+    row("overview.png", lambda: overview_png(results, [target], colours))
     with tempfile.TemporaryDirectory() as folder:
         row("the whole folder", lambda: write_gallery(found, Path(folder), figures=figures))
 

@@ -17,6 +17,7 @@ Types are those of `orbiflow.kinds` and `orbiflow.units`: `bool`, `int`, `float`
 - `Range(1, 100)`, `Range(above=0)`, `Unit("s")`: which numbers, in which unit.
 - `Option("-n", "--count", off="--no-count")`: what the command line calls the field, where that is
   not just `--field-name`. `Repeated()`: a tuple given by repeating the option. `Hidden()`: no option.
+  `Positional()`: an argument that may be left out.
 - `Group("Pieces")`: its heading in the help. `DefaultText("one per core")`: what None means.
 - `OnlyWith(cut="pieces")`, `Needs("emphasis")`, `NotWith("parts")`: rules about other fields. They
   apply to fields that were given (`settings.fields_given`), so a default never offends.
@@ -87,6 +88,11 @@ class Group:
 @dataclass(frozen=True)
 class Hidden:
     """A field that Python and JSON can set, and the command line cannot."""
+
+
+@dataclass(frozen=True)
+class Positional:
+    """A parameter with a default that the command line takes as an argument rather than an option."""
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ def boot_parcels(count: int) -> list[Parcel]:
     }
     call = find("escherize").call(given)
     data = json.dumps(BOOT).encode()
-    return [Parcel(f"boot {k}", call, "image", "out", "boot.json", data) for k in range(count)]
+    return [Parcel(f"boot {k}", call, "out", {"image": ("boot.json", data)}) for k in range(count)]
 
 
 class Here(Executor):

@@ -63,7 +63,7 @@ def cluster_fixture() -> Iterator[Any]:
 
 
 def parcels_of(*data: bytes) -> list[Parcel]:
-    return [Parcel(f"{k}", DEADLY, "image", "out", f"{k}.png", d) for k, d in enumerate(data)]
+    return [Parcel(f"{k}", DEADLY, "out", {"image": (f"{k}.png", d)}) for k, d in enumerate(data)]
 
 
 def answers(
@@ -252,7 +252,9 @@ def test_an_answer_without_an_end() -> None:
 
 @given(st.binary(max_size=200))
 def test_whatever_the_bytes_are_there_is_an_answer(data: bytes) -> None:
-    one = Parcel("key", find("escherize").call({"image": "a.svg"}), "image", "out", "a.svg", data)
+    one = Parcel(
+        "key", find("escherize").call({"image": "a.svg"}), "out", {"image": ("a.svg", data)}
+    )
     answer = Answer.from_worker("key", *carry_out(one.header(), one.data, Cancel()))
     assert isinstance(answer.end, Failed)
     assert answer.end.failure == "mistake"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,8 @@ from PIL import Image
 from batch.small_batches import rows, write_boot
 from cli.conftest import LAUNCH
 from orbiflow.runtime import find
+from outlines import FOLDER
+from small_pairs import small_pairs
 
 QUICK = ["--classes", "IH4", "--effort", "fast"]
 TESTS = str(Path(__file__).parents[1])
@@ -40,6 +43,28 @@ def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
     assert third.status == 1
     assert "broken: failed: broken.json: " in third.out
     assert "--retry-failed does them again" in third.err
+
+
+def test_every_pair_of_a_folder_twice(tmp_path: Path, orbiflow) -> None:
+    (tmp_path / "in").mkdir()
+    for name in ("squirrel.dat", "nagata/dolphin_60.dat"):
+        shutil.copy(FOLDER / name, tmp_path / "in")
+    command = ("batch", tmp_path / "in", "--pairs", "all", "--effort", "fast", "--workers", 1)
+    with small_pairs():
+        first = orbiflow(*command, "--out", tmp_path / "out")
+        second = orbiflow(*command, "--out", tmp_path / "out")
+    assert first.status == 0, first.err
+    assert "1 of 1 done" in first.out
+    assert "nothing was left to do" in second.out
+    found = rows(tmp_path / "out")["dolphin_60.dat + squirrel.dat"]
+    assert found["certified"] == "yes"
+    assert found["folder"] == "dolphin_60-squirrel"
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "Which go together?" in page
+    assert f'<a href="dolphin_60-squirrel/index.html">{float(found["stars"]):g}</a>' in page
+    again = orbiflow(*command[:2], "--ratio", "1", "--out", tmp_path / "other")
+    assert again.status == 2
+    assert "--ratio is for pairs" in again.err
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
@@ -139,6 +164,7 @@ def test_options_of_a_search_are_those_of_escherize() -> None:
         return {field.option.names for field in find(name).fields if not field.positional}
 
     of_one = {"--emphasis", "--strength", "--pin", "--pin-angle"}
+    of_one |= {"--second-emphasis", "--second-pin", "--second-called"}
     own, other = options("batch"), options("escherize")
     assert {names[0] for names in other - own} == {*of_one, "--called", "--shown-out", "--verbose"}
 

@@ -39,6 +39,8 @@ from orbiflow.tiles.run_folder import writing
 from orbiflow.tiles.run_folder.files import FIGURE_FILES
 from orbiflow.tiles.search import candidates
 from orbiflow.tiles.search.finished_tiles import best_tiles
+from outlines import FOLDER
+from small_pairs import NAMES, small_pairs
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}
@@ -221,7 +223,7 @@ def test_a_forced_tile_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(candidates, "TOLERANCES", (5e-3,))  # its thousands of vertices take long
     target = Target.from_polygon(BOOT, source="some/boot.json")
     result = best_tiles(target, Fit(crossed(), 1, 0, 1), force=True)[0]
-    written = write_tile_folder(result, target, tmp_path / "IH21")
+    written = write_tile_folder(result, [target], tmp_path / "IH21")
     assert {path.name for path in written} == FILES
     for name in ("tile.svg", "tiling.svg"):
         assert "boot.json, IH21 (p6), NOT CERTIFIED" in (tmp_path / "IH21" / name).read_text()
@@ -305,3 +307,28 @@ def test_a_folder_with_something_else_is_refused(tmp_path: Path, orbiflow) -> No
     )
     assert "fitting" not in refused.out
     assert [p.name for p in tmp_path.iterdir()] == ["boot.json"]
+
+
+def test_two_silhouettes_become_a_pair(tmp_path: Path, orbiflow) -> None:
+    files = [FOLDER / name for name in NAMES]
+    out, schema = tmp_path / "out", json.loads((DOCS / "result.schema.json").read_text())
+    with small_pairs():
+        done = orbiflow("escherize", *files, "--out", out, "--effort", "fast", "--workers", 1)
+    assert done.status == 0, done.err
+    assert {"read.png", "read-2.png", "overview.png", "index.html"} <= {
+        f.name for f in out.iterdir()
+    }
+    document = json.loads((out / "result.json").read_text())
+    jsonschema.validate(document, schema)
+    name = document["tiles"][0]["class"]
+    own = {f.name for f in (out / name).iterdir()}
+    assert own == FILES | {"overlay-2.png", "model-2.safetensors"}
+    made = orbiflow("export", out, "--cut", "pieces", "-o", tmp_path / "pieces.svg")
+    assert made.status == 0, made.err
+    assert (tmp_path / "pieces-2.svg").is_file()
+    with small_pairs():
+        again = orbiflow("escherize", *files, "--out", out, "--effort", "fast", "--verbose")
+    assert again.status == 0, again.err
+    assert "was replaced" in again.out
+    assert "dolphin_60" in again.out
+    ElementTree.parse(out / name / "tiling.svg")

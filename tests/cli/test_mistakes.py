@@ -163,6 +163,9 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
         "--pin applies only to --method descent",
     ),
     "angle of nothing": (["--pin-angle"], "--pin-angle needs --pin"),
+    "ratio of one": (["--ratio", "1"], "--ratio needs a second silhouette"),
+    "second pin of one": (["--second-pin", "9,9"], "--second-pin needs a second silhouette"),
+    "ratio that is none": (["--ratio", "big"], "--ratio: 'big' is no ratio"),
     "no such option": (["--clases", "IH4"], "--clases"),
 }
 

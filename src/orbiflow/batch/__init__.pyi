@@ -2,13 +2,16 @@ from .executors import LocalProcesses as LocalProcesses
 from .executors import WorkSettings as WorkSettings
 from .folder import BatchFolder as BatchFolder
 from .folder import Column as Column
+from .folder import ContactSheet as ContactSheet
 from .folder import Entry as Entry
 from .folder import Kind as Kind
+from .folder import Matrix as Matrix
 from .folder import Summary as Summary
 from .folder import csv_bytes as csv_bytes
 from .parcels import Answer as Answer
 from .parcels import Executor as Executor
 from .parcels import Parcel as Parcel
+from .work import PAIRED as PAIRED
 from .work import Item as Item
 from .work import run_files as run_files
 from .work import run_items as run_items

@@ -155,6 +155,21 @@ class Overview(Protocol):
 
 
 @dataclass(frozen=True)
+class Matrix:
+    """A table of what is compared in pairs.
+
+    - `title`: What it shows.
+    - `names`: What is compared, in order: the heads of rows and columns.
+    - `cells`: For each row, the entry and the text of each cell before the diagonal, if there is one,
+      and its share, 0 to 1, of the best.
+    """
+
+    title: str
+    names: Sequence[str]
+    cells: Sequence[Sequence[tuple[Entry, str, float] | None]]
+
+
+@dataclass(frozen=True)
 class ContactSheet:
     """The table of a folder's files, and a page of this title: a card for each, to sort and search.
 
@@ -167,6 +182,10 @@ class ContactSheet:
 
     kind: Kind
     title: str
+
+    def matrix(self, entries: Sequence[Entry]) -> Matrix | None:  # noqa: ARG002
+        """Return a table of all that is compared in pairs, if it is."""
+        return None
 
     def files(
         self,
@@ -187,6 +206,7 @@ class ContactSheet:
             "orbiflow.batch",
             "page.html",
             title=self.title,
+            matrix=self.matrix(entries),
             kind=self.kind,
             figures=[column for column in columns if column.form],
             words=[column for column in columns if not column.form],

@@ -37,25 +37,29 @@ MOST_WRITTEN = 512 * 2**20
 
 @dataclass(frozen=True)
 class Parcel:
-    """A call that reads one file and writes a folder, with the bytes of the file.
+    """A call that reads files and writes a folder, with the bytes of the files.
 
     - `key`: What its answer is known by.
     - `call`: The call; its paths are replaced where it runs.
-    - `reads`, `writes`: The names of these two parameters.
-    - `name`, `data`: The name of the file, and its bytes.
+    - `writes`: The name of the parameter of the folder.
+    - `files`: The name and bytes of each file, by the name of its parameter.
     """
 
     key: str
     call: Call
-    reads: str
     writes: str
-    name: str
-    data: bytes
+    files: Mapping[str, tuple[str, bytes]]
 
     def header(self) -> str:
-        """Return all but the file's bytes, as text."""
-        names = {"reads": self.reads, "writes": self.writes, "name": self.name}
-        return json.dumps({"version": __version__, "call": self.call.to_json(), **names})
+        """Return all but the files' bytes, as text."""
+        reads = [[key, name, len(data)] for key, (name, data) in self.files.items()]
+        known = {"call": self.call.to_json(), "writes": self.writes, "reads": reads}
+        return json.dumps({"version": __version__, **known})
+
+    @property
+    def data(self) -> bytes:
+        """The bytes of all files in a row."""
+        return b"".join(data for _, data in self.files.values())
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,7 @@ def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, 
     with temporary as folder, one_core():
         end, files = _run(json.loads(header), data, Path(folder), cancel)
     text = json.dumps(end.to_json(), allow_nan=False)
-    for part in ("in", "out"):  # a folder that is gone is not to be named
+    for part in ("in", "in-2", "out"):  # a folder that is gone is not to be named
         text = text.replace(json.dumps(str(Path(folder, part, "_")))[1:-2], "")
     return text, files
 
@@ -154,10 +158,14 @@ def _run(
         return Failed(text, "mistake"), {}
     last: deque[Event] = deque([Failed("the work ended without a word", "error")], maxlen=1)
     try:
-        read, written = folder / "in" / order["name"], folder / "out"
-        read.parent.mkdir()
-        read.write_bytes(data)
-        there = {order["reads"]: str(read), order["writes"]: str(written)}
+        written, begin = folder / "out", 0
+        there = {order["writes"]: str(written)}
+        for number, (parameter, name, size) in enumerate(order["reads"]):
+            # files of one name may differ
+            read = folder / ("in" if number == 0 else f"in-{number + 1}") / name
+            read.parent.mkdir()
+            read.write_bytes(data[begin : begin + size])
+            there[parameter], begin = str(read), begin + size
         call = call_from_json({**order["call"], **there})
         with suppress(Exception):  # the last event says what
             call.run(last.append, cancel)

@@ -9,9 +9,10 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from fnmatch import fnmatch
 from functools import partial
+from itertools import combinations
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -40,10 +41,13 @@ from orbiflow.runtime import (
     State,
 )
 
+PAIRED = " + "
+"""What joins the names of two files that a call takes."""
+
 LONGEST_NAME = 80
 """The number of characters that the name of a result's folder may have."""
 
-NO_RESULT = ("workers", "called", "shown_out", "verbose")
+NO_RESULT = ("workers", "called", "second_called", "shown_out", "verbose")
 """Parameters of a call that do not change its result."""
 
 
@@ -68,20 +72,31 @@ class Item:
     - `call`: The call; the file that it reads and the folder that it writes are set where it runs.
     - `read`: Returns the bytes of the file, or raises an `OrbiflowError`; called when somebody is free
       for them.
+    - `more`: Returns those of further files, by the parameter that names each.
     """
 
     key: str
     name: str
     call: Call
     read: Callable[[], bytes]
+    more: Mapping[str, Callable[[], bytes]] = field(default_factory=dict[str, Callable[[], bytes]])
+
+    def files(self, kind: Kind) -> dict[str, tuple[str, bytes]]:
+        """Return the name and bytes of each file, by its parameter; raises as `read`."""
+        calls, flat = {kind.reads: self.read, **self.more}, self.call.flat
+        return {key: (flat[key].name, read()) for key, read in calls.items()}
+
+    def code(self) -> str:
+        """Return what the bytes of its files are known by."""
+        return code_of(b"".join([self.read(), *(read() for read in self.more.values())]))
 
     def settings(self, kind: Kind) -> dict[str, Any]:
         """Return what decides the result besides the bytes and their name, as JSON has it."""
         flat = self.call.flat
         return {
-            field.name: field.kind.plain(flat[field.name])
-            for field in self.call.operation.fields
-            if field.name not in (kind.reads, kind.writes, *NO_RESULT)
+            entry.name: entry.kind.plain(flat[entry.name])
+            for entry in self.call.operation.fields
+            if entry.name not in (kind.reads, *self.more, kind.writes, *NO_RESULT)
         }
 
 
@@ -142,6 +157,8 @@ def folder_names(
 
     >>> folder_names(["cats/tom.png", "tom.png", "tom.svg"], {})
     {'cats/tom.png': 'cats-tom', 'tom.png': 'tom', 'tom.svg': 'tom-svg'}
+    >>> folder_names(["tom.png + kit.svg"], {})
+    {'tom.png + kit.svg': 'tom-kit'}
     """
     names = {path: given[path] for path in paths if path in given}
     # those of files that are not there now are kept for them
@@ -156,8 +173,9 @@ def folder_names(
 
 def _names(path: str) -> Iterator[str]:
     """Possible names, from the best to those that are as good as unique."""
-    whole = PurePosixPath(path)
-    plain, ending = _plain(str(whole.parent / whole.stem)), _plain(whole.suffix[1:])
+    *first, last = (PurePosixPath(own) for own in path.split(PAIRED))
+    plain = "-".join(_plain(str(own.parent / own.stem)) for own in (*first, last))
+    ending = _plain(last.suffix[1:])
     yield plain
     yield f"{plain}-{ending}"
     code = hashlib.sha256(path.encode("utf-8", "surrogateescape")).hexdigest()
@@ -220,27 +238,35 @@ def run_files(
     settings: WorkSettings,
     tell: Sink,
     cancel: Cancel,
+    *,
+    sheet: ContactSheet | None = None,
+    second: str = "",
 ) -> Outcome:
     """Make a call for every file of a folder, and put its result into a folder as it comes.
 
     `call_of` returns the call for a file's name and the name of its results' folder; `match` is a
-    pattern of names, None for all that can be read. The outcome's summary has `folder`, `table` and
-    `page`; the number of `files`, and how many of them are `done`, gave `nothing`, `failed` or are
-    `left`; how many were `kept` from before; `seconds`.
+    pattern of names, None for all that can be read. With `second`, the name of a parameter, each call
+    takes two of the files, every pair once, and `call_of` is given both names, joined by `PAIRED`. The
+    `sheet` is written over the results, by default a plain one of the title. The outcome's summary has
+    `folder`, `table` and `page`; the number of `files`, and how many of them are `done`, gave
+    `nothing`, `failed` or are `left`; how many were `kept` from before; `seconds`.
     """
     begin = time.perf_counter()
     if match is not None and not match.strip():
         raise SettingError("{match} must be a pattern of names, such as *.svg")
-    files = listed(source, kind.endings, match, out)
-    with BatchFolder(out, kind, ContactSheet(kind, title)) as folder:
+    listing = listed(source, kind.endings, match, out)
+    files = [PAIRED.join(pair) for pair in combinations(listing, 2)] if second else listing
+    if not files:
+        raise InputFileError(f"{source} holds one file that can be read, and a pair needs two")
+    with BatchFolder(out, kind, sheet or ContactSheet(kind, title)) as folder:
         given = {file: entry.name for file, entry in folder.journal.entries.items()}
         names = folder_names(files, given, RESERVED)
-        items = [
-            Item(
-                file, name, call_of(file, name), partial(read_file, source / file, kind.most_bytes)
-            )
-            for file, name in ((file, names[file]) for file in files)
-        ]
+        read = {file: partial(read_file, source / file, kind.most_bytes) for file in listing}
+        items: list[Item] = []
+        for file in files:
+            first, _, other = file.partition(PAIRED) if second else (file, "", "")
+            more = {second: read[other]} if second else {}
+            items.append(Item(file, names[file], call_of(file, names[file]), read[first], more))
         left_out = f" or that {match} leaves out" if match else ""
         gone = f"of files that are not in {source}{left_out}"
         counts = run_items(items, settings, folder, tell, cancel, gone=gone)
@@ -279,15 +305,16 @@ def run_items(
 
 def _todo(items: Sequence[Item], settings: WorkSettings, folder: BatchFolder) -> Iterator[Item]:
     """What is new or changed, has other settings, or has lost its result."""
-    codes: dict[Callable[[], bytes], str] = {}
+    codes: dict[Any, str] = {}
     for item in items:
         before = folder.journal.entries.get(item.key)
         if before is not None and not (settings.retry_failed and before.state != "done"):
-            if item.read not in codes:  # items may share what they read
+            reads = (item.read, *item.more.values())
+            if reads not in codes:  # items may share what they read
                 with suppress(OrbiflowError):
-                    codes[item.read] = code_of(item.read())
+                    codes[reads] = item.code()
             there = before.state == "failed" or (folder.path / before.name).is_dir()
-            work = codes.get(item.read, ""), item.settings(folder.kind), __version__
+            work = codes.get(reads, ""), item.settings(folder.kind), __version__
             if there and work == (before.code, before.settings, before.version):
                 continue
         yield item
@@ -330,16 +357,16 @@ class _Batch:
                     self._keep(answer)
 
     def _parcels(self, todo: Sequence[Item]) -> Iterator[Parcel]:
-        reads, writes = self.kind.reads, self.kind.writes
         for item in todo:
             try:
-                data = item.read()
+                files = item.files(self.kind)
             except OrbiflowError as error:
                 known = (item.key, item.name, "", item.settings(self.kind), __version__)
                 self._finish(Entry(*known, "failed", str(error)), {}, None)
                 continue
-            self.at_work[item.key] = item, code_of(data)
-            yield Parcel(item.key, item.call, reads, writes, item.call.flat[reads].name, data)
+            parcel = Parcel(item.key, item.call, self.kind.writes, files)
+            self.at_work[item.key] = item, code_of(parcel.data)
+            yield parcel
 
     def _keep(self, answer: Answer) -> None:
         entry = _entry(answer, *self.at_work.pop(answer.key), self.kind)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 from orbiflow.arguments import is_a
@@ -21,6 +22,26 @@ class Palette(NamedTuple):
         """Return colour number `index`; after the last they start again, mixed with the paper."""
         turn, place = divmod(index, len(self.colours))
         return _mixed(self.colours[place], self.paper, 0.5**turn)
+
+    def shaded(self, shares: Sequence[int]) -> Palette:
+        """Return a palette of so many shades of each colour in turn, unless its colours are a user's.
+
+        >>> PALETTES["ink"].shaded((2, 1)).colours
+        ('#f5f5f2', '#d7d7d5', '#2b2b2b')
+        """
+        if self not in PALETTES.values():
+            return self
+        colours = (
+            self._shade(self.fill(k), turn)
+            for k, count in enumerate(shares)
+            for turn in range(count)
+        )
+        return self._replace(colours=tuple(colours))
+
+    def _shade(self, fill: str, turn: int) -> str:
+        if _lightness(fill) > 0.5:
+            return _mixed(fill, self.outline, DARKER**turn)
+        return _mixed(fill, self.paper, LIGHTER**turn)
 
     def shortage(self, count: int) -> tuple[str, ...]:
         """Return notes for a user who needs more colours than there are.
@@ -72,6 +93,7 @@ dichromacy (tested).
 """
 
 DEFAULT_PALETTE = "delft"
+DARKER, LIGHTER = 0.87, 0.76  # the share of a colour that is left in its next shade
 MAX_COLOURS = 24
 """Colours of a palette that the user writes out, at most."""
 

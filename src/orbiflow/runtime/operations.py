@@ -53,7 +53,7 @@ from orbiflow.runtime.events import (
     Progress,
     Started,
 )
-from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of
+from orbiflow.settings import Field, Positional, Settings, check_names, check_rules, fields_of
 
 SCHEMA_VERSION = 2
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
@@ -127,12 +127,14 @@ class Operation:
                 parts[name] = hint
                 continue
             required = parameter.default is parameter.empty
+            is_argument = required and parameter.kind is parameter.POSITIONAL_OR_KEYWORD
+            metadata = cast(tuple[Any, ...], getattr(cast(Any, hint), "__metadata__", ()))
             parts[name] = Field(
                 name,
                 hint,
                 MISSING if required else parameter.default,
                 lambda name=name: self._argument_docs.get(name, ""),
-                positional=required and parameter.kind is parameter.POSITIONAL_OR_KEYWORD,
+                positional=is_argument or Positional() in metadata,
             )
         return parts
 

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path, PurePath
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
+from orbiflow.batch import (
+    PAIRED,
+    Column,
+    ContactSheet,
+    Entry,
+    Kind,
+    Matrix,
+    Summary,
+    WorkSettings,
+    run_files,
+)
 from orbiflow.runtime import NEVER, Call, Cancel, Outcome, Sink, find, ignore, operation
-from orbiflow.settings import Option
+from orbiflow.settings import Option, SettingError
 from orbiflow.tiles.search import SearchSettings
 from orbiflow.tiles.silhouette import ReadingSettings
 
@@ -23,6 +35,7 @@ def batch(
     reading: ReadingSettings = ReadingSettings(),
     work: WorkSettings = WorkSettings(),
     *,
+    pairs: Literal["all"] | None = None,
     match: str | None = None,
     figures: bool = False,
     on_event: Sink = ignore,
@@ -39,21 +52,31 @@ def batch(
         folder: Folder of silhouettes, searched with the folders inside: PNG, JPEG, WebP, SVG, and
             polygons (.json, .geojson, .dat, .wkt).
         out: Folder for the results; an earlier batch there is resumed.
+        pairs: With all, find two figures that tile the plane together for every pair of silhouettes,
+            and show which go together.
         match: Only files whose names fit a pattern, such as "*.svg".
         figures: Also write figures for print.
     """
     given = {**settings.to_json(), "figures": figures}
+    if pairs is None and settings.ratio is not None:
+        raise SettingError("{ratio} is for pairs; give {pairs} all, or leave it out")
 
     def call_of(name: str, results: str) -> Call:
-        is_outline = PurePath(name).suffix.lower() in OUTLINES
+        first, _, second = name.partition(PAIRED) if pairs else (name, "", "")
+        names = [own for own in (first, second) if own]
+        is_outline = all(PurePath(own).suffix.lower() in OUTLINES for own in names)
         own = {"smooth": reading.smooth} if is_outline else reading.to_json()
-        # each silhouette has one process: many at a time make better use of the cores
-        fixed = {"image": name, "out": "out", "workers": 1}
-        words = {"called": name, "shown_out": str(out / results)}
-        return find("escherize").call({**given, **own, **fixed, **words})
+        # each call has one process: many at a time make better use of the cores
+        fixed = {"image": first, "out": "out", "workers": 1}
+        words = {"called": first, "shown_out": str(out / results)}
+        more = {"second": second, "second_called": second} if second else {}
+        return find("escherize").call({**given, **own, **fixed, **words, **more})
 
-    title = f"Tiles of {folder.name or 'a folder'}"
-    return run_files(folder, out, TILES, title, call_of, match, work, on_event, cancel)
+    title = f"{'Pairs' if pairs else 'Tiles'} of {folder.name or 'a folder'}"
+    kind = TILES if pairs is None else PAIRS
+    sheet, reads = (None, "") if pairs is None else (PairSheet(kind, title), "second")
+    own = match, work, on_event, cancel
+    return run_files(folder, out, kind, title, call_of, *own, sheet=sheet, second=reads)
 
 
 def _best(summary: Summary) -> dict[str, Any]:
@@ -97,3 +120,27 @@ TILES = Kind(
     opens="index.html",
     written=_written,
 )
+
+PAIRS = replace(TILES, things="pairs", items="pairs")
+
+
+class PairSheet(ContactSheet):
+    """The table and page of all pairs of silhouettes, with the stars of each pair at a glance."""
+
+    def matrix(self, entries: Sequence[Entry]) -> Matrix:
+        """Return a table of the stars of the worse figure of each pair."""
+        found = {tuple(entry.file.split(PAIRED)): entry for entry in entries}
+        names = sorted({name for pair in found for name in pair})
+        cells = [
+            [_cell(found.get((column, row))) for column in names[:number]]
+            for number, row in enumerate(names)
+        ]
+        shown = [PurePath(name).stem for name in names]
+        return Matrix("Which go together? The stars of the worse figure", shown, cells)
+
+
+def _cell(entry: Entry | None) -> tuple[Entry, str, float] | None:
+    stars = None if entry is None else entry.best.get("stars")
+    if entry is None or not isinstance(stars, int | float):
+        return None
+    return entry, f"{stars:g}", (stars - 1) / 4

@@ -5,7 +5,7 @@ a stack of rings. Functions with `AnyRing` take tensors as well and are differen
 """
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -77,6 +77,36 @@ def _crosses(local: AnyRing) -> AnyRing:
     """Return twice the area (..., N) of the triangle of each side and the origin."""
     ahead = local[..., [*range(1, local.shape[-2]), 0], :]
     return local[..., 0] * ahead[..., 1] - ahead[..., 0] * local[..., 1]
+
+
+class Place(NamedTuple):
+    """Where things lie in other coordinates: the similarity p -> linear p + offset.
+
+    >>> half = Place(np.eye(2) / 2, np.array([1.0, 0.0]))
+    >>> half(np.array([2.0, 2.0])), half.after(half).scale
+    (array([2., 1.]), 0.25)
+    """
+
+    linear: Array  # (2, 2)
+    offset: Array  # (2,)
+
+    def __call__(self, points: Array) -> Array:
+        return points @ self.linear.T + self.offset
+
+    @property
+    def scale(self) -> float:
+        """By how much lengths grow."""
+        return float(np.sqrt(abs(np.linalg.det(self.linear))))
+
+    @property
+    def inverse(self) -> "Place":
+        """The way back."""
+        linear = np.linalg.inv(self.linear)
+        return Place(linear, -linear @ self.offset)
+
+    def after(self, first: "Place") -> "Place":
+        """Return this after another one."""
+        return Place(self.linear @ first.linear, self(first.offset))
 
 
 def complex_points(points: ArrayLike) -> Complex:

@@ -24,7 +24,7 @@ from orbiflow.runtime import (
     operation,
     write_atomic,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, InMemory, Option, Parsed
+from orbiflow.settings import DefaultText, Ending, Hidden, InMemory, Option, Parsed, Positional
 from orbiflow.tiles.make import ArtSettings, ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings, class_names
@@ -53,14 +53,18 @@ def escherize(
     settings: EscherizeSettings = EscherizeSettings(),
     reading: ReadingSettings = ReadingSettings(),
     *,
+    second: Annotated[Path | None, Positional()] = None,
     figures: bool = False,
     verbose: bool = False,
     called: Annotated[str | None, Hidden()] = None,
+    second_called: Annotated[str | None, Hidden()] = None,
     shown_out: Annotated[str | None, Hidden()] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
+
+    With a second silhouette, find two figures that tile the plane together, one like each.
 
     Writes read.png, a picture of what was read, into the folder at once. Then come result.json,
     overview.png and index.html, and for each class a folder with tile.svg, tiling.svg, tiling.png,
@@ -68,30 +72,41 @@ def escherize(
 
     Args:
         image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .geojson, .dat, .csv, .wkt).
+        second: A second silhouette.
         out: Folder for the results, made if need be.
         figures: Also write for print tiling.pdf and overlay.pdf, and of the flow field.png and
             field.pdf.
         verbose: Also show the scores and other figures of result.json.
         called: What the results call the silhouette. Default: its path.
+        second_called: What they call the second one. Default: its path.
         shown_out: What the page's commands call the folder. Default: its path.
     """
     from orbiflow.tiles import run_folder, search
 
     begin = time.perf_counter()
     target = reading.read(image, called)
+    other = None if second is None else reading.read(second, second_called)
+    if other is None:
+        settings.check_single()
     run_folder.result_folder(out)
-    check_output_folder(out, image, settings.emphasis, *map(Path, settings.pin or ()))
-    picture = functools.cache(functools.partial(run_folder.read_png, target, image))
+    check_output_folder(out, image, second, *settings.files)
+    silhouettes = [(target, image)]
+    if other is not None and second is not None:
+        silhouettes.append((other, second))
+    pictures = functools.cache(lambda: [run_folder.read_png(*own) for own in silhouettes])
 
     def show() -> None:
-        run_folder.show_reading(target, picture(), out, on_event)
+        for number, (own, picture) in enumerate(zip(silhouettes, pictures(), strict=True)):
+            run_folder.show_reading(own[0], picture, out, on_event, number=number)
 
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
-    result = search.escherize(target, settings, on_checked=show, on_event=on_event, cancel=cancel)
+    result = search.escherize(
+        target, settings, second=other, on_checked=show, on_event=on_event, cancel=cancel
+    )
     for text in _remarks(result):
         on_event(Note(text))
     written = run_folder.write_run(
-        result, out, picture(), figures=figures, shown_out=shown_out, on_event=on_event
+        result, out, pictures(), figures=figures, shown_out=shown_out, on_event=on_event
     )
     tiles = result.tiles if written else ()
     summary = {
@@ -114,7 +129,8 @@ def _tables(tiles: Sequence[EscherTile]) -> list[Table]:
     """Return a table of the tiles, in words and in figures; empty if there are none."""
     if not tiles:
         return []
-    figures = _table("Figures", [_figures(tile) for tile in tiles])
+    rows = [_figures(tile, part.figure) for tile in tiles for part in tile.figures]
+    figures = _table("Figures", rows)
     return [_table("Tiles, best first", [_words(tile) for tile in tiles]), figures]
 
 
@@ -125,24 +141,26 @@ def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
 
 def _words(tile: EscherTile) -> dict[str, str]:
     """Return a line about a tile, in 80 characters."""
-    rating, lies = tile.rating, tile.arrangement
+    lies, ratings = tile.arrangement, [part.figure.rating for part in tile.figures]
+    words = dict.fromkeys(rating.word for rating in ratings if rating)
     return {
         "class": f"{tile.name} ({tile.group_name})",
-        "stars": str(rating or ""),
-        "likeness": rating.word if rating else "",
+        "stars": ", ".join(str(rating) for rating in ratings if rating),
+        "likeness": ", ".join(words),
         "how its copies lie": lies or "NOT CERTIFIED: they do not tile",
     }
 
 
-def _figures(tile: EscherTile) -> dict[str, str]:
-    """The same in figures."""
-    mismatch, bent = tile.certificate.edge_mismatch, tile.likeness.deformation
+def _figures(tile: EscherTile, own: EscherTile) -> dict[str, str]:
+    """The same in figures, of one of its parts."""
+    mismatch, bent = tile.certificate.edge_mismatch, own.likeness.deformation
     return {
         "class": f"{tile.name} ({tile.group_name})",
-        "score": f"{tile.score:.3f}",
+        **({"figure": own.name} if tile.parts else {}),
+        "score": f"{own.score:.3f}",
         "bent": "-" if bent is None else f"{bent:.3f}",
-        "IoU": f"{tile.likeness.metrics.iou:.4f}",
-        "recognised": f"{tile.likeness.recognisability.score:.3f}",
+        "IoU": f"{own.likeness.metrics.iou:.4f}",
+        "recognised": f"{own.likeness.recognisability.score:.3f}",
         "certified": "yes" if tile.certificate.valid else "NO",
         "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
         "s": f"{tile.search.seconds:.1f}",
@@ -154,8 +172,9 @@ def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> 
     from orbiflow.tiles.search import rounded_for, why_poor
     from orbiflow.tiles.silhouette import doubts, is_mere_line
 
-    explains = not result.tiles or is_mere_line(result.target)
-    again = [Note(text, warning=True) for text in doubts(result.target)] if explains else []
+    explains = not result.tiles or any(map(is_mere_line, result.targets))
+    texts = [text for target in result.targets for text in doubts(target)]
+    again = [Note(text, warning=True) for text in texts] if explains else []
     if poor := why_poor(result.tiles[0]) if result.tiles else "":
         again = [Note(poor), *again]
     if rounded := rounded_for(result.tiles):
@@ -176,19 +195,19 @@ def _remarks(result: SearchResult) -> list[str]:
 
 
 def _measures(tile: EscherTile) -> dict[str, Any]:
-    mismatch = tile.certificate.edge_mismatch
+    mismatch, own = tile.certificate.edge_mismatch, tile.worst.likeness
     return {
         "class": tile.isohedral_class,
         "group": tile.group_name,
         "objective": tile.search.objective,
-        "deformation": tile.likeness.deformation,
+        "deformation": own.deformation,
         "arrangement": tile.arrangement,
         "stars": tile.rating and tile.rating.stars,
         "word": tile.rating and tile.rating.word,
         "score": tile.score,
-        "iou": tile.likeness.metrics.iou,
-        "dice": tile.likeness.metrics.dice,
-        "recognised": tile.likeness.recognisability.score,
+        "iou": own.metrics.iou,
+        "dice": own.metrics.dice,
+        "recognised": own.recognisability.score,
         "certified": tile.certificate.valid,
         "edge_mismatch": mismatch if mismatch < float("inf") else None,
         "seconds": tile.search.seconds,
@@ -201,7 +220,7 @@ def _tell(on_event: Sink, notes: Sequence[str], *files: Path) -> None:
 
 
 def _taken(
-    result: TileSource, tile: str | None, out: Path | None, name: str, picture: Path | None = None
+    result: TileSource, tile: str | None, out: Path | None, name: str, *pictures: Path | None
 ) -> tuple[EscherTile, Path]:
     """Return the tile that is meant, and the file to write, which is by default named after it."""
     from orbiflow.tiles.result_file import as_tile
@@ -209,7 +228,7 @@ def _taken(
     given = as_tile(result, tile)
     out = out or Path(name.format(given.name))
     read = (result,) if isinstance(result, str | Path) else ()
-    check_output_file(out, *map(Path, read), picture)
+    check_output_file(out, *map(Path, read), *pictures)
     return given, out
 
 
@@ -222,6 +241,7 @@ def export(
     tile: Which = None,
     force: bool = False,
     picture: Path | None = None,
+    second_picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Exported:
@@ -235,6 +255,7 @@ def export(
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
+        second_picture: One over the second silhouette, of a tile of two figures.
 
     Raises:
         CertificationError: If the tile is not certified.
@@ -246,9 +267,12 @@ def export(
 
     from orbiflow.tiles import make
 
-    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", picture)
+    pictures = picture, second_picture
+    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)
     on_event(Progress(0.0, "laying out"))
-    sheets, notes = make.scenes(given, settings, picture=picture, force=force)
+    sheets, notes = make.scenes(
+        given, settings, picture=picture, second_picture=second_picture, force=force
+    )
     contents: list[str | bytes] = []  # all, before the first file
     for k, sheet in enumerate(sheets):
         cancel.check()
@@ -274,6 +298,7 @@ def art(
     tile: Which = None,
     force: bool = False,
     picture: Path | None = None,
+    second_picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Artwork:
@@ -287,6 +312,7 @@ def art(
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
+        second_picture: One over the second silhouette, of a tile of two figures.
 
     Raises:
         InputFileError: If the picture cannot be read.
@@ -296,14 +322,15 @@ def art(
 
     from orbiflow.tiles import make, motifs
 
-    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", picture)
+    pictures = picture, second_picture
+    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)
     given.require_certified(
         force=force, otherwise="so it is not drawn; {force} draws it all the same"
     )
     on_event(Progress(0.0, "laying out"))
     given = motifs.with_map(given)
-    over = None if picture is None else motifs.read_over(picture, given)
-    made = make.artwork(given, settings, over)
+    motifs.require_figures(given, settings, 1 + (second_picture is not None))
+    made = make.artwork(given, settings, *motifs.read_overs(pictures, given))
     cancel.check()
     on_event(Progress(0.2, "drawing"))
     write_atomic(out, make.art_file(made, settings.file_format, cancel=cancel))
@@ -321,6 +348,7 @@ def solid(
     tile: Which = None,
     force: bool = False,
     picture: Path | None = None,
+    second_picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Solid:
@@ -334,18 +362,21 @@ def solid(
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
         picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
+        second_picture: One over the second silhouette, of a tile of two figures.
 
     Raises:
         InputFileError: If the drawing cannot be read, or is a picture of pixels.
         OrbiflowError: As `make_solid` and `export` raise it.
     """
     settings = settings.for_file(out)
-    settings.check_picture(picture)
+    settings.check_picture(picture or second_picture)
 
     from orbiflow.tiles.solids import make_solid, solid_file
 
-    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", picture)
-    made = make_solid(given, settings, picture=picture, force=force)
+    pictures = picture, second_picture
+    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", *pictures)
+    own = {"picture": picture, "second_picture": second_picture}
+    made = make_solid(given, settings, **own, force=force)
     cancel.check()
     write_atomic(out, solid_file(made, settings.file_format))
     done = made.written(out)
@@ -389,7 +420,7 @@ def animate(
     from orbiflow.tiles.tilings import colouring
 
     given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}")
-    for note in palette(settings.palette).shortage(colouring(given.tile).count):
+    for note in palette(settings.palette).shortage(colouring(given.tiling).count):
         on_event(Note(note))
 
     def told(share: float) -> None:

@@ -24,6 +24,7 @@ from orbiflow.runtime import (
     write_json,
 )
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
+from orbiflow.tiles.geometry import Place
 from orbiflow.tiles.likeness import (
     Fidelity,
     Likeness,
@@ -32,12 +33,13 @@ from orbiflow.tiles.likeness import (
     ShapeMetrics,
     Thinnest,
 )
-from orbiflow.tiles.tile import EscherTile, SearchFacts, TileSource
+from orbiflow.tiles.tile import NO_MAP, EscherTile, Part, SearchFacts, TileSource
 from orbiflow.tiles.tilings import ISOHEDRAL_TYPES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
 SCHEMA_VERSION = 2
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf")
+SAME_AREA = 1e-6  # the relative difference below which areas are the same
 MOST_NAMED = 5  # runs that a message names
 
 
@@ -68,21 +70,63 @@ def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
     entry = document["tiles"][index]
     try:
         tile = _tile(entry)
-        found = EscherTile(
-            tile,
-            name=f"{source}-{names[index]}",
-            y_down=bool(silhouette["y_down"]),
+        # folders are named after classes: an unknown name leads nowhere
+        own = file.parent / folder_names(names)[index] if tile.isohedral_class else None
+        found = _measured(tile, entry, f"{source}-{names[index]}", silhouette, own)
+        found = found.changed(
             rank=index + 1,
-            silhouette=silhouette,
-            likeness=_likeness(entry),
-            rating=Rating(entry["rating"]["stars"]) if entry.get("rating") else None,
             search=SearchFacts(**{name: entry[name] for name in _SEARCH if name in entry}),
         )
+        if parts := entry.get("parts", []):
+            found = _divided(found, parts, own)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise InputFileError(f"{file}: tile {index + 1} cannot be read: {error}") from error
-    if not tile.isohedral_class:
-        return found  # folders are named after classes: an unknown name leads nowhere
-    return found.changed(map_source=file.parent / folder_names(names)[index] / TILE_MODEL)
+    return found
+
+
+def _measured(
+    tile: Tile,
+    entry: dict[str, Any],
+    name: str,
+    silhouette: dict[str, Any],
+    folder: Path | None,
+    number: int = 0,
+) -> EscherTile:
+    """Return a tile, or one of its figures, with what an entry says of it."""
+    return EscherTile(
+        tile,
+        name=name,
+        y_down=bool(silhouette["y_down"]),
+        silhouette=silhouette,
+        map_source=None if folder is None else folder / part_file(TILE_MODEL, number),
+        likeness=_likeness(entry),
+        rating=Rating(entry["rating"]["stars"]) if entry.get("rating") else None,
+    )
+
+
+def _divided(whole: EscherTile, entries: list[dict[str, Any]], folder: Path | None) -> EscherTile:
+    """Return a tile that figures divide."""
+    parts = tuple(_part(whole.tile, own, folder, k) for k, own in enumerate(entries))
+    found = whole.changed(parts=parts, map_source=None, no_map=NO_MAP)
+    area, whole_area = (
+        sum(own.signed_area for own in found.tiling.prototiles),
+        found.tile.signed_area,
+    )
+    if not abs(area - whole_area) <= SAME_AREA * abs(whole_area):
+        raise OrbiflowError("its parts do not fill its polygon")
+    return found
+
+
+def _part(whole: Tile, entry: dict[str, Any], folder: Path | None, number: int) -> Part:
+    """Return one of the figures that divide a tile."""
+    place = Place(*(np.array(entry["place"][name], float) for name in ("linear", "offset")))
+    if place.linear.shape != (2, 2) or place.offset.shape != (2,) or not place.scale > 0:
+        raise OrbiflowError("the place of a part must be a similarity: linear (2, 2), offset (2,)")
+    tile = Tile(
+        _ring(entry), whole.group.conjugate(*place.inverse), corners=tuple(entry["corners"])
+    )
+    name = str(entry["name"])
+    return Part(_measured(tile, entry, name, entry["input"], folder, number), place)
 
 
 def as_tile(source: TileSource, which: str | int | None = None) -> EscherTile:
@@ -113,6 +157,16 @@ def _contents(file: Path, document: dict[str, Any]) -> tuple[list[str], str, dic
     except (KeyError, TypeError) as error:
         missing = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
         raise InputFileError(f"{file}: not a result of orbiflow escherize: {missing}") from error
+
+
+def part_file(name: str, number: int) -> str:
+    """Return the name of the file of a figure, counted from 0, among those of a tile.
+
+    >>> part_file("model.safetensors", 0), part_file("overlay.png", 1)
+    ('model.safetensors', 'overlay-2.png')
+    """
+    stem, dot, ending = name.rpartition(".")
+    return name if number == 0 else f"{stem}-{number + 1}{dot}{ending}"
 
 
 def folder_names(classes: Iterable[str]) -> list[str]:
@@ -209,9 +263,10 @@ def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
     }
     with own.replaced() as staged:
         for tile, name in zip(tiles, names, strict=True):
-            if tile.map is not None:
-                make_folder(staged / name)
-                write_atomic(staged / name / TILE_MODEL, tile.map.to_bytes())
+            for number, part in enumerate(tile.figures):
+                if part.figure.map is not None:
+                    file = make_folder(staged / name) / part_file(TILE_MODEL, number)
+                    write_atomic(file, part.figure.map.to_bytes())
         write_json(staged / RESULT, document)
     return own.path
 
@@ -219,10 +274,17 @@ def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
 def _saved_files(folder: Path) -> set[str]:
     """Return the files that `save_tiles` wrote into a folder, relative to it."""
     try:
-        names = [entry["class"] or "tile" for entry in read_document(folder / RESULT)[1]["tiles"]]
+        entries = read_document(folder / RESULT)[1]["tiles"]
+        names = folder_names([entry["class"] or "tile" for entry in entries])
+        counts = [max(1, len(entry.get("parts", ()))) for entry in entries]
     except (OrbiflowError, KeyError, TypeError):
         return set()
-    return {RESULT, *(f"{name}/{TILE_MODEL}" for name in folder_names(names))}
+    models = (
+        f"{name}/{part_file(TILE_MODEL, number)}"
+        for name, count in zip(names, counts, strict=True)
+        for number in range(count)
+    )
+    return {RESULT, *models}
 
 
 def group_json(group: CrystallographicGroup) -> dict[str, Any]:
@@ -239,14 +301,40 @@ def group_json(group: CrystallographicGroup) -> dict[str, Any]:
 
 def tile_json(tile: EscherTile) -> dict[str, Any]:
     """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
-    own, search, rating = tile.likeness, tile.search, tile.rating
-    thin = own.thinnest
+    search = tile.search
+    # what is measured of a tile that figures divide is theirs
+    own = (
+        {"parts": [_part_json(part) for part in tile.parts]} if tile.parts else _measures_json(tile)
+    )
     return {
         "class": tile.isohedral_class,
         "arrangement": tile.arrangement,
+        "objective": search.objective,
+        **_rating_json(tile),
+        **own,
+        "certificate": tile.certificate.as_dict(),
+        "group": group_json(tile.tile.group),
+        "starts": search.starts,
+        "dropped": search.dropped,
+        "seconds": round(search.seconds, 3),
+    }
+
+
+def _rating_json(tile: EscherTile) -> dict[str, Any]:
+    """Return how good a tile or a figure is, and its polygon in its own coordinates."""
+    rating = tile.rating
+    return {
         "rating": rating and {"stars": rating.stars, "word": rating.word},
         "score": _or_none(tile.score),
-        "objective": search.objective,
+        "polygon": _closed(tile.tile.polygon),
+        "corners": list(tile.tile.corners),
+    }
+
+
+def _measures_json(tile: EscherTile) -> dict[str, Any]:
+    """Return what is measured of a tile, or one of its figures, in its own coordinates."""
+    own, thin = tile.likeness, tile.likeness.thinnest
+    return {
         "smoothed": own.smoothed,
         "metrics": {
             **_or_none(own.metrics.as_dict()),
@@ -256,16 +344,16 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
             "fidelity": None if own.fidelity is None else asdict(own.fidelity),
         },
         "recognisability": _or_none(own.recognisability.as_dict()),
-        "certificate": tile.certificate.as_dict(),
-        "polygon": _closed(tile.tile.polygon),
         "bent": None if own.bent is None else _closed(own.bent),
         "thinnest": thin if thin is None else {**thin._asdict(), "ends": thin.ends.tolist()},
-        "corners": list(tile.tile.corners),
-        "group": group_json(tile.tile.group),
-        "starts": search.starts,
-        "dropped": search.dropped,
-        "seconds": round(search.seconds, 3),
     }
+
+
+def _part_json(part: Part) -> dict[str, Any]:
+    """Return what is known of one of the figures that divide a tile."""
+    place = {"linear": part.place.linear.tolist(), "offset": part.place.offset.tolist()}
+    known = {"name": part.figure.name, "input": part.figure.silhouette, "place": place}
+    return {**known, **_rating_json(part.figure), **_measures_json(part.figure)}
 
 
 def _or_none(value: Any) -> Any:
@@ -315,12 +403,17 @@ def _tile(entry: dict[str, Any]) -> Tile:
     if not cosets:
         raise OrbiflowError("its group has no cosets")
     name = str(entry["class"])
-    ring = np.array(entry["polygon"], dtype=np.float64)
-    if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 4:
-        raise OrbiflowError(f"its polygon should be a closed ring of points, got {ring.shape}")
     return Tile(
-        ring[:-1],
+        _ring(entry),
         CrystallographicGroup(checked_lattice(group["lattice"]), cosets, str(group["name"])),
         name if name in ISOHEDRAL_TYPES else "",
         tuple(entry["corners"]),
     )
+
+
+def _ring(entry: dict[str, Any]) -> Array:
+    """Return the polygon (N, 2) of an entry."""
+    ring = np.array(entry["polygon"], dtype=np.float64)
+    if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 4:
+        raise OrbiflowError(f"its polygon should be a closed ring of points, got {ring.shape}")
+    return ring[:-1]

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, literal
-from orbiflow.tiles.geometry import border
+from orbiflow.tiles.geometry import Place, border
 from orbiflow.tiles.likeness import Likeness, Rating
 from orbiflow.tiles.silhouette import Bending, Covered, Frame
 from orbiflow.tiles.tile_map import TileMap
-from orbiflow.tiles.tilings import Certificate, Tile, arrangement, certify
+from orbiflow.tiles.tilings import Certificate, Prototile, Tile, Tiling, arrangement, certify
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,24 @@ class SearchFacts:
 
 
 UNMEASURED, UNSEARCHED = Likeness(), SearchFacts()
+NO_MAP = "each of its figures has a map of its own"  # a reason, for tiles that figures divide
+
+
+class Part(NamedTuple):
+    """One of the figures that divide a tile.
+
+    - `figure`: Its polygon, map and measures, in the coordinates of its own silhouette.
+    - `place`: Where these lie in the coordinates of the whole.
+    """
+
+    figure: EscherTile
+    place: Place
+
+    @property
+    def prototile(self) -> Prototile:
+        """Its polygon and corners in the coordinates of the whole."""
+        tile = self.figure.tile
+        return Prototile(self.place(tile.polygon), tile.corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +72,7 @@ class EscherTile:
     - `rating`: Its stars among the tiles of its run.
     - `search`: How it was found.
     - `others`: More tiles of the class, if they were asked for.
+    - `parts`: The figures that divide it, each like a silhouette of its own; none if it is one figure.
     """
 
     tile: Tile
@@ -70,6 +89,7 @@ class EscherTile:
     rating: Rating | None = None
     search: SearchFacts = UNSEARCHED
     others: tuple[EscherTile, ...] = ()
+    parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -85,6 +105,18 @@ class EscherTile:
         """The name of the wallpaper group, such as "p2"."""
         return self.tile.group.name
 
+    @property
+    def figures(self) -> tuple[Part, ...]:
+        """The figures that divide it; one that is whole is its own."""
+        return self.parts or (Part(self, Place(np.eye(2), np.zeros(2))),)
+
+    @cached_property
+    def tiling(self) -> Tiling:
+        """The group with a prototile for each of the `figures`."""
+        if not self.parts:
+            return self.tile.tiling
+        return Tiling(self.tile.group, [part.prototile for part in self.parts])
+
     @cached_property
     def arrangement(self) -> str:
         """How its copies lie, in plain words; "" if it does not tile."""
@@ -92,8 +124,8 @@ class EscherTile:
 
     @cached_property
     def certificate(self) -> Certificate:
-        """The proof that it tiles, or what is wrong: from the polygon and the group alone."""
-        return certify(self.tile)
+        """The proof that it tiles, or what is wrong: from the polygons and the group alone."""
+        return certify(self.tiling)
 
     @cached_property
     def normal_tile(self) -> Tile:
@@ -149,13 +181,19 @@ class EscherTile:
 
     @property
     def score(self) -> float:
-        """What tiles are ranked by, from 0 to 1: that of `likeness`."""
-        return self.likeness.score
+        """What tiles are ranked by, from 0 to 1: that of `likeness`, or of the worst of the parts."""
+        return self.worst.likeness.score
+
+    @property
+    def worst(self) -> EscherTile:
+        """The one of the `figures` that is least like its silhouette."""
+        return min((part.figure for part in self.figures), key=lambda own: own.likeness.score)
 
     def changed(self, **changes: Any) -> EscherTile:
         """Return the tile with other values of some fields, and a certificate that is known kept."""
         other = replace(self, **changes)
-        if "certificate" in self.__dict__ and other.tile is self.tile:
+        same = other.tile is self.tile and other.parts is self.parts
+        if "certificate" in self.__dict__ and same:
             other.__dict__["certificate"] = self.certificate
         return other
 

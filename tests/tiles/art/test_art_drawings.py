@@ -131,7 +131,7 @@ def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
     tile = squirrel("IH6")
     settings = PAGE.replace(strokes=strokes, eyes=(EYE,), tile_size="260px")
     art = artwork(tile, settings)
-    ink = art.motif.parts[0]
+    ink = art.motifs[0].parts[0]
     assert ink.style.fill == INK
     assert len(ink.curves) > 15
     inside = shapely.Polygon(tile.tile.polygon).buffer(tile.silhouette_outline.max() * 0.004)
@@ -139,7 +139,7 @@ def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
         assert inside.contains(shapely.MultiPoint(curve.pieces[:, 0]))
     middle = tile.forward(np.array(EYE))
     points = np.concatenate([curve.pieces[:, 0] for curve in ink.curves])
-    eye = np.concatenate([curve.pieces[:, 0] for curve in art.motif.parts[1].curves])
+    eye = np.concatenate([curve.pieces[:, 0] for curve in art.motifs[0].parts[1].curves])
     radius = np.hypot(*(eye - middle).T)
     np.testing.assert_allclose(radius, radius[0], rtol=1e-6)  # round
     assert np.hypot(*(points - middle).T).min() > 1.5 * radius[0]
@@ -308,8 +308,8 @@ def test_current_colour_is_ink(tmp_path: Path) -> None:
     <path d="M 300 400 L 500 300" fill="none" stroke="currentcolor" stroke-width="9"/>
     <path d="M 300 400 L 500 300 L 600 400" fill="currentColor" color="#203040"/>"""
     art = drawn("IH4", body, tmp_path)
-    assert [INK in part.style for part in art.motif.parts] == [True, True, False]
-    assert art.motif.parts[2].style.fill == "#203040"
+    assert [INK in part.style for part in art.motifs[0].parts] == [True, True, False]
+    assert art.motifs[0].parts[2].style.fill == "#203040"
     chosen = palette(art.settings.palette)
     inks = {layer.ink for layer in art_scene(art).layers} - {None}
     assert inks == {chosen.outline, chosen.paper}

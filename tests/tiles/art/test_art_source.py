@@ -37,7 +37,7 @@ def test_without_a_map_outlines_are_matched(tmp_path: Path) -> None:
     known = squirrel("IH6").forward(np.array(EYE))
     # the bent head and the matched one are near each other
     assert np.hypot(*(moved - known)) < 0.15 * np.sqrt(abs(tile.tile.signed_area))
-    assert artwork(tile, art_settings(area="60x40px", eyes=(EYE,))).motif.parts
+    assert artwork(tile, art_settings(area="60x40px", eyes=(EYE,))).motifs[0].parts
 
 
 def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> None:
@@ -46,7 +46,7 @@ def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> No
     document["input"]["source"] = "gone.dat"
     (run / "result.json").write_text(json.dumps(document))
     tile = with_map(run)
-    assert artwork(tile, art_settings(area="60x40px", strokes="hatch")).motif.parts
+    assert artwork(tile, art_settings(area="60x40px", strokes="hatch")).motifs[0].parts
     with pytest.raises(OrbiflowError, match=r"its silhouette gone\.dat is not there"):
         artwork(tile, art_settings(area="60x40px", eyes=(EYE,)))
     document["input"]["source"] = str(FOLDER / "nagata" / "bat_60.dat")

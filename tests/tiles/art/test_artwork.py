@@ -115,7 +115,7 @@ def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
 def test_the_map_onto_the_raster_has_no_fold() -> None:
     tile = squirrel("IH6")
     art = artwork(tile, PAGE, Over(flat(tile, "white")))
-    grid = picture_paint(art.picture, art.tile, art.density, art.page.count).grid
+    grid = picture_paint(art.pictures[0], art.tile, art.density(0), art.page.count).grid
     places = _places(tile, grid)
     whole = np.asarray(binary_erosion(grid.inside(tile.tile.polygon), iterations=2), dtype=bool)
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
@@ -193,7 +193,7 @@ def test_a_silhouette_with_y_up_is_drawn_the_same_way_up(name: str) -> None:
     assert apart.mean() < 3  # their rasters lie a fraction of a texel apart
     assert (apart > 80).mean() < 0.002
     eyes = [
-        artwork(own, settings(eyes=((EYE[0], y),))).motif.parts
+        artwork(own, settings(eyes=((EYE[0], y),))).motifs[0].parts
         for own, y in ((tile, EYE[1]), (turned, -EYE[1]))
     ]
     for first, second in zip(*eyes, strict=True):

@@ -65,7 +65,7 @@ def test_smooth_tiles_tile_as_exactly_as_polygons(tile: Tile, share: float) -> N
         np.testing.assert_allclose(
             image.pieces, found.curves[pair.second].pieces, atol=1e-9 * tile.radius
         )
-    ring = found.closed.flattened(tolerance / 50)
+    ring = found.closed[0].flattened(tolerance / 50)
     polygon = shapely.Polygon(ring)
     assert polygon.is_valid
     assert polygon.area == pytest.approx(abs(tile.signed_area), rel=1e-9)
@@ -77,7 +77,7 @@ def test_smooth_tiles_tile_as_exactly_as_polygons(tile: Tile, share: float) -> N
 @pytest.mark.parametrize("name", CLASSES)
 def test_smooth_tiles_are_shorter_to_write(name: str) -> None:
     tile = tile_of(name)
-    assert len(outline(tile, 0.02 * tile.radius).closed.pieces) < len(tile.polygon) / 3
+    assert len(outline(tile, 0.02 * tile.radius).closed[0].pieces) < len(tile.polygon) / 3
 
 
 def test_curves_that_would_cross_are_fitted_more_closely() -> None:
@@ -87,7 +87,7 @@ def test_curves_that_would_cross_are_fitted_more_closely() -> None:
     found = outline(Tile(np.array(thin), group), 0.3)
     assert found.edges is None
     assert "left as it is" in found.note
-    assert len(found.closed.pieces) == 7
+    assert len(found.closed[0].pieces) == 7
 
 
 def test_flattened_curves_keep_the_tolerance_they_are_given() -> None:

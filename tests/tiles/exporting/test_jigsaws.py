@@ -52,13 +52,13 @@ def test_the_pieces_are_the_rectangle_and_none_is_a_crumb(name: str) -> None:
     assert len(pieces) == scene.facts["pieces"]
     assert sum(piece.area for piece in pieces) == pytest.approx(140 * 100, rel=1e-4)
     assert shapely.union_all(pieces).bounds == pytest.approx((5, 5, 145, 105), abs=5e-3)
-    tile = shapely.Polygon(scene.prototile)
+    tile = shapely.Polygon(scene.prototiles[0])
     shares = np.array([piece.area / tile.area for piece in pieces])
     assert shares.min() >= LEAST_SHARE - 1e-3
     assert shares.min() == pytest.approx(scene.facts["smallest"], abs=2e-3)
     # whole tiles are images of the tile
     whole = sum(
-        shapely.Polygon(scene.prototile @ placed.linear.T + placed.offset)
+        shapely.Polygon(scene.prototiles[0] @ placed.linear.T + placed.offset)
         .symmetric_difference(min(pieces, key=lambda p, at=placed: apart(p, scene, at)))
         .area
         < 0.006 * tile.area
@@ -68,8 +68,8 @@ def test_the_pieces_are_the_rectangle_and_none_is_a_crumb(name: str) -> None:
 
 
 def apart(piece: shapely.Polygon, scene: Scene, placed) -> float:
-    assert scene.prototile is not None
-    centre = shapely.Polygon(scene.prototile).centroid
+    assert scene.prototiles
+    centre = shapely.Polygon(scene.prototiles[0]).centroid
     x, y = placed.linear @ [centre.x, centre.y] + placed.offset
     return piece.centroid.distance(shapely.Point(x, y))
 

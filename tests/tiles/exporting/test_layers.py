@@ -44,8 +44,8 @@ def exported(
 def eyes(name: str, scene: Scene) -> np.ndarray:
     """Where the tiles' own isometries put the eye, (M, 2) in mm."""
     tile = squirrel(name)
-    assert scene.prototile is not None
-    own, there = tile.tile.polygon, scene.prototile
+    assert scene.prototiles
+    own, there = tile.tile.polygon, scene.prototiles[0]
     first = np.linalg.lstsq(np.column_stack([own, np.ones(len(own))]), there)[0]
     place = np.append(tile.forward(np.array(EYE)), 1.0) @ first
     return np.stack([one.linear @ place + one.offset for one in scene.tiles])

@@ -74,7 +74,7 @@ def test_pieces_in_the_file(name: str, offset: float) -> None:
     assert isinstance(text, str)
     lines = svg_lines(text)
     cuts = polygons([line for line in lines if line.layer == "cut"])
-    tile = shapely.Polygon(scene.prototile)
+    tile = shapely.Polygon(scene.prototiles[0])
     for cut, placed in zip(cuts, scene.tiles, strict=True):
         own = shapely.affinity.affine_transform(tile, [*placed.linear.ravel(), *placed.offset])
         left = cut.buffer(-0.1)  # what the beam leaves

@@ -46,8 +46,8 @@ def painted_rings(art: Artwork) -> np.ndarray:
 def cut_rings(tile: Any, **settings: Any) -> np.ndarray:
     """The tiles (M, N, 2) of an export in mm."""
     (scene,), _ = scenes(tile, ExportSettings(**settings))
-    assert scene.prototile is not None
-    return np.stack([scene.prototile @ one.linear.T + one.offset for one in scene.tiles])
+    assert scene.prototiles
+    return np.stack([scene.prototiles[0] @ one.linear.T + one.offset for one in scene.tiles])
 
 
 def apart(some: np.ndarray, others: np.ndarray) -> float:

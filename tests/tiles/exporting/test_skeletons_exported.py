@@ -70,8 +70,8 @@ def test_the_lines_bound_the_tiles(name: str) -> None:
     bits: Any = shapely.linestrings(sides_of(lines))
     noded = shapely.union_all(bits, grid_size=2e-3)
     areas = [face.area for face in shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))]
-    assert scene.prototile is not None
-    area = shapely.Polygon(scene.prototile).area
+    assert scene.prototiles
+    area = shapely.Polygon(scene.prototiles[0]).area
     tiles_found = sum(abs(found - area) < 0.002 * area for found in areas)
     assert tiles_found == len(scene.tiles)
     shared = sum(len(tile.neighbours) for tile in scene.tiles) / 2

@@ -65,9 +65,9 @@ def test_tiles_cover_the_page_once(tile: Tile, size: float, dxf: bool, angle: fl
 def test_a_tiling_is_turned_counterclockwise_on_the_page(cut: Literal["none", "skeleton"]) -> None:
     (straight,), _ = scenes(tile_of("IH4"), ExportSettings(cut=cut))
     (turned,), _ = scenes(tile_of("IH4"), ExportSettings(cut=cut, rotate=30))
-    assert straight.prototile is not None
-    assert turned.prototile is not None
-    step, other = (ring[1] - ring[0] for ring in (straight.prototile, turned.prototile))
+    assert straight.prototiles
+    assert turned.prototiles
+    step, other = (ring[1] - ring[0] for ring in (straight.prototiles[0], turned.prototiles[0]))
     # y points down: what points right turns up
     before, after = complex(step[0], -step[1]), complex(other[0], -other[1])
     assert after == pytest.approx(before * np.exp(1j * np.radians(30)))

@@ -155,7 +155,7 @@ def test_shapes_of_clips(bent: EscherTile, area, height: int, kind) -> None:
     made = motion(bent, AnimationSettings(kind=kind, area=area))
     assert made.page.size == pytest.approx((1080, height))
     # about as many tiles, whatever the shape
-    low, high = made.outline(1.0).min(axis=0), made.outline(1.0).max(axis=0)
+    low, high = made.outlines(1.0)[0].min(axis=0), made.outlines(1.0)[0].max(axis=0)
     share = np.prod(high - low) / (1080 * height)
     assert 0.02 < share < 0.5
 
@@ -167,7 +167,7 @@ def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:
     assert np.abs(way.at(0.0) - bending.rest[way.ring]).max() < 1e-9
     assert np.abs(way.at(1.0) - bending.images[way.ring]).max() < 1e-9
     whole = motion(bent, AnimationSettings(kind="bend", **{**SMALL, "area": "200x134px"}))
-    ring = whole.outline(1.0) @ whole.places(1.0).linear[0].T + whole.places(1.0).offset[0]
+    ring = whole.outlines(1.0)[0] @ whole.places(1.0).linear[0].T + whole.places(1.0).offset[0]
     assert ring.min() > 0
     assert whole.grown(0.0).tolist()[0] == 1
     assert whole.grown(0.0)[1:].max() == 0

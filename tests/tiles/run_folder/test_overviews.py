@@ -128,7 +128,7 @@ def test_commands_of_a_page_can_be_copied_into_a_shell(
 ) -> None:
     out, names = "-my <b> $(out)/it's", ["IH4", "IH6", "IH4-2"]
     refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
-    page = Page(index_page([bent, refused, bent], target, names, out=out))
+    page = Page(index_page([bent, refused, bent], [target], names, out=out))
     calls = [call_by_orbiflow(shlex.split(command)[1:]) for command in page.commands]
     assert len(calls) == 3 * (10 + len(TRIED))
     assert all(isinstance(call, Call) for call in calls)
@@ -141,7 +141,7 @@ def test_commands_of_a_page_can_be_copied_into_a_shell(
 
 
 def test_small_tilings_are_those_of_the_tile(target: Target, bent: EscherTile) -> None:
-    page = Page(index_page([bent], target, ["IH4"]))
+    page = Page(index_page([bent], [target], ["IH4"]))
     uses = page.all("use")
     ids = {attributes.get("id") for _, attributes in page.tags}
     assert {str(use["href"])[1:] for use in uses} <= ids
@@ -160,7 +160,7 @@ def test_small_tilings_are_those_of_the_tile(target: Target, bent: EscherTile) -
 
 
 def test_what_was_read_is_shown_if_it_is_there(target: Target, bent: EscherTile) -> None:
-    read, bare = (Page(index_page([bent], target, ["IH4"], read=own)) for own in (True, False))
+    read, bare = (Page(index_page([bent], [target], ["IH4"], read=own)) for own in (True, False))
     assert "read.png" in [picture["src"] for picture in read.all("img")]
     assert "left out, a hole, filled." in " ".join(read.words.split())
     assert "What was read" not in bare.words
@@ -171,7 +171,7 @@ def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> No
     bad = replace(flowed.certificate, reasons=("it <overlaps> itself",))
     uncertified = replace(flowed)
     vars(uncertified)["certificate"] = bad  # no real reason has characters to escape
-    page = Page(index_page([uncertified], target, ["IH6"]))
+    page = Page(index_page([uncertified], [target], ["IH6"]))
     assert "Not certified: it <overlaps> itself." in page.words
 
 
@@ -181,7 +181,7 @@ def test_figures_are_those_that_were_taken(
     of_bent, of_flowed = (
         Page(
             index_page(
-                [tile.changed(likeness=replace(tile.likeness, pinned=pinned))], target, ["IH4"]
+                [tile.changed(likeness=replace(tile.likeness, pinned=pinned))], [target], ["IH4"]
             )
         ).words
         for tile, pinned in ((bent, 0.0042), (flowed, None))
@@ -202,7 +202,7 @@ def test_figures_are_those_that_were_taken(
 def test_an_overview_of_any_number(
     target: Target, bent: EscherTile, flowed: EscherTile, count: int, size: int
 ) -> None:
-    picture = Image.open(io.BytesIO(overview_png(([bent, flowed] * 4)[:count], target)))
+    picture = Image.open(io.BytesIO(overview_png(([bent, flowed] * 4)[:count], [target])))
     assert picture.width == size
     assert 600 < picture.height < 2100
     assert len(picture.getcolors(2**24) or []) > 50
@@ -211,7 +211,7 @@ def test_an_overview_of_any_number(
 @pytest.mark.parametrize("wide", [1.0, 90.0, 1 / 90])
 def test_an_overview_of_a_long_silhouette(flowed: EscherTile, wide: float) -> None:
     ring = np.array(BOOT) * (wide**0.5, wide**-0.5)
-    picture = overview_png([flowed], Target.from_polygon(ring))
+    picture = overview_png([flowed], [Target.from_polygon(ring)])
     assert Image.open(io.BytesIO(picture)).width == 1320
 
 
@@ -226,16 +226,16 @@ def test_what_was_decided_and_what_failed_is_on_the_sheets(
     target: Target, bent: EscherTile
 ) -> None:
     noted = replace(target, notes=("filled 3 holes <of> it",))
-    page = Page(index_page([bent], noted, ["IH4"]))
+    page = Page(index_page([bent], [noted], ["IH4"]))
     assert "filled 3 holes <of> it" in page.words
-    assert not [item for item in Page(index_page([bent], target, ["IH4"])).all("ul")
+    assert not [item for item in Page(index_page([bent], [target], ["IH4"])).all("ul")
                 if item.get("class") == "notes"]  # fmt: skip
-    plain = overview_png([bent], target)
-    assert overview_png([bent], target, failures=[ClassFailure("IH7", "no tile")]) != plain
+    plain = overview_png([bent], [target])
+    assert overview_png([bent], [target], failures=[ClassFailure("IH7", "no tile")]) != plain
 
 
 def test_a_sheet_shows_stars_and_how_tiles_lie(target: Target, bent: EscherTile) -> None:
-    sheets = {overview_png([bent.changed(rating=rating)], target) for rating in (
+    sheets = {overview_png([bent.changed(rating=rating)], [target]) for rating in (
         None, Rating(1.0), Rating(3.5), Rating(4.0)
     )}  # fmt: skip
     assert len(sheets) == 4

@@ -72,7 +72,7 @@ def test_a_neck_that_is_too_thin_may_make_a_good_tile_poor() -> None:
 
 @pytest.mark.parametrize("kept", [GOOD, STRETCHED])
 def test_it_is_said_on_the_page(kept: Fidelity) -> None:
-    page = index_page([tile(kept)], TARGET, ["IH1"])
+    page = index_page([tile(kept)], [TARGET], ["IH1"])
     assert ("Few people would call the first tile a good likeness, because " in page) == (
         kept is not GOOD
     )

@@ -22,6 +22,7 @@ from orbiflow.tiles.search.pair_bending import BentPair, Figures, bent, finer, m
 from orbiflow.tiles.search.pair_body import Glue, PairBody
 from orbiflow.tiles.search.pair_carving import CarvedPair, carved_pair
 from orbiflow.tiles.search.pair_search import PairSearch, search_pair
+from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.search.tile_space import _gains as every_gain
 from orbiflow.tiles.search.tile_space import edge_lengths
 from outlines import animal
@@ -30,7 +31,7 @@ from strategies import seeds
 NAMES = "squirrel.dat", "nagata/dolphin_60.dat"
 NINE = [isohedral_class(name) for name in CLASSES]
 SMALL = PairSearch(
-    ratios=(1.0,), points=48, glues=30, placed=120, held=12, starts=8, carved=4, finalists=2
+    ratios=1, points=48, glues=30, placed=120, held=12, starts=8, carved=4, finalists=2
 )
 
 
@@ -138,14 +139,14 @@ def _pose(part: Elastic, z: Complex) -> float:
 
 
 def test_processes_find_what_one_does() -> None:
-    one, two = (animal(name) for name in NAMES)
+    goals = [Goal(animal(name)) for name in NAMES]
     shares: list[float] = []
 
     def tell(event: Event) -> None:
         assert isinstance(event, Progress)
         shares.append(event.share)
 
-    found = search_pair(one, two, SMALL.replace(workers=2), on_event=tell)
+    found = search_pair(goals, SMALL.replace(workers=2), on_event=tell)
     assert [pair.marks for pair in found] == [pair.marks for pair in pairs()]
     assert [pair.glue for pair in found] == [pair.glue for pair in pairs()]
     assert shares == sorted(shares)
@@ -154,21 +155,21 @@ def test_processes_find_what_one_does() -> None:
 
 def test_nothing_is_found_where_no_glue_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gluing, "MOST_OVERLAP", -1.0)
-    assert search_pair(animal(NAMES[0]), animal(NAMES[1]), SMALL) == []
+    assert search_pair([Goal(animal(name)) for name in NAMES], SMALL) == []
 
 
 def test_a_pair_search_can_be_cancelled() -> None:
     cancel = Cancel()
     cancel.cancel()
     with pytest.raises(Cancelled):
-        search_pair(animal(NAMES[0]), animal(NAMES[1]), SMALL, cancel=cancel)
+        search_pair([Goal(animal(name)) for name in NAMES], SMALL, cancel=cancel)
 
 
 @cache
 def pairs() -> tuple[CarvedPair, ...]:
     """What a small search finds."""
-    one, two = (animal(name) for name in NAMES)
-    return tuple(search_pair(one, two, SMALL))
+    goals = [Goal(animal(name)) for name in NAMES]
+    return tuple(search_pair(goals, SMALL))
 
 
 def test_a_search_finds_certified_pairs() -> None:
@@ -209,7 +210,7 @@ def test_a_point_of_the_path_that_moved_is_refused() -> None:
 
 
 def test_levels_and_moves_do_not_tear_a_pair() -> None:
-    figures = Figures.of(*rings(), 1.2, mirrored=True, count=40)
+    figures = Figures.of(*rings(), ratio=1.2, mirrored=True, count=40)
     one, two = figures.parts(0)
     found = glues(one.rest[: one.size], two.rest[: two.size], 6)
     placed = [

@@ -113,7 +113,7 @@ def test_it_is_said_and_kept(found: SearchResult, tmp_path: Path) -> None:
     assert words.startswith("no tile of IH")
     assert "narrower than 2 % of its length was rounded off" in words
     assert "narrower than 2 % of its length was rounded off" in index_page(
-        found.tiles, HAIR, ["IH4", "IH6"]
+        found.tiles, [HAIR], ["IH4", "IH6"]
     )
     save_tiles(found.tiles[:1], tmp_path / "tile")
     assert read_result(tmp_path / "tile").likeness.smoothed == ROUNDED_SHARES[0]

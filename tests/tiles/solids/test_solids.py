@@ -158,7 +158,7 @@ def test_a_drawing_stands_on_the_mould_s_floor(relief: float) -> None:
     page = ExportSettings(cut="pieces", tile_size=own.tile_size)
     placed, _ = laid_out(as_tile(tile_of("IH5")), page)
     disc = shapely.Point(placed.page.tiling.center).buffer(4)
-    body = shape(Plan(own, placed, disc))["mould"]
+    body = shape([Plan(own, placed, disc)])["mould"]
     (island,) = (p for p in polygons_in(section(body, 2 + relief / 2)) if not p.interiors)
     assert island.area == pytest.approx(disc.area)
     assert len(polygons_in(section(body, 2 + relief + 1e-3))) == (1 if relief < 6 else 0)

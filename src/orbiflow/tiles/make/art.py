@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import zip_longest
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +20,7 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import palette, png_bytes
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Outcome, SideBySide, Tell
+from orbiflow.tiles.geometry import Place
 from orbiflow.tiles.make.art_settings import ArtSettings
 from orbiflow.tiles.make.repeats import repeating_page
 from orbiflow.tiles.motifs import (
@@ -30,12 +34,13 @@ from orbiflow.tiles.motifs import (
     drawn_motif,
     paint_motif,
     picture_paint,
+    require_figures,
     rgb_of,
     ring_sides,
     runs,
     with_map,
 )
-from orbiflow.tiles.page import Curve, Motif, Page, Part, Scene, Style, edge_margin, longer_side
+from orbiflow.tiles.page import Curve, Motif, Page, Part, Scene, Style, edge_margin, tiling_size
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.write import write_svg
 
@@ -53,16 +58,16 @@ class Artwork(Outcome):
     - `tile`: The tile with its map.
     - `settings`: The settings as they were given.
     - `page`: The copies of the tile and where they are.
-    - `picture`: The picture over the silhouette, or None.
-    - `motif`: What is drawn over the picture, in the tile's units.
+    - `pictures`: The picture over the silhouette of each of the tile's figures, or None.
+    - `motifs`: What is drawn over these, in each figure's units.
     - `notes`: What the user should know.
     """
 
     tile: EscherTile
     settings: ArtSettings
     page: Page
-    picture: Picture | None
-    motif: Motif
+    pictures: tuple[Picture | None, ...]
+    motifs: tuple[Motif, ...]
     notes: tuple[str, ...]
 
     @property
@@ -94,10 +99,13 @@ class Artwork(Outcome):
         usual = max(1 / self.settings.pixels, self.page.tile_size / TILE_PER_OUTLINE)
         return usual if self.settings.outline is None else self.settings.outline
 
-    @property
-    def density(self) -> float:
-        """The texels of the tile's raster along its unit."""
-        return TEXELS_PER_PIXEL * self.settings.pixels * self.page.place.scale
+    def place(self, number: int) -> Place:
+        """Return where the units of one of the tile's figures lie on the page."""
+        return self.page.place.after(self.tile.figures[number].place)
+
+    def density(self, number: int) -> float:
+        """Return the texels of a figure's raster along its unit."""
+        return TEXELS_PER_PIXEL * self.settings.pixels * self.place(number).scale
 
     def written(self, out: Path) -> Artwork:
         """Return what came of writing it to a file, with its facts as JSON has them."""
@@ -119,42 +127,53 @@ class Artwork(Outcome):
         return png_of(render_artwork(self), self.settings.dpi)
 
 
-def artwork(
-    tile: TileSource, settings: ArtSettings | None = None, over: Over | None = None
-) -> Artwork:
+def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over | None) -> Artwork:
     """Prepare a picture of a tiling with something on its tiles.
 
     Args:
         tile: A tile in memory, or a run's folder; see `with_map`.
         settings: How it is drawn.
-        over: What lies over the silhouette, as `read_over` returns it.
+        overs: What lies over the silhouette of each of the tile's figures, as `read_over` returns it.
 
     Raises:
         OrbiflowError: If a picture or an eye is given but there is no map of the silhouette, an eye
             lies outside it, there are too many tiles, or no rectangle repeats.
     """
-    settings, tile, over = settings or ArtSettings(), with_map(tile), over or Over()
-    if over.picture is not None:
-        tile.require_map()
+    settings, tile = settings or ArtSettings(), with_map(tile)
+    require_figures(tile, settings, len(overs))
+    known = [over or Over() for over, _ in zip_longest(overs, tile.figures)]
+    figures = [part.figure for part in tile.figures]
+    for over, figure in zip(known, figures, strict=True):
+        if over.picture is not None:
+            figure.require_map()
     (page, told), chosen = _art_page(tile, settings), palette(settings.palette)
-    motif = drawn_motif(tile, settings, chosen, over.drawing)
-    said = (*tile.notes, *over.notes, *filter(None, [told]), *chosen.shortage(page.count))
+    motifs = tuple(
+        drawn_motif(figure, settings.of_figure(number), chosen, over.drawing)
+        for number, (over, figure) in enumerate(zip(known, figures, strict=True))
+    )
+    said = [note for own in (*figures, *known) for note in own.notes]
     return Artwork(
-        tile=tile, settings=settings, page=page, picture=over.picture, motif=motif, notes=said
+        tile=tile,
+        settings=settings,
+        page=page,
+        pictures=tuple(over.picture for over in known),
+        motifs=motifs,
+        notes=(*said, *filter(None, [told]), *chosen.shortage(page.count)),
     )
 
 
 def _art_page(given: EscherTile, settings: ArtSettings) -> tuple[Page, str]:
     """Return the page that is painted, and what the user should know of it."""
-    width, height = settings.page
-    scale = float(np.sqrt(width * height / USUAL_TILES / abs(given.tile.signed_area)))
+    (width, height), size = settings.page, tiling_size(given.tiling)
+    area = abs(given.tile.signed_area) / len(given.figures)
+    scale = float(np.sqrt(width * height / USUAL_TILES / area))
     if settings.tile_size is not None:
-        scale = settings.tile_size / longer_side(given.tile.polygon)
+        scale = settings.tile_size / size
     if settings.repeat is not None:
         return repeating_page(given, settings, scale)
-    whole = None if settings.clip else edge_margin(scale * longer_side(given.tile.polygon))
+    whole = None if settings.clip else edge_margin(scale * size)
     page = Page.placed(
-        given.tile, settings, scale, y_down=given.y_down, whole=whole, centred=settings.clip
+        given.tiling, settings, scale, y_down=given.y_down, whole=whole, centred=settings.clip
     )
     if not len(page.copies):
         raise OrbiflowError(
@@ -166,29 +185,32 @@ def _art_page(given: EscherTile, settings: ArtSettings) -> tuple[Page, str]:
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
     """Render the picture (height, width, 3) in 8 bits, antialiased."""
-    chosen, samples, paint = palette(art.settings.palette), art.settings.samples, painted(art)
-    coloured = paint.coloured(chosen, art.page.count)
+    chosen, samples = palette(art.settings.palette), art.settings.samples
+    shaded = art.page.palette(chosen)
+    painted = [
+        Painted(paint.grid, paint.coloured(shaded, art.page.count), art.place(number))
+        for number, paint in enumerate(map(partial(paint_of, art), range(len(art.motifs))))
+    ]
     return render_page(
-        art.page,
-        art.settings.pixels,
-        paint.grid,
-        coloured,
-        chosen.paper,
-        samples=samples,
-        cancel=cancel,
+        art.page, art.settings.pixels, painted, chosen.paper, samples=samples, cancel=cancel
     )
 
 
-def painted(art: Artwork) -> Paint:
-    """Paint the tile's raster with all that is on the tile."""
-    polygon = art.tile.tile.polygon
-    paint = picture_paint(art.picture, art.tile, art.density, art.page.count)
-    if art.motif.parts:
-        paint_motif(paint, art.motif)
+def paint_of(art: Artwork, number: int) -> Paint:
+    """Paint the raster of one of the tile's figures with all that is on it."""
+    figure, motif, density = (
+        art.tile.figures[number].figure,
+        art.motifs[number],
+        art.density(number),
+    )
+    polygon = figure.tile.polygon
+    paint = picture_paint(art.pictures[number], figure, density, art.page.count)
+    if motif.parts:
+        paint_motif(paint, motif)
         paint.bleed(paint.grid.inside(polygon))
     if art.outline > 0:
         # half of its width inside
-        colour, width = palette(art.settings.palette).outline, art.outline / art.page.place.scale
+        colour, width = palette(art.settings.palette).outline, art.outline / art.place(number).scale
         line = Part((Curve.polyline(polygon, closed=True),), Style(None, colour, width))
         paint_motif(paint, Motif((line,)))
     return paint
@@ -196,16 +218,22 @@ def painted(art: Artwork) -> Paint:
 
 def art_scene(art: Artwork) -> Scene:
     """Return the page in millimetres, as `render_artwork` draws it, with pixels carried already."""
-    page, chosen, rasters = art.page, palette(art.settings.palette), ()
-    if art.picture is not None:
-        rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
+    page, chosen = art.page, palette(art.settings.palette)
+    motifs: list[Motif] = []
+    for number, (part, picture, own) in enumerate(
+        zip(art.tile.figures, art.pictures, art.motifs, strict=True)
+    ):
+        rasters = ()
+        if picture is not None:
+            rasters = (carried_raster(picture, part.figure, art.density(number), page.count),)
+        motifs.append(Motif(own.parts, rasters).moved(*art.place(number)))
     name = art.tile.isohedral_class or "a tile"
     return page.scene(
         chosen,
         Style(None, chosen.outline, art.outline),
         clipped=True,
         seam=SEAM / art.settings.pixels,
-        motif=Motif(art.motif.parts, rasters).moved(*page.place),
+        motifs=motifs,
         title=art.tile.name,
         notes=(f"Artwork of {name}, made with orbiflow {__version__}.",),
     )
@@ -223,11 +251,18 @@ def png_of(pixels: np.ndarray, dpi: float) -> bytes:
     return png_bytes(Image.fromarray(pixels), dpi=(dpi, dpi), compress_level=5)
 
 
+class Painted(NamedTuple):
+    """The raster of one prototile in all colours."""
+
+    grid: Grid
+    colours: Array  # (colours, height, width, 3), as `Paint.coloured` returns it
+    place: Place  # where its units lie on the page
+
+
 def render_page(
     page: Page,
     pixels: float,
-    grid: Grid,
-    coloured: Array,
+    painted: Sequence[Painted],
     paper: str,
     *,
     samples: int,
@@ -235,14 +270,14 @@ def render_page(
 ) -> np.ndarray:
     """Return the picture of a page (height, width, 3) in 8 bits, with so many `pixels` in a mm.
 
-    Every sample belongs to exactly one copy of the tile, and has its colour in the raster (colours,
-    height, width, 3) that `Paint.coloured` returns. A pixel within a copy is one sample, and one that
-    copies share is the mean of `samples` x `samples`.
+    Every sample belongs to exactly one copy of a prototile, and has its colour in what is `painted` of
+    it. A pixel within a copy is one sample, and one that copies share is the mean of `samples` x
+    `samples`.
     """
     cancel = cancel or Cancel()
     every, shown = _with_hidden(page)
-    look = _lookup(every, pixels * samples, grid, coloured, paper)
-    rings = np.array(every.rings()) * (pixels * samples)
+    look = _lookup(every, pixels * samples, painted, paper)
+    rings = _as_one(every.rings()) * (pixels * samples)
     page_width, page_height = (round(side * pixels) for side in page.size)
     low, high = rings[..., 1].min(axis=1), rings[..., 1].max(axis=1)
     step = max(1, BAND // (page_width * samples * samples))
@@ -284,27 +319,38 @@ def _with_hidden(page: Page) -> tuple[Page, NDArray[np.bool_]]:
     return every, np.array([key in known for key in keys])
 
 
+def _as_one(rings: Sequence[Array]) -> Array:
+    """Return rings (N, 2) as one array (M, N, 2): the last vertex of shorter ones is repeated."""
+    most = max(map(len, rings))
+    return np.stack([np.pad(ring, ((0, most - len(ring)), (0, 0)), mode="edge") for ring in rings])
+
+
 def _lookup(
-    page: Page, samples: float, grid: Grid, coloured: Array, paper: str
+    page: Page, samples: float, painted: Sequence[Painted], paper: str
 ) -> Callable[[Integers, Array, Array], Array]:
     """Return a function for colours (..., 3) in copies of the tile, by their number, at x and y."""
-    copies = page.copies
-    count, height, width = coloured.shape[:3]
-    # all colours in one tall raster, and a strip of paper under them
+    copies, width = page.copies, max(own.colours.shape[2] for own in painted)
+    # all colours of all prototiles in one tall raster, and a strip of paper under them
     strip = np.broadcast_to(rgb_of(paper).astype(np.float32), (8, width, 3))
-    tall = np.concatenate([coloured.reshape(count * height, width, 3), strip])
-    raster = np.ascontiguousarray(tall, dtype=np.float32)
+    tall = list[Array]()
     # from samples to texels: linear @ sample + offset, one a copy
     to_page = page.stretch @ copies.group.linear_parts[copies.cosets] * samples
-    inverse = np.linalg.inv(to_page @ page.place.linear)
-    shift = to_page @ page.place.offset
-    shift += samples * copies.translations @ page.stretch.T
-    start = -np.einsum("mij,mj->mi", inverse, shift) - grid.corner
-    start *= grid.density
-    start[:, 1] += page.colours * height
-    # nowhere, the last: the middle of the strip
-    linears = np.concatenate([inverse * grid.density, np.zeros((1, 2, 2))])
-    offsets = np.concatenate([start, [[width / 2, count * height + 4.0]]])
+    linears, offsets, top = np.zeros((len(copies) + 1, 2, 2)), np.zeros((len(copies) + 1, 2)), 0
+    for number, (grid, colours, place) in enumerate(painted):
+        count, height, wide = colours.shape[:3]
+        mine = np.flatnonzero(copies.prototiles == number)
+        inverse = np.linalg.inv(to_page[mine] @ place.linear)
+        shift = to_page[mine] @ place.offset
+        shift += samples * copies.translations[mine] @ page.stretch.T
+        start = -np.einsum("mij,mj->mi", inverse, shift) - grid.corner
+        start *= grid.density
+        start[:, 1] += page.colours[mine] * height + top
+        linears[mine], offsets[mine] = inverse * grid.density, start
+        own = colours.reshape(count * height, wide, 3)
+        tall.append(np.pad(own, ((0, 0), (0, width - wide), (0, 0))))
+        top += count * height
+    offsets[-1] = width / 2, top + 4.0  # nowhere, the last: the middle of the strip
+    raster = np.ascontiguousarray(np.concatenate([*tall, strip]), dtype=np.float32)
     maps = np.concatenate([linears.reshape(-1, 4), offsets], axis=1).astype(np.float32).T.copy()
 
     def look(labels: Integers, x: Array, y: Array) -> Array:

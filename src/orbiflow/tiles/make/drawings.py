@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from orbiflow.tiles.page import (
     Layer,
     Motif,
     Part,
+    PlacedTile,
     Scene,
     Style,
     Uses,
@@ -25,20 +27,22 @@ from orbiflow.tiles.page import (
     lines_of,
     polylines,
     region_of,
+    symbol_of,
 )
 from orbiflow.tiles.silhouette import lightness
-from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.write import INCH
 
 EDGE = 0.6  # least distance in mm from the tile's edge of lines, which a drawing has there, too
 MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
-def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
-    """Return what the settings draw on a tile, at its place on the page in mm."""
-    settings, place = layout.settings, layout.page.place
+def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
+    """Return what the settings draw on one of the tile's figures, at its place on the page in mm."""
+    settings, (given, within) = layout.settings, layout.tile.figures[number]
+    place = layout.page.place.after(within)
     chosen = palette(settings.palette if settings.coloured else "ink")
-    motif = drawn_motif(given, settings, chosen, over.drawing, hairlines=not settings.coloured)
+    own = settings.of_figure(number)
+    motif = drawn_motif(given, own, chosen, over.drawing, hairlines=not settings.coloured)
     rasters = motif.rasters
     if over.picture is not None:
         if settings.purpose == "plotter":
@@ -51,12 +55,11 @@ def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
 
 
 def with_drawing(scene: Scene, layout: Layout) -> Scene:
-    """Lay the layout's motif on each tile of a scene, in layers under the lines to cut."""
-    settings, area = layout.settings, shapely.Polygon(layout.outline.closed.flattened(0.01))
-    if layout.motif is None or scene.motifs or not scene.tiles:
+    """Lay the layout's motifs on the tiles of a scene, in layers under the lines to cut."""
+    settings = layout.settings
+    if not layout.motifs or scene.motifs or not scene.tiles:
         return scene
     if settings.coloured:
-        motifs = {"drawing": cut_off(layout.motif, area, whole_strokes=False)}
         styles = {"drawing": Style()}
     else:
         line = line_style(layout)
@@ -65,20 +68,35 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
             width = min(line.width, USUAL_WIDTH)  # finer than what is thick for small hands
             pen = line if settings.purpose == "plotter" else line._replace(width=width)
             styles = dict.fromkeys(styles, pen)
-        edge = max(EDGE, settings.tile_size / 60) + line.width / 2
-        motifs = burnt(layout.motif, area, styles, edge)
-    linear = np.array([tile.linear for tile in scene.tiles])
-    offsets = np.array([tile.offset for tile in scene.tiles])
-    which, ink = np.arange(len(offsets)), palette(settings.palette).outline
-    ink, clip = ink if settings.coloured else None, settings.clip or settings.cut == "jigsaw"
+    motifs: dict[str, Motif] = {}
+    items: dict[str, list[Uses]] = {name: [] for name in styles}
+    for kind, (own, curve) in enumerate(zip(layout.motifs, layout.outline.closed, strict=True)):
+        area = shapely.Polygon(curve.flattened(0.01))
+        if settings.coloured:
+            found = {"drawing": cut_off(own, area, whole_strokes=False)}
+        else:
+            edge = max(EDGE, settings.tile_size / 60) + styles["score"].width / 2
+            found = burnt(own, area, styles, edge)
+        tiles = [tile for tile in scene.tiles if tile.prototile == kind]
+        for name, motif in found.items():
+            if tiles and (motif.parts or motif.rasters):
+                motifs[symbol_of(kind, name)] = motif
+                items[name].append(_uses(symbol_of(kind, name), tiles))
+    ink = palette(settings.palette).outline if settings.coloured else None
+    clip = settings.clip or settings.cut == "jigsaw"
     layers = [
-        Layer(name, "drawing", styles[name], (Uses(name, linear, which, offsets),), clip, ink)
-        for name, motif in motifs.items()
-        if motif.parts or motif.rasters
+        Layer(name, "drawing", styles[name], tuple(own), clip, ink)
+        for name, own in items.items()
+        if own
     ]
     below = tuple(layer for layer in scene.layers if layer.role == "tiles")
     above = tuple(layer for layer in scene.layers if layer.role != "tiles")
     return replace(scene, layers=(*below, *layers, *above), motifs=motifs)
+
+
+def _uses(name: str, tiles: Sequence[PlacedTile]) -> Uses:
+    linear = np.array([tile.linear for tile in tiles])
+    return Uses(name, linear, np.arange(len(tiles)), np.array([tile.offset for tile in tiles]))
 
 
 def dark_parts(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +21,7 @@ from orbiflow.tiles.make.pieces import pieces_scenes
 from orbiflow.tiles.make.sheets import calibrated, registered, split
 from orbiflow.tiles.make.skeletons import skeleton_scene
 from orbiflow.tiles.make.templates import template_scene
-from orbiflow.tiles.motifs import Over, read_over, with_map
+from orbiflow.tiles.motifs import Over, read_overs, require_figures, with_map
 from orbiflow.tiles.page import Scene, flattened
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import EscherTile, TileSource
@@ -107,6 +107,7 @@ def scenes(
     settings: ExportSettings,
     *,
     picture: str | Path | None = None,
+    second_picture: str | Path | None = None,
     force: bool = False,
 ) -> tuple[list[Scene], tuple[str, ...]]:
     """Return the sheets of an export, and what the user should know; it raises what `export` does."""
@@ -114,7 +115,7 @@ def scenes(
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; {force} exports it, marked so"
     )
-    placed, notes = laid_out(given, settings, picture)
+    placed, notes = laid_out(given, settings, (picture, second_picture))
     settings, maker = placed.settings, MAKERS[placed.settings.cut]
     made = _made(placed, maker)
     notes = (*notes, *_colour_notes(given, settings), *made[0].told)
@@ -137,24 +138,27 @@ def _made(placed: Layout, maker: Maker) -> list[Scene]:
 
 
 def laid_out(
-    given: EscherTile, settings: ExportSettings, picture: str | Path | None = None
+    given: EscherTile, settings: ExportSettings, pictures: Sequence[str | Path | None] = ()
 ) -> tuple[Layout, tuple[str, ...]]:
-    """Return a tile in its place with what lies on it, and what the user should know."""
-    over = Over()
-    if drawn := picture is not None or bool(settings.strokes or settings.eyes):
+    """Return a tile in its place with what lies on its figures, and what the user should know."""
+    overs: list[Over] = []
+    require_figures(given, settings, 1 + any(pictures[1:]))
+    if settings.strokes or settings.eyes or settings.second_eyes or any(pictures):
         given = with_map(given)
-        over = over if picture is None else read_over(picture, given)
-    if over.picture is not None and settings.file_format in LINES_ALONE:
+        overs = read_overs(pictures, given)
+    if any(over.picture for over in overs) and settings.file_format in LINES_ALONE:
         raise OrbiflowError(
-            f"{picture}: DXF and JSON hold lines, and the picture is made of pixels; choose SVG or "
-            "PDF, or draw it as SVG"
+            f"{next(filter(None, pictures))}: DXF and JSON hold lines, and the picture is made of "
+            "pixels; choose SVG or PDF, or draw it as SVG"
         )
     placed = layout(given, settings)
-    told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
-    notes = (*filter(None, told), *_neck_notes(placed))
-    if drawn:
-        placed = replace(placed, motif=drawn_on(placed, given, over))
-        notes = (*given.notes, *over.notes, *notes)
+    offset = [note for _, note in placed.pieces] if settings.cut == "pieces" else []
+    notes = (*filter(None, [placed.outline.note, *offset]), *_neck_notes(placed))
+    if overs:
+        motifs = tuple(drawn_on(placed, number, over) for number, over in enumerate(overs))
+        placed = replace(placed, motifs=motifs)
+        carried = [note for part in given.figures for note in part.figure.notes]
+        notes = (*carried, *(note for over in overs for note in over.notes), *notes)
     return placed, notes
 
 
@@ -189,7 +193,7 @@ def _described(
 
 def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...]:
     if settings.cut == "none" or settings.purpose == "stickers":
-        return palette(settings.palette).shortage(colouring(given.tile).count)
+        return palette(settings.palette).shortage(colouring(given.tiling).count)
     width = settings.outline
     if width is None or width >= VISIBLE:
         return ()
@@ -197,17 +201,19 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
 
 
 def _neck_notes(placed: Layout) -> tuple[str, ...]:
-    limit, ring = placed.settings.warn_neck, placed.page.ring
-    if not limit:
-        return ()
-    try:
-        neck = narrowest_neck(ring)
-    except OrbiflowError as error:  # a forced tile may cross itself
-        return (f"its necks cannot be measured: {error}",)
-    if neck.width >= limit:
-        return ()
-    place = place_on(ring, neck.place)
-    return (f"the tile is thinner than {limit:g} mm: a neck {place} is {neck.width:.2f} mm wide",)
+    limit, found = placed.settings.warn_neck, list[str]()
+    for part, ring in zip(placed.tile.figures, placed.prototiles, strict=True):
+        name = part.figure.name if placed.tile.parts else ""
+        try:
+            neck = narrowest_neck(ring) if limit else None
+        except OrbiflowError as error:  # a forced tile may cross itself
+            whose = f"the necks of {name}" if name else "its necks"
+            found.append(f"{whose} cannot be measured: {error}")
+            continue
+        if neck is not None and neck.width < limit:
+            neck_there = f"a neck {place_on(ring, neck.place)} is {neck.width:.2f} mm wide"
+            found.append(f"{name or 'the tile'} is thinner than {limit:g} mm: {neck_there}")
+    return tuple(found)
 
 
 def sheet_content(scene: Scene, settings: ExportSettings) -> str | bytes:

@@ -37,13 +37,14 @@ def jigsaw_scenes(layout: Layout) -> list[Scene]:
     flat = layout.fine / 2
     edges = {shapely.LineString(c.flattened(flat)): c for c, _ in shared_edges(layout)}
     lines = [area.exterior, *edges]
-    tile = shapely.Polygon(layout.outline.closed.flattened(flat))
-    widest = shapely.maximum_inscribed_circle(tile).length
+    tiles = [shapely.Polygon(curve.flattened(flat)) for curve in layout.outline.closed]
+    widest = min(shapely.maximum_inscribed_circle(tile).length for tile in tiles)
     width = min(LEAST_WIDTH * layout.settings.tile_size, widest)
+    areas = [tile.area for tile in tiles]
     pieces, whole = _faces(lines, area), 0
     for _ in range(ROUNDS):
         lines += [line for piece in pieces for line in _chords(piece, area.exterior, width)]
-        pieces, whole = _pieces(_faces(lines, area), tile.area, width)
+        pieces, whole = _pieces(_faces(lines, area), areas, width)
     if len(pieces) < 2:
         raise OrbiflowError("the jigsaw has a single piece; choose a larger area or smaller tiles")
     style = line_style(layout)
@@ -52,7 +53,7 @@ def jigsaw_scenes(layout: Layout) -> list[Scene]:
     facts = {
         "pieces": len(pieces),
         "whole_tiles": whole,
-        "smallest": round(min(piece.area for piece in pieces) / tile.area, 3),
+        "smallest": round(min(piece.area for piece in pieces) / min(areas), 3),
     }
     tray = list(_tray(layout))
     told = f"the jigsaw has {len(pieces)} pieces, {whole} whole tiles and "
@@ -90,14 +91,16 @@ def _chords(
 
 
 def _pieces(
-    faces: list[shapely.Polygon], tile_area: float, width: float
+    faces: list[shapely.Polygon], tile_areas: Sequence[float], width: float
 ) -> tuple[list[shapely.Polygon], int]:
     """Join faces that are no pieces to a neighbour; return the pieces, and how many are whole tiles."""
 
     def poor(piece: shapely.Polygon) -> bool:
-        return piece.area < LEAST_SHARE * tile_area or piece.buffer(-width / 2).is_empty
+        small = piece.area < LEAST_SHARE * min(tile_areas)
+        return small or piece.buffer(-width / 2).is_empty
 
-    pieces = [(face, face.area > 0.999 * tile_area) for face in faces]
+    own = np.array(tile_areas)
+    pieces = [(face, bool((abs(face.area - own) < 1e-3 * own).any())) for face in faces]
     todo = [face for face, whole in pieces if not whole and poor(face)]
     while todo and len(pieces) > 1:
         crumb = min(todo, key=shapely.area)

@@ -27,10 +27,11 @@ from orbiflow.tiles.page import (
     Style,
     edge_margin,
     inset,
-    longer_side,
     outline,
+    tiling_size,
 )
 from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import Tiling
 
 STRIP = 8.0  # height in mm of the strip at the page's foot that the calibration mark has for itself
 LABELS = 9.0  # width in mm of the edge around a template that numbers have for themselves
@@ -47,7 +48,7 @@ class Layout:
     tile: EscherTile
     page: Page
     outline: Outline  # the tile's curves, on the page
-    motif: Motif | None = None  # what lies on the tile, on the page
+    motifs: tuple[Motif, ...] = ()  # what lies on each of its prototiles, on the page
 
     @property
     def fine(self) -> float:
@@ -56,14 +57,19 @@ class Layout:
 
     def scene(self, layers: Iterable[Layer], tiles: tuple[PlacedTile, ...], **more: Any) -> Scene:
         """Return a scene of the page with these layers and tiles."""
-        return self.page.empty(layers, prototile=self.page.ring, tiles=tiles, **more)
+        return self.page.empty(layers, prototiles=self.prototiles, tiles=tiles, **more)
+
+    @property
+    def prototiles(self) -> tuple[Array, ...]:
+        """The polygon (N, 2) of each prototile, on the page."""
+        return tuple(own.polygon for own in self.page.tiling.prototiles)
 
     @cached_property
-    def piece(self) -> tuple[Array, str]:
-        """The outline (M, 2) of a piece with its offset, and what the user should know of it."""
+    def pieces(self) -> list[tuple[Array, str]]:
+        """The outline (M, 2) of each prototile's pieces with its offset, and what to know of it."""
         # flattening and fitting again share what the outline's fit left of the tolerance
-        ring = self.outline.closed.flattened(self.fine / 2)
-        return offset_ring(ring, self.settings.offset, self.fine / 2)
+        rings = (curve.flattened(self.fine / 2) for curve in self.outline.closed)
+        return [offset_ring(ring, self.settings.offset, self.fine / 2) for ring in rings]
 
     @cached_property
     def placed_tiles(self) -> tuple[PlacedTile, ...]:
@@ -75,13 +81,13 @@ def layout(given: EscherTile, settings: ExportSettings) -> Layout:
     """Scale and turn the tile and put it on the page."""
     width, height = settings.page
     strip = STRIP if settings.calibrate else 0.0
-    box, ring = inset(Box(0.0, 0.0, width, height - strip), settings.margin), given.tile.polygon
+    box, tiling = inset(Box(0.0, 0.0, width, height - strip), settings.margin), given.tiling
     if settings.cut == "template" and "tile_size" not in settings.fields_given:
-        settings = settings.replace(tile_size=_largest(ring, settings.rotate, box))
+        settings = settings.replace(tile_size=_largest(tiling, settings.rotate, box))
     page = Page.placed(
-        given.tile,
+        tiling,
         settings,
-        settings.tile_size / longer_side(ring),
+        settings.tile_size / tiling_size(tiling),
         y_down=given.y_down,
         box=box,
         whole=None if settings.clip or settings.cut == "jigsaw" else bleed(settings),
@@ -95,7 +101,8 @@ def layout(given: EscherTile, settings: ExportSettings) -> Layout:
 def _require_fit(page: Page, settings: ExportSettings, strip: float) -> None:
     """Check that the page holds a whole tile."""
     (width, height), box = page.size, page.box
-    need = np.ptp(page.ring, axis=0) + 2 * bleed(settings)
+    need = np.max([np.ptp(own.box, axis=0) for own in page.tiling.prototiles], axis=0)
+    need += 2 * bleed(settings)
     if need[0] > box.width or need[1] > box.height:
         extra = f", {strip:g} mm of it for the calibration mark" if strip else ""
         edge = f" with a margin of {settings.margin:g} mm" if settings.margin else ""
@@ -106,11 +113,12 @@ def _require_fit(page: Page, settings: ExportSettings, strip: float) -> None:
         )
 
 
-def _largest(ring: Array, rotate: float, box: Box) -> float:
+def _largest(tiling: Tiling, rotate: float, box: Box) -> float:
     """Return the size of the largest tile, turned by an angle in degrees, with its numbers in a box."""
-    width, height = np.ptp(ring @ rotation_matrix(-np.radians(rotate)).T, axis=0)
+    points = np.concatenate([own.polygon for own in tiling.prototiles])
+    width, height = np.ptp(points @ rotation_matrix(-np.radians(rotate)).T, axis=0)
     room = inset(box, LABELS)
-    return max(0.0, min(room.width / width, room.height / height)) * longer_side(ring)
+    return max(0.0, min(room.width / width, room.height / height)) * tiling_size(tiling)
 
 
 def bleed(settings: ExportSettings) -> float:
@@ -127,19 +135,19 @@ def line_style(layout: Layout) -> Style:
 
 def tiling_scene(layout: Layout) -> Scene:
     """Return a scene of all tiles, with their colours and what lies on them."""
-    settings, page, motif = layout.settings, layout.page, None
+    settings, page, motifs = layout.settings, layout.page, ()
     chosen, line = None, settings.stroke or BLACK
     if settings.filled:
-        chosen, motif = palette(settings.palette), layout.motif
+        chosen, motifs = palette(settings.palette), layout.motifs
         line = settings.stroke or chosen.outline
     width = USUAL_WIDTH if settings.outline is None else settings.outline
     return page.scene(
         chosen,
         Style(None, line, width),
-        outlines=[layout.outline.closed],
+        outlines=layout.outline.closed,
         clipped=settings.clip,
-        seam=SEAM if motif is not None else None,
-        motif=motif,
-        prototile=page.ring,
+        seam=SEAM if motifs else None,
+        motifs=motifs,
+        prototiles=layout.prototiles,
         tiles=layout.placed_tiles,
     )

@@ -36,9 +36,15 @@ LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
 
 def pieces_scenes(layout: Layout) -> list[Scene]:
-    """Return a scene for each sheet, several where a bed does not hold all."""
+    """Return a scene for each sheet, several where a bed does not hold all, and for each figure."""
+    kinds = range(len(layout.pieces))
+    return [scene for kind in kinds for scene in _scenes_of(layout, kind)]
+
+
+def _scenes_of(layout: Layout, kind: int) -> list[Scene]:
+    """Return the sheets of one prototile's pieces."""
     settings, box, flat = layout.settings, layout.page.box, layout.fine
-    ring = cut_ring(layout.piece[0], settings.kerf, settings.clearance)
+    ring = cut_ring(layout.pieces[kind][0], settings.kerf, settings.clearance)
     curve = _closed_fit(ring, flat)
     line = curve.flattened(flat / 4)
     gap = max(settings.spacing, LEAST_GAP)
@@ -58,7 +64,8 @@ def pieces_scenes(layout: Layout) -> list[Scene]:
             f"the page of {box.width:g} x {box.height:g} mm does not hold a single piece, which takes "
             f"{long:.1f} x {short:.1f} mm; choose a larger area or bed, or a smaller tile size"
         )
-    return [_scene(layout, part, curve, line, gap) for part in _shared_out(placed, layout, box)]
+    shared = _shared_out(placed, layout, box)
+    return [_scene(layout, kind, part, curve, line, gap) for part in shared]
 
 
 def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
@@ -76,17 +83,17 @@ def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
     return [placed.select(slice(n)) for n in counts]
 
 
-def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, gap: float) -> Scene:
+def _scene(layout: Layout, kind: int, placed: Uses, curve: Curve, line: Array, gap: float) -> Scene:
     _require_clear(placed.images(line), layout.page.box, gap)
     pieces = [
-        PlacedTile(aspect, placed.linear[aspect], offset)
+        PlacedTile(aspect, placed.linear[aspect], offset, prototile=kind)
         for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
     ]
     layers = [Layer("cut", "cut", line_style(layout), _moved(curve, pieces))]
     if layout.settings.purpose == "stickers":
         layers = [*_coloured(layout, pieces), *layers]
     elif layout.settings.offset > 0 and not layout.settings.coloured:
-        seams = _moved(layout.outline.closed, pieces)
+        seams = _moved(layout.outline.closed[kind], pieces)
         layers.insert(0, Layer("seam", "mark", Style(None, BLUE, 0.1), seams))
     return layout.scene(layers, tuple(pieces))
 
@@ -95,7 +102,8 @@ def _coloured(layout: Layout, pieces: list[PlacedTile]) -> Iterator[Layer]:
     """Yield a layer of tiles for each of a few colours, which pieces have in turn."""
     chosen, count = palette(layout.settings.palette), min(STICKER_COLOURS, len(pieces))
     for colour in range(count):
-        tiles = _moved(layout.outline.closed, pieces[colour::count])
+        kind = pieces[0].prototile
+        tiles = _moved(layout.outline.closed[kind], pieces[colour::count])
         style = Style(chosen.fill(colour), chosen.outline, USUAL_WIDTH)
         yield Layer(f"colour {colour + 1}", "tiles", style, tiles)
 

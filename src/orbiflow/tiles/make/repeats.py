@@ -9,15 +9,16 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import Place
 from orbiflow.tiles.make.art_settings import ArtSettings, check_size
-from orbiflow.tiles.page import Box, Page, Place
+from orbiflow.tiles.page import Box, Page
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import colouring
 
 
 def repeating_page(given: EscherTile, settings: ArtSettings, scale: float) -> tuple[Page, str]:
     """Return the cell that repeats as a page, at about `scale` mm per unit, and what to know of it."""
-    tiling, pixels = given.tile.tiling, settings.pixels
+    tiling, pixels = given.tiling, settings.pixels
     lattice = tiling.group.lattice
     if settings.colour == "neighbour":  # the translations that keep the colours
         a, b, c = colouring(tiling).sublattice

@@ -134,11 +134,11 @@ def _part(
 
 
 def _tiles(scene: Scene, seams: Box, back: np.ndarray) -> tuple[PlacedTile, ...]:
-    if scene.prototile is None:
+    if not scene.prototiles:
         return ()
     kept: dict[int, PlacedTile] = {}
     for number, tile in enumerate(scene.tiles):
-        ring = scene.prototile @ tile.linear.T + tile.offset
+        ring = scene.prototiles[tile.prototile] @ tile.linear.T + tile.offset
         low, high = ring.min(axis=0), ring.max(axis=0)
         if (high > seams[:2]).all() and (low < seams[2:]).all():
             whole = tile.whole and bool((low >= seams[:2]).all() and (high <= seams[2:]).all())

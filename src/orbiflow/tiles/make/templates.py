@@ -7,6 +7,7 @@ from operator import itemgetter
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from orbiflow.arrays import Array
@@ -38,14 +39,23 @@ DIGITS = (
 def template_scene(layout: Layout) -> Scene:
     """Return a scene with one tile; edges that fit together have a number, and arrows that agree."""
     style, given = line_style(layout), layout.tile
-    layers = [Layer("outline", "cut", style, (layout.outline.closed,))]
-    if given.bending is not None:
-        silhouette = Curve.polyline(given.silhouette_outline, closed=True).moved(*layout.page.place)
-        layers.insert(0, Layer("silhouette", "tiles", Style(FAINT), (silhouette,)))
+    layers = [Layer("outline", "cut", style, layout.outline.closed)]
+    known = [part for part in given.figures if part.figure.bending is not None]
+    if known:
+        faint = tuple(
+            Curve.polyline(own.silhouette_outline, closed=True).moved(
+                *layout.page.place.after(place)
+            )
+            for own, place in known
+        )
+        layers.insert(0, Layer("silhouette", "tiles", Style(FAINT), faint))
     marks = tuple(_marks(layout))
     layers.append(Layer("numbers", "mark", style._replace(width=style.width / 2), marks))
-    told = () if given.bending else ("the template has no silhouette: no map of it is known",)
-    return layout.scene(layers, (PlacedTile(0, np.eye(2), np.zeros(2)),), told=told)
+    told = () if known else ("the template has no silhouette: no map of it is known",)
+    tiles = (
+        PlacedTile(0, np.eye(2), np.zeros(2), prototile=k) for k in range(len(layout.prototiles))
+    )
+    return layout.scene(layers, tuple(tiles), told=told)
 
 
 def numbered_edges(layout: Layout) -> Iterator[tuple[int, Array]]:
@@ -70,7 +80,8 @@ def numbered_edges(layout: Layout) -> Iterator[tuple[int, Array]]:
 
 def _marks(layout: Layout) -> Iterator[Curve]:
     """Yield a tick where each edge begins, and an arrow and a number for each."""
-    tile = shapely.Polygon(layout.outline.closed.flattened(layout.fine))
+    tiles = [shapely.Polygon(curve.flattened(layout.fine)) for curve in layout.outline.closed]
+    tile = shapely.union_all(tiles)
     for curve in layout.outline.curves:
         yield _turned(TICK, curve.start, curve.flattened(layout.fine)[1] - curve.start)
     taken: list[Array] = []
@@ -82,7 +93,7 @@ def _marks(layout: Layout) -> Iterator[Curve]:
 
 
 def _place(
-    line: shapely.LineString, tile: shapely.Polygon, taken: list[Array]
+    line: shapely.LineString, tile: BaseGeometry, taken: list[Array]
 ) -> tuple[Array, Array, Array]:
     """Return a point on a line, the way along it, and a free place beside it, outside if possible."""
     found: list[tuple[float, Array, Array, Array]] = []
@@ -94,7 +105,7 @@ def _place(
         for middle in (at + across, at - across):
             point = shapely.Point(middle)
             near = [float(np.linalg.norm(middle - other)) for other in taken]
-            free = min([tile.exterior.distance(point), *near]) - INSIDE * tile.contains(point)
+            free = min([tile.boundary.distance(point), *near]) - INSIDE * tile.contains(point)
             found.append((round(free, 1), at, along, middle))
     return max(found, key=itemgetter(0))[1:]
 

@@ -5,6 +5,8 @@ from .carried import drawn_motif as drawn_motif
 from .carried import paint_motif as paint_motif
 from .carried import picture_paint as picture_paint
 from .carried import read_over as read_over
+from .carried import read_overs as read_overs
+from .carried import require_figures as require_figures
 from .carried import with_map as with_map
 from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, png_bytes
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError, OrbiflowError, SettingError
 from orbiflow.tiles import search
 from orbiflow.tiles.geometry import polygons_in, triangle_sides
 from orbiflow.tiles.motifs.engraving import engraved, eye
@@ -57,6 +58,10 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
         InputFileError: As `read_result`, and if a model belongs to another tile.
     """
     tile = as_tile(source)
+    if tile.parts:
+        return tile.changed(
+            parts=tuple(part._replace(figure=with_map(part.figure)) for part in tile.parts)
+        )
     if tile.no_map or (tile.bending is not None and tile.frame is not None):
         return tile
     frame, bending, known = tile.frame, None, tile.map or TileMap()
@@ -312,6 +317,23 @@ def read_over(path: str | Path, tile: EscherTile) -> Over:
         return Over(None, drawing, notes)
     picture = read_picture(path, tile)
     return Over(picture, None, picture.notes)
+
+
+def require_figures(tile: EscherTile, settings: MotifSettings, pictures: int) -> None:
+    """Check that a tile has figures for all that is to be drawn on them.
+
+    Raises:
+        SettingError: If what is said of the second figure has no figure.
+    """
+    extra = {"second_picture": pictures > 1, "second_eyes": bool(settings.second_eyes)}
+    for name in (name for name, given in extra.items() if given and len(tile.figures) == 1):
+        raise SettingError(f"{{{name}}} applies only to a tile of two figures; leave it out")
+
+
+def read_overs(paths: Sequence[str | Path | None], tile: EscherTile) -> list[Over]:
+    """Read what lies over the silhouette of each of a tile's figures, from no file for some."""
+    figures = zip_longest(paths[: len(tile.figures)], tile.figures)
+    return [Over() if path is None else read_over(path, part.figure) for path, part in figures]
 
 
 def paint_motif(paint: Paint, motif: Motif) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import Group, Option, Parsed, Repeated, SettingError, Settings
@@ -45,14 +45,31 @@ class MotifSettings(Settings):
     ] = ()
     """An eye, in the silhouette's coordinates. May be repeated."""
 
+    second_eyes: Annotated[
+        tuple[
+            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")], ...
+        ],
+        Repeated(),
+        Option("--second-eye"),
+        ON_TILE,
+    ] = ()
+    """An eye of the second figure, in its own silhouette's coordinates. May be repeated."""
+
+    def of_figure(self, number: int) -> Self:
+        """Return the settings of one of a tile's figures, counted from 0."""
+        return self.replace(eyes=self.second_eyes, second_eyes=()) if number else self
+
     def defaults(self) -> Mapping[str, Any]:
         return {"strokes": "hatch"} if self.engrave else {}
 
     def check(self) -> None:
-        for number, place in enumerate(self.eyes, 1):
+        eyes = {"eyes": self.eyes, "second_eyes": self.second_eyes}
+        for name, number, place in (
+            (key, k, own) for key, given in eyes.items() for k, own in enumerate(given, 1)
+        ):
             if len(place) not in (2, 3) or min(place[2:], default=0) < 0:
                 raise SettingError(
-                    f"{{eyes}}: entry {number} must be x,y or x,y,radius in the silhouette's "
+                    f"{{{name}}}: entry {number} must be x,y or x,y,radius in the silhouette's "
                     "coordinates, with a radius of 0 or more, got "
                     f"{','.join(f'{part:g}' for part in place)}"
                 )

@@ -5,23 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
-from orbiflow.arrays import Array, Window
-from orbiflow.drawing import palette
+from orbiflow.arrays import Array, Integers, Window
+from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import border, triangle_sides
+from orbiflow.tiles.geometry import Place, border, triangle_sides
 from orbiflow.tiles.motion.morph import Morph, OwnFrame
 from orbiflow.tiles.motion.settings import AnimationSettings
-from orbiflow.tiles.page import Page, Style, edge_margin, longer_side
+from orbiflow.tiles.page import Page, Style, edge_margin, tiling_size
 from orbiflow.tiles.silhouette import Bending
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import ASPECT, Copies, Tile, copies_meeting, default_window
+from orbiflow.tiles.tilings import ASPECT, Copies, Tiling, copies_meeting, default_window
 
 
 class Places(NamedTuple):
@@ -36,16 +36,22 @@ NO_LINE = Style()
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """An outline that changes, and M copies of it, in pixels, y down; the progress runs from 0 to 1."""
+    """Outlines that change, and M copies of them, in pixels, y down; the progress runs from 0 to 1."""
 
     page: Page
-    outline: Callable[[float], Array]  # (N, 2) at a progress, about its own point; N is the same
-    places: Callable[[float], Places]  # of the copies at a progress; the first is the tile itself
-    colours: NDArray[np.int64]  # the numbers (M,) of the palette's fills
+    # of each prototile (N, 2) at a progress, about a point of its own; N is the same
+    outlines: Callable[[float], list[Array]]
+    places: Callable[[float], Places]  # of the copies at a progress; the first are the prototiles
+    kinds: Integers  # the prototile (M,) of each copy
+    colours: Integers  # the numbers (M,) of the palette's fills
     births: Array  # the progress (M, 2) in which each copy grows; below 0 if it is always there
     keys: tuple[float, ...]  # progress between which the outline moves in nearly straight lines
     what: str  # the motion in words, for titles
     line: Style = NO_LINE  # of outlines
+
+    def palette(self, settings: AnimationSettings) -> Palette:
+        """Return the colours of the copies."""
+        return self.page.palette(palette(settings.palette))
 
     def grown(self, progress: float) -> Array:
         """Return the size (M,) of each copy, 0 to 1."""
@@ -54,10 +60,14 @@ class Motion:
 
     def rings(self, progress: float) -> Iterator[tuple[Array, int, bool]]:
         """Yield every visible copy (N, 2), the number of its colour, and whether it is whole."""
-        outline, (linear, offset) = self.outline(progress), self.places(progress)
+        outlines, (linear, offset) = self.outlines(progress), self.places(progress)
         size = self.grown(progress)
         for k in np.flatnonzero(size > 0):
-            yield size[k] * outline @ linear[k].T + offset[k], int(self.colours[k]), size[k] == 1
+            yield (
+                size[k] * outlines[self.kinds[k]] @ linear[k].T + offset[k],
+                int(self.colours[k]),
+                size[k] == 1,
+            )
 
 
 OUTLINE = 0.0016  # width of outlines, as a share of the page's, where none is given
@@ -75,8 +85,8 @@ def motion(given: EscherTile, settings: AnimationSettings) -> Motion:
     settings = settings.in_pixels()
     page, chosen = _page(given, settings), palette(settings.palette)
     kinds: dict[str, Callable[[], Motion]] = {
-        "morph": lambda: morph(given.tile, page, steady=settings.format == "svg"),
-        "grow": lambda: grow(given.tile, page),
+        "morph": lambda: morph(given, page, steady=settings.format == "svg"),
+        "grow": lambda: grow(given, page),
         "bend": lambda: bend(given, page),
     }
     width = max(1.0, OUTLINE * page.size[0]) if settings.outline is None else settings.outline
@@ -86,12 +96,12 @@ def motion(given: EscherTile, settings: AnimationSettings) -> Motion:
 
 def _page(given: EscherTile, settings: AnimationSettings) -> Page:
     """Return the page, by default with the tile's default window or one that is as large."""
-    (width, height), window = settings.page, default_window(given.tile)
+    (width, height), window = settings.page, default_window(given.tiling)
     scale = math.sqrt(width * height * ASPECT) / (window[2] - window[0])
     if settings.tile_size is not None:
-        scale = settings.tile_size / longer_side(given.tile.polygon)
-    whole = None if settings.clip else edge_margin(scale * longer_side(given.tile.polygon))
-    return Page.placed(given.tile, settings, scale, y_down=given.y_down, whole=whole)
+        scale = settings.tile_size / tiling_size(given.tiling)
+    whole = None if settings.clip else edge_margin(scale * tiling_size(given.tiling))
+    return Page.placed(given.tiling, settings, scale, y_down=given.y_down, whole=whole)
 
 
 def _window(page: Page, linear: Array) -> Window:
@@ -101,15 +111,16 @@ def _window(page: Page, linear: Array) -> Window:
     return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
 
 
-def morph(tile: Tile, page: Page, *, steady: bool = False) -> Motion:
+def morph(given: EscherTile, page: Page, *, steady: bool = False) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
     It is a tiling throughout; if `steady`, the tile's lattice is there from the start.
     """
-    way, middle = Morph(OwnFrame.of(tile)), np.array(page.size) / 2
+    tile, middle = given.tile, np.array(page.size) / 2
+    way = Morph(OwnFrame.of(tile), [part.prototile.polygon for part in given.parts])
     end = way.end
-    group, own = end.kind.group(), Tile(end.points, end.kind.group(), end.kind.name)
-    center = np.linalg.solve(end.linear, tile.center - end.offset)
+    group, own = end.kind.group(), Tiling(end.kind.group(), way.rings(1.0))
+    center = np.linalg.solve(end.linear, given.tiling.center - end.offset)
 
     def linear(progress: float) -> Array:
         return page.place.linear @ (end.linear if steady else way.at(progress).linear)
@@ -121,87 +132,107 @@ def morph(tile: Tile, page: Page, *, steady: bool = False) -> Motion:
         shifts = moved[copies.cosets] + copies.translations - center
         return Places(turned[copies.cosets], shifts @ by.T + middle)
 
-    def outline(progress: float) -> Array:
-        return (way.at(progress).points - center) @ linear(progress).T
+    def outlines(progress: float) -> list[Array]:
+        return [(ring - center) @ linear(progress).T for ring in way.rings(progress)]
 
-    copies = _seen(own, center, linear, outline, places, page)
+    copies = _seen(own, center, linear, outlines, places, page)
     still = places(1.0, copies)
     return Motion(
         page,
-        outline,
+        outlines,
         (lambda _: still) if steady else (lambda progress: places(progress, copies)),
-        page.colours_of(copies, own.tiling),
+        copies.prototiles,
+        page.colours_of(copies, own),
         np.tile(ALWAYS, (len(copies), 1)),
         (0.0, 1.0) if way.weights is None and steady else tuple(np.linspace(0, 1, 17).tolist()),
         f"A tiling with straight edges becomes the tiling of {tile.isohedral_class}",
     )
 
 
-def grow(tile: Tile, page: Page) -> Motion:
-    """Return one tile, and the tiling growing around it, nearest first."""
-    outline = page.ring - page.tiling.center
-    places, colours = _still_places(page)
+def grow(given: EscherTile, page: Page) -> Motion:
+    """Return one tile, with all of its figures, and the tiling growing around it, nearest first."""
+    outlines = [own.polygon - own.center for own in page.tiling.prototiles]
+    places, kinds, colours = _still_places(page)
     return Motion(
         page,
-        lambda _: outline,
+        lambda _: outlines,
         lambda _: places,
+        kinds,
         colours,
-        _births(places, 0.0),
+        _births(places, 0.0, len(outlines)),
         (0.0, 1.0),
-        f"The tiling of {tile.isohedral_class or 'a tile'} grows around one tile",
+        f"The tiling of {given.isohedral_class or 'a tile'} grows around one tile",
     )
 
 
 def bend(given: EscherTile, page: Page) -> Motion:
-    """Return the silhouette bending into the tile, and then the tiling growing around it."""
-    bending, frame = given.bending, given.frame
-    if bending is None or frame is None:
-        raise OrbiflowError(
-            "this tile has no bent silhouette: only tiles of a search for likeness have one, in the "
-            "model.safetensors of their folder; choose kind morph or grow"
-        )
-    way = BendingWay(bending)
-    places, colours = _still_places(page)
-
-    def outline(progress: float) -> Array:
-        ring = frame.to_input(way.at(min(1.0, progress / BEND)))
-        return page.place(ring) - page.tiling.center
-
+    """Return each silhouette bending into its figure, and then the tiling growing around them."""
+    ways: list[Callable[[float], Array]] = []
+    for part, prototile in zip(given.figures, page.tiling.prototiles, strict=True):
+        bending, frame = part.figure.bending, part.figure.frame
+        if bending is None or frame is None:
+            raise OrbiflowError(
+                "this tile has no bent silhouette: only tiles of a search for likeness have one, in "
+                "the model.safetensors of their folder; choose kind morph or grow"
+            )
+        place = page.place.after(part.place).after(Place(frame.linear, frame.offset))
+        ways.append(partial(_bent, BendingWay(bending), place, prototile.center))
+    places, kinds, colours = _still_places(page)
+    silhouettes = "silhouettes bend" if given.parts else "silhouette bends"
     return Motion(
         page,
-        outline,
+        lambda progress: [way(min(1.0, progress / BEND)) for way in ways],
         lambda _: places,
+        kinds,
         colours,
-        _births(places, BEND),
+        _births(places, BEND, len(ways)),
         (*np.linspace(0, BEND, 13).tolist(), 1.0),
-        f"The silhouette bends into a tile of {given.isohedral_class}, and its tiling grows",
+        f"The {silhouettes} into a tile of {given.isohedral_class}, and its tiling grows",
     )
 
 
-def _still_places(page: Page) -> tuple[Places, Array]:
-    """Return the places of all copies in the picture, the nearest first, and their colours."""
-    uses, colours = page.uses(), page.colours
-    far = np.linalg.norm(uses.offsets - np.array(page.size) / 2, axis=1)
+def _bent(way: BendingWay, place: Place, center: Array, share: float) -> Array:
+    return place(way.at(share)) - center
+
+
+def _still_places(page: Page) -> tuple[Places, Integers, Integers]:
+    """Return the places of all copies in the picture, their prototiles and their colours.
+
+    The prototiles come first, then the nearest.
+    """
+    count = len(page.tiling.prototiles)
+    uses, kinds = [page.uses(k) for k in range(count)], np.arange(count)
+    mine = [np.flatnonzero(page.copies.prototiles == k) for k in range(count)]
+    linear = np.concatenate([own.linear[own.which] for own in uses])
+    offsets = np.concatenate([own.offsets for own in uses])
+    numbers = np.repeat(kinds, [len(own) for own in uses])
+    colours = page.colours[np.concatenate(mine)]
+    far = np.linalg.norm(offsets - np.array(page.size) / 2, axis=1)
+    itself = [np.linalg.norm(offsets - own.center, axis=1) for own in page.tiling.prototiles]
+    first = [int(np.argmin(np.where(numbers == k, away, np.inf))) for k, away in enumerate(itself)]
+    far[first] = -1.0
     order = np.argsort(far, kind="stable")
-    places, colours = Places(uses.linear[uses.which[order]], uses.offsets[order]), colours[order]
-    # the tile that is alone at first has the palette's second colour
-    return places, np.where(colours == colours[0], 1, np.where(colours == 1, colours[0], colours))
+    places, numbers, colours = Places(linear[order], offsets[order]), numbers[order], colours[order]
+    if count == 1:  # the tile that is alone at first has the palette's second colour
+        one = colours[0]
+        colours = np.where(colours == one, 1, np.where(colours == 1, one, colours))
+    return places, numbers, colours
 
 
-def _births(places: Places, begin: float) -> Array:
-    """Return each copy's birth (M, 2), by its distance from the first, which is always there."""
-    far = np.linalg.norm(places.offset - places.offset[0], axis=1)
+def _births(places: Places, begin: float, alone: int) -> Array:
+    """Return each copy's birth (M, 2), by its distance from the first ones, which are always there."""
+    far = np.linalg.norm(places.offset - places.offset[:alone].mean(axis=0), axis=1)
     start = begin + (1 - begin) * 0.7 * far / max(far.max(), 1e-300)
     births = np.stack([start, start + 0.3 * (1 - begin)], axis=1)
-    births[0] = ALWAYS
+    births[:alone] = ALWAYS
     return births
 
 
 def _seen(
-    own: Tile,
+    own: Tiling,
     center: Array,
     linear: Callable[[float], Array],
-    outline: Callable[[float], Array],
+    outlines: Callable[[float], list[Array]],
     places: Callable[[float, Copies], Places],
     page: Page,
 ) -> Copies:
@@ -213,9 +244,10 @@ def _seen(
     seen = np.zeros(len(copies), dtype=bool)
     for look in LOOKS:
         by, offset = places(look, copies)
-        rings = np.einsum("mij,nj->mni", by, outline(look)) + offset[:, None]
+        points = np.concatenate(outlines(look))
+        rings = np.einsum("mij,nj->mni", by, points) + offset[:, None]
         # copies that come in between two looks are near at one of them
-        room = 0.1 * np.ptp(outline(look), axis=0).max()
+        room = 0.1 * np.ptp(points, axis=0).max()
         low, high = rings.min(axis=1) - room, rings.max(axis=1) + room
         seen |= ((low <= page.size) & (high >= 0)).all(axis=1)
     copies = copies.select(seen)

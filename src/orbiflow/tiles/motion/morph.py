@@ -14,10 +14,10 @@ stops.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -261,13 +261,19 @@ CHECKED = 96  # number of places at which the straight way is checked
 
 
 class Morph:
-    """The way from a tile's template to the tile: straight if it stays simple, else by weights."""
+    """The way from a tile's template to the tile: straight if it stays simple, else by weights.
 
-    def __init__(self, own: OwnFrame) -> None:
+    Parts of the tile, polygons (N, 2) with the tile's vertices, go with the weights, which take the
+    triangles along; where there are parts, nothing moves along straight lines.
+    """
+
+    def __init__(self, own: OwnFrame, parts: Sequence[Array] = ()) -> None:
         self.end, self.start = own, own.straight()
         self.weights: _Weights | None = None  # None if every vertex moves along a straight line
         shares = np.linspace(0, 1, CHECKED + 1)
-        if not all(shapely.Polygon(self._straight_way(float(s))).is_valid for s in shares):
+        straight = (shapely.Polygon(self._straight_way(float(s))).is_valid for s in shares)
+        self._parts: list[_Within] = []
+        if parts or not all(straight):
             self.weights = _Weights.of(own)
             self.end = self.weights.own
             self.start = replace(self.end.straight(), points=self.weights.points(0.0))
@@ -276,6 +282,10 @@ class Morph:
             steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
             far = np.concatenate([[0], np.cumsum(steps)])
             self._even = far / far[-1]
+            inverse = np.linalg.inv(own.linear).T
+            self._parts = [
+                _Within.of(self.weights, (ring - own.offset) @ inverse) for ring in parts
+            ]
 
     def at(self, share: float) -> OwnFrame:
         """Return the tile at 0 (the template) to 1 (the tile)."""
@@ -286,13 +296,44 @@ class Morph:
         if self.weights is None:
             points = self._straight_way(share)
         else:
-            s = float(np.interp(share, self._even, np.linspace(0, 1, len(self._even))))
-            points = self.weights.points(s)
+            points = self.weights.points(self._of_weights(share))
         linear = (1 - share) * self.start.linear + share * self.end.linear
         return replace(self.end, points=points, linear=linear)
 
+    def rings(self, share: float) -> list[Array]:
+        """Return the polygon of each part at a share of the way, or the tile's if it has none."""
+        if self.weights is None or not self._parts:
+            return [self.at(share).points]
+        points = self.weights.every(self._of_weights(share))
+        return [part.at(points) for part in self._parts]
+
+    def _of_weights(self, share: float) -> float:
+        return float(np.interp(share, self._even, np.linspace(0, 1, len(self._even))))
+
     def _straight_way(self, share: float) -> Array:
         return (1 - share) * self.start.points + share * self.end.points
+
+
+class _Within(NamedTuple):
+    """Points (n,) that move with triangles: means of the corners of one."""
+
+    corners: NDArray[np.int64]  # (n, 3)
+    weights: Array  # (n, 3)
+
+    @classmethod
+    def of(cls, known: _Weights, points: Array) -> _Within:
+        """Return those of points (n, 2) of the tile in its own frame."""
+        corners = known.guess[known.triangles]
+        tree = shapely.STRtree(np.asarray(shapely.polygons(corners)))
+        nearest = known.triangles[tree.nearest(shapely.points(points))]
+        first, second, third = known.guess[nearest].transpose(1, 0, 2)
+        sides = np.stack([second - first, third - first], axis=-1)
+        two = np.linalg.solve(sides, (points - first)[..., None])[..., 0]
+        return cls(nearest, np.column_stack([1 - two.sum(axis=1), two]))
+
+    def at(self, points: Array) -> Array:
+        """Return them where the triangles' corners are `points` (N, 2)."""
+        return np.einsum("nk,nki->ni", self.weights, points[self.corners])
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,6 +346,7 @@ class _Weights:
     first: Array  # with `last`: weights (E,) of template and tile, which add up to 1 for each orbit
     last: Array
     guess: Array  # the points (N, 2) of the tile
+    triangles: NDArray[np.int64]  # (M, 3) of these
 
     @classmethod
     def of(cls, own: OwnFrame) -> _Weights:
@@ -331,10 +373,14 @@ class _Weights:
                 _mean_values(mesh.points, mesh.triangles, sides),
             )
         )
-        return cls(own, orbits, sides, first, last, mesh.points)
+        return cls(own, orbits, sides, first, last, mesh.points, mesh.triangles)
 
     def points(self, share: float) -> Array:
         """Return the outline (n, 2) at a share of the way."""
+        return self.every(share)[: len(self.own.points)]
+
+    def every(self, share: float) -> Array:
+        """Return all points (N, 2) at a share of the way."""
         weights = self.first ** (1 - share) * self.last**share
         ways = _open_ways(self.own)
         i, j = self.sides.T
@@ -353,7 +399,7 @@ class _Weights:
                 steps = np.linalg.inv(np.stack(nearby, axis=1) / TINY)
             tilt = tilt - steps @ force
             solution, force = self._solved(weights * np.exp(along @ tilt), ways)
-        return self.orbits.spread(solution)[: len(self.own.points)]
+        return self.orbits.spread(solution)
 
     def _solved(self, weights: Array, ways: Array) -> tuple[Array, Array]:
         """Return places (N, 2) in which each orbit is the mean of its neighbours, and a force (k,).

@@ -17,11 +17,11 @@ import numpy as np
 from PIL import Image
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette, limited, palette
+from orbiflow.drawing import Palette, limited
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Motion, Places, eased, frames, motion
 from orbiflow.tiles.motion.settings import AnimationSettings
-from orbiflow.tiles.page import Curve, Layer, Part, Scene, Style, rectangle
+from orbiflow.tiles.page import Curve, Layer, Part, Scene, Style, rectangle, symbol_of
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import TileSource
 from orbiflow.tiles.write import Numbers, scene_image
@@ -63,7 +63,7 @@ def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
 
 def write_gif(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
     """Return a GIF that repeats for ever, with one palette for all frames."""
-    chosen, loop = palette(settings.palette), frames(settings.seconds, settings.fps)
+    chosen, loop = motion.palette(settings), frames(settings.seconds, settings.fps)
     fills = [chosen.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
     colours = (chosen.paper, *fills, chosen.outline)
     # few mixed colours, each of which costs bytes in every frame
@@ -90,7 +90,7 @@ def require_ffmpeg() -> str:
 
 def write_mp4(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
     """Return an MP4 (H.264) of one loop, which every player and browser shows."""
-    ffmpeg, chosen, fps = require_ffmpeg(), palette(settings.palette), settings.fps
+    ffmpeg, chosen, fps = require_ffmpeg(), motion.palette(settings), settings.fps
     loop = frames(settings.seconds, fps)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "loop.mp4"
@@ -133,7 +133,7 @@ _EASE, _EVEN = "0.42 0 0.58 1", "0 0 1 1"
 
 def write_motion_svg(motion: Motion, settings: AnimationSettings, _: ProgressCall) -> str:
     """Return an animated SVG; readers who prefer less motion see the tiling at rest."""
-    chosen, seconds = palette(settings.palette), settings.seconds
+    chosen, seconds = motion.palette(settings), settings.seconds
     # ids and classes begin with the key, so that a page can hold several animations
     name = f"{motion.what.partition(':')[0]}-{settings.kind}"
     key = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "tile"
@@ -141,9 +141,15 @@ def write_motion_svg(motion: Motion, settings: AnimationSettings, _: ProgressCal
     still = motion.places(1.0)
     # growing tiles lie below whole ones
     order = range(len(motion.colours))[::-1]
-    moving = [_copy(motion, still, k, f"{key}-moving", chosen, seconds) for k in order]
+    moving = [_copy(motion, still, k, key, "moving", chosen, seconds) for k in order]
     grown = replace(motion, births=np.full_like(motion.births, -1.0))
-    fixed = [_copy(grown, still, k, f"{key}-still", chosen, seconds) for k in reversed(order)]
+    fixed = [_copy(grown, still, k, key, "still", chosen, seconds) for k in reversed(order)]
+    paths = [
+        f'<path id="{symbol_of(k, key)}-still" d="{_path(ring)}"/>\n'
+        f'<path id="{symbol_of(k, key)}-moving" d="{_path(ring)}">{_changing(motion, k, seconds)}'
+        "</path>\n"
+        for k, ring in enumerate(motion.outlines(1.0))
+    ]
     stroke = f'stroke="{motion.line.stroke or "none"}" stroke-width="{motion.line.width:.2f}"'
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
@@ -158,9 +164,7 @@ width="{width}" height="{height}" role="img" class="{key}">
 </style>
 <defs>
 <clipPath id="{key}-page"><rect width="{width}" height="{height}"/></clipPath>
-<path id="{key}-still" d="{_path(motion.outline(1.0))}"/>
-<path id="{key}-moving" d="{_path(motion.outline(1.0))}">{_changing(motion, seconds)}</path>
-</defs>
+{"".join(paths)}</defs>
 <g clip-path="url(#{key}-page)" {stroke} stroke-linejoin="round">
 <rect width="{width}" height="{height}" fill="{chosen.paper}" stroke="none"/>
 <g class="moving">
@@ -183,17 +187,18 @@ def _matrix(linear: Array) -> str:
     return ",".join(Numbers(5)(value) for value in linear.T.ravel())
 
 
-def _changing(motion: Motion, seconds: float) -> str:
-    paths = [_path(motion.outline(key)) for key in motion.keys]
+def _changing(motion: Motion, kind: int, seconds: float) -> str:
+    paths = [_path(motion.outlines(key)[kind]) for key in motion.keys]
     if len(set(paths)) == 1:
         return ""
     return _animate("animate", 'attributeName="d"', motion.keys, paths, seconds)
 
 
 def _copy(
-    motion: Motion, places: Places, k: int, symbol: str, chosen: Palette, seconds: float
+    motion: Motion, places: Places, k: int, key: str, what: str, chosen: Palette, seconds: float
 ) -> str:
     linear, (x, y) = places.linear[k], places.offset[k].tolist()
+    symbol = f"{symbol_of(int(motion.kinds[k]), key)}-{what}"
     use = f'<use href="#{symbol}" fill="{chosen.fill(int(motion.colours[k]))}"'
     start, end = motion.births[k].tolist()
     if end <= 0:

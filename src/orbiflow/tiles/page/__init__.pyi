@@ -9,14 +9,14 @@ from .outlines import Outline as Outline
 from .outlines import fitted as fitted
 from .outlines import outline as outline
 from .outlines import turning as turning
-from .page import MOTIF as MOTIF
 from .page import Page as Page
-from .page import Place as Place
 from .page import edge_margin as edge_margin
 from .page import inset as inset
 from .page import longer_side as longer_side
 from .page import mark_corners as mark_corners
 from .page import rectangle_sides as rectangle_sides
+from .page import symbol_of as symbol_of
+from .page import tiling_size as tiling_size
 from .scene import INK as INK
 from .scene import Box as Box
 from .scene import Curve as Curve

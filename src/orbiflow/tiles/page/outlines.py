@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -156,20 +157,33 @@ _SHARES = (0.6, 0.15, 0.04)  # of the tolerance; finer where curves would otherw
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The outline of a tile in curves."""
+    """The outlines of a tiling's prototiles in curves."""
 
-    edges: Edges | None  # how it falls into edges; None if not known (`note` says why)
-    curves: tuple[Curve, ...]  # one curve for each edge, end to end; or a single closed curve
+    edges: Edges | None  # how they fall into edges; None if not known (`note` says why)
+    # one curve for each edge, end to end, prototile by prototile; or a closed curve for each prototile
+    curves: tuple[Curve, ...]
     note: str = ""  # what the user should know, or ""
 
-    @property
-    def closed(self) -> Curve:
-        """The whole outline as one closed curve."""
-        return Curve.joined(self.curves, closed=True)
+    @cached_property
+    def closed(self) -> tuple[Curve, ...]:
+        """The outline of each prototile as one closed curve."""
+        if self.edges is None:
+            return self.curves
+        return tuple(
+            Curve.joined(
+                [
+                    curve
+                    for curve, owner in zip(self.curves, self.edges.owners, strict=True)
+                    if owner == k
+                ],
+                closed=True,
+            )
+            for k in range(len(self.edges.tiling.prototiles))
+        )
 
 
 def outline(tile: Tiles, tolerance: float) -> Outline:
-    """Fit smooth curves near a tile's polygon that tile the plane as exactly as it does.
+    """Fit smooth curves near a tile's polygons that tile the plane as exactly as they do.
 
     One edge of each class is fitted, up to its middle if it is its own image, and the others are its
     images. Where curves would touch, they are fitted more closely, at worst along the polygon.
@@ -177,13 +191,13 @@ def outline(tile: Tiles, tolerance: float) -> Outline:
     try:
         own = edges(tile)
     except OrbiflowError as error:
-        plain = Curve.polyline(as_tiling(tile).prototiles[0].polygon, closed=True)
-        return Outline(None, (plain,), f"the outline is left as it is: {error}")
+        plain = (Curve.polyline(p.polygon, closed=True) for p in as_tiling(tile).prototiles)
+        return Outline(None, tuple(plain), f"the outline is left as it is: {error}")
     for share in _SHARES:
-        curves = _curves(own, share * tolerance)
-        ring = Curve.joined(curves, closed=True).flattened(tolerance / 20)
-        if shapely.Polygon(ring).is_valid:
-            return Outline(own, curves)
+        found = Outline(own, _curves(own, share * tolerance))
+        rings = (curve.flattened(tolerance / 20) for curve in found.closed)
+        if all(shapely.Polygon(ring).is_valid for ring in rings):
+            return found
     return Outline(own, tuple(Curve.polyline(own.points(k)) for k in range(len(own))))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import shapely
@@ -13,6 +13,7 @@ import shapely
 from orbiflow.arrays import Array, Integers, Window, checked_window
 from orbiflow.drawing import Palette
 from orbiflow.symmetry import Isometry, rotation_matrix
+from orbiflow.tiles.geometry import Place
 from orbiflow.tiles.page.scene import (
     Box,
     Curve,
@@ -53,21 +54,6 @@ SHIFTS = 10
 MOST_TILES_TO_SHIFT = 1000
 
 
-class Place(NamedTuple):
-    """The map p -> linear p + offset from a tile's own units to millimetres on a page, y down."""
-
-    linear: Array
-    offset: Array
-
-    def __call__(self, points: Array) -> Array:
-        return points @ self.linear.T + self.offset
-
-    @property
-    def scale(self) -> float:
-        """Millimetres per unit."""
-        return float(np.sqrt(abs(np.linalg.det(self.linear))))
-
-
 @dataclass(frozen=True, eq=False)
 class Page:
     """A page of copies in mm, y down: what every cut, picture and motion is made from.
@@ -75,7 +61,7 @@ class Page:
     - `size`: Its width and height.
     - `box`: The part of it that tiles may use.
     - `tiling`: The tiles, in their place on the page.
-    - `place`: The map to the page from the tile's own units.
+    - `place`: The map to the page, whose y points down, from the tile's own units.
     - `whole`: The distance that whole tiles keep from the box's edge. None shows all that meet the box.
     - `colour`: Which tiles have the same colour.
     - `known`: A colouring of the tiling in its own units. Default: the one with fewest colours.
@@ -115,7 +101,7 @@ class Page:
         middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
         place = Place(linear, middle - linear @ tiling.center)
         if not centred:
-            within = inset(box, edge_margin(scale * longer_side(tiling.prototiles[0].polygon)))
+            within = inset(box, edge_margin(scale * tiling_size(tiling)))
             shift = _shift_to_most_whole(tiling.transformed(*place), within)
             place = place._replace(offset=place.offset + shift)
         return cls(size, box, tiling.transformed(*place), place, whole, settings.colour)
@@ -151,8 +137,8 @@ class Page:
 
     @property
     def tile_size(self) -> float:
-        """The longer side in mm of the smallest rectangle around the first prototile."""
-        return longer_side(self.ring)
+        """The longer side in mm of the smallest rectangle around the largest prototile."""
+        return tiling_size(self.tiling)
 
     @cached_property
     def copies(self) -> Copies:
@@ -174,6 +160,15 @@ class Page:
         if self.colour == "aspect":
             return self.tiling.group.order
         return self._colouring.count if self.colour == "neighbour" else 1
+
+    def palette(self, chosen: Palette) -> Palette:
+        """Return a palette in which each of several figures has a colour of its own, and its shades.
+
+        One that a user wrote out is taken as it is.
+        """
+        if self.colour != "neighbour" or len(self.tiling.prototiles) == 1:
+            return chosen
+        return chosen.shaded(self._colouring.shares)
 
     @cached_property
     def colours(self) -> Integers:
@@ -237,7 +232,7 @@ class Page:
         outlines: Sequence[Curve] | None = None,
         clipped: bool,
         seam: float | None = None,
-        motif: Motif | None = None,
+        motifs: Sequence[Motif] = (),
         **more: Any,
     ) -> Scene:
         """Return the copies as a scene: symbols, a use of them for each copy, a layer for each colour.
@@ -248,27 +243,35 @@ class Page:
                 close the seams that viewers leave between neighbours.
             outlines: The outline of each prototile, on the page. Default: its polygon.
             clipped: Whether tiles are cut off at the box.
-            motif: What lies on the first prototile, on the page.
+            motifs: What lies on each prototile, on the page; nothing lies on those beyond.
             more: Further fields of the scene.
         """
         given = enumerate(self.polygons if outlines is None else outlines)
         symbols = {symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in given}
-        motifs = {}
-        if motif is not None and (motif.parts or motif.rasters):
-            own = motif.moved(*self.about_middle())
-            motifs = {MOTIF: Motif(own.parts, own.rasters, symbol_of(0))}
+        drawn = {
+            k: replace(motif.moved(*self.about_middle(k)), within=symbol_of(k))
+            for k, motif in enumerate(motifs)
+            if motif.parts or motif.rasters
+        }
         layers = []
         if chosen is not None:
+            chosen = self.palette(chosen)
             layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(self.box),))]
-        layers += self._tile_layers(chosen, line, clipped, seam, drawn=bool(motifs))
-        return Scene(*self.size, tuple(layers), symbols, self.box, motifs=motifs, **more)
+        layers += self._tile_layers(chosen, line, clipped, seam, drawn)
+        named = {symbol_of(k, MOTIF): motif for k, motif in drawn.items()}
+        return Scene(*self.size, tuple(layers), symbols, self.box, motifs=named, **more)
 
     def empty(self, layers: Iterable[Layer], **more: Any) -> Scene:
         """Return the page as a scene of other layers."""
         return Scene(*self.size, tuple(layers), window=self.box, **more)
 
     def _tile_layers(
-        self, chosen: Palette | None, line: Style, clipped: bool, seam: float | None, *, drawn: bool
+        self,
+        chosen: Palette | None,
+        line: Style,
+        clipped: bool,
+        seam: float | None,
+        drawn: Iterable[int],
     ) -> list[Layer]:
         kinds = range(len(self.tiling.prototiles))
         every, numbers = [self.uses(k) for k in kinds], [self.copies.prototiles == k for k in kinds]
@@ -284,8 +287,8 @@ class Page:
             fill, name = chosen.fill(colour), f"colour {colour + 1}"
             style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
             layers.append(Layer(name, "tiles", style, tuple(filter(len, own)), clipped))
-            if drawn:
-                on = (replace(own[0], symbol=MOTIF),)
+            on = tuple(replace(own[k], symbol=symbol_of(k, MOTIF)) for k in drawn if len(own[k]))
+            if on:
                 ink = chosen.ink(colour)
                 layers.append(Layer(f"drawing on {name}", "drawing", Style(), on, clipped, ink))
         if seam is not None and line.width > 0:
@@ -293,21 +296,26 @@ class Page:
         return layers
 
     def listed(self, edges: Edges | None) -> tuple[PlacedTile, ...]:
-        """Return what a JSON file says of each copy of the first prototile, with its neighbours."""
+        """Return what a JSON file says of each copy, with its neighbours."""
         copies, linear = self.copies, self.copies.group.linear_parts
-        beyond = [[]] * len(copies) if edges is None else copies.neighbours(edges.across).copy
+        beyond: Any = [[]] * len(copies)
+        if edges is not None:
+            beyond = copies.neighbours(edges.across, edges.owners).copy
         low, high = copies.boxes()
         whole = np.all((low >= self.box[:2]) & (high <= self.box[2:]), axis=1).tolist()
         near = [
             tuple(dict.fromkeys(k for k in row if k >= 0)) for row in np.asarray(beyond).tolist()
         ]
-        placed = zip(copies.cosets.tolist(), copies.translations, near, whole, strict=True)
-        return tuple(PlacedTile(k, linear[k], at, ks, kept) for k, at, ks, kept in placed)
+        numbers = copies.prototiles.tolist()
+        placed = zip(copies.cosets.tolist(), copies.translations, near, whole, numbers, strict=True)
+        return tuple(
+            PlacedTile(k, linear[k], at, ks, kept, number) for k, at, ks, kept, number in placed
+        )
 
 
-def symbol_of(prototile: int) -> str:
-    """Return the name of a prototile's outline among a scene's symbols."""
-    return "tile" if prototile == 0 else f"tile-{prototile + 1}"
+def symbol_of(prototile: int, what: str = "tile") -> str:
+    """Return the name of a prototile's outline among a scene's symbols, or of its motif."""
+    return what if prototile == 0 else f"{what}-{prototile + 1}"
 
 
 def edge_margin(tile_size: float) -> float:
@@ -344,6 +352,11 @@ def _shift_to_most_whole(tiling: Tiling, box: Box) -> Array:
         if count > best:
             best, shift = count, step
     return shift
+
+
+def tiling_size(tiling: Tiling) -> float:
+    """Return the longer side of the smallest rectangle around the largest prototile."""
+    return max(longer_side(own.polygon) for own in tiling.prototiles)
 
 
 def longer_side(ring: Array) -> float:

@@ -255,6 +255,7 @@ class PlacedTile:
     offset: Array
     neighbours: tuple[int, ...] = ()  # the numbers of the scene's tiles that share an edge with it
     whole: bool = True  # whether all of it is on the page
+    prototile: int = 0  # the number of the scene's prototile that it is a copy of
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +269,7 @@ class Scene:
     window: Box | None = None  # the box within which clipped layers show; by default the page
     title: str = ""  # with `notes`: words for the file's metadata
     notes: tuple[str, ...] = ()
-    prototile: Array | None = None  # the polygon (N, 2) in mm of which `tiles` are copies
+    prototiles: tuple[Array, ...] = ()  # the polygons (N, 2) in mm of which `tiles` are copies
     tiles: tuple[PlacedTile, ...] = ()
     facts: dict[str, Any] = field(default_factory=dict)  # for the JSON file, such as the class
     told: tuple[str, ...] = ()  # what the user should know of how it was made

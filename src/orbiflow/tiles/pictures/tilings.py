@@ -11,7 +11,7 @@ from orbiflow.arguments import as_whole
 from orbiflow.arrays import Window
 from orbiflow.drawing import DEFAULT_PALETTE, Sheet, font, palette, palette_png
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.page import Layer, Page, Style
+from orbiflow.tiles.page import Layer, Page, Style, symbol_of
 from orbiflow.tiles.pictures.sketch import LEAST_LINE, ScenePicture
 from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, default_window
 from orbiflow.tiles.write import INCH, scene_image
@@ -21,16 +21,22 @@ TILE_MARGIN = 0.04  # the margin around a single tile, as a share of its longer 
 
 
 def tile_picture(
-    tile: Tile, *, y_down: bool = False, sheet: Sheet | None = None, title: str = ""
+    tile: Tiles, *, y_down: bool = False, sheet: Sheet | None = None, title: str = ""
 ) -> ScenePicture:
-    """Return a picture of one tile with a small margin; arguments as for `tiling_picture`."""
-    low, high = tile.tiling.box
+    """Return a picture of one tile with a small margin; arguments as for `tiling_picture`.
+
+    Of a tiling it shows a copy of each prototile.
+    """
+    low, high = as_tiling(tile).box
     margin = TILE_MARGIN * float((high - low).max())
     sheet, chosen = sheet or Sheet.column(100.0), palette(DEFAULT_PALETTE)
     window = (*(low - margin).tolist(), *(high + margin).tolist())
     page = Page.of_window(tile, window, sheet.width * INCH, y_down=y_down)
-    style = Style(chosen.fill(1), chosen.outline, 0.003 * page.size[0])
-    layers = (Layer("tile", "tiles", style, tuple(page.polygons)),)
+    width, first = 0.003 * page.size[0], int(len(page.polygons) == 1)
+    layers = tuple(
+        Layer(symbol_of(k), "tiles", Style(chosen.fill(first + k), chosen.outline, width), (own,))
+        for k, own in enumerate(page.polygons)
+    )
     note = "A tile of the plane, made with orbiflow"
     return ScenePicture(page.empty(layers, title=title or _name(tile), notes=(note,)), sheet)
 

@@ -17,7 +17,8 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, rendered, window_of
 from orbiflow.tiles.page import Page
 from orbiflow.tiles.pictures import RAMP, STRIP
-from orbiflow.tiles.run_folder.files import TILE_FILES
+from orbiflow.tiles.result_file import part_file
+from orbiflow.tiles.run_folder.files import READ, TILE_FILES, files_of
 from orbiflow.tiles.run_folder.overview import FILLED, LEFT_OUT, OUTLINE
 from orbiflow.tiles.search import ClassFailure, rounded_for, why_poor
 from orbiflow.tiles.silhouette import Target
@@ -30,7 +31,7 @@ TRIED = ("delft", "lagoon", "ochre", "dusk", "forest", "ink")
 
 def index_page(
     results: Sequence[EscherTile],
-    target: Target,
+    targets: Sequence[Target],
     folders: Sequence[str],
     *,
     out: str = ".",
@@ -45,28 +46,36 @@ def index_page(
     `colours` has the colouring of each tiling, if it is known already; `figures` are the names of the
     files in each folder besides the `TILE_FILES`.
     """
-    name = PurePath(target.source).name
+    names = [PurePath(target.source).name for target in targets]
+    name = " and ".join(names)
     extra = figures or [()] * len(results)
-    known = colours or [colouring(tile.tile) for tile in results]
+    known = colours or [colouring(tile.tiling) for tile in results]
     tiles = [
-        {"found": tile, "folder": folder, "files": TILE_FILES + more, "patch": _patch(tile, own)}
+        {
+            "found": tile,
+            "folder": folder,
+            "files": files_of(TILE_FILES + more, len(targets)),
+            "patch": _patch(tile, own),
+            "words": f" a tile like {name}" if len(targets) == 1 else f" {name}",
+        }
         for tile, folder, more, own in zip(results, folders, extra, known, strict=True)
     ]
     return rendered(
         "orbiflow.tiles.run_folder",
         "index_page.html",
         title=f"Tiles that look like {name}",
+        names=names,
         name=name,
-        stem=PurePath(name).stem,
+        stem="-".join(PurePath(own).stem for own in names),
         out=shlex.quote(f"./{out}" if out.startswith("-") else out),
         quote=shlex.quote,
-        read=read,
+        reads=[part_file(READ, number) for number in range(len(targets))] if read else [],
+        part_file=part_file,
         marks=(OUTLINE, LEFT_OUT, FILLED),
-        silhouette=_silhouette(target),
-        notes=target.notes,
+        silhouettes=[_silhouette(target) for target in targets],
+        notes=[note for target in targets for note in target.notes],
         remarks=[text for text in (rounded_for(results), results and why_poor(results[0])) if text],
         tiles=tiles,
-        palettes={way: PALETTES[way] for way in TRIED},
         ramp=RAMP,
         strip=STRIP,
         failures=failures,
@@ -78,20 +87,26 @@ PATCH = 150  # the width of a small tiling in its own units, about pixels
 
 def _patch(tile: EscherTile, colours: Colouring) -> dict[str, Any]:
     """Return a small tiling as an SVG has it: a path, and where its copies of each colour are."""
-    left, low, right, high = default_window(tile.tile)
-    middle, half = tile.tile.center, np.array([right - left, high - low]) * 0.3
+    left, low, right, high = default_window(tile.tiling)
+    middle, half = tile.tiling.center, np.array([right - left, high - low]) * 0.3
     window = (*(middle - half).tolist(), *(middle + half).tolist())
-    page = Page.of_window(tile.tile, window, PATCH, y_down=tile.y_down, known=colours)
-    uses, (width, height) = page.uses(), page.size
-    columns = uses.linear[uses.which].transpose(0, 2, 1).reshape(-1, 4)
-    numbers = np.concatenate([columns, uses.offsets], axis=1)
-    matrices = [" ".join(f"{x:.4g}" for x in row) for row in numbers]
-    ring = shapely.LinearRing(page.ring - page.tiling.center).simplify(0.2)
-    own = page.colours
+    page = Page.of_window(tile.tiling, window, PATCH, y_down=tile.y_down, known=colours)
+    (width, height), paths = page.size, list[str]()
+    copies: list[list[tuple[int, str]]] = [[] for _ in range(page.count)]
+    for kind, prototile in enumerate(page.tiling.prototiles):
+        uses, own = page.uses(kind), page.colours[page.copies.prototiles == kind]
+        columns = uses.linear[uses.which].transpose(0, 2, 1).reshape(-1, 4)
+        numbers = np.concatenate([columns, uses.offsets], axis=1)
+        for colour, row in zip(own.tolist(), numbers, strict=True):
+            copies[colour].append((kind, " ".join(f"{x:.4g}" for x in row)))
+        ring = shapely.LinearRing(prototile.polygon - prototile.center).simplify(0.2)
+        paths.append(_path(shapely.get_coordinates(ring)[:-1]))
+    palettes = {way: page.palette(PALETTES[way]) for way in TRIED}
     return {
         "box": f"0 0 {width:.1f} {height:.1f}",
-        "path": _path(shapely.get_coordinates(ring)[:-1]),
-        "copies": [[matrices[k] for k in np.flatnonzero(own == n)] for n in range(page.count)],
+        "paths": paths,
+        "copies": copies,
+        "palettes": palettes,
     }
 
 

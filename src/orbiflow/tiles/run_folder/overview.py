@@ -103,7 +103,7 @@ _COLUMN = 32  # letters in a line of words
 
 def overview_png(
     results: Sequence[EscherTile],
-    target: Target,
+    targets: Sequence[Target],
     colours: Sequence[Colouring] | None = None,
     *,
     failures: Sequence[ClassFailure] = (),
@@ -114,7 +114,7 @@ def overview_png(
 
     Args:
         results: The tiles of one search, one or more.
-        target: The silhouette that was searched for.
+        targets: The silhouettes that were searched for.
         colours: The colouring of each tiling, if it is known already.
         failures: The classes without a tile, which are named.
     """
@@ -125,36 +125,48 @@ def overview_png(
     rows = -(-len(results) // columns)
     sheet = Image.new("RGB", (width, _HEADER + rows * (height + _GAP)), "white")
     pen = ImageDraw.Draw(sheet)
-    _header(sheet, pen, target, len(results), [failure.name for failure in failures])
+    _header(sheet, pen, targets, len(results), [failure.name for failure in failures])
+    thumbs = len(targets) * (_THUMB + 22)
     for k, result in enumerate(results):
         row, column = divmod(k, columns)
         left, top = _MARGIN + column * (cell + _GAP), _HEADER + row * (height + _GAP)
         below = top + round(cell / 1.5) + 14
-        _write_words(pen, result, left + _THUMB + 22, below, k + 1)
+        _write_words(pen, result, left + thumbs, below, k + 1)
         own = colours[k] if colours else None
-        tiling = tiling_picture(result.tile, colours=own, outline=1.4 / cell, y_down=target.y_down)
+        tiling = tiling_picture(
+            result.tiling, colours=own, outline=1.4 / cell, y_down=result.y_down
+        )
         sheet.paste(tiling.image(cell), (left, top))
-        thumb = _small(result, target)
-        thumb.thumbnail((_THUMB, _THUMB))
-        sheet.paste(thumb, (left + (_THUMB - thumb.width) // 2, below))
+        for number, (part, target) in enumerate(zip(result.figures, targets, strict=True)):
+            thumb = _small(part.figure, target)
+            thumb.thumbnail((_THUMB, _THUMB))
+            middle = left + number * (_THUMB + 22) + (_THUMB - thumb.width) // 2
+            sheet.paste(thumb, (middle, below))
     return png_bytes(sheet, compress_level=4)
 
 
 def _header(
-    sheet: Image.Image, pen: ImageDraw.ImageDraw, target: Target, count: int, failed: list[str]
+    sheet: Image.Image,
+    pen: ImageDraw.ImageDraw,
+    targets: Sequence[Target],
+    count: int,
+    failed: list[str],
 ) -> None:
-    window = window_of([target.outline])
-    width = _fitting(window)
-    small = Sketch(window, Sheet.screen(width), y_down=target.y_down)
-    small.fill(target.outline, INK)
-    picture = small.picture().image(width)
-    picture.thumbnail((_THUMB, _THUMB))
-    sheet.paste(picture, (_MARGIN, (_HEADER - picture.height) // 2))
-    left, middle = _MARGIN + picture.width + 28, _HEADER // 2
-    name = PurePath(target.source).name
+    left, middle = _MARGIN, _HEADER // 2
+    for target in targets:
+        window = window_of([target.outline])
+        width = _fitting(window)
+        small = Sketch(window, Sheet.screen(width), y_down=target.y_down)
+        small.fill(target.outline, INK)
+        picture = small.picture().image(width)
+        picture.thumbnail((_THUMB, _THUMB))
+        sheet.paste(picture, (left, (_HEADER - picture.height) // 2))
+        left += picture.width + 28
+    name = " and ".join(PurePath(target.source).name for target in targets)
     pen.text((left, middle - 6), name, INK, font(_TITLE), anchor="ls")
     tiles = "1 tile: its" if count == 1 else f"{count} tiles, best first: each one's"
-    text = f"{tiles} tiling, and below it the silhouette in its place"
+    what = "silhouette in its place" if len(targets) == 1 else "silhouettes in their places"
+    text = f"{tiles} tiling, and below it the {what}"
     pen.text((left, middle + 40), text, FAINT, font(_WORDS), anchor="ls")
     if failed:
         text = f"No tile of {', '.join(failed)}"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path, PurePath
 
 from orbiflow.arguments import as_instance, as_path
 from orbiflow.drawing import Sheet
@@ -22,7 +23,7 @@ from orbiflow.runtime import (
     write_json,
 )
 from orbiflow.tiles.pictures import ScenePicture, comparison, tile_picture, tiling_picture
-from orbiflow.tiles.result_file import RESULT, folder_names
+from orbiflow.tiles.result_file import RESULT, folder_names, part_file
 from orbiflow.tiles.run_folder.files import (
     FIELD_FILES,
     FIGURE_FILES,
@@ -30,7 +31,9 @@ from orbiflow.tiles.run_folder.files import (
     OVERVIEW,
     READ,
     READ_NEXT,
+    READ_NEXT_FILES,
     TILE_FILES,
+    files_of,
     written_files,
 )
 from orbiflow.tiles.run_folder.html_page import index_page
@@ -50,7 +53,7 @@ def figure_files(result: EscherTile) -> tuple[str, ...]:
 
 def write_tile_folder(
     result: EscherTile,
-    target: Target,
+    targets: Sequence[Target],
     folder: Path,
     *,
     colours: Colouring | None = None,
@@ -58,12 +61,15 @@ def write_tile_folder(
 ) -> list[Path]:
     """Write the `TILE_FILES` of a tile into its folder, and the `FIGURE_FILES`, which take much longer.
 
+    There is a target for each of its figures.
+
     Raises `OutputError` if a file cannot be written.
     """
     make_folder(folder)
-    tile, colours, y_down = result.tile, colours or colouring(result.tile), target.y_down
+    prototiles, y_down = result.tiling, result.y_down
+    colours = colours or colouring(prototiles)
     label = f"{result.isohedral_class} ({result.group_name})"
-    title = f"{target.source.rsplit('/', 1)[-1]}, {label}"
+    title = f"{' and '.join(PurePath(target.source).name for target in targets)}, {label}"
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
 
@@ -80,21 +86,32 @@ def write_tile_folder(
     printed = Sheet.column()
 
     def tiling(sheet: Sheet | None = None) -> ScenePicture:
-        return tiling_picture(tile, y_down=y_down, title=title, colours=colours, sheet=sheet)
+        return tiling_picture(prototiles, y_down=y_down, title=title, colours=colours, sheet=sheet)
 
     contents: dict[str, Callable[[], str | bytes]] = {
-        "tile.svg": lambda: tile_picture(tile, y_down=y_down, title=title).svg(),
+        "tile.svg": lambda: tile_picture(prototiles, y_down=y_down, title=title).svg(),
         "tiling.svg": lambda: tiling(Sheet.column(300.0)).svg(),
         "tiling.png": lambda: tiling(Sheet.screen(1200)).png(),
-        "overlay.png": lambda: comparison(result, target, label=label).png(),
         "tiling.pdf": lambda: tiling(printed).file(),
-        "overlay.pdf": lambda: comparison(result, target, sheet=printed).file(),
         "field.png": lambda: field(Sheet.screen(1200)),
         "field.pdf": lambda: field(Sheet.column()),
-        "model.safetensors": (result.map or TileMap()).to_bytes,
     }
-    names = (*TILE_FILES, *(figure_files(result) if figures else ()))
+    for number, (part, target) in enumerate(zip(result.figures, targets, strict=True)):
+        own, label = part.figure, part.figure.name if result.parts else label
+        more: dict[str, Callable[[], str | bytes]] = {
+            "overlay.png": partial(_overlay, own, target, label),
+            "overlay.pdf": partial(_overlay, own, target, label, printed),
+            "model.safetensors": (own.map or TileMap()).to_bytes,
+        }
+        contents |= {part_file(name, number): content for name, content in more.items()}
+    names = files_of((*TILE_FILES, *(figure_files(result) if figures else ())), len(targets))
     return [write_atomic(folder / name, contents[name]()) for name in names]
+
+
+def _overlay(figure: EscherTile, target: Target, label: str, printed: Sheet | None = None) -> bytes:
+    if printed is None:
+        return comparison(figure, target, label=label).png()
+    return comparison(figure, target, sheet=printed).file()
 
 
 def write_gallery(
@@ -109,10 +126,10 @@ def write_gallery(
     Raises:
         OutputError: If a file cannot be written.
     """
-    tiles, target, failures = result.tiles, result.target, result.failures
+    tiles, targets, failures = result.tiles, result.targets, result.failures
     names = folder_names([tile.isohedral_class for tile in tiles])
-    colours = [colouring(tile.tile) for tile in tiles]
-    draw = functools.partial(_draw, target, figures)
+    colours = [colouring(tile.tiling) for tile in tiles]
+    draw = functools.partial(_draw, targets, figures)
     items = list(zip(tiles, colours, (out / name for name in names), strict=True))
     if result.workers == 1 or len(tiles) == 1:
         for item in items:
@@ -125,19 +142,19 @@ def write_gallery(
         with contextlib.closing(work(draw, items, result.workers)) as news:
             for _ in news:
                 pass
-    write_atomic(out / OVERVIEW, overview_png(tiles, target, colours, failures=failures))
+    write_atomic(out / OVERVIEW, overview_png(tiles, targets, colours, failures=failures))
     extra = [figure_files(tile) if figures else () for tile in tiles]
     read, more = (out / READ).is_file(), {"failures": failures, "figures": extra}
-    page = index_page(tiles, target, names, out=shown_out, read=read, colours=colours, **more)
+    page = index_page(tiles, targets, names, out=shown_out, read=read, colours=colours, **more)
     write_atomic(out / INDEX, page)
 
 
 def _draw(
-    target: Target, figures: bool, item: tuple[EscherTile, Colouring, Path], *_: object
+    targets: Sequence[Target], figures: bool, item: tuple[EscherTile, Colouring, Path], *_: object
 ) -> None:
     """Write the folder of one tile; this may run in a worker process."""
     tile, colours, folder = item
-    write_tile_folder(tile, target, folder, colours=colours, figures=figures)
+    write_tile_folder(tile, targets, folder, colours=colours, figures=figures)
 
 
 def result_folder(out: str | Path) -> ResultFolder:
@@ -145,21 +162,25 @@ def result_folder(out: str | Path) -> ResultFolder:
     return ResultFolder(as_path(out, "the folder to write into"), written_files)
 
 
-def show_reading(target: Target, picture: bytes, out: Path, on_event: Sink = ignore) -> None:
+def show_reading(
+    target: Target, picture: bytes, out: Path, on_event: Sink = ignore, *, number: int = 0
+) -> None:
     """Write `read.png` into the folder at once and tell what was read and what may be wrong with it.
 
-    Beside an earlier run it is `read-next.png`, until this run replaces that one.
+    That of the second silhouette, whose `number` is 1, is `read-2.png`. Beside an earlier run it is
+    `read-next.png`, until this run replaces that one.
 
     Raises:
         OutputError: If the folder holds what orbiflow did not write, or cannot be written.
     """
     folder = result_folder(out)
     is_beside_a_run = (folder.path / RESULT).is_file()
-    path = make_folder(folder.path) / (READ_NEXT if is_beside_a_run else READ)
+    name = part_file(READ, number)
+    path = make_folder(folder.path) / (part_file(READ_NEXT, number) if is_beside_a_run else name)
     write_atomic(path, picture)
     for note in target.notes:
         on_event(Note(note))
-    soon = f", and in {out / READ} once this run replaces the earlier one" * is_beside_a_run
+    soon = f", and in {out / name} once this run replaces the earlier one" * is_beside_a_run
     on_event(Note(f"what was read is drawn in {path}{soon}"))
     for doubt in doubts(target):
         on_event(Note(doubt, warning=True))
@@ -168,7 +189,7 @@ def show_reading(target: Target, picture: bytes, out: Path, on_event: Sink = ign
 def write_run(
     result: SearchResult,
     out: str | Path,
-    picture: bytes = b"",
+    pictures: Sequence[bytes] = (),
     *,
     figures: bool = False,
     shown_out: str | None = None,
@@ -182,7 +203,7 @@ def write_run(
     Args:
         result: What the search found.
         out: The folder, which every command on a RESULT takes.
-        picture: What was read, as `read_png` draws it.
+        pictures: What was read of each silhouette, as `read_png` draws it.
         figures: Write the figures for print, too, in as many processes as the search had.
         shown_out: What the page's commands call the folder. Default: its path.
         on_event: Called with each `Note` and `Written`.
@@ -197,13 +218,14 @@ def write_run(
     folder, tiles = result_folder(out), result.tiles
     earlier = folder.has_a_run and (folder.path / OVERVIEW).is_file()
     if earlier and all(tile.isohedral_class in result.interrupted for tile in tiles):
-        (folder.path / READ_NEXT).unlink(missing_ok=True)
+        for name in READ_NEXT_FILES:
+            (folder.path / name).unlink(missing_ok=True)
         return []
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
         on_event(Note("no flow made these tiles, so there is none to draw"))
     with folder.replaced() as staged:
-        if picture:
-            write_atomic(staged / READ, picture)
+        for number, picture in enumerate(pictures):
+            write_atomic(staged / part_file(READ, number), picture)
         if tiles:
             write_gallery(result, staged, figures=figures, shown_out=shown_out or str(out))
         write_json(staged / RESULT, report(result))

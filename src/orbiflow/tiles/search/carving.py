@@ -144,7 +144,7 @@ def carved(
 
     start = scipy.linalg.lstsq(whole, ring.view(float), lapack_driver="gelsy")[0]
     best = climbed(np.append(start, np.zeros(SLIDES)))
-    places, points = _cornered(own + calmed(spline @ best[count:]), corners)
+    places, points = cornered(own + calmed(spline @ best[count:]), corners)
     best = climbed(best, places)[:count]
     parameters = scipy.linalg.solve_triangular(root, best, lower=True, trans="T")
     return Carved(basis @ best, places, points, *space.group(0, parameters))
@@ -226,7 +226,7 @@ def calmed(slide: Array) -> Array:
     )
 
 
-def _cornered(places: Array, corners: Integers) -> tuple[Array, Integers]:
+def cornered(places: Array, corners: Integers) -> tuple[Array, Integers]:
     """Return places (n,) of which some are moved to the corners, and which points (K,) these are."""
     n = len(places)
     first = corners - corners[0]

@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import (
     Count,
     DefaultText,
@@ -23,12 +24,17 @@ from orbiflow.settings import (
 )
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.search.search_method import SearchMethod
+    from orbiflow.tiles.search.pair_search import PairSearch
+    from orbiflow.tiles.search.search_method import Goal, SearchMethod
+    from orbiflow.tiles.silhouette import Target
 
 
 LIKENESS = Group("Search for likeness")
 OVERLAP = Group("Search for overlap")
 OCCUPANCY = Group("Occupancy method")
+TWO = Group("Two silhouettes")
+
+LEAST_RATIO = 0.1  # of the areas of two figures
 
 METHODS = {
     "likeness": ("orbiflow.tiles.search", "LikenessSearch"),
@@ -45,6 +51,25 @@ def class_names(text: str) -> tuple[str, ...]:
     (('IH4', 'IH6'), ('all',))
     """
     return tuple(filter(None, re.split(r"[,\s]+", text)))
+
+
+def area_ratios(text: str) -> tuple[float, float]:
+    """Return the least and the largest ratio that a text gives.
+
+    >>> area_ratios("1"), area_ratios("0.8-1.25")
+    ((1.0, 1.0), (0.8, 1.25))
+    """
+    found = re.fullmatch(r"\s*([\d.]+)\s*(?:-\s*([\d.]+))?\s*", text)
+    try:
+        low, high = (float(part) for part in (found[1], found[2] or found[1])) if found else (0, 0)
+    except ValueError:
+        low = high = 0
+    if not LEAST_RATIO <= low <= high <= 1 / LEAST_RATIO:
+        raise OrbiflowError(
+            f"{text!r} is no ratio of areas from {LEAST_RATIO:g} to {1 / LEAST_RATIO:g}; write one, "
+            "such as 1, or the least and the largest, such as 0.8-1.25"
+        )
+    return low, high
 
 
 class SearchSettings(Settings, group="Search"):
@@ -69,7 +94,8 @@ class SearchSettings(Settings, group="Search"):
     """The descent, or the paper's occupancy loss for comparison."""
 
     per_class: Count = 1
-    """Number of tiles of each class: the best, and others that differ from it."""
+    """Number of tiles of each class: the best, and others that differ from it. Of two silhouettes the
+    best pairs come, whatever their classes."""
 
     min_neck: Annotated[float, Range(0, 0.2), OnlyWith(method="descent")] = 0.01
     """Tiles with necks thinner than this rank lower; in square roots of the tile's area."""
@@ -88,6 +114,15 @@ class SearchSettings(Settings, group="Search"):
         Count | None, OnlyWith(method="occupancy"), OCCUPANCY, DefaultText("200")
     ] = None
     """Number of steps of the fit."""
+
+    ratio: Annotated[
+        tuple[float, float] | None,
+        Parsed(area_ratios, "a number, or two with a dash, such as 0.8-1.25", "RATIO"),
+        DefaultText("0.6-1.7"),
+        OnlyWith(method="descent", objective="likeness"),
+        TWO,
+    ] = None
+    """Area of the second figure over the first, before they bend, or the least and the largest."""
 
     seed: Seed = 0
     """Seed of the random numbers: the same seed on the same machine gives the same tiles."""
@@ -115,7 +150,7 @@ class EscherizeSettings(SearchSettings, group="Search"):
     emphasis: Annotated[Path | None, OnlyWith(method="descent")] = None
     """A mask, white where the silhouette must survive, such as a head or a tail."""
 
-    strength: Annotated[float | None, Range(above=0), Needs("emphasis"), DefaultText("4")] = None
+    strength: Annotated[float | None, Range(above=0), DefaultText("4")] = None
     """How many times more the white part of the mask counts."""
 
     pin: Annotated[
@@ -130,5 +165,67 @@ class EscherizeSettings(SearchSettings, group="Search"):
     pin_angle: Annotated[bool, Needs("pin"), LIKENESS] = False
     """Keep the angle of what is pinned, too."""
 
+    second_emphasis: Annotated[
+        Path | None, OnlyWith(method="descent", objective="likeness"), TWO
+    ] = None
+    """A mask, white where the second silhouette must survive."""
+
+    second_pin: Annotated[
+        tuple[str, ...] | None, Repeated(), OnlyWith(method="descent", objective="likeness"), TWO
+    ] = None
+    """A part of the second silhouette that keeps its shape, as for the first. May be repeated."""
+
     workers: Annotated[int | None, Range(1), DefaultText("one per core")] = None
     """Number of processes. Python calls default to 1."""
+
+    def check(self) -> None:
+        super().check()
+        if self.strength is not None and not (self.emphasis or self.second_emphasis):
+            raise SettingError("{strength} needs {emphasis}; give both or neither")
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that are read besides the silhouettes, if pins are files."""
+        pins = (*(self.pin or ()), *(self.second_pin or ()))
+        masks = (self.emphasis, self.second_emphasis)
+        return [*(mask for mask in masks if mask is not None), *map(Path, pins)]
+
+    def check_single(self) -> None:
+        """Raise a `SettingError` for what applies only to two silhouettes."""
+        for name in ("ratio", "second_emphasis", "second_pin"):
+            if getattr(self, name) is not None:
+                raise SettingError(
+                    f"{{{name}}} needs a second silhouette; give one or leave it out"
+                )
+
+    def goal(self, target: Target) -> Goal:
+        """Return the silhouette with what matters in it."""
+        from orbiflow.tiles.search.search_method import Goal
+
+        own: dict[str, Any] = {
+            "emphasis": self.emphasis,
+            "pin": self.pin,
+            "keep_angle": self.pin_angle,
+        }
+        return Goal.read(target, strength=self.strength, **own)
+
+    def second_goal(self, target: Target) -> Goal:
+        """Return the same for the second silhouette."""
+        from orbiflow.tiles.search.search_method import Goal
+
+        own: dict[str, Any] = {"emphasis": self.second_emphasis, "pin": self.second_pin}
+        return Goal.read(target, strength=self.strength, **own)
+
+    @property
+    def pair_search(self) -> PairSearch:
+        """The search for two silhouettes."""
+        from orbiflow.tiles.search.pair_search import PairSearch
+
+        if self.method != "descent" or self.objective != "likeness":
+            raise SettingError(
+                "two silhouettes are searched for likeness; leave out {objective} and {method}"
+            )
+        given = {"classes": self.classes, "ratio": self.ratio}
+        given = {name: value for name, value in given.items() if value is not None}
+        known = {"min_neck": self.min_neck, "seed": self.seed, "workers": self.workers or 1}
+        return PairSearch.for_effort(self.effort, force=self.force, **known, **given)

@@ -34,14 +34,17 @@ from orbiflow.tiles.likeness import NearSymmetry, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
-from orbiflow.tiles.search.finished_tiles import (
-    HOW_TO_GET_A_TARGET,
-    ClassFailure,
-    best_tiles,
-    rated,
-)
+from orbiflow.tiles.search.finished_tiles import ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.search_method import SYMMETRIC_CLASSES, Goal, SearchMethod, Sketches
+from orbiflow.tiles.search.pair_record import PairRecord
+from orbiflow.tiles.search.pair_search import PairSearch
+from orbiflow.tiles.search.search_method import (
+    HOW_TO_GET_A_TARGET,
+    SYMMETRIC_CLASSES,
+    Goal,
+    SearchMethod,
+    Sketches,
+)
 from orbiflow.tiles.search.search_record import OnTile, Outcome, Record, without_twins
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
@@ -52,7 +55,7 @@ from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
 class SearchResult:
     """What a search found.
 
-    - `target`: The silhouette.
+    - `target`: The silhouette, of two the first.
     - `tiles`: Certified tiles, best first, with their ratings.
     - `failures`: The classes that gave none, and why.
     - `method`: The method that was used, with its settings.
@@ -61,27 +64,37 @@ class SearchResult:
     - `workers`: The number of processes.
     - `interrupted`: The classes that were not finished: each is a failure, or has its first tile alone.
     - `near_symmetry`: How near the silhouette is to symmetric, if the method asks.
+    - `second`: The other silhouette, of two, with what had to survive and what did not bend.
     """
 
     target: Target
     tiles: Sequence[EscherTile] = ()
     failures: Sequence[ClassFailure] = ()
-    method: SearchMethod = field(default_factory=lambda: LikenessSearch.for_effort("normal"))
+    method: SearchMethod | PairSearch = field(
+        default_factory=lambda: LikenessSearch.for_effort("normal")
+    )
     emphasis: Emphasis | None = None
     pins: Pins | None = None
     seconds: float = 0.0
     workers: int = 1
     interrupted: frozenset[str] = frozenset()
     near_symmetry: NearSymmetry | None = None
+    second: Goal | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tiles", rated(self.tiles, self.target))
+        object.__setattr__(self, "tiles", rated(self.tiles, *self.targets))
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """The silhouettes."""
+        return (self.target,) if self.second is None else (self.target, self.second.target)
 
 
 def escherize(
     target: Target,
     settings: EscherizeSettings | None = None,
     *,
+    second: Target | None = None,
     method: SearchMethod | None = None,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
@@ -92,10 +105,13 @@ def escherize(
 ) -> SearchResult:
     """Find tiles that look like a silhouette and tile the plane, and certify them.
 
+    With a second silhouette each tile is divided into two figures, one like each (design point 21).
+
     Args:
         target: The silhouette; `Target.read` reads one.
         settings: Which tiles are looked for, and how. Without `workers` the search stays in this
             process; a script that asks for more must work under `if __name__ == "__main__":`.
+        second: The second silhouette, of two.
         method: A method of one's own, or with settings of its own, instead of the settings'.
         emphasis: What must survive, instead of the settings' mask.
         pins: What must not bend, instead of the settings'.
@@ -116,19 +132,29 @@ def escherize(
         OrbiflowError: For an unknown class, a mask that cannot be read, or workers that die.
     """
     begin = time.perf_counter()
-    as_instance(target, Target, "the target", HOW_TO_GET_A_TARGET)
     settings = as_instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
-    if emphasis is None and settings.emphasis is not None:
-        strength = {} if settings.strength is None else {"strength": settings.strength}
-        emphasis = Emphasis.read(settings.emphasis, target, **strength)
-    if pins is None and settings.pin is not None:
-        pins = Pins.read(settings.pin, target, keep_angle=settings.pin_angle)
+    goal = settings.goal(target)
+    goal = replace(goal, emphasis=emphasis or goal.emphasis, pins=pins or goal.pins)
+    if second is not None:
+        if method is not None:
+            raise OrbiflowError(
+                "a method of one's own searches for one silhouette; leave out second"
+            )
+        other, search = settings.second_goal(second), settings.pair_search
+        record = PairRecord((goal, other), search, on_tile, on_event)
+        found = record.search(on_checked, cancel)
+        seconds, known = time.perf_counter() - begin, (search, goal.emphasis, goal.pins)
+        workers, left = search.workers, found.interrupted
+        return SearchResult(
+            target, found.tiles, found.failures, *known, seconds, workers, left, second=other
+        )
+    emphasis, pins = goal.emphasis, goal.pins
     method = method or settings.search_method
-    task = _task(Goal(target, emphasis, pins), method, settings.per_class, settings.force)
+    task = _task(goal, method, settings.per_class, settings.force)
     with one_blas_thread():
         near = near_symmetry(target.normal) if method.takes_symmetric else None
     names = _class_names(settings.classes, near)
-    notes = [note for source in (emphasis, pins) if source for note in source.notes]
+    notes = list(goal.notes)
     if near is not None and near.stabiliser in SYMMETRIC_CLASSES:
         notes.append(_symmetry_note(near, names))
     workers = min(settings.workers or 1, len(names))
@@ -379,6 +405,14 @@ def _chosen_tiles(
         raise reasons[0]
 
 
+def _second_report(goal: Goal) -> dict[str, Any]:
+    return {
+        "input": goal.target.report(),
+        "emphasis": None if goal.emphasis is None else goal.emphasis.report(),
+        "pins": None if goal.pins is None else goal.pins.report(),
+    }
+
+
 def report(result: SearchResult) -> dict[str, Any]:
     """Return the whole document, ready for JSON, tiles best first."""
     tiles, method, near = result.tiles, result.method, result.near_symmetry
@@ -402,6 +436,7 @@ def report(result: SearchResult) -> dict[str, Any]:
             "workers": result.workers,
         },
         "input": result.target.report(),
+        **({} if result.second is None else {"second": _second_report(result.second)}),
         "near_symmetry": None if near is None else near._asdict(),
         "emphasis": None if result.emphasis is None else result.emphasis.report(),
         "pins": None if result.pins is None else result.pins.report(),

@@ -27,11 +27,11 @@ from orbiflow.tiles.likeness import (
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
+from orbiflow.tiles.search.search_method import HOW_TO_GET_A_TARGET
 from orbiflow.tiles.silhouette import Target, is_mere_line
 from orbiflow.tiles.tile import EscherTile, SearchFacts
-
-# How a target is made, for messages
-HOW_TO_GET_A_TARGET = "Target.read, Target.from_mask and Target.from_polygon make one"
+from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tilings import Tile
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def best_tiles(
             if not force:
                 result.certificate.require()
             if bent := fit.candidates.bent(index):
-                result = _with_bent(target, result, bent, original)
+                result = with_bent(target, result, bent, original)
             found.append(result)
         except CertificationError as error:
             reasons.append(str(error))
@@ -82,20 +82,25 @@ def best_tiles(
 
 def _result(target: Target, fit: Fit, index: int, original: Target, *, force: bool) -> EscherTile:
     tile, flow = fit.candidates.finished(index, force=force)
+    found = measured_tile(target, tile, flow, original)
+    return found.changed(search=SearchFacts(starts=fit.starts))
+
+
+def measured_tile(target: Target, tile: Tile, known: TileMap, original: Target) -> EscherTile:
+    """Return a tile in the target's normal form as a finished one, with its measures."""
     placed = tile.transformed(target.frame.linear, target.frame.offset)
     region, simple = _region(placed.polygon)
     return EscherTile(
         placed,
         y_down=target.y_down,
         silhouette=original.report(),
-        map_source=replace(flow, frame=target.frame),
+        map_source=replace(known, frame=target.frame),
         normal=tile,
         likeness=Likeness(
             metrics=compare(region, original.outline),
             recognisability=recogniser(original)(region),
             thinnest=narrowest_neck(placed.polygon) if simple else None,
         ),
-        search=SearchFacts(starts=fit.starts),
     )
 
 
@@ -105,9 +110,10 @@ def _region(ring: Array) -> tuple[shapely.Polygon, bool]:
     return (shape, True) if shape.is_valid else (shapely.make_valid(shape).buffer(0), False)
 
 
-def _with_bent(
+def with_bent(
     target: Target, result: EscherTile, placed: PlacedBent, original: Target
 ) -> EscherTile:
+    """Return a finished tile with the silhouette that was bent to it, and the map from it."""
     rest, outline, ends = (target.frame.to_input(ring) for ring in placed.outlines)
     kept = replace(placed.bent.fidelity, cost=placed.bent.cost)
     if smoothed := result.likeness.smoothed:
@@ -140,16 +146,26 @@ def recogniser(target: Target) -> Recogniser:
     return Recogniser(target.outline)
 
 
-def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
-    """Return the tiles of a run with their ratings, in the same order."""
-    if is_mere_line(target):
-        return [tile.changed(rating=Rating(1)) for tile in tiles]
-    return [
-        tile.changed(
-            rating=(Rating.of_likeness if tile.likeness.fidelity else Rating.of_overlap)(tile.score)
+def rated(tiles: Sequence[EscherTile], *targets: Target) -> list[EscherTile]:
+    """Return the tiles of a run with their ratings, in the same order.
+
+    That of a tile that figures divide is the worst one's.
+    """
+    return [_rated(tile, targets) for tile in tiles]
+
+
+def _rated(tile: EscherTile, targets: Sequence[Target]) -> EscherTile:
+    if tile.parts:
+        parts = tuple(
+            part._replace(figure=_rated(part.figure, [target]))
+            for part, target in zip(tile.parts, targets, strict=True)
         )
-        for tile in tiles
-    ]
+        worst = min((part.figure for part in parts), key=lambda own: own.score)
+        return tile.changed(parts=parts, rating=worst.rating)
+    if is_mere_line(targets[0]):
+        return tile.changed(rating=Rating(1))
+    of_score = Rating.of_likeness if tile.likeness.fidelity else Rating.of_overlap
+    return tile.changed(rating=of_score(tile.score))
 
 
 POOR_SCORE = 0.4  # the score below which a note explains what makes the best likeness poor

@@ -6,9 +6,10 @@ figures do and, once more, what the worse one does: nobody looks at a pair of wh
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import product
 from typing import Any, TypeVar
@@ -30,7 +31,7 @@ from orbiflow.tiles.search.co_deformation import (
 from orbiflow.tiles.search.gluing import Placement
 from orbiflow.tiles.search.pair_body import Glue, PairBody
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
-from orbiflow.tiles.silhouette import CORNER_DEPTH, important_vertices, with_corners
+from orbiflow.tiles.silhouette import CORNER_DEPTH, important_vertices, triangulate, with_corners
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 MULTIPLES = (1, 2, 4)  # points of each level for each point of the first
@@ -42,6 +43,8 @@ BEST_OF_GLUE = 5  # neighbours of each neighbouring glue that are worked out
 
 
 Pair = TypeVar("Pair", bound="BentPair")
+Stiff = Callable[[Array], Array]
+"""How much stiffer than usual a silhouette is at points (N, 2) of its normal form."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +55,28 @@ class Figures:
     ratio: float = 1.0  # the area of the second one over that of the first
     mirrored: bool = False  # whether the second one is mirrored
     count: int = 64  # of points of both on the first level, in proportion to their lengths
+    phase: float = 0.0  # by how many of the finest points' distances these are shifted
+    # the width of necks, in square roots of the mean area, below which scores fall
+    min_neck: float = 0.01
+    # how much stiffer the silhouettes are at points (N, 2) of their normal forms
+    stiff: tuple[Stiff | None, Stiff | None] = field(default=(None, None), compare=False)
 
     @classmethod
-    def of(
-        cls, one: Array, two: Array, ratio: float = 1.0, *, mirrored: bool = False, count: int = 64
-    ) -> Figures:
-        """Return those of two rings (M, 2)."""
+    def of(cls, one: Array, two: Array, **others: Any) -> Figures:
+        """Return those of two rings (M, 2), with other fields by name."""
         rings = np.ascontiguousarray(one, np.float64), np.ascontiguousarray(two, np.float64)
-        return cls((rings[0].tobytes(), rings[1].tobytes()), ratio, mirrored, count)
+        return cls((rings[0].tobytes(), rings[1].tobytes()), **others)
+
+    @property
+    def plain(self) -> bool:
+        """Whether no part of a silhouette is stiffer than others."""
+        return self.stiff == (None, None)
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """How large both are, in lengths of their normal forms."""
+        first = math.sqrt(2 / (1 + self.ratio))
+        return first, first * math.sqrt(self.ratio)
 
     def parts(self, level: int) -> tuple[Elastic, Elastic]:
         """Return the bodies of both, with the points of a level."""
@@ -68,20 +85,21 @@ class Figures:
 
 @lru_cache(maxsize=64)
 def _parts(figures: Figures, level: int) -> tuple[Elastic, Elastic]:
-    areas = 2 / (1 + figures.ratio), 2 * figures.ratio / (1 + figures.ratio)
-    one, two = (
-        np.frombuffer(ring).reshape(-1, 2) * np.sqrt(area)
-        for ring, area in zip(figures.rings, areas, strict=True)
-    )
-    lengths = ring_length(one), ring_length(two)
+    rings = [np.frombuffer(ring).reshape(-1, 2) for ring in figures.rings]
+    lengths = [ring_length(ring) * size for ring, size in zip(rings, figures.sizes, strict=True)]
     first = round(figures.count * lengths[0] / sum(lengths))
+    multiple, step = MULTIPLES[-1], MULTIPLES[-1] // MULTIPLES[level]
 
-    def body(ring: Array, count: int, mirrored: bool) -> Elastic:
-        fine = with_corners(ring, important_vertices(ring, CORNER_DEPTH), MULTIPLES[-1] * count)
-        fine = reverse(fine) * (1.0, -1.0) if mirrored else fine
-        return Elastic(fine[:: MULTIPLES[-1] // MULTIPLES[level]], BODIES["firm"])
+    def body(k: int, count: int, mirrored: bool) -> Elastic:
+        corners = important_vertices(rings[k], CORNER_DEPTH)
+        fine = with_corners(rings[k], corners, multiple * count, figures.phase)
+        flip = (1.0, -1.0) if mirrored else (1.0, 1.0)
+        fine = (reverse(fine) if mirrored else fine) * flip
+        mesh, factor = triangulate(fine[::step] * figures.sizes[k]), figures.stiff[k]
+        own = None if factor is None else factor(mesh.points / figures.sizes[k] * flip)
+        return Elastic(mesh.points[: mesh.size], BODIES["firm"], stiff=own, mesh=mesh)
 
-    return body(one, first, False), body(two, figures.count - first, figures.mirrored)
+    return body(0, first, False), body(1, figures.count - first, figures.mirrored)
 
 
 @lru_cache(maxsize=256)

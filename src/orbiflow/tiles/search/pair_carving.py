@@ -31,7 +31,6 @@ from orbiflow.tiles.search.pair_bending import BentPair
 from orbiflow.tiles.tilings import Tiling
 
 SOFTNESS = 0.4  # marks by which one figure may be better before the other one alone counts
-MIN_NECK = 0.01  # the width of necks, in square roots of the mean area, below which scores fall
 ROOM = 0.012  # the gaps that carving apart leaves, in square roots of the mean area
 
 
@@ -64,7 +63,8 @@ class CarvedPair(BentPair):
         if not self.sound:
             return 0.0
         polygons = [plane_points(ring) for ring in self.body.rings(self.points)]
-        return min(neck_factor(neck_up_to(own, MIN_NECK), MIN_NECK) for own in polygons)
+        width = self.figures.min_neck
+        return min(neck_factor(neck_up_to(own, width), width) for own in polygons)
 
     @property
     def scores(self) -> tuple[float, float]:
@@ -83,14 +83,32 @@ class CarvedPair(BentPair):
 def carved_pair(pair: BentPair, steps: int) -> CarvedPair:
     """Carve a pair, by so many steps while points slide and after it.
 
-    If something crosses, or a neck is thin, it is carved apart.
+    If something crosses, or a neck is thin, it is carved apart. Where users say which parts matter, the
+    pair stays as it is bent.
     """
+    if not pair.figures.plain:
+        return _uncarved(pair)
     found = _carved(pair, steps, 0.0)
     return (
         found
         if found.factor == 1
         else max(found, _carved(pair, steps, ROOM), key=lambda own: own.scores)
     )
+
+
+def _uncarved(pair: BentPair) -> CarvedPair:
+    """Return a bent pair with its tile's frame, which its outline gives."""
+    space, n = pair.space, pair.body.size
+    real, imaginary = space.matrices(0)
+    whole = np.concatenate([real, imaginary])
+    outline = pair.points[:n]
+    parameters = scipy.linalg.lstsq(whole, np.concatenate([outline.real, outline.imag]))[0]
+    points = pair.points.copy()
+    points[:n] = real @ parameters + 1j * (imaginary @ parameters)
+    rings = pair.body.rings(points)
+    known = pair.figures, pair.level, pair.glue, pair.kind, pair.placement, points
+    slides = np.zeros(len(rings[0])), np.zeros(len(rings[1]))
+    return CarvedPair(*known, slides, rings, *space.group(0, parameters))
 
 
 def _carved(pair: BentPair, steps: int, room: float) -> CarvedPair:

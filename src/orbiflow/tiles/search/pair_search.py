@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import product
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from orbiflow.arguments import as_choice
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     NEVER,
     Cancel,
@@ -21,11 +23,13 @@ from orbiflow.runtime import (
     process_context,
     work,
 )
-from orbiflow.settings import Count, Range, Settings
+from orbiflow.settings import Count, Range, Seed, Settings
+from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.gluing import Placement, glues, placements
 from orbiflow.tiles.search.pair_bending import (
     BentPair,
     Figures,
+    Stiff,
     bent,
     finer,
     glued_body,
@@ -33,17 +37,35 @@ from orbiflow.tiles.search.pair_bending import (
     unlike,
 )
 from orbiflow.tiles.search.pair_carving import CarvedPair, carved_pair, finer_slides
-from orbiflow.tiles.silhouette import Target
-from orbiflow.tiles.tilings import CLASSES, certify, isohedral_class
+from orbiflow.tiles.search.search_method import Goal
+from orbiflow.tiles.tilings import CLASSES, IsohedralClass, certify, isohedral_class
 
 FIRST_STEPS, LAST_STEPS = 25, 60  # of carving, with half of the points and with all
+PINNED_STIFFNESS = 30.0  # how much stiffer than the rest are parts that a user pins
+MORE_POINTS = (1.0, 1.25, 1.5, 2.0)  # times as many, until outlines do not cross themselves
+
+# Settings of the first look
+LOOK: dict[str, Any] = {
+    "ratios": 1,
+    "glues": 40,
+    "placed": 300,
+    "per_glue": 6,
+    "held": 25,
+    "starts": 12,
+    "carved": 6,
+}
+PairSink = Callable[[str, list[CarvedPair]], object]
+"""Is called with each stage's name and its certified pairs, best first."""
 
 
 class PairSearch(Settings):
-    """The search for pairs.
+    """The search for pairs; the defaults are effort "normal".
 
-    - `ratios`: areas of the second figure over the first, as they are before both bend.
-    - `points`: points of both outlines together, on the first of three levels.
+    - `ratio`: the least and largest area of the second figure over the first, as they are before both
+      bend.
+    - `ratios`: how many such ratios are tried.
+    - `points`: points of both outlines together, on the first of three levels; more if they would cross
+      themselves.
     - `glues`: paths that both outlines may share that are placed, for each ratio and with the second
       figure as it is and mirrored.
     - `placed`: placements of the union's corners, of all these together, that springs draw to tiles.
@@ -54,28 +76,120 @@ class PairSearch(Settings):
     - `ranked`: of these, the best that move their corners.
     - `finalists`: of these, the best that are carved with all points.
     - `classes`: classes of what both figures cover together.
+    - `min_neck`: width of necks below which a tile's score falls, in square roots of the area.
+    - `seed`: moves the outlines' points.
+    - `force`: keep pairs that are not certified, too.
     - `workers`: processes that share the work; 1 stays in this one.
     """
 
-    ratios: tuple[Annotated[float, Range(0.1, 10)], ...] = (0.7, 1.0, 1.4)
+    objective: ClassVar[str] = "likeness"
+    method_name: ClassVar[str] = "pairs"
+    efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "fast": {
+            **{"ratios": 3, "glues": 60, "placed": 1200, "per_glue": 10},
+            **{"held": 40, "starts": 80, "carved": 36, "ranked": 10, "finalists": 8},
+        },
+        "normal": {},
+    }
+
+    ratio: tuple[Annotated[float, Range(0.1, 10)], Annotated[float, Range(0.1, 10)]] = (0.6, 1.7)
+    ratios: Count = 6
     points: Annotated[int, Range(30, 200)] = 64
-    glues: Count = 125
+    glues: Count = 60
     placed: Count = 3200
     per_glue: Count = 16
-    held: Count = 80
+    held: Count = 40
     starts: Count = 160
     carved: Count = 60
     ranked: Count = 20
     finalists: Count = 10
     classes: tuple[str, ...] = tuple(CLASSES)
+    min_neck: Annotated[float, Range(0, 0.2)] = 0.01
+    seed: Seed = 0
+    force: bool = False
     workers: Count = 1
+
+    @classmethod
+    def for_effort(cls, effort: str, **changes: Any) -> PairSearch:
+        """Return the settings of a level of effort, "fast" or "normal", with changes by name."""
+        return cls(**{**cls.efforts[as_choice(effort, tuple(cls.efforts), "effort")], **changes})
+
+    @property
+    def kinds(self) -> list[IsohedralClass]:
+        """The classes, of tiles without a symmetry of their own.
+
+        Raises:
+            SettingError: For others.
+        """
+        every = [name.strip().lower() for name in self.classes] == ["all"]
+        kinds = [isohedral_class(name) for name in (CLASSES if every else self.classes)]
+        if others := [own.name for own in kinds if own.name not in CLASSES]:
+            raise SettingError(
+                f"two figures share tiles of the nine classes {', '.join(CLASSES)}; leave "
+                f"{', '.join(others)} out of {{classes}}"
+            )
+        return kinds
+
+    def figures(self, goals: Sequence[Goal]) -> list[Figures]:
+        """Return both silhouettes at all sizes, the second one as it is and mirrored."""
+        one, two = (np.asarray(goal.target.normal) for goal in goals)
+        first = float(np.random.default_rng(self.seed).random()) if self.seed else 0.0
+        known = {
+            "stiff": tuple(map(_stiff, goals)),
+            "phase": 4 * first,
+            "min_neck": min(least_neck(goal.target.normal, self.min_neck) for goal in goals),
+        }
+        low, high = self.ratio
+        ratios = _between(low, high, self.ratios)
+        for more in MORE_POINTS:
+            count = round(more * self.points)
+            found = [
+                Figures.of(one, two, ratio=float(ratio), mirrored=hand, count=count, **known)
+                for ratio, hand in product(ratios, (False, True))
+            ]
+            with contextlib.suppress(OrbiflowError):
+                for own, level in product(found, (0, 1, 2)):
+                    own.parts(level)
+                return found
+        raise SettingError(
+            "parts of a silhouette are too thin to be followed: draw them thicker, or round them off "
+            "with {smooth} 0.01"
+        )
+
+
+def _between(low: float, high: float, count: int) -> list[float]:
+    """Return so many ratios, evenly on a scale of logarithms; of one, the middle."""
+    if count == 1 or low == high:
+        return [float(np.sqrt(low * high))]
+    return np.geomspace(low, high, count).tolist()
+
+
+def _stiff(goal: Goal) -> Stiff | None:
+    """Return how stiff a silhouette is where a user says what matters."""
+    emphasis, pins = goal.emphasis, goal.pins
+    if pins is None:
+        return None if emphasis is None else emphasis.weight
+    return partial(_stiff_where_pinned, goal)
+
+
+def _stiff_where_pinned(goal: Goal, points: np.ndarray) -> np.ndarray:
+    factor = np.ones(len(points)) if goal.emphasis is None else goal.emphasis.weight(points)
+    return factor * np.where(goal.pins is not None and goal.pins.holds(points), PINNED_STIFFNESS, 1)
+
+
+def first_pair(
+    goals: Sequence[Goal], settings: PairSearch, cancel: Cancel = NEVER
+) -> list[CarvedPair]:
+    """Return certified pairs of two silhouettes in some seconds, best first, if there are any."""
+    few = settings.replace(**LOOK)
+    return _certified(_rough(few, few.figures(goals), _Team(few.workers, ignore, cancel))[1])
 
 
 def search_pair(
-    one: Target,
-    two: Target,
+    goals: Sequence[Goal],
     settings: PairSearch | None = None,
     *,
+    on_pairs: PairSink = lambda _stage, _pairs: None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> list[CarvedPair]:
@@ -85,35 +199,47 @@ def search_pair(
     have a mean area of 1.
 
     Args:
-        one, two: The silhouettes.
+        goals: The silhouettes, and what matters in them.
         settings: How much is tried.
+        on_pairs: Called with pairs that are not yet worked out, too: the stage "better".
         on_event: Called with `Progress`.
         cancel: Checked before each step.
+
+    Raises:
+        OrbiflowError: If a silhouette is too thin to be followed.
+        Cancelled: If the token was cancelled.
     """
     own = settings or PairSearch()
-    figures = [
-        Figures.of(
-            np.asarray(one.normal), np.asarray(two.normal), ratio, mirrored=hand, count=own.points
-        )
-        for ratio, hand in product(own.ratios, (False, True))
-    ]
     team = _Team(own.workers, on_event, cancel)
-    found = team.each(partial(_placed, own), figures, "gluing", 0.3)
-    kept = sorted(placement.residual for placed in found for placement in placed)[: own.placed]
-    best = [[p for p in placed if p.residual <= kept[-1]] for placed in found]
-    jobs = list(zip(figures, best, strict=True))
-    pairs = [pair for some in team.each(partial(_bent, own), jobs, "bending", 0.5) for pair in some]
-    pairs.sort(key=lambda pair: pair.cost)
-    middle = team.each(partial(finer, level=1), unlike(pairs, own.starts), "refining", 0.55)
-    middle.sort(key=lambda pair: pair.cost)
-    starts = unlike(middle, own.carved)
-    carved = team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
+    starts, carved = _rough(own, own.figures(goals), team)
+    on_pairs("better", _certified(_ranked(carved)[: own.finalists]))
     before = dict(zip(map(id, carved), starts, strict=True))
     ranked = unlike(_ranked(carved), own.ranked)
     nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "moving corners", 0.9)
     last = unlike(_ranked([*ranked, *nearby]), own.finalists)
     done = team.each(_detailed, last, "carving with all detail", 1.0)
-    return [pair for pair in _ranked(done) if pair.sound and certify(pair.tiling).valid]
+    return _ranked(done) if own.force else _certified(done)
+
+
+def _certified(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
+    return [pair for pair in _ranked(pairs) if pair.sound and certify(pair.tiling).valid]
+
+
+def _rough(
+    settings: PairSearch, figures: Sequence[Figures], team: _Team
+) -> tuple[list[BentPair], list[CarvedPair]]:
+    """Return pairs with half of the points, before they are carved and after it."""
+    found = team.each(partial(_placed, settings), figures, "gluing", 0.3)
+    kept = sorted(placement.residual for placed in found for placement in placed)[: settings.placed]
+    best = [[p for p in placed if p.residual <= kept[-1]] for placed in found]
+    jobs = list(zip(figures, best, strict=True))
+    bending = team.each(partial(_bent, settings), jobs, "bending", 0.5)
+    pairs = [pair for some in bending for pair in some]
+    pairs.sort(key=lambda pair: pair.cost)
+    middle = team.each(partial(finer, level=1), unlike(pairs, settings.starts), "refining", 0.55)
+    middle.sort(key=lambda pair: pair.cost)
+    starts = unlike(middle, settings.carved)
+    return starts, team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
 
 
 class _Team:
@@ -163,11 +289,10 @@ def _placed(settings: PairSearch, figures: Figures) -> list[Placement]:
     one, two = (part.rest[: part.size] for part in figures.parts(0))
     steps = np.concatenate([np.roll(own, -1) - own for own in (one, two)])
     unit = float((abs(steps) ** 2).mean())
-    kinds = [isohedral_class(name) for name in settings.classes]
     found: list[Placement] = []
     for own in glues(one, two, settings.glues):
         body = glued_body(figures, 0, own.glue)
-        found += placements(body.rest[: body.size], own, kinds, unit, settings.per_glue)
+        found += placements(body.rest[: body.size], own, settings.kinds, unit, settings.per_glue)
     return found
 
 

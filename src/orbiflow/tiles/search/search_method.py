@@ -6,15 +6,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from orbiflow.arguments import as_choice
+from orbiflow.arguments import as_choice, as_instance
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.search.candidates import Fit, OnProgress
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
+
+# How a target is made, for messages
+HOW_TO_GET_A_TARGET = "Target.read, Target.from_mask and Target.from_polygon make one"
 
 # The classes by how often they come near a silhouette at once, for the time that they take
 PREFERRED_CLASSES = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
@@ -31,6 +35,32 @@ class Goal:
     target: Target
     emphasis: Emphasis | None = None  # what must survive
     pins: Pins | None = None  # what must not bend
+
+    @classmethod
+    def read(
+        cls,
+        target: Target,
+        *,
+        emphasis: Path | None = None,
+        strength: float | None = None,
+        pin: Sequence[str] | None = None,
+        keep_angle: bool = False,
+    ) -> Self:
+        """Return a silhouette with what settings say of it: a mask of what matters, and pins.
+
+        Raises:
+            OrbiflowError: For a mask or pin that cannot be read.
+        """
+        as_instance(target, Target, "the target", HOW_TO_GET_A_TARGET)
+        more = {} if strength is None else {"strength": strength}
+        mask = None if emphasis is None else Emphasis.read(emphasis, target, **more)
+        pins = None if pin is None else Pins.read(pin, target, keep_angle=keep_angle)
+        return cls(target, mask, pins)
+
+    @property
+    def notes(self) -> list[str]:
+        """What was decided for the user about emphasis and pins."""
+        return [note for source in (self.emphasis, self.pins) if source for note in source.notes]
 
 
 class SearchMethod(ABC):

@@ -74,7 +74,8 @@ class Solid(Outcome):
 
     - `kind`: What it is, such as "cutter".
     - `tile`: The tile that it is made of.
-    - `parts`: Closed bodies by name; a puzzle has a "tray" and "piece 1", ...
+    - `parts`: Closed bodies by name; a puzzle has a "tray" and "piece 1", ..., and what is made of
+      two figures one body for each.
     - `title`: What a file says about it.
     - `notes`: What the user should know.
     """
@@ -120,6 +121,7 @@ def make_solid(
     settings: SolidSettings | None = None,
     *,
     picture: str | Path | None = None,
+    second_picture: str | Path | None = None,
     force: bool = False,
 ) -> Solid:
     """Return a solid to print, made of a tile.
@@ -128,6 +130,7 @@ def make_solid(
         tile, force: As for `export`; for a drawing the tile needs a map.
         settings: What is made, and how; `solid_file` then writes it.
         picture: An SVG drawing over the silhouette, for a stamp or mould.
+        second_picture: One over the second silhouette, of a tile of two figures.
 
     Raises:
         CertificationError: If the tile is not certified.
@@ -135,25 +138,30 @@ def make_solid(
         InputFileError: If the drawing cannot be read, or is a picture of pixels.
     """
     settings, given = settings or SolidSettings(), as_tile(tile)
-    settings.check_picture(picture)
+    settings.check_picture(picture or second_picture)
     certificate = given.require_certified(
         force=force, otherwise="so no solid is made of it; {force} makes one, marked so"
     )
     title = f"{settings.kind} of {given.name} in mm, made with orbiflow {__version__}"
     if not certificate.valid:
         title = f"NOT CERTIFIED: {title}"
-    placed, notes = laid_out(given, _page(settings), picture)
-    drawing = Motif() if placed.motif is None else placed.motif
-    if drawing.rasters:
-        raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
-    plan = Plan(settings, placed, dark_parts(drawing, settings.nozzle)[0])
-    notes = (*notes, *_gap_notes(plan), *_dark_notes(plan))
-    return Solid(kind=settings.kind, tile=given, parts=shape(plan), title=title, notes=notes)
+    pictures = picture, second_picture
+    placed, notes = laid_out(given, _page(settings), pictures)
+    drawings = placed.motifs or (Motif(),) * len(given.figures)
+    for file, drawing in zip(pictures, drawings, strict=False):
+        if drawing.rasters:
+            raise InputFileError(f"{file}: a {settings.kind} needs lines: draw it as SVG")
+    plans = [
+        Plan(settings, placed, dark_parts(drawing, settings.nozzle)[0], number)
+        for number, drawing in enumerate(drawings)
+    ]
+    notes = (*notes, *(note for plan in plans for note in _gap_notes(plan) + _dark_notes(plan)))
+    return Solid(kind=settings.kind, tile=given, parts=shape(plans), title=title, notes=notes)
 
 
 def _page(settings: SolidSettings) -> ExportSettings:
     """Return how the tile is laid out: a puzzle's for most whole tiles within the tray's walls."""
-    names = ("tile_size", "warn_neck", "strokes", "eyes")
+    names = ("tile_size", "warn_neck", "strokes", "eyes", "second_eyes")
     page = ExportSettings(**{name: getattr(settings, name) for name in names})
     if settings.kind != "puzzle":
         return page.replace(cut="pieces")
@@ -196,11 +204,12 @@ class Plan(NamedTuple):
     settings: SolidSettings
     layout: Layout
     drawing: BaseGeometry
+    number: int = 0  # which of the tile's figures it is made of
 
     @property
     def ring(self) -> Array:
-        """The tile's outline (N, 2)."""
-        return self.layout.outline.closed.flattened(FLATNESS)
+        """The figure's outline (N, 2)."""
+        return self.layout.outline.closed[self.number].flattened(FLATNESS)
 
     @property
     def piece(self) -> shapely.Polygon:
@@ -208,19 +217,41 @@ class Plan(NamedTuple):
         return shapely.Polygon(cut_ring(self.ring, 0.0, self.settings.clearance))
 
 
-def shape(plan: Plan) -> dict[str, Manifold]:
+def shape(plans: Sequence[Plan]) -> dict[str, Manifold]:
     """Return the parts of a solid by name, as they are printed and seen from above.
+
+    What is made of two figures lies side by side.
 
     What a cutter, stamp or mould makes is seen from its other side: they are mirrored, so that it
     looks like the tile.
     """
     makers = {"tile": _tile, "cutter": _cutter, "stamp": _stamp, "mould": _mould}
-    kind = plan.settings.kind
+    kind = plans[0].settings.kind
     across = -1.0 if kind in ("cutter", "stamp", "mould") else 1.0
-    found = _puzzle(plan) if kind == "puzzle" else {kind: makers[kind](plan)}
+    if kind == "puzzle":
+        found = _puzzle(plans)
+    elif len(plans) == 1:
+        found = {kind: makers[kind](plans[0])}
+    else:
+        figures = (part.figure.name for part in plans[0].layout.tile.figures)
+        names = [f"{kind} {number}, {name}" for number, name in enumerate(figures, 1)]
+        found = dict(zip(names, map(makers[kind], plans), strict=True))
+        found = dict(zip(names, _in_a_row(list(found.values()), across), strict=True))
     turned = [body.scale((across, -1.0, 1.0)) for body in found.values()]
     x, y = np.min([body.bounding_box()[:2] for body in turned], axis=0)
     return {name: body.translate((-x, -y, 0.0)) for name, body in zip(found, turned, strict=True)}
+
+
+def _in_a_row(bodies: Sequence[Manifold], across: float) -> list[Manifold]:
+    """Return bodies moved apart, from left to right once x is multiplied by `across`."""
+    placed: list[Manifold] = []
+    right = 0.0
+    for body in bodies:
+        low, _, _, high, *_ = body.bounding_box()
+        left = low if across > 0 else -high
+        placed.append(body.translate((across * (right - left), 0.0, 0.0)))
+        right += high - low + APART
+    return placed
 
 
 def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
@@ -276,9 +307,10 @@ def _mould(plan: Plan) -> Manifold:
     )
 
 
-def _puzzle(plan: Plan) -> dict[str, Manifold]:
+def _puzzle(plans: Sequence[Plan]) -> dict[str, Manifold]:
     """Return a tray and its pieces, in it or beside it on the bed."""
-    settings, copies = plan.settings, plan.layout.page.copies
+    plan, copies = plans[0], plans[0].layout.page.copies
+    settings = plan.settings
     fit = min(len(copies), MOST_PIECES)
     wanted = settings.copies or max(fit, 1)
     if wanted > fit:
@@ -289,20 +321,22 @@ def _puzzle(plan: Plan) -> dict[str, Manifold]:
     centers = copies.centers()
     far = np.linalg.norm(centers - centers.mean(axis=0), axis=1)
     copies = copies.select(np.sort(np.argsort(far, kind="stable")[:wanted]))
-    tray, piece = _tray(plan, copies.images(plan.ring)), _tile(plan)
+    tray, kinds = _tray(plan, copies.rings([own.ring for own in plans])), list(map(_tile, plans))
     moves = np.zeros((wanted, 3, 4))
     moves[:, :2, :2] = copies.group.linear_parts[copies.cosets]
     moves[:, :2, 3], moves[:, 2, 2] = copies.translations, 1.0
     moves[:, 2, 3] = settings.floor if settings.assembled else 0.0
-    pieces = [piece.transform(move) for move in moves]
+    numbers = copies.prototiles.tolist()
+    pieces = [kinds[k].transform(move) for k, move in zip(numbers, moves, strict=True)]
     pieces = pieces if settings.assembled else _beside(tray, pieces)
     return {"tray": tray, **{f"piece {k}": body for k, body in enumerate(pieces, 1)}}
 
 
-def _tray(plan: Plan, rings: Array) -> Manifold:
-    """Return a tray around tiles (M, N, 2), half as deep as the pieces are high."""
+def _tray(plan: Plan, rings: Sequence[Array]) -> Manifold:
+    """Return a tray around tiles (N, 2), half as deep as the pieces are high."""
     settings, gap = plan.settings, plan.settings.clearance / 2
-    grown = shapely.buffer(shapely.polygons(rings), gap, join_style="mitre", mitre_limit=2)
+    polygons = [shapely.Polygon(ring) for ring in rings]
+    grown = shapely.buffer(polygons, gap, join_style="mitre", mitre_limit=2)
     cavity = shapely.union_all(grown)
     if settings.tray_border == "straight":
         around = shapely.box(*cavity.bounds).buffer(settings.wall)

@@ -1,7 +1,7 @@
 """Colourings in which tiles that share an edge differ: periodic, with few colours."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, TypeAlias
@@ -68,12 +68,14 @@ class Colouring:
         count: The number of colours.
         sublattice: The sublattice in Hermite normal form, in the basis of the group's lattice.
         table: The colour (A, a, c) by aspect and by cell modulo the sublattice.
+        shares: How many of the colours each prototile has, in order.
     """
 
     tiling: Tiling
     count: int
     sublattice: Sublattice
     table: Integers
+    shares: tuple[int, ...]
 
     def colour(self, element: Isometry) -> int:
         """Return the colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
@@ -94,10 +96,11 @@ class Colouring:
 def colouring(tile: Tiles) -> Colouring:
     """Return a proper colouring with the fewest colours that a small sublattice allows.
 
-    The search is exact on the quotient of the tiling by each sublattice of index up to 9, for 1, 2,
-    3 ... colours in turn. It is deterministic: of equals the smallest index wins, so that colours
-    follow the aspects where possible. Colour 0 is the most frequent, and so on. Extremely skew
-    lattices, whose tiles meet their own translates modulo all those sublattices, get a larger one.
+    Each of several prototiles has colours of its own. The search is exact on the quotient of the tiling
+    by each sublattice of index up to 9, for 1, 2, 3 ... colours in turn. It is deterministic: of equals
+    the smallest index wins, so that colours follow the aspects where possible. Of a prototile's colours
+    the first is the most frequent, and so on. Extremely skew lattices, whose tiles meet their own
+    translates modulo all those sublattices, get a larger one.
 
     Raises `OrbiflowError` if polygon and group are of very different size.
 
@@ -107,26 +110,45 @@ def colouring(tile: Tiles) -> Colouring:
     3
     """
     tiling = as_tiling(tile)
-    links = _links(tiling)
-    graph_of = cache(partial(_quotient, links))  # few are needed
+    links, table = _links(tiling), tiling.aspects
+    kinds = [np.flatnonzero(table.prototiles == k) for k in range(len(tiling.prototiles))]
+    among = [_among(links, kind.tolist()) for kind in kinds]
+    least = [_least_colours(own) for own in among]
+    coloured = cache(partial(_coloured, among))  # few are needed
+
+    def fewest(sublattice: Sublattice, most: int) -> list[list[int]]:
+        """Return each prototile's colours, if together they are at most so many; else nothing."""
+        found: list[list[int]] = []
+        for k in range(len(kinds)):
+            room = most - sum(max(own) + 1 for own in found) - sum(least[k + 1 :])
+            options = (coloured(k, sublattice, count) for count in range(least[k], room + 1))
+            own = next((own for own in options if own is not None), None)
+            if own is None:
+                return []
+            found.append(own)
+        return found
 
     def is_loop_free(sublattice: Sublattice) -> bool:
-        return all(node not in near for node, near in enumerate(graph_of(sublattice)))
+        quotients = (_quotient(own, sublattice) for own in among)
+        return all(node not in near for graph in quotients for node, near in enumerate(graph))
 
     sublattices, size = [h for index in _INDICES for h in _sublattices(index)], max(_INDICES)
-    while not any(is_loop_free(own) for own in sublattices):
+    while not (free := [own for own in sublattices if is_loop_free(own)]):
         size *= 2
         sublattices = [(size, 0, size)]
-    count, sublattice, colours = next(
-        (count, sublattice, colours)
-        for count in itertools.count(_least_colours(links))  # one more than neighbours is enough
-        for sublattice in filter(is_loop_free, sublattices)
-        if (colours := colour_graph(graph_of(sublattice), count)) is not None
+    sublattice, colours = next(
+        (sublattice, found)
+        for count in itertools.count(sum(least))  # one more than neighbours is enough
+        for sublattice in free
+        if (found := fewest(sublattice, count))
     )
-    shape = (len(tiling.aspects), sublattice[0], sublattice[2])
-    order = np.argsort(-np.bincount(colours), kind="stable")  # the most frequent colour first
-    table = np.argsort(order)[np.array(colours)].reshape(shape)
-    return Colouring(tiling, count, sublattice, table)
+    a, _, c = sublattice
+    numbers, shares = np.zeros((len(table), a, c), dtype=np.int64), list[int]()
+    for kind, own in zip(kinds, colours, strict=True):
+        order = np.argsort(-np.bincount(own), kind="stable")  # the most frequent colour first
+        numbers[kind] = sum(shares) + np.argsort(order)[np.array(own)].reshape(len(kind), a, c)
+        shares.append(len(order))
+    return Colouring(tiling, sum(shares), sublattice, numbers, tuple(shares))
 
 
 def reduce_cell(cell: Any, sublattice: Sublattice) -> tuple[Any, Any]:
@@ -149,6 +171,19 @@ def _links(tiling: Tiling) -> _Links:
         found = [table.find(group, g @ near, near.prototile) for near in shared[int(k)]]
         links.append([(aspect, cell) for aspect, cell, _ in found])
     return links
+
+
+def _among(links: _Links, aspects: list[int]) -> _Links:
+    """Return the links among some aspects, which are numbered anew."""
+    number = {aspect: k for k, aspect in enumerate(aspects)}
+    return [[(number[k], cell) for k, cell in links[own] if k in number] for own in aspects]
+
+
+def _coloured(
+    among: Sequence[_Links], kind: int, sublattice: Sublattice, count: int
+) -> list[int] | None:
+    """Return a proper colouring of one prototile's tiles modulo a sublattice, or None."""
+    return colour_graph(_quotient(among[kind], sublattice), count)
 
 
 def _least_colours(links: _Links) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ SCHEMA_VERSION = 1
 
 def write_json(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
     """Return the scene as JSON; all lengths in mm, y down from the page's upper left corner."""
-    scene, prototile = flattened(scene, tolerance), scene.prototile
+    scene, prototiles = flattened(scene, tolerance), scene.prototiles
+    several = {"prototiles": list(map(_rounded, prototiles))} if len(prototiles) > 1 else {}
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "kind": "orbiflow-export",
@@ -25,17 +27,19 @@ def write_json(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
         "y": "down",
         "page": {"width": scene.width, "height": scene.height, "window": list(scene.clip)},
         **scene.facts,
-        "prototile": None if prototile is None else _rounded(prototile),
-        "tiles": [_tile(tile, number, prototile) for number, tile in enumerate(scene.tiles)],
+        "prototile": _rounded(prototiles[0]) if prototiles else None,
+        **several,
+        "tiles": [_tile(tile, number, prototiles) for number, tile in enumerate(scene.tiles)],
         "layers": [_layer(scene, layer, tolerance) for layer in scene.layers],
     }
     return json.dumps(document, allow_nan=False, separators=(",", ":"))
 
 
-def _tile(tile: PlacedTile, number: int, prototile: np.ndarray | None) -> dict[str, Any]:
-    placed = {}
-    if prototile is not None:
-        placed["polygon"] = _rounded(prototile @ tile.linear.T + tile.offset)
+def _tile(tile: PlacedTile, number: int, prototiles: Sequence[np.ndarray]) -> dict[str, Any]:
+    placed: dict[str, Any] = {"prototile": tile.prototile} if len(prototiles) > 1 else {}
+    if prototiles:
+        polygon = prototiles[tile.prototile]
+        placed["polygon"] = _rounded(polygon @ tile.linear.T + tile.offset)
     return {
         "number": number,
         "aspect": tile.aspect,

@@ -1,0 +1,106 @@
+"""What a search for two figures has found, and its events, from a first look to finished tiles."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from orbiflow.runtime import (
+    Cancel,
+    Cancelled,
+    ClassFailed,
+    Note,
+    Preview,
+    Sink,
+    TileFound,
+    one_blas_thread,
+    one_thread,
+)
+from orbiflow.tiles.search.finished_tiles import ClassFailure, rated
+from orbiflow.tiles.search.pair_carving import CarvedPair
+from orbiflow.tiles.search.pair_search import PairSearch, first_pair, search_pair
+from orbiflow.tiles.search.pair_tiles import finished_pair
+from orbiflow.tiles.search.search_method import Goal
+from orbiflow.tiles.search.search_record import INTERRUPTED, OnTile, without_twins
+from orbiflow.tiles.tile import EscherTile, SearchFacts
+
+NOTHING = "no tile of both figures is certified"
+
+
+class Found(NamedTuple):
+    """What was found."""
+
+    tiles: Sequence[EscherTile]  # best first
+    failures: Sequence[ClassFailure]
+    interrupted: frozenset[str]  # the classes that were not finished
+
+
+class PairRecord:
+    """Searches for two figures, and keeps and reports the tiles of each stage."""
+
+    def __init__(
+        self, goals: tuple[Goal, Goal], settings: PairSearch, on_tile: OnTile | None, on_event: Sink
+    ) -> None:
+        self.goals, self.settings, self.on_tile, self.on_event = goals, settings, on_tile, on_event
+        self.names = [kind.name for kind in settings.kinds]
+        self._pairs: list[CarvedPair] = []
+        self._is_done = False
+
+    def search(self, on_checked: Callable[[], object] | None, cancel: Cancel) -> Found:
+        """Search, with a first look before `on_checked` is called."""
+        begin, on_event = time.perf_counter(), self.on_event
+        with contextlib.suppress(Cancelled):
+            if first := self._show("sketch", first_pair(self.goals, self.settings, cancel)[:1]):
+                name, iou = first[0].isohedral_class, first[0].worst.likeness.metrics.iou
+                on_event(Preview(name, iou, time.perf_counter() - begin))
+            if on_checked is not None:
+                on_checked()
+            for note in (*self.goals[0].notes, *self.goals[1].notes):
+                on_event(Note(note))
+            self._pairs = search_pair(
+                self.goals, self.settings, on_pairs=self._show, on_event=on_event, cancel=cancel
+            )
+            self._is_done = True
+        tiles = self._finished(self._pairs)
+        return self._told(tiles, time.perf_counter() - begin)
+
+    def _show(self, stage: str, pairs: list[CarvedPair]) -> list[EscherTile]:
+        """Keep the pairs of a stage, and return them as tiles if somebody sees them."""
+        self._pairs = pairs or self._pairs
+        if self.on_tile is None and stage != "sketch":
+            return []
+        tiles = self._finished(pairs)
+        if self.on_tile is not None:
+            for tile in tiles:
+                self.on_tile(tile, stage)
+        return tiles
+
+    def _finished(self, pairs: Sequence[CarvedPair]) -> list[EscherTile]:
+        """Return pairs as tiles with their ratings, best first, no two of them alike."""
+        targets = [goal.target for goal in self.goals]
+        facts = SearchFacts(self.settings.objective, starts=self.settings.placed)
+        with one_thread(), one_blas_thread():
+            found = [finished_pair(targets, pair).changed(search=facts) for pair in pairs]
+        tiles = rated(found, *targets)
+        tiles.sort(key=lambda tile: -tile.score)
+        kept = without_twins(tiles, self.settings.finalists) if tiles else []
+        return [tiles[k] for k in sorted(kept)]
+
+    def _told(self, tiles: list[EscherTile], seconds: float) -> Found:
+        """Report the tiles of a search that took so many seconds; each class has its share of them."""
+        reason, kinds = NOTHING if self._is_done else INTERRUPTED, len({t.name for t in tiles})
+        share = seconds * self.settings.workers / max(1, kinds)
+        tiles = [t.changed(search=replace(t.search, seconds=share)) for t in tiles]
+        failures = [] if tiles else [ClassFailure(name, reason) for name in self.names]
+        for tile in tiles:
+            iou, certified = tile.worst.likeness.metrics.iou, tile.certificate.valid
+            self.on_event(TileFound(tile.isohedral_class, iou, tile.score, certified))
+            if self.on_tile is not None and self._is_done:
+                self.on_tile(tile, "final")
+        for failure in failures:
+            self.on_event(ClassFailed(failure.name, failure.reason))
+        left = [tile.isohedral_class for tile in tiles] if tiles else self.names
+        return Found(tiles, failures, frozenset() if self._is_done else frozenset(left))

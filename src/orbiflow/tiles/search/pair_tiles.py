@@ -1,0 +1,114 @@
+"""Finished tiles of two figures: from a carved pair to polygons, maps and measures of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+
+import numpy as np
+
+from orbiflow.arrays import Integers
+from orbiflow.tiles.geometry import Place, plane_points, reverse
+from orbiflow.tiles.likeness import Elastic, Overlap, Stiffness, kept_of
+from orbiflow.tiles.search.bending import FOLLOW_ROUNDS, Bent, PlacedBent, placed_best
+from orbiflow.tiles.search.carving import Laid, cornered
+from orbiflow.tiles.search.co_deformation import Orientation
+from orbiflow.tiles.search.finished_tiles import measured_tile, with_bent
+from orbiflow.tiles.search.pair_carving import CarvedPair
+from orbiflow.tiles.silhouette import Samples, Target
+from orbiflow.tiles.tile import NO_MAP, EscherTile, Part
+from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tilings import Tile
+
+FLIP = np.array([1.0, -1.0])
+
+
+def finished_pair(targets: Sequence[Target], pair: CarvedPair) -> EscherTile:
+    """Return a carved pair as a finished tile, in the coordinates of the first silhouette.
+
+    The first figure lies over its silhouette.
+    """
+    placed = [_placed(target, pair, k) for k, target in enumerate(targets)]
+    frames = [Place(target.frame.linear, target.frame.offset) for target in targets]
+    ways = [_place(own, pair, k) for k, own in enumerate(placed)]
+    whole = frames[0].after(ways[0])
+    parts: list[Part] = []
+    for k, (target, own) in enumerate(zip(targets, placed, strict=True)):
+        polygon = plane_points(pair.body.rings(pair.points)[k])
+        tile = Tile(polygon, pair.tiling.group, corners=tuple(own.bent.corners.tolist()))
+        figure = measured_tile(target, tile.transformed(*ways[k]), TileMap(), target)
+        figure = with_bent(target, figure, own, target)
+        figure = figure.changed(name=PurePath(target.source).stem)
+        parts.append(Part(figure, whole.after(frames[k].after(ways[k]).inverse)))
+    union = _union(pair)
+    return EscherTile(
+        union.transformed(*whole),
+        y_down=targets[0].y_down,
+        silhouette=targets[0].report(),
+        no_map=NO_MAP,
+        normal=union.transformed(*ways[0]),
+        parts=tuple(parts),
+    )
+
+
+def _union(pair: CarvedPair) -> Tile:
+    """Return both figures together as a tile of the pair's class, in the pair's own coordinates."""
+    lengths, start = pair.placement.lengths[0], int(pair.placement.starts[0])
+    ring = np.roll(plane_points(pair.points[: pair.body.size]), -start, axis=0)
+    corners = np.cumsum(lengths) - lengths
+    return Tile(ring, pair.tiling.group, pair.kind.name, tuple(corners.tolist()))
+
+
+def _place(placed: PlacedBent, pair: CarvedPair, k: int) -> Place:
+    """Return the map from the pair's coordinates to the normal form of a silhouette."""
+    a, b = placed.factor / pair.figures.sizes[k], placed.shift
+    place = Place(np.array([[a.real, -a.imag], [a.imag, a.real]]), np.array([b.real, b.imag]))
+    if placed.bent.orientation.mirrored:
+        place = Place(np.diag(FLIP), np.zeros(2)).after(place)
+    return place
+
+
+def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
+    """Return a figure of a pair as a bent silhouette that is a tile, over its silhouette."""
+    mirrored, scale = bool(k) and pair.figures.mirrored, pair.figures.sizes[k]
+    part, places = pair.body.parts[k], pair.body.places[k]
+    normal = np.asarray(target.normal)
+    ring = part.mesh.points[: part.size] / scale
+    body = Elastic(ring, Stiffness())
+    side = Orientation(
+        mirrored,
+        reverse(normal) * FLIP if mirrored else normal,
+        Samples(*[reverse(ring) * FLIP if mirrored else ring] * 3),
+        lambda _level, _stiffness: body,
+        plain=True,
+    )
+    corners = _corners(pair, places[: part.size], k)
+    along, corners = cornered(np.arange(part.size) + pair.slides[k], corners)
+    vertices = pair.points[places] / scale
+    outline = Laid.straight(along).points(vertices[: part.size])
+    points = vertices[:, None]
+    for _ in range(FOLLOW_ROUNDS):
+        points = body.condensed.whole(outline[:, None], body.forces(points))
+    bent = Bent(
+        side,
+        body,
+        vertices[: part.size],
+        points[:, 0],
+        corners,
+        pair.linear / scale,
+        pair.offset / scale,
+        pair.placement,
+        kept_of(body.measures, outline, 0.0),
+        pair.factor,
+    )
+    return placed_best(bent, Overlap(normal * FLIP if mirrored else normal))
+
+
+def _corners(pair: CarvedPair, ring: Integers, k: int) -> Integers:
+    """Return which points of a figure's outline are corners of the union or ends of the path."""
+    lengths, start = pair.placement.lengths[0], pair.placement.starts[0]
+    corners = (np.cumsum(lengths) - lengths + start) % pair.body.size
+    glue, size = pair.glue, len(ring)
+    first = glue.second if k else glue.first
+    ends = [first % size, (first + glue.length) % size]
+    return np.union1d(np.flatnonzero(np.isin(ring, corners)), ends)

@@ -1,0 +1,38 @@
+"""Searches for two figures made small, and the pair that one finds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import pytest
+
+from orbiflow.tiles import EscherizeSettings, SearchResult, escherize
+from orbiflow.tiles.search.pair_search import LOOK, PairSearch
+from outlines import animal
+
+NAMES = "squirrel.dat", "nagata/dolphin_60.dat"
+FEW: dict[str, Any] = {
+    "ratios": 1, "points": 48, "glues": 20, "placed": 80, "held": 8, "starts": 6, "carved": 3,
+    "ranked": 2, "finalists": 2,
+}  # fmt: skip
+
+
+@contextmanager
+def small_pairs() -> Iterator[None]:
+    """Search for pairs at the effort "fast" from few glues, in this process and its forks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(PairSearch.efforts, "fast", FEW)  # pyright: ignore[reportArgumentType]
+        for name in ("glues", "placed", "held", "starts", "carved"):
+            patch.setitem(LOOK, name, FEW[name])
+        yield
+
+
+@cache
+def pair_result() -> SearchResult:
+    """What a small search finds for two animals."""
+    one, two = map(animal, NAMES)
+    with small_pairs():
+        return escherize(one, EscherizeSettings(effort="fast"), second=two)
