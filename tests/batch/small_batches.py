@@ -137,7 +137,7 @@ def deadly(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
     """Kills the process that works on `b"deadly"`; all else is done at once."""
     if data == b"deadly":
         os._exit(3)
-    ended = Finished("done", {"name": json.loads(header)["name"]})
+    ended = Finished("done", {"name": json.loads(header)["reads"][0][1]})
     return json.dumps(ended.to_json()), {"file": data}
 
 

@@ -126,7 +126,7 @@ def test_outlines_of_symmetric_tiles_tile(tiling: Tiling) -> None:
     size = float(np.sqrt(tiling.tile_area))
     smooth = outline(tile, 0.01 * size)
     assert smooth.note == ""
-    ring = smooth.closed.flattened(1e-3 * size)
+    ring = smooth.closed[0].flattened(1e-3 * size)
     found = certify(Tile(ring, tiling.group), tolerance=5e-3)
     assert found.total_overlap < 5e-3
     assert found.uncovered < 5e-3

@@ -323,7 +323,7 @@ def require_figures(tile: EscherTile, settings: MotifSettings, pictures: int) ->
     """Check that a tile has figures for all that is to be drawn on them.
 
     Raises:
-        SettingError: If what is said of the second figure has no figure.
+        SettingError: If something is for a second figure, and there is none.
     """
     extra = {"second_picture": pictures > 1, "second_eyes": bool(settings.second_eyes)}
     for name in (name for name, given in extra.items() if given and len(tile.figures) == 1):

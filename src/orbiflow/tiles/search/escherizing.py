@@ -38,15 +38,9 @@ from orbiflow.tiles.search.finished_tiles import ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.pair_record import PairRecord
 from orbiflow.tiles.search.pair_search import PairSearch
-from orbiflow.tiles.search.search_method import (
-    HOW_TO_GET_A_TARGET,
-    SYMMETRIC_CLASSES,
-    Goal,
-    SearchMethod,
-    Sketches,
-)
+from orbiflow.tiles.search.search_method import SYMMETRIC_CLASSES, Goal, SearchMethod, Sketches
 from orbiflow.tiles.search.search_record import OnTile, Outcome, Record, without_twins
-from orbiflow.tiles.silhouette import Emphasis, Pins, Target
+from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
 

@@ -27,8 +27,7 @@ from orbiflow.tiles.likeness import (
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
-from orbiflow.tiles.search.search_method import HOW_TO_GET_A_TARGET
-from orbiflow.tiles.silhouette import Target, is_mere_line
+from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Target, is_mere_line
 from orbiflow.tiles.tile import EscherTile, SearchFacts
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Tile
@@ -174,7 +173,7 @@ LONG_OUTLINE_LENGTH = 8.5  # in square roots of the area: long thin limbs, such 
 
 def why_poor(best: EscherTile) -> str:
     """Return why few people would find a run's best tile good, and what to try; "" if many would."""
-    kept = best.likeness.fidelity
+    kept = best.worst.likeness.fidelity
     share = best.score if kept else 1.0
     if share >= POOR_SCORE and not (best.rating and best.rating.word == "poor"):
         return ""
@@ -193,7 +192,7 @@ def rounded_for(tiles: Sequence[EscherTile]) -> Advice:
     """Return which tiles are of the silhouette with thin parts rounded off; "" if none are."""
     shares: dict[float, list[str]] = {}
     for tile in tiles:
-        if share := tile.likeness.smoothed:
+        if share := tile.worst.likeness.smoothed:
             shares.setdefault(share, []).append(tile.isohedral_class)
     lines = (
         f"no tile of {', '.join(dict.fromkeys(names))} has all of the silhouette's thin parts: what is "

@@ -37,6 +37,7 @@ from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 MULTIPLES = (1, 2, 4)  # points of each level for each point of the first
 HELD_ROUNDS = 5  # steps of the minimisation among tiles
 SPRUNG_ROUNDS = 3  # steps of springs that compare neighbours
+CROSSING_MARKS = 1.0  # less for a pair in which something crosses, before it is carved
 TWIN_DISTANCE = 4e-4  # mean squared distance of both outlines below which pairs are twins
 MOST_CHANGED = 3  # steps by which lengths of edges change at a time, in all
 BEST_OF_GLUE = 5  # neighbours of each neighbouring glue that are worked out
@@ -146,6 +147,11 @@ class BentPair:
     def cost(self) -> float:
         """What bending costs, by which pairs are compared before they are carved."""
         return float(together(self._costs[0])) + CROSSING_COST * (not self.sound)
+
+    @property
+    def promise(self) -> float:
+        """The mark of the worse figure, less if something crosses: it predicts what carving gives."""
+        return min(self.marks) - CROSSING_MARKS * (not self.sound)
 
     @property
     def outlines(self) -> tuple[Complex, Complex]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from orbiflow.errors import SettingError
 from orbiflow.runtime import (
     Cancel,
     Cancelled,
@@ -20,6 +21,7 @@ from orbiflow.runtime import (
     one_thread,
 )
 from orbiflow.tiles.search.finished_tiles import ClassFailure, rated
+from orbiflow.tiles.search.likeness_search import ROUNDED_SHARES, rounded_off
 from orbiflow.tiles.search.pair_carving import CarvedPair
 from orbiflow.tiles.search.pair_search import PairSearch, first_pair, search_pair
 from orbiflow.tiles.search.pair_tiles import finished_pair
@@ -48,12 +50,15 @@ class PairRecord:
         self.names = [kind.name for kind in settings.kinds]
         self._pairs: list[CarvedPair] = []
         self._is_done = False
+        plain = all(goal.emphasis is None and goal.pins is None for goal in goals)
+        shares = (0.0, *ROUNDED_SHARES) if plain else (0.0,)
+        self._rounded, self._share = _thick_enough(goals, settings, shares)
 
     def search(self, on_checked: Callable[[], object] | None, cancel: Cancel) -> Found:
         """Search, with a first look before `on_checked` is called."""
         begin, on_event = time.perf_counter(), self.on_event
         with contextlib.suppress(Cancelled):
-            if first := self._show("sketch", first_pair(self.goals, self.settings, cancel)[:1]):
+            if first := self._show("sketch", first_pair(self._rounded, self.settings, cancel)[:1]):
                 name, iou = first[0].isohedral_class, first[0].worst.likeness.metrics.iou
                 on_event(Preview(name, iou, time.perf_counter() - begin))
             if on_checked is not None:
@@ -61,7 +66,7 @@ class PairRecord:
             for note in (*self.goals[0].notes, *self.goals[1].notes):
                 on_event(Note(note))
             self._pairs = search_pair(
-                self.goals, self.settings, on_pairs=self._show, on_event=on_event, cancel=cancel
+                self._rounded, self.settings, on_pairs=self._show, on_event=on_event, cancel=cancel
             )
             self._is_done = True
         tiles = self._finished(self._pairs)
@@ -80,11 +85,11 @@ class PairRecord:
 
     def _finished(self, pairs: Sequence[CarvedPair]) -> list[EscherTile]:
         """Return pairs as tiles with their ratings, best first, no two of them alike."""
-        targets = [goal.target for goal in self.goals]
+        targets, originals = ([goal.target for goal in own] for own in (self._rounded, self.goals))
         facts = SearchFacts(self.settings.objective, starts=self.settings.placed)
         with one_thread(), one_blas_thread():
-            found = [finished_pair(targets, pair).changed(search=facts) for pair in pairs]
-        tiles = rated(found, *targets)
+            found = [finished_pair(targets, pair, originals, self._share) for pair in pairs]
+        tiles = rated([tile.changed(search=facts) for tile in found], *originals)
         tiles.sort(key=lambda tile: -tile.score)
         kept = without_twins(tiles, self.settings.finalists) if tiles else []
         return [tiles[k] for k in sorted(kept)]
@@ -104,3 +109,22 @@ class PairRecord:
             self.on_event(ClassFailed(failure.name, failure.reason))
         left = [tile.isohedral_class for tile in tiles] if tiles else self.names
         return Found(tiles, failures, frozenset() if self._is_done else frozenset(left))
+
+
+def _thick_enough(
+    goals: tuple[Goal, Goal], settings: PairSearch, shares: Sequence[float]
+) -> tuple[tuple[Goal, Goal], float]:
+    """Return silhouettes that can be followed, and the first of the shares at which they can.
+
+    That is the share of their lengths below which parts are rounded off. Raises `SettingError` if
+    nothing helps.
+    """
+    share, *rest = shares
+    one, two = (Goal(rounded_off(goal.target, share)) if share else goal for goal in goals)
+    try:
+        settings.figures((one, two))
+    except SettingError:
+        if not rest:
+            raise
+        return _thick_enough(goals, settings, rest)
+    return (one, two), share

@@ -237,7 +237,7 @@ def _rough(
     pairs = [pair for some in bending for pair in some]
     pairs.sort(key=lambda pair: pair.cost)
     middle = team.each(partial(finer, level=1), unlike(pairs, settings.starts), "refining", 0.55)
-    middle.sort(key=lambda pair: pair.cost)
+    middle.sort(key=lambda pair: -pair.promise)
     starts = unlike(middle, settings.carved)
     return starts, team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import PurePath
 
 import numpy as np
@@ -23,28 +24,37 @@ from orbiflow.tiles.tilings import Tile
 FLIP = np.array([1.0, -1.0])
 
 
-def finished_pair(targets: Sequence[Target], pair: CarvedPair) -> EscherTile:
+def finished_pair(
+    targets: Sequence[Target],
+    pair: CarvedPair,
+    originals: Sequence[Target] | None = None,
+    smoothed: float = 0.0,
+) -> EscherTile:
     """Return a carved pair as a finished tile, in the coordinates of the first silhouette.
 
-    The first figure lies over its silhouette.
+    The first figure lies over its silhouette. Both are rated by how much they are like the `originals`,
+    if the targets are these with what is narrower than the share `smoothed` of their lengths rounded
+    off.
     """
+    originals = originals or targets
     placed = [_placed(target, pair, k) for k, target in enumerate(targets)]
     frames = [Place(target.frame.linear, target.frame.offset) for target in targets]
     ways = [_place(own, pair, k) for k, own in enumerate(placed)]
     whole = frames[0].after(ways[0])
     parts: list[Part] = []
-    for k, (target, own) in enumerate(zip(targets, placed, strict=True)):
+    for k, (target, own, original) in enumerate(zip(targets, placed, originals, strict=True)):
         polygon = plane_points(pair.body.rings(pair.points)[k])
         tile = Tile(polygon, pair.tiling.group, corners=tuple(own.bent.corners.tolist()))
-        figure = measured_tile(target, tile.transformed(*ways[k]), TileMap(), target)
-        figure = with_bent(target, figure, own, target)
-        figure = figure.changed(name=PurePath(target.source).stem)
+        figure = measured_tile(target, tile.transformed(*ways[k]), TileMap(), original)
+        known = replace(figure.likeness, smoothed=smoothed, min_neck=pair.figures.min_neck)
+        figure = with_bent(target, figure.changed(likeness=known), own, original)
+        figure = figure.changed(name=PurePath(original.source).stem)
         parts.append(Part(figure, whole.after(frames[k].after(ways[k]).inverse)))
     union = _union(pair)
     return EscherTile(
         union.transformed(*whole),
         y_down=targets[0].y_down,
-        silhouette=targets[0].report(),
+        silhouette=originals[0].report(),
         no_map=NO_MAP,
         normal=union.transformed(*ways[0]),
         parts=tuple(parts),

@@ -13,12 +13,9 @@ from orbiflow.arguments import as_choice, as_instance
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.search.candidates import Fit, OnProgress
-from orbiflow.tiles.silhouette import Emphasis, Pins, Target
+from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
-
-# How a target is made, for messages
-HOW_TO_GET_A_TARGET = "Target.read, Target.from_mask and Target.from_polygon make one"
 
 # The classes by how often they come near a silhouette at once, for the time that they take
 PREFERRED_CLASSES = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")

@@ -33,6 +33,7 @@ from .readers.svg_regions import paints as paints
 from .readers.svg_shapes import DrawnShape as DrawnShape
 from .readers.svg_values import lightness as lightness
 from .settings import ReadingSettings as ReadingSettings
+from .target import HOW_TO_GET_A_TARGET as HOW_TO_GET_A_TARGET
 from .target import Covered as Covered
 from .target import Frame as Frame
 from .target import Target as Target

@@ -38,6 +38,10 @@ LIMB_WIDTHS = 2.0  # widths: what is rounded off and longer is a limb, and no co
 ASPECT_TOLERANCE = 0.01  # relative difference up to which two aspect ratios count as the same
 
 
+HOW_TO_GET_A_TARGET = "Target.read, Target.from_mask and Target.from_polygon make one"
+"""How a target is made, for messages."""
+
+
 class Covered(NamedTuple):
     """The rectangle that a picture of a silhouette covers, in the input's units, and its name."""
 
