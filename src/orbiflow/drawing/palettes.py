@@ -27,21 +27,22 @@ class Palette(NamedTuple):
         """Return a palette of so many shades of each colour in turn, unless its colours are a user's.
 
         >>> PALETTES["ink"].shaded((2, 1)).colours
-        ('#f5f5f2', '#d7d7d5', '#2b2b2b')
+        ('#f5f5f2', '#d1d1ce', '#2b2b2b')
         """
         if self not in PALETTES.values():
             return self
         colours = (
-            self._shade(self.fill(k), turn)
+            self._shade(self.fill(k), turn / max(1, count - 1))
             for k, count in enumerate(shares)
             for turn in range(count)
         )
         return self._replace(colours=tuple(colours))
 
-    def _shade(self, fill: str, turn: int) -> str:
+    def _shade(self, fill: str, turn: float) -> str:
+        """Return a shade of a colour, from itself at 0 to its last one at 1."""
         if _lightness(fill) > 0.5:
-            return _mixed(fill, self.outline, DARKER**turn)
-        return _mixed(fill, self.paper, LIGHTER**turn)
+            return _mixed(fill, self.outline, 1 - DARKEST * turn)
+        return _mixed(fill, self.paper, 1 - LIGHTEST * turn)
 
     def shortage(self, count: int) -> tuple[str, ...]:
         """Return notes for a user who needs more colours than there are.
@@ -93,7 +94,8 @@ dichromacy (tested).
 """
 
 DEFAULT_PALETTE = "delft"
-DARKER, LIGHTER = 0.87, 0.76  # the share of a colour that is left in its next shade
+# The share of the outline's or the paper's colour in the last shade of one that is light or dark
+DARKEST, LIGHTEST = 0.16, 0.42
 MAX_COLOURS = 24
 """Colours of a palette that the user writes out, at most."""
 

@@ -12,10 +12,18 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, literal
 from orbiflow.tiles.geometry import Place, border
-from orbiflow.tiles.likeness import Likeness, Rating
+from orbiflow.tiles.likeness import Likeness, Rating, mixing_factor
 from orbiflow.tiles.silhouette import Bending, Covered, Frame
 from orbiflow.tiles.tile_map import TileMap
-from orbiflow.tiles.tilings import Certificate, Prototile, Tile, Tiling, arrangement, certify
+from orbiflow.tiles.tilings import (
+    Certificate,
+    Prototile,
+    Tile,
+    Tiling,
+    arrangement,
+    certify,
+    mixing,
+)
 
 
 @dataclass(frozen=True)
@@ -181,8 +189,16 @@ class EscherTile:
 
     @property
     def score(self) -> float:
-        """What tiles are ranked by, from 0 to 1: that of `likeness`, or of the worst of the parts."""
-        return self.worst.likeness.score
+        """What tiles are ranked by, from 0 to 1: that of `likeness`.
+
+        Of several figures it is the worst one's, less where copies of one figure lie side by side, as
+        the eye takes them for one.
+        """
+        known = self.likeness.known_score
+        if not self.parts or known is not None:
+            return self.likeness.score
+        mixed = mixing(self.tiling) if self.certificate.valid else 0.0
+        return self.worst.score * mixing_factor(mixed)
 
     @property
     def worst(self) -> EscherTile:

@@ -38,9 +38,11 @@ from orbiflow.tiles import (
     scenes,
     write_scene,
 )
+from orbiflow.tiles.likeness import mixing_factor
 from orbiflow.tiles.motifs.carried import Picture
 from orbiflow.tiles.motion.kinds import motion
 from orbiflow.tiles.result_file import part_file
+from orbiflow.tiles.tilings import mixing
 from outlines import animal
 from small_pairs import NAMES, pair_result, small_pairs
 from strategies import seeds
@@ -59,7 +61,8 @@ def test_both_figures_are_measured_and_the_worse_one_ranks() -> None:
     for tile in found.tiles:
         assert tile.certificate.valid
         assert tile.rating == tile.worst.rating
-        assert tile.score == min(part.figure.score for part in tile.parts)
+        worst = min(part.figure.score for part in tile.parts)
+        assert tile.score == pytest.approx(worst * mixing_factor(mixing(tile.tiling)))
         for part, target in zip(tile.parts, found.targets, strict=True):
             assert part.figure.likeness.metrics.iou > 0.5
             assert part.figure.silhouette == target.report()

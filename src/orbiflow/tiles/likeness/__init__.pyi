@@ -36,6 +36,7 @@ from .necks import slit_share as slit_share
 from .own_symmetry import NearSymmetry as NearSymmetry
 from .own_symmetry import near_symmetry as near_symmetry
 from .ranking import diverse as diverse
+from .ranking import mixing_factor as mixing_factor
 from .ranking import mutual_iou as mutual_iou
 from .ranking import rank_score as rank_score
 from .rating import MOST_STARS as MOST_STARS

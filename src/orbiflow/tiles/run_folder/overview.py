@@ -119,6 +119,8 @@ def overview_png(
         failures: The classes without a tile, which are named.
     """
     columns = {1: 1, 2: 2, 4: 2}.get(len(results), 3)
+    if len(targets) > 1:  # two small pictures leave less room for words
+        columns = min(columns, 2)
     width = 1320 if columns == 1 else _WIDTH
     cell = (width - 2 * _MARGIN - (columns - 1) * _GAP) // columns
     height = round(cell / 1.5) + _FOOT

@@ -148,6 +148,30 @@ class BentPair:
         """What bending costs, by which pairs are compared before they are carved."""
         return float(together(self._costs[0])) + CROSSING_COST * (not self.sound)
 
+    @cached_property
+    def mixed(self) -> float:
+        """The share of all boundaries, by length, that lie between both figures."""
+        n, own = self.body.size, self.placement
+        ring = self.points[:n]
+        steps = abs(np.roll(ring, -1) - ring)
+        # which figure each step is of; those of the first one come first
+        first = np.arange(n) < self.body.parts[0].size - self.glue.length
+        lengths, corners = (
+            own.lengths[0],
+            np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0],
+        )
+        between = 0.0
+        for kind in self.kind.edge_classes:
+            mine = (corners[kind.edge] + np.arange(lengths[kind.edge])) % n
+            for image in (*kind.images, *([kind.turn] if kind.turn else [])):
+                mate = (corners[image.edge] + np.arange(lengths[image.edge])) % n
+                mate = mate[::-1] if image.reversed else mate
+                sides = 1 if image.edge == kind.edge else 2
+                between += sides * float(steps[mine][first[mine] != first[mate]].sum())
+        path = self.body.path(*self.outlines)[0]
+        within = 2 * float(abs(np.diff(path)).sum())
+        return (between + within) / (float(steps.sum()) + within)
+
     @property
     def promise(self) -> float:
         """The mark of the worse figure, less if something crosses: it predicts what carving gives."""

@@ -17,7 +17,15 @@ import scipy.optimize
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import plane_points
-from orbiflow.tiles.likeness import Gaps, Measures, mark_gradient, neck_factor, neck_up_to, score_of
+from orbiflow.tiles.likeness import (
+    Gaps,
+    Measures,
+    mark_gradient,
+    mixing_factor,
+    neck_factor,
+    neck_up_to,
+    score_of,
+)
 from orbiflow.tiles.search.carving import (
     SLIDES,
     STEPS_APART,
@@ -68,9 +76,13 @@ class CarvedPair(BentPair):
 
     @property
     def scores(self) -> tuple[float, float]:
-        """What pairs are ordered by: how probably people like the worse figure, and the better."""
+        """What pairs are ordered by: how probably people like the worse figure, and the better.
+
+        They are less where copies of one figure lie side by side.
+        """
         low, high = sorted(score_of(mark) for mark in self.marks)
-        return low * self.factor, high * self.factor
+        factor = self.factor * mixing_factor(self.mixed)
+        return low * factor, high * factor
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "factor": self.factor}

@@ -88,7 +88,7 @@ def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
     side = Orientation(
         mirrored,
         reverse(normal) * FLIP if mirrored else normal,
-        Samples(*[reverse(ring) * FLIP if mirrored else ring] * 3),
+        Samples(ring, ring, ring),
         lambda _level, _stiffness: body,
         plain=True,
     )

@@ -30,6 +30,7 @@ from .tile_edges import Skeleton as Skeleton
 from .tile_edges import edge_classes as edge_classes
 from .tile_edges import edge_to_edge as edge_to_edge
 from .tile_edges import edges as edges
+from .tile_edges import mixing as mixing
 from .tile_edges import skeleton as skeleton
 from .tiling import Tile as Tile
 from .tiling import Tiles as Tiles

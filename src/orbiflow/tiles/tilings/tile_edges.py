@@ -281,6 +281,22 @@ class EdgeClass(NamedTuple):
         return any(not fold.reversed for fold in self.folds)
 
 
+def mixing(tile: Tiles) -> float:
+    """Return the share of all boundaries, by length, that copies of different prototiles share.
+
+    Raises `OrbiflowError` as `edge_to_edge`.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> bar, group = [[0, 0], [0.5, 0], [0.5, 1], [0, 1]], wallpaper_group("p1")
+    >>> round(mixing(Tiling(group, [bar, [[x + 0.5, y] for x, y in bar]])), 9)
+    0.666666667
+    """
+    own = edges(edge_to_edge(tile))
+    lengths = np.array([np.hypot(*np.diff(own.points(k), axis=0).T).sum() for k in range(len(own))])
+    differ = [there.prototile != here for there, here in zip(own.across, own.owners, strict=True)]
+    return float(lengths[differ].sum() / lengths.sum())
+
+
 def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
     """Return the classes of a tiling's edges; one edge of each class determines all others.
 
