@@ -287,9 +287,9 @@ def mixing(tile: Tiles) -> float:
     Raises `OrbiflowError` as `edge_to_edge`.
 
     >>> from orbiflow.symmetry import wallpaper_group
-    >>> bar, group = [[0, 0], [0.5, 0], [0.5, 1], [0, 1]], wallpaper_group("p1")
-    >>> round(mixing(Tiling(group, [bar, [[x + 0.5, y] for x, y in bar]])), 9)
-    0.666666667
+    >>> from orbiflow.tiles import dirichlet_tiling
+    >>> round(mixing(dirichlet_tiling(wallpaper_group("p4m"), [(0, 0), (0.5, 0.5)])), 9)
+    1.0
     """
     own = edges(edge_to_edge(tile))
     lengths = np.array([np.hypot(*np.diff(own.points(k), axis=0).T).sum() for k in range(len(own))])
