@@ -32,14 +32,14 @@ def test_enough_of_them_in_every_class() -> None:
     assert {entry.tile for entry in ENTRIES} == set(CLASSES)
     assert sum(bool(entry.drawing) for entry in ENTRIES) >= 16
     assert len({entry.name for entry in ENTRIES}) == len(ENTRIES)
-    assert len({entry.silhouette for entry in ENTRIES}) == len(ENTRIES)
+    assert len({(entry.silhouette, entry.second) for entry in ENTRIES}) == len(ENTRIES)
 
 
 @each
 def test_files_are_there(entry: Entry) -> None:
-    assert (ROOT / entry.silhouette).is_file()
-    if entry.drawing:
-        assert (ROOT / entry.drawing).is_file()
+    for silhouette, drawing, *_ in entry.silhouettes:
+        assert (ROOT / silhouette).is_file()
+        assert not drawing or (ROOT / drawing).is_file()
     assert entry.picture.stat().st_size <= MOST_BYTES
     width, height = (int(side) for side in entry.size.removesuffix("px").split("x"))
     with Image.open(entry.picture) as image:
@@ -49,14 +49,14 @@ def test_files_are_there(entry: Entry) -> None:
 
 @each
 def test_licences_are_named(entry: Entry) -> None:
-    source = entry.source
-    assert source.licence in FREE
-    assert entry.image
-    assert source.by
-    assert source.url.startswith("https://")
-    # MIT asks for its text
-    assert source.text or source.licence != "MIT"
-    assert not source.text or (GALLERY / source.text).is_file()
+    for _, _, image, source in entry.silhouettes:
+        assert source.licence in FREE
+        assert image
+        assert source.by
+        assert source.url.startswith("https://")
+        # MIT asks for its text
+        assert source.text or source.licence != "MIT"
+        assert not source.text or (GALLERY / source.text).is_file()
 
 
 @each

@@ -18,8 +18,8 @@ ZOOM = 1.45
 
 HEAD = """# Gallery
 
-This page has tilings of {count} silhouettes, in all nine isohedral classes. Each comes with the
-commands that make it.
+This page has {count} tilings of silhouettes, in all nine isohedral classes; the last ones have two
+figures each ([two figures](../two-figures.md)). Each comes with the commands that make it.
 
 ![All of them](contact-sheet.webp)
 
@@ -112,10 +112,10 @@ def shown(words: list[str]) -> str:
 def _credits(entries: list[Entry]) -> list[str]:
     found = []
     for entry in entries:
-        source = entry.source
-        text = f" ([text]({source.text}))" if source.text else ""
-        found.append(
-            f"| {entry.title} | {entry.image}: {source.by}, [{source.name}]({source.url}) | "
-            f"{source.licence}{text} |\n"
-        )
+        for _, _, image, source in entry.silhouettes:
+            text = f" ([text]({source.text}))" if source.text else ""
+            found.append(
+                f"| {entry.title} | {image}: {source.by}, [{source.name}]({source.url}) | "
+                f"{source.licence}{text} |\n"
+            )
     return found

@@ -38,6 +38,8 @@ class Entry:
 
     - `silhouette`, `drawing`: files, from the project's root.
     - `source`: of the silhouette, and `image`: which of the source's.
+    - `second`, `second_drawing`, `second_source`, `second_image`: the same of the second figure, if the
+      tile has two.
     - `art`: further options of `orbiflow art`, in order.
     - `search`: further options of `orbiflow escherize`.
     - `svg`: whether it is written as SVG, too.
@@ -51,6 +53,10 @@ class Entry:
     image: str
     tile: str
     drawing: str = ""
+    second: str = ""
+    second_drawing: str = ""
+    second_source: Source | None = None
+    second_image: str = ""
     size: str = "1000x750px"
     seed: int = 0
     art: tuple[str, ...] = ()
@@ -63,6 +69,14 @@ class Entry:
         return HERE / "pictures" / f"{self.name}.webp"
 
     @property
+    def silhouettes(self) -> list[tuple[str, str, str, Source]]:
+        """The silhouette, drawing, image and source of each figure."""
+        first = (self.silhouette, self.drawing, self.image, self.source)
+        if self.second_source is None:
+            return [first]
+        return [first, (self.second, self.second_drawing, self.second_image, self.second_source)]
+
+    @property
     def made(self) -> str:
         """What the commands write, from the project's root."""
         return f"{OUT}/{self.name}.png"
@@ -71,8 +85,10 @@ class Entry:
         """What to type in the project's root, without the first word `orbiflow`."""
         folder = f"{OUT}/{self.name}"
         seed = ("--seed", str(self.seed)) if self.seed else ()
-        search = ["escherize", self.silhouette, "--classes", self.tile, *seed, *self.search]
+        both = [self.silhouette, self.second] if self.second else [self.silhouette]
+        search = ["escherize", *both, "--classes", self.tile, *seed, *self.search]
         over = ["--picture", self.drawing] if self.drawing else []
+        over += ["--second-picture", self.second_drawing] if self.second_drawing else []
         art = ["art", folder, *over, *self.art]
         found = [[*search, "--out", folder], [*art, "--area", self.size, "--out", self.made]]
         if self.svg:
@@ -93,12 +109,14 @@ def read_table(path: Path = TABLE) -> list[Entry]:
 
 def _entry(values: Mapping[str, Any], sources: Mapping[str, Source]) -> Entry:
     own = dict(values)
-    source = own.pop("source")
-    if source not in sources:
-        raise ValueError(f"{own.get('name')}: there is no source {source!r}")
+    for key in ("source", "second_source"):
+        if key in own and own[key] not in sources:
+            raise ValueError(f"{own.get('name')}: there is no source {own[key]!r}")
+    source, second = sources[own.pop("source")], sources.get(own.pop("second_source", ""))
     try:
         return Entry(
-            source=sources[source],
+            source=source,
+            second_source=second,
             art=tuple(own.pop("art", ())),
             search=tuple(own.pop("search", ())),
             **own,

@@ -129,7 +129,7 @@ def _tables(tiles: Sequence[EscherTile]) -> list[Table]:
     """Return a table of the tiles, in words and in figures; empty if there are none."""
     if not tiles:
         return []
-    rows = [_figures(tile, part.figure) for tile in tiles for part in tile.figures]
+    rows = [_figures(tile, own) for tile in tiles for own in tile.likenesses]
     figures = _table("Figures", rows)
     return [_table("Tiles, best first", [_words(tile) for tile in tiles]), figures]
 
@@ -141,7 +141,7 @@ def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
 
 def _words(tile: EscherTile) -> dict[str, str]:
     """Return a line about a tile, in 80 characters."""
-    lies, ratings = tile.arrangement, [part.figure.rating for part in tile.figures]
+    lies, ratings = tile.arrangement, [own.rating for own in tile.likenesses]
     words = dict.fromkeys(rating.word for rating in ratings if rating)
     return {
         "class": f"{tile.name} ({tile.group_name})",

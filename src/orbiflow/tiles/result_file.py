@@ -88,7 +88,7 @@ def _measured(
     tile: Tile,
     entry: dict[str, Any],
     name: str,
-    silhouette: dict[str, Any],
+    silhouette: dict[str, Any] | None,
     folder: Path | None,
     number: int = 0,
 ) -> EscherTile:
@@ -96,7 +96,7 @@ def _measured(
     return EscherTile(
         tile,
         name=name,
-        y_down=bool(silhouette["y_down"]),
+        y_down=bool(silhouette and silhouette["y_down"]),
         silhouette=silhouette,
         map_source=None if folder is None else folder / part_file(TILE_MODEL, number),
         likeness=_likeness(entry),
@@ -106,7 +106,7 @@ def _measured(
 
 def _divided(whole: EscherTile, entries: list[dict[str, Any]], folder: Path | None) -> EscherTile:
     """Return a tile that figures divide."""
-    parts = tuple(_part(whole.tile, own, folder, k) for k, own in enumerate(entries))
+    parts = tuple(_part(whole, own, folder, k) for k, own in enumerate(entries))
     found = whole.changed(parts=parts, map_source=None, no_map=NO_MAP)
     area, whole_area = (
         sum(own.signed_area for own in found.tiling.prototiles),
@@ -117,16 +117,18 @@ def _divided(whole: EscherTile, entries: list[dict[str, Any]], folder: Path | No
     return found
 
 
-def _part(whole: Tile, entry: dict[str, Any], folder: Path | None, number: int) -> Part:
+def _part(whole: EscherTile, entry: dict[str, Any], folder: Path | None, number: int) -> Part:
     """Return one of the figures that divide a tile."""
     place = Place(*(np.array(entry["place"][name], float) for name in ("linear", "offset")))
     if place.linear.shape != (2, 2) or place.offset.shape != (2,) or not place.scale > 0:
         raise OrbiflowError("the place of a part must be a similarity: linear (2, 2), offset (2,)")
-    tile = Tile(
-        _ring(entry), whole.group.conjugate(*place.inverse), corners=tuple(entry["corners"])
-    )
-    name = str(entry["name"])
-    return Part(_measured(tile, entry, name, entry["input"], folder, number), place)
+    group = whole.tile.group.conjugate(*place.inverse)
+    tile = Tile(_ring(entry), group, corners=tuple(entry["corners"]))
+    name, silhouette = str(entry["name"]), entry["input"]
+    figure = _measured(tile, entry, name, silhouette, folder, number)
+    if silhouette is None:  # a background has the coordinates of the whole
+        figure = figure.changed(y_down=whole.y_down)
+    return Part(figure.changed(rank=whole.rank), place)
 
 
 def as_tile(source: TileSource, which: str | int | None = None) -> EscherTile:
@@ -353,7 +355,8 @@ def _part_json(part: Part) -> dict[str, Any]:
     """Return what is known of one of the figures that divide a tile."""
     place = {"linear": part.place.linear.tolist(), "offset": part.place.offset.tolist()}
     known = {"name": part.figure.name, "input": part.figure.silhouette, "place": place}
-    return {**known, **_rating_json(part.figure), **_measures_json(part.figure)}
+    measured = {} if part.is_background else _measures_json(part.figure)
+    return {**known, **_rating_json(part.figure), **measured}
 
 
 def _or_none(value: Any) -> Any:

@@ -56,6 +56,11 @@ class Part(NamedTuple):
     place: Place
 
     @property
+    def is_background(self) -> bool:
+        """Whether it may have any shape: what is left between figures."""
+        return self.figure.silhouette is None
+
+    @property
     def prototile(self) -> Prototile:
         """Its polygon and corners in the coordinates of the whole."""
         tile = self.figure.tile
@@ -203,7 +208,12 @@ class EscherTile:
     @property
     def worst(self) -> EscherTile:
         """The one of the `figures` that is least like its silhouette."""
-        return min((part.figure for part in self.figures), key=lambda own: own.likeness.score)
+        return min(self.likenesses, key=lambda own: own.likeness.score)
+
+    @property
+    def likenesses(self) -> list[EscherTile]:
+        """The figures that are to be like a silhouette: all but a background."""
+        return [part.figure for part in self.parts if not part.is_background] or [self]
 
     def changed(self, **changes: Any) -> EscherTile:
         """Return the tile with other values of some fields, and a certificate that is known kept."""

@@ -139,8 +139,8 @@ def overview_png(
             result.tiling, colours=own, outline=1.4 / cell, y_down=result.y_down
         )
         sheet.paste(tiling.image(cell), (left, top))
-        for number, (part, target) in enumerate(zip(result.figures, targets, strict=True)):
-            thumb = _small(part.figure, target)
+        for number, (own, target) in enumerate(zip(result.likenesses, targets, strict=True)):
+            thumb = _small(own, target)
             thumb.thumbnail((_THUMB, _THUMB))
             middle = left + number * (_THUMB + 22) + (_THUMB - thumb.width) // 2
             sheet.paste(thumb, (middle, below))

@@ -96,8 +96,8 @@ def write_tile_folder(
         "field.png": lambda: field(Sheet.screen(1200)),
         "field.pdf": lambda: field(Sheet.column()),
     }
-    for number, (part, target) in enumerate(zip(result.figures, targets, strict=True)):
-        own, label = part.figure, part.figure.name if result.parts else label
+    for number, (own, target) in enumerate(zip(result.likenesses, targets, strict=True)):
+        label = own.name if result.parts else label
         more: dict[str, Callable[[], str | bytes]] = {
             "overlay.png": partial(_overlay, own, target, label),
             "overlay.pdf": partial(_overlay, own, target, label, printed),

@@ -35,6 +35,7 @@ OCCUPANCY = Group("Occupancy method")
 TWO = Group("Two silhouettes")
 
 LEAST_RATIO = 0.1  # of the areas of two figures
+BACKGROUND_RATIO = (0.15, 0.6)
 
 METHODS = {
     "likeness": ("orbiflow.tiles.search", "LikenessSearch"),
@@ -118,7 +119,7 @@ class SearchSettings(Settings, group="Search"):
     ratio: Annotated[
         tuple[float, float] | None,
         Parsed(area_ratios, "a number, or two with a dash, such as 0.8-1.25", "RATIO"),
-        DefaultText("0.6-1.7"),
+        DefaultText("0.6-1.7, of a background 0.15-0.6"),
         OnlyWith(method="descent", objective="likeness"),
         TWO,
     ] = None
@@ -165,6 +166,9 @@ class EscherizeSettings(SearchSettings, group="Search"):
     pin_angle: Annotated[bool, Needs("pin"), LIKENESS] = False
     """Keep the angle of what is pinned, too."""
 
+    background: Annotated[bool, OnlyWith(method="descent", objective="likeness"), TWO] = False
+    """Let the second figure be what the first one leaves, of any shape. Give one silhouette."""
+
     second_emphasis: Annotated[
         Path | None, OnlyWith(method="descent", objective="likeness"), TWO
     ] = None
@@ -192,7 +196,7 @@ class EscherizeSettings(SearchSettings, group="Search"):
 
     def check_single(self) -> None:
         """Raise a `SettingError` for what applies only to two silhouettes."""
-        for name in ("ratio", "second_emphasis", "second_pin"):
+        for name in ("second_emphasis", "second_pin", *(() if self.background else ("ratio",))):
             if getattr(self, name) is not None:
                 raise SettingError(
                     f"{{{name}}} needs a second silhouette; give one or leave it out"
@@ -225,7 +229,8 @@ class EscherizeSettings(SearchSettings, group="Search"):
             raise SettingError(
                 "two silhouettes are searched for likeness; leave out {objective} and {method}"
             )
-        given = {"classes": self.classes, "ratio": self.ratio}
+        usual = BACKGROUND_RATIO if self.background else None
+        given = {"classes": self.classes, "ratio": self.ratio or usual}
         given = {name: value for name, value in given.items() if value is not None}
         known = {"min_neck": self.min_neck, "seed": self.seed, "workers": self.workers or 1}
         return PairSearch.for_effort(self.effort, force=self.force, **known, **given)

@@ -17,7 +17,7 @@ import shapely
 
 from orbiflow import __version__
 from orbiflow.arguments import as_instance, described, is_a
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import CertificationError, OrbiflowError, SettingError
 from orbiflow.runtime import (
     NEVER,
     Cancel,
@@ -81,7 +81,9 @@ class SearchResult:
     @property
     def targets(self) -> tuple[Target, ...]:
         """The silhouettes."""
-        return (self.target,) if self.second is None else (self.target, self.second.target)
+        if self.second is None or self.second.is_background:
+            return (self.target,)
+        return (self.target, self.second.target)
 
 
 def escherize(
@@ -129,12 +131,15 @@ def escherize(
     settings = as_instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
     goal = settings.goal(target)
     goal = replace(goal, emphasis=emphasis or goal.emphasis, pins=pins or goal.pins)
-    if second is not None:
+    if second is not None or settings.background:
         if method is not None:
             raise OrbiflowError(
                 "a method of one's own searches for one silhouette; leave out second"
             )
-        other, search = settings.second_goal(second), settings.pair_search
+        if second is not None and settings.background:
+            raise SettingError("{background} takes the place of a second silhouette; leave one out")
+        other = Goal.background() if second is None else settings.second_goal(second)
+        search = settings.pair_search
         record = PairRecord((goal, other), search, on_tile, on_event)
         found = record.search(on_checked, cancel)
         seconds, known = time.perf_counter() - begin, (search, goal.emphasis, goal.pins)
@@ -399,7 +404,10 @@ def _chosen_tiles(
         raise reasons[0]
 
 
-def _second_report(goal: Goal) -> dict[str, Any]:
+def _second_report(goal: Goal) -> dict[str, Any] | None:
+    """Return what was asked of the second figure; None of a background, which may be anything."""
+    if goal.is_background:
+        return None
     return {
         "input": goal.target.report(),
         "emphasis": None if goal.emphasis is None else goal.emphasis.report(),

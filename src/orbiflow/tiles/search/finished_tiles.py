@@ -155,12 +155,12 @@ def rated(tiles: Sequence[EscherTile], *targets: Target) -> list[EscherTile]:
 
 def _rated(tile: EscherTile, targets: Sequence[Target]) -> EscherTile:
     if tile.parts:
-        parts = tuple(
+        own = tuple(
             part._replace(figure=_rated(part.figure, [target]))
-            for part, target in zip(tile.parts, targets, strict=True)
+            for part, target in zip(tile.parts, targets, strict=False)
         )
-        worst = min((part.figure for part in parts), key=lambda own: own.score)
-        return tile.changed(parts=parts, rating=worst.rating)
+        tile = tile.changed(parts=own + tile.parts[len(own) :])
+        return tile.changed(rating=tile.worst.rating)
     if is_mere_line(targets[0]):
         return tile.changed(rating=Rating(1))
     of_score = Rating.of_likeness if tile.likeness.fidelity else Rating.of_overlap

@@ -18,7 +18,7 @@ import numpy as np
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import apart, best_similarity, reverse, ring_length
-from orbiflow.tiles.likeness import Elastic, kept_of
+from orbiflow.tiles.likeness import Elastic, Stiffness, kept_of
 from orbiflow.tiles.search.bending import FOLLOWING_STRENGTH
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
@@ -37,6 +37,8 @@ from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 MULTIPLES = (1, 2, 4)  # points of each level for each point of the first
 HELD_ROUNDS = 5  # steps of the minimisation among tiles
 SPRUNG_ROUNDS = 3  # steps of springs that compare neighbours
+BACKGROUND = Stiffness(salience=0.0, pose=0.0)  # of a figure that may have any shape
+BACKGROUND_STIFFNESS = 0.03  # of it, relative to others
 CROSSING_MARKS = 1.0  # less for a pair in which something crosses, before it is carved
 TWIN_DISTANCE = 4e-4  # mean squared distance of both outlines below which pairs are twins
 MOST_CHANGED = 3  # steps by which lengths of edges change at a time, in all
@@ -59,6 +61,7 @@ class Figures:
     phase: float = 0.0  # by how many of the finest points' distances these are shifted
     # the width of necks, in square roots of the mean area, below which scores fall
     min_neck: float = 0.01
+    background: bool = False  # whether the second one may have any shape
     # how much stiffer the silhouettes are at points (N, 2) of their normal forms
     stiff: tuple[Stiff | None, Stiff | None] = field(default=(None, None), compare=False)
 
@@ -97,6 +100,9 @@ def _parts(figures: Figures, level: int) -> tuple[Elastic, Elastic]:
         flip = (1.0, -1.0) if mirrored else (1.0, 1.0)
         fine = (reverse(fine) if mirrored else fine) * flip
         mesh, factor = triangulate(fine[::step] * figures.sizes[k]), figures.stiff[k]
+        if k == 1 and figures.background:
+            weak = np.full(len(mesh.points), BACKGROUND_STIFFNESS)
+            return Elastic(mesh.points[: mesh.size], BACKGROUND, stiff=weak, mesh=mesh)
         own = None if factor is None else factor(mesh.points / figures.sizes[k] * flip)
         return Elastic(mesh.points[: mesh.size], BODIES["firm"], stiff=own, mesh=mesh)
 
@@ -156,16 +162,17 @@ class BentPair:
         steps = abs(np.roll(ring, -1) - ring)
         # which figure each step is of; those of the first one come first
         first = np.arange(n) < self.body.parts[0].size - self.glue.length
-        lengths, corners = (
-            own.lengths[0],
-            np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0],
-        )
+        lengths = own.lengths[0]
+        corners = np.cumsum(lengths) - lengths + own.starts[0]
+
+        def along(edge: int) -> Integers:
+            return (corners[edge] + np.arange(lengths[edge])) % n
+
         between = 0.0
         for kind in self.kind.edge_classes:
-            mine = (corners[kind.edge] + np.arange(lengths[kind.edge])) % n
+            mine = along(kind.edge)
             for image in (*kind.images, *([kind.turn] if kind.turn else [])):
-                mate = (corners[image.edge] + np.arange(lengths[image.edge])) % n
-                mate = mate[::-1] if image.reversed else mate
+                mate = along(image.edge)[:: -1 if image.reversed else 1]
                 sides = 1 if image.edge == kind.edge else 2
                 between += sides * float(steps[mine][first[mine] != first[mate]].sum())
         path = self.body.path(*self.outlines)[0]
@@ -189,7 +196,7 @@ class BentPair:
             kept_of(part.measures, ring, 0.0).mark
             for part, ring in zip(self.body.parts, self.outlines, strict=True)
         )
-        return one, two
+        return one, one if self.figures.background else two
 
     @property
     def space(self) -> TileSpace:

@@ -38,6 +38,7 @@ from orbiflow.tiles.search.carving import (
 from orbiflow.tiles.search.pair_bending import BentPair
 from orbiflow.tiles.tilings import Tiling
 
+NO_MARK = 20.0  # of a figure that may have any shape: above all marks, so that it never counts
 SOFTNESS = 0.4  # marks by which one figure may be better before the other one alone counts
 ROOM = 0.012  # the gaps that carving apart leaves, in square roots of the mean area
 
@@ -48,6 +49,7 @@ class _Part(NamedTuple):
     measures: Measures
     places: Integers  # (n,) of its outline's points among the pair's
     spline: Array  # (n, `SLIDES`) how its points slide
+    has_mark: bool = True  # whether it is to be like its silhouette
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,11 +141,15 @@ def _carved(pair: BentPair, steps: int, room: float) -> CarvedPair:
     )
     root = scipy.linalg.cholesky(stiff, lower=True)
     basis: Complex = scipy.linalg.solve_triangular(root, columns.T, lower=True).T.astype(complex)
+    has_mark = (True, not pair.figures.background)
     parts = [
         _Part(
-            part.measures, places[: part.size], spline_basis(part, pair.points[places[: part.size]])
+            part.measures,
+            places[: part.size],
+            spline_basis(part, pair.points[places[: part.size]]),
+            counts,
         )
-        for part, places in zip(body.parts, body.places, strict=True)
+        for part, places, counts in zip(body.parts, body.places, has_mark, strict=True)
     ]
     climb = _Climb(basis, parts, n)
     outline = pair.points[: body.outer]
@@ -230,6 +236,8 @@ class _Climb:
             places = np.arange(n) + slide
             laid = Laid.smoothly(places) if fixed is None else Laid.straight(places)
             mark, rise = mark_gradient(part.measures, laid.points(ring))
+            if not part.has_mark:
+                mark, rise = NO_MARK, 0 * rise
             wrinkles, bumpy, shifted = part.measures.wrinkles(ring, places)
             marks.append(mark)
             rises.append(laid.gradient(rise))

@@ -89,7 +89,8 @@ class PairRecord:
         facts = SearchFacts(self.settings.objective, starts=self.settings.placed)
         with one_thread(), one_blas_thread():
             found = [finished_pair(targets, pair, originals, self._share) for pair in pairs]
-        tiles = rated([tile.changed(search=facts) for tile in found], *originals)
+        likely = [goal.target for goal in self.goals if not goal.is_background]
+        tiles = rated([tile.changed(search=facts) for tile in found], *likely)
         tiles.sort(key=lambda tile: -tile.score)
         kept = without_twins(tiles, self.settings.finalists) if tiles else []
         return [tiles[k] for k in sorted(kept)]

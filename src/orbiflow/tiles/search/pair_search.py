@@ -138,14 +138,16 @@ class PairSearch(Settings):
             "stiff": tuple(map(_stiff, goals)),
             "phase": 4 * first,
             "min_neck": min(least_neck(goal.target.normal, self.min_neck) for goal in goals),
+            "background": goals[1].is_background,
         }
         low, high = self.ratio
         ratios = _between(low, high, self.ratios)
+        hands = (False,) if goals[1].is_background else (False, True)
         for more in MORE_POINTS:
             count = round(more * self.points)
             found = [
                 Figures.of(one, two, ratio=float(ratio), mirrored=hand, count=count, **known)
-                for ratio, hand in product(ratios, (False, True))
+                for ratio, hand in product(ratios, hands)
             ]
             with contextlib.suppress(OrbiflowError):
                 for own, level in product(found, (0, 1, 2)):

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from orbiflow.arguments import as_choice, as_instance
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
@@ -32,6 +34,14 @@ class Goal:
     target: Target
     emphasis: Emphasis | None = None  # what must survive
     pins: Pins | None = None  # what must not bend
+    is_background: bool = False  # whether any shape will do, as of what another figure leaves
+
+    @classmethod
+    def background(cls) -> Self:
+        """Return the goal of what is left between figures, which would be round."""
+        turns = 2 * np.pi * np.arange(72) / 72
+        disc = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        return cls(Target.from_polygon(disc, source="background"), is_background=True)
 
     @classmethod
     def read(
