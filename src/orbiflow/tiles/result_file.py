@@ -88,7 +88,7 @@ def _measured(
     tile: Tile,
     entry: dict[str, Any],
     name: str,
-    silhouette: dict[str, Any] | None,
+    silhouette: dict[str, Any],
     folder: Path | None,
     number: int = 0,
 ) -> EscherTile:
@@ -96,7 +96,7 @@ def _measured(
     return EscherTile(
         tile,
         name=name,
-        y_down=bool(silhouette and silhouette["y_down"]),
+        y_down=bool(silhouette["y_down"]),
         silhouette=silhouette,
         map_source=None if folder is None else folder / part_file(TILE_MODEL, number),
         likeness=_likeness(entry),
@@ -124,10 +124,9 @@ def _part(whole: EscherTile, entry: dict[str, Any], folder: Path | None, number:
         raise OrbiflowError("the place of a part must be a similarity: linear (2, 2), offset (2,)")
     group = whole.tile.group.conjugate(*place.inverse)
     tile = Tile(_ring(entry), group, corners=tuple(entry["corners"]))
-    name, silhouette = str(entry["name"]), entry["input"]
-    figure = _measured(tile, entry, name, silhouette, folder, number)
-    if silhouette is None:  # a background has the coordinates of the whole
-        figure = figure.changed(y_down=whole.y_down)
+    if entry["input"] is None:
+        return Part.background(tile, y_down=whole.y_down)
+    figure = _measured(tile, entry, str(entry["name"]), entry["input"], folder, number)
     return Part(figure.changed(rank=whole.rank), place)
 
 

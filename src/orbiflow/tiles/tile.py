@@ -11,9 +11,9 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, literal
-from orbiflow.tiles.geometry import Place, border
+from orbiflow.tiles.geometry import Place, border, orient
 from orbiflow.tiles.likeness import Likeness, Rating, mixing_factor
-from orbiflow.tiles.silhouette import Bending, Covered, Frame
+from orbiflow.tiles.silhouette import Bending, Covered, Frame, triangulate
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import (
     Certificate,
@@ -54,6 +54,16 @@ class Part(NamedTuple):
 
     figure: EscherTile
     place: Place
+
+    @classmethod
+    def background(cls, tile: Tile, *, y_down: bool) -> Part:
+        """Return what is left between figures: it is its own silhouette, in the whole's coordinates."""
+        flip = np.array([1.0, -1.0 if y_down else 1.0])
+        mesh = triangulate(orient(tile.polygon * flip, counter_clockwise=True))
+        bending = Bending(mesh.points, mesh.points, mesh.triangles)
+        known = TileMap(frame=Frame(np.diag(flip), np.zeros(2)), bending=bending)
+        figure = EscherTile(tile, name="background", y_down=y_down, map_source=known)
+        return cls(figure, Place(np.eye(2), np.zeros(2)))
 
     @property
     def is_background(self) -> bool:

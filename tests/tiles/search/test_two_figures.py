@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 import shapely
@@ -34,8 +35,10 @@ from orbiflow.tiles import (
     make_solid,
     read_result,
     render_artwork,
+    report,
     save_tiles,
     scenes,
+    write_run,
     write_scene,
 )
 from orbiflow.tiles.likeness import mixing_factor
@@ -46,6 +49,8 @@ from orbiflow.tiles.tilings import mixing
 from outlines import animal
 from small_pairs import NAMES, pair_result, small_pairs
 from strategies import seeds
+
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def pair() -> EscherTile:
@@ -291,3 +296,34 @@ def test_two_silhouettes_are_searched_for_likeness() -> None:
 def test_ratios_that_are_none_are_refused(text: str) -> None:
     with pytest.raises(SettingError, match="ratio"):
         EscherizeSettings(ratio=text)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_background_may_have_any_shape(tmp_path: Path) -> None:
+    with small_pairs():
+        settings = EscherizeSettings(effort="fast", background=True)
+        found = escherize(animal(NAMES[0]), settings)
+    assert found.targets == (found.target,)
+    best = found.tiles[0]
+    figure, left = best.parts
+    assert best.certificate.valid
+    assert left.is_background
+    assert best.worst is figure.figure
+    assert figure.figure.score > pair().worst.score  # any shape is easier than another animal
+    folder = write_run(found, tmp_path / "run")[0].parents[1]
+    again = read_result(folder)
+    assert [part.is_background for part in again.parts] == [False, True]
+    assert not list(folder.rglob("overlay-2.png"))
+    point = left.figure.tile.polygon.mean(axis=0)
+    np.testing.assert_allclose(
+        again.parts[1].figure.forward(point), point, atol=1e-9 * np.ptp(point)
+    )
+    assert len(make_solid(again).parts) == 2
+    jsonschema.validate(
+        json.loads(json.dumps(report(found))), json.loads((DOCS / "result.schema.json").read_text())
+    )
+
+
+def test_a_background_takes_the_second_silhouettes_place() -> None:
+    one, two = map(animal, NAMES)
+    with pytest.raises(SettingError, match="background"):
+        escherize(one, EscherizeSettings(background=True), second=two)

@@ -166,7 +166,7 @@ class BentPair:
         corners = np.cumsum(lengths) - lengths + own.starts[0]
 
         def along(edge: int) -> Integers:
-            return (corners[edge] + np.arange(lengths[edge])) % n
+            return np.arange(corners[edge], corners[edge] + lengths[edge], dtype=np.int64) % n
 
         between = 0.0
         for kind in self.kind.edge_classes:

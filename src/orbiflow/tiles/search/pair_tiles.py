@@ -8,15 +8,15 @@ from pathlib import PurePath
 
 import numpy as np
 
-from orbiflow.arrays import Array, Integers
-from orbiflow.tiles.geometry import Place, orient, plane_points, reverse
+from orbiflow.arrays import Integers
+from orbiflow.tiles.geometry import Place, plane_points, reverse
 from orbiflow.tiles.likeness import Elastic, Overlap, Stiffness, kept_of
 from orbiflow.tiles.search.bending import FOLLOW_ROUNDS, Bent, PlacedBent, placed_best
 from orbiflow.tiles.search.carving import Laid, cornered
 from orbiflow.tiles.search.co_deformation import Orientation
 from orbiflow.tiles.search.finished_tiles import measured_tile, with_bent
 from orbiflow.tiles.search.pair_carving import CarvedPair
-from orbiflow.tiles.silhouette import Bending, Frame, Samples, Target, triangulate
+from orbiflow.tiles.silhouette import Samples, Target
 from orbiflow.tiles.tile import NO_MAP, EscherTile, Part
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Tile
@@ -45,7 +45,8 @@ def finished_pair(
     for k, (target, own, original) in enumerate(zip(targets, placed, originals, strict=True)):
         polygon = plane_points(pair.body.rings(pair.points)[k])
         if k == 1 and pair.figures.background:
-            parts.append(_background(whole(polygon), parts[0], targets[0].y_down))
+            left = Tile(whole(polygon), parts[0].figure.tile.group)
+            parts.append(Part.background(left, y_down=targets[0].y_down))
             break
         tile = Tile(polygon, pair.tiling.group, corners=tuple(own.bent.corners.tolist()))
         figure = measured_tile(target, tile.transformed(*ways[k]), TileMap(), original)
@@ -62,20 +63,6 @@ def finished_pair(
         normal=union.transformed(*ways[0]),
         parts=tuple(parts),
     )
-
-
-def _background(polygon: Array, first: Part, y_down: bool) -> Part:
-    """Return what is left between figures as a part that is its own silhouette."""
-    mesh = triangulate(orient(polygon * (FLIP if y_down else 1), counter_clockwise=True))
-    frame = Frame(np.diag(FLIP if y_down else np.ones(2)), np.zeros(2))
-    bending = Bending(mesh.points, mesh.points, mesh.triangles)
-    figure = EscherTile(
-        Tile(polygon, first.figure.tile.group),
-        name="background",
-        y_down=y_down,
-        map_source=TileMap(frame=frame, bending=bending),
-    )
-    return Part(figure, Place(np.eye(2), np.zeros(2)))
 
 
 def _union(pair: CarvedPair) -> Tile:
