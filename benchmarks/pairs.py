@@ -38,7 +38,7 @@ ENOUGH_STARS = 3.5
 def searched(
     one: Path, two: Path, settings: EscherizeSettings
 ) -> tuple[Tiling | None, float, bool]:
-    """Print the row of a pair; return its tiling, seconds, and whether both figures have enough stars."""
+    """Print the row of a pair; return its tiling, its seconds, and whether it has enough stars."""
     begin, first = time.perf_counter(), list[float]()
 
     def tell(event: Event) -> None:
@@ -54,11 +54,9 @@ def searched(
     figures = best.likenesses
     stars = [own.rating.stars if own.rating else 0.0 for own in figures]
     marks = [own.likeness.fidelity.mark if own.likeness.fidelity else 0.0 for own in figures]
-    print(
-        f"{name:32} {best.name:5} {stars[0]:3g} {stars[1]:4g}  {marks[0]:5.2f} {marks[1]:5.2f} "
-        f"{mixing(best.tiling):7.2f} {len(found.tiles):6} {min(first, default=0.0):7.1f} {seconds:6.0f}",
-        flush=True,
-    )
+    row = f"{name:32} {best.name:5} {stars[0]:3g} {stars[1]:4g}  {marks[0]:5.2f} {marks[1]:5.2f}"
+    count, look = len(found.tiles), min(first, default=0.0)
+    print(f"{row} {mixing(best.tiling):7.2f} {count:6} {look:7.1f} {seconds:6.0f}", flush=True)
     return best.tiling, seconds, min(stars) >= ENOUGH_STARS
 
 
@@ -75,9 +73,7 @@ def main() -> None:
     print(f"{'pair':32} class stars      marks       mixed  tiles   first  whole")
     rows = [searched(one, two, settings) for one, two in pairs]
     good, slowest = sum(good for *_, good in rows), max(seconds for _, seconds, _ in rows)
-    print(
-        f"{good} of {len(rows)} have {ENOUGH_STARS:g} stars for both; the slowest took {slowest:.0f} s"
-    )
+    print(f"{good} of {len(rows)} have {ENOUGH_STARS:g} stars for both; at most {slowest:.0f} s")
     if options.sheet is not None:
         shown = {
             f"{one.stem}, {two.stem}": tiling

@@ -13,12 +13,16 @@ interface Palette {
   colours: string[];
   outline: string;
   paper?: string;
+  /** The colours of each of two figures, if it has 1, 2, 3 ... of them. */
+  shades?: string[][][];
 }
 
 interface Group {
   name?: string;
   lattice: [Point, Point];
   cosets: { linear: [Point, Point]; translation: Point }[];
+  /** The figure of each aspect, if a tile has several. */
+  figures?: number[];
 }
 
 /** A tile in a list: see tile_card in tile_view.py. */
@@ -36,15 +40,29 @@ interface Card {
   y_down: boolean;
   neck: [Point, Point];
   group: Group;
-  colours: { sublattice: [number, number, number]; table: number[][][] };
+  colours: { sublattice: [number, number, number]; table: number[][][]; shares?: number[] };
+  /** The figures that divide it, if it is not one. */
+  figures?: { name: string; stars: number; polygon: Point[]; neck: [Point, Point] }[];
 }
 
 /** What is drawn of a tile. */
-type Outlined = Pick<Card, "polygon" | "y_down" | "group" | "colours">;
+type Outlined = Pick<Card, "polygon" | "y_down" | "group" | "colours"> & {
+  figures?: { polygon: Point[] }[];
+};
 
-/** A copy of a tile in view; its matrix leads from the prototile to the canvas. */
+/** A figure of a tile, ready to be drawn. */
+interface Figure {
+  polygon: Point[];
+  path: Path2D;
+  area: number;
+  middle: { x: number; y: number };
+  radius: number;
+}
+
+/** A copy of a figure of a tile in view; its matrix leads from the tile to the canvas. */
 interface Copy {
   aspect: number;
+  figure: number;
   cell: [number, number];
   colour: number;
   matrix: Matrix;
@@ -70,14 +88,19 @@ interface TileMap {
   triangles: [number, number, number][];
 }
 
-/** A tile on a page of its own: see tile_view in tile_view.py. */
-interface TileView extends Card {
-  elements: Elements;
+/** What a page shows of a figure: see figure_view in tile_view.py. */
+interface FigureView {
+  polygon: Point[];
   silhouette_track: Point[];
   tile_track: Point[];
   map: TileMap | null;
   covered: [Point, Point] | null;
+  y_down: boolean;
+  place?: Matrix;
 }
+
+/** A tile on a page of its own, with what is shown of it or of each of its figures. */
+type TileView = Card & FigureView & { elements: Elements; figures?: FigureView[] };
 
 interface Task {
   id: number;
@@ -119,20 +142,25 @@ interface Views {
   drawing?: any;
 }
 
-interface Project {
+/** A picture, what was read of it, and what was painted over it. */
+interface Picture {
+  input: { name: string; type: string } | null;
+  reading: Reading;
+  silhouette: Silhouette | null;
+  mend: string | null;
+  pins: string | null;
+  emphasis: string | null;
+}
+
+interface Project extends Picture {
   id: string;
   name: string;
   kind: "tile" | "density";
   head?: number;
-  input: { name: string; type: string } | null;
-  reading: Reading;
-  silhouette: Silhouette | null;
+  second: Picture | null;
   tasks: Task[];
   tiles: Card[];
   view: Views | null;
-  mend: string | null;
-  pins: string | null;
-  emphasis: string | null;
   changed_by?: string;
 }
 

@@ -124,7 +124,7 @@ def test_lines_over_the_outline_end_there_in_files(
     export(folder, tmp_path / "a.dxf", settings, picture=files["picture"])
     (scene,), _ = scenes(folder, settings, picture=files["picture"])
     layout, _ = laid_out(read_result(folder), settings)
-    outline = layout.outline.closed.flattened(0.01)
+    outline = layout.outline.closed[0].flattened(0.01)
     tiles = shapely.union_all(
         [shapely.Polygon(outline @ tile.linear.T + tile.offset) for tile in scene.tiles]
     ).buffer(0.03)

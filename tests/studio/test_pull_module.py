@@ -219,7 +219,7 @@ def test_what_is_drawn_is_carried_simplified_and_rubbed_out() -> None:
 import { Carry } from "MODULES/carry.js";
 import { rubbed, simplified } from "MODULES/lines.js";
 const { map, points, line } = JSON.parse((await import("node:fs")).readFileSync(0));
-const carry = new Carry(map);
+const carry = new Carry({ map });
 const there = points.map((point) => carry.forward(point));
 console.log(JSON.stringify({
   there,

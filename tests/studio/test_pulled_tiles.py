@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.studio.pulled_tiles import pulled, space_json, variations
+from orbiflow.studio.pulled_tiles import PullSpace, pulled, space_json
 from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
 from orbiflow.studio.tile_view import elements_json, tile_view
 from orbiflow.symmetry import Line, reflection, rotation
@@ -46,7 +46,7 @@ def squirrel(name: str, *, y_down: bool = False) -> EscherTile:
 
 def nudged(tile: EscherTile, seed: int, reach: float) -> Array:
     """Parameters of a tile, moved at random by a share of its size that keeps sides apart."""
-    space = variations(tile)
+    space = PullSpace(tile)
     ring = space.first.polygon
     room = min(shapely.Polygon(ring).minimum_clearance, tile.tile.radius)
     rng = np.random.default_rng(seed)
@@ -72,10 +72,10 @@ def test_what_the_browser_is_told_is_the_space_of_the_tile(tile: Tile, seed: int
     pieces = shapely.polygons(points[triangles])
     assert shapely.area(pieces).sum() == pytest.approx(abs(tile.signed_area), rel=1e-9)
     sides, shares = (
-        np.array(told["body"]["sides"], dtype=int),
+        np.array(told["body"]["sides"], dtype=int).reshape(-1, 2),
         np.array(told["body"]["shares"])[:, None],
     )
-    on_sides = ring[sides] + shares * (ring[(sides + 1) % len(ring)] - ring[sides])
+    on_sides = ring[sides[:, 0]] + shares * (ring[sides[:, 1]] - ring[sides[:, 0]])
     assert np.abs(points[len(ring) :][: len(sides)] - on_sides).max(initial=0) < 1e-9 * tile.radius
 
 
@@ -93,7 +93,7 @@ def test_a_pulled_tile_is_certified(tile: Tile, seed: int, reach: float) -> None
 @pytest.mark.parametrize("name", ["IH4", "IH6", "IH21"])
 def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: Path) -> None:
     tile = squirrel(name, y_down=y_down)
-    before = variations(tile).first.polygon
+    before = PullSpace(tile).first.polygon
     found = pulled(tile, nudged(tile, 3, 0.4))
     after = found.tile.polygon
     assert found.map is not None
@@ -112,7 +112,7 @@ def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: 
 
 def test_not_pulled_is_the_same_tile_and_map() -> None:
     tile = squirrel("IH4")
-    found = pulled(tile, variations(tile).start)
+    found = pulled(tile, PullSpace(tile).start)
     assert tile.bending is not None
     assert tile.frame is not None
     inside = tile.frame.to_input(tile.bending.images[tile.bending.triangles].mean(axis=1))
@@ -121,7 +121,7 @@ def test_not_pulled_is_the_same_tile_and_map() -> None:
 
 def test_refusals_are_plain() -> None:
     tile = squirrel("IH4")
-    start = variations(tile).start
+    start = PullSpace(tile).start
     crossed = start.copy()
     crossed[:2] += 3 * tile.tile.radius
     with pytest.raises(CertificationError, match=r"outline crosses itself there.*pull it less far"):

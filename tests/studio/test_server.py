@@ -50,7 +50,7 @@ def test_about(client: Client) -> None:
     for animal in about["animals"]:
         picture = client.get(animal["picture"])
         assert max(Image.open(io.BytesIO(picture.content)).size) == 384
-    assert set(about["palettes"][0]) == {"name", "colours", "outline", "paper"}
+    assert set(about["palettes"][0]) == {"name", "colours", "shades", "outline", "paper"}
 
 
 def test_an_upload_becomes_a_silhouette(client: Client, project: str) -> None:

@@ -419,6 +419,22 @@ def test_another_version_is_not_touched(tmp_path: Path) -> None:
         Store(tmp_path)
 
 
+def test_a_folder_of_the_version_before_is_taken_over(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    project = store.create("tile", "a project", 9)
+    for change in ("ALTER TABLE projects DROP COLUMN second", "PRAGMA user_version = 1"):
+        store._data.execute(change)  # pyright: ignore[reportPrivateUsage]
+    store.close()
+    store = Store(tmp_path)
+    assert (store.project(project)["name"], store.project(project)["second"]) == ("a project", None)
+    with pytest.raises(OrbiflowError, match="no second picture"):
+        store.change(project, "silhouette", 1, silhouette={})
+    store.change(project, "silhouette", 1, input={"name": "a.png"})
+    store.change(project, "silhouette", 1, silhouette={})
+    assert store.project(project)["second"] == {"input": {"name": "a.png"}, "silhouette": {}}
+    store.close()
+
+
 ACTIONS = st.lists(
     st.tuples(
         st.sampled_from(["submit", "pause", "resume", "cancel", "finish"]), st.integers(0, 5)

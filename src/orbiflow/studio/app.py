@@ -20,7 +20,7 @@ from starlette.staticfiles import StaticFiles
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from orbiflow import __version__
-from orbiflow.drawing import PALETTES
+from orbiflow.drawing import PALETTES, Palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
@@ -37,6 +37,7 @@ from orbiflow.studio.work_queue import WorkQueue
 STATIC = Path(__file__).parent / "static"
 SETTLE_SECONDS = 20.0  # seconds
 MAX_PIXELS = 128_000_000  # of a picture that is read
+MAX_SHADES = 8  # of the colour of one of two figures
 log = logging.getLogger("orbiflow.studio")
 
 
@@ -108,9 +109,18 @@ async def about(here: Studio) -> dict[str, Any]:
             {"name": name, "title": title, "picture": f"/api/animals/{name}.png"}
             for name, title in ANIMALS.items()
         ],
-        "palettes": [{"name": name, **own._asdict()} for name, own in PALETTES.items()],
+        "palettes": [
+            {"name": name, **own._asdict(), "shades": _shades(own)}
+            for name, own in PALETTES.items()
+        ],
         "efforts": ["fast", "normal"],
     }
+
+
+def _shades(own: Palette) -> list[list[tuple[str, ...]]]:
+    """Return, for each of two figures, its colours if it has 1, 2, 3 ... of them."""
+    every = [own.shaded((count, count)).colours for count in range(1, MAX_SHADES + 1)]
+    return [[both[: len(both) // 2] for both in every], [both[len(both) // 2 :] for both in every]]
 
 
 @routes("GET", "/animals/{name}.png")

@@ -53,8 +53,11 @@ TAKE_SETTINGS = ("tile", "picture", "drawing", "called")
 WITH_DRAWING = ("export", "art")
 """What shows the drawing on a tile."""
 
+READS = ("read", "read second")
+"""The kind of task that reads the first picture of a project, and the second."""
+
 KINDS = {
-    "read": Kind("studio read", "quick"),
+    **dict.fromkeys(READS, Kind("studio read", "quick")),
     "open": Kind("studio open", "quick"),
     "search": Kind("studio search"),
     "space": Kind("studio space", "quick"),

@@ -22,17 +22,20 @@ from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.runtime import is_object
 from orbiflow.studio.tile_files import PLACES, best_stage, tile_folder
-from orbiflow.studio.words import MASKS
+from orbiflow.studio.words import MASKS, OF_PICTURE
 
 if TYPE_CHECKING:
-    from orbiflow.tiles import EscherTile, Target
+    from orbiflow.tiles import EscherTile, ReadingSettings, Target
 
 FORMAT = "orbiflow-project/1"
 PROJECT, ENDING = "project.json", ".orbiflow"
-INPUT = re.compile(r"input\.[a-z0-9]{1,7}")
-TILE = re.compile(r"tiles/([1-9][0-9]{0,14})/(result\.json|[A-Za-z0-9-]{1,20}/model\.safetensors)")
+INPUT = re.compile(r"input(-2)?\.[a-z0-9]{1,7}")
+TILE = re.compile(
+    r"tiles/([1-9][0-9]{0,14})/(result\.json|[A-Za-z0-9-]{1,20}/model(-2)?\.safetensors)"
+)
+PAINTED = tuple(f"{mask}{end}.png" for end in OF_PICTURE for mask in MASKS)
 MAX_VIEW = 200_000  # characters of what pages remember of a project
-MAX_ENTRIES = 3 * PLACES
+MAX_ENTRIES = 4 * PLACES
 MAX_BYTES = 512 * 2**20  # of all entries, unpacked
 MAX_ENTRY_BYTES = 64 * 2**20
 DAMAGE_ERRORS = (zlib.error, EOFError, struct.error, KeyError, IndexError, TypeError, OverflowError)
@@ -44,6 +47,7 @@ class StudioProject:
 
     - `name`: Its name.
     - `target`: The silhouette; None if there was no picture yet.
+    - `second`: That of a second picture, if there was one.
     - `tiles`: Its tiles, each certified again, best first.
     - `numbers`: The number of each tile in the studio, and of the tile that it was made from by hand.
     - `document`: What else the file says.
@@ -51,6 +55,7 @@ class StudioProject:
 
     name: str
     target: Target | None
+    second: Target | None
     tiles: tuple[EscherTile, ...]
     numbers: tuple[tuple[int, int | None], ...]
     document: Mapping[str, Any]
@@ -61,13 +66,14 @@ def write_project(home: Path, document: Mapping[str, Any], out: Path) -> None:
 
     Args:
         home: The project's folder.
-        document: Its name, kind, view and reading; its input's name; and `tiles`, each with its `id`
-            and `parent`.
+        document: Its name, kind, view and reading; its input's name; the same of a `second` picture;
+            and `tiles`, each with its `id` and `parent`.
         out: The file.
     """
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr(PROJECT, json.dumps({"format": FORMAT, **document}, allow_nan=False))
-        for file in [*home.glob("input.*"), *(home / f"{mask}.png" for mask in MASKS)]:
+        inputs = (file for end in OF_PICTURE for file in home.glob(f"input{end}.*"))
+        for file in (*inputs, *(home / name for name in PAINTED)):
             if file.exists():
                 archive.write(file, file.name, zipfile.ZIP_STORED)
         for number in (tile["id"] for tile in document["tiles"]):
@@ -93,14 +99,11 @@ def open_project(path: str | Path) -> StudioProject:
         home = Path(folder)
         document = unpack(as_path(path, "the project's file"), home)
         found = read_tiles(home, document)
-        target = None
-        if next(home.glob("input.*"), None) is not None:
-            from orbiflow.studio.silhouette_file import read_input
-
-            target = read_input(home, *reading_of(document))
+        target, second = read_pictures(home, document)
         return StudioProject(
             str(document["name"]),
             target,
+            second,
             tuple(tile for tile, _, _ in found),
             tuple((number, parent) for _, number, parent in found),
             document,
@@ -136,8 +139,7 @@ def _unpack_entries(archive: zipfile.ZipFile, home: Path) -> None:
     left = MAX_BYTES
     for entry in entries:
         name = entry.filename
-        own = name == PROJECT or name in {f"{mask}.png" for mask in MASKS}
-        if not (own or INPUT.fullmatch(name) or TILE.fullmatch(name)):
+        if not (name in (PROJECT, *PAINTED) or INPUT.fullmatch(name) or TILE.fullmatch(name)):
             continue  # of a later version, or of somebody else
         # what an entry says of its size may be a lie: no more is read
         with archive.open(entry) as source:
@@ -162,13 +164,36 @@ def _checked(document: object, path: Path) -> dict[str, Any]:
     return document
 
 
-def reading_of(document: Mapping[str, Any]) -> tuple[str, Any]:
-    """Return what the picture was called, and how it was read."""
+def reading_of(document: Mapping[str, Any], number: int = 0) -> tuple[str, ReadingSettings]:
+    """Return what a picture was called, and how it was read."""
     from orbiflow.tiles import ReadingSettings
 
-    given = document.get("input")
+    about = document.get("second") if number else document
+    about = about if is_object(about) else {}
+    given, reading = about.get("input"), about.get("reading", {})
     called = given.get("name") if is_object(given) else None
-    return str(called or "picture")[:80], ReadingSettings(**document["reading"])
+    reading = reading if is_object(reading) else {}
+    return str(called or "picture")[:80], ReadingSettings(**reading)
+
+
+def read_pictures(home: Path, document: Mapping[str, Any]) -> list[Target | None]:
+    """Read the first and the second picture in an unpacked project again; None for one that is not."""
+    from orbiflow.studio.silhouette_file import read_input
+
+    return [
+        read_input(home, *reading_of(document, number), number)
+        if any(home.glob(f"input{end}.*"))
+        else None
+        for number, end in enumerate(OF_PICTURE)
+    ]
+
+
+def _with_maps(tile: EscherTile) -> EscherTile:
+    """Return a tile with its maps, or those of its figures, read."""
+    if not tile.parts:
+        return tile.changed(map_source=tile.map)
+    parts = (part._replace(figure=_with_maps(part.figure)) for part in tile.parts)
+    return tile.changed(parts=tuple(parts))
 
 
 def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile, int, int | None]]:
@@ -182,7 +207,7 @@ def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile
             continue
         tile = read_result(home / "tiles" / str(number))
         tile.require_certified(otherwise="so the project cannot be opened; save it again")
-        tile = tile.changed(map_source=tile.map)  # its file may go
+        tile = _with_maps(tile)  # their files may go
         parent = entry.get("parent")
         found.append((tile, number, parent if type(parent) is int else None))
     return found

@@ -19,13 +19,21 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.extras import naming_extras
 from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.kinds_of_work import kind_of_work
+from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
 from orbiflow.studio.routes import Routes, Studio, body_object, save_body
 from orbiflow.studio.store import Missing
 from orbiflow.studio.tasks import PREVIEW, SPACE, export_folder
 from orbiflow.studio.tile_files import VIEW, best_stage, tile_number
-from orbiflow.studio.words import MASKS, NAMES, plain_name, shown_project, shown_summary, shown_task
+from orbiflow.studio.words import (
+    MASKS,
+    NAMES,
+    OF_PICTURE,
+    plain_name,
+    shown_project,
+    shown_summary,
+    shown_task,
+)
 from orbiflow.tiles import ReadingSettings
 
 routes = Routes()
@@ -75,7 +83,7 @@ def file(project: str, here: Studio) -> FileResponse:
         own, cards = here.store.project(project), here.store.cards(project)
     if own["kind"] != "tile":
         raise OrbiflowError("only projects of tiles are saved as a file; take the model away")
-    names = ("name", "kind", "view", "reading", "input")
+    names = ("name", "kind", "view", "reading", "input", "second")
     tiles = [{name: card[name] for name in ("id", "parent")} for card in cards]
     out = here.store.home(project) / f".{secrets.token_hex(4)}.tmp"
     document = {**{name: own[name] for name in names}, "tiles": tiles}
@@ -169,98 +177,155 @@ PLAIN_ENDING = re.compile("[.][a-z0-9]{1,7}")
 
 
 @routes("PUT", "/projects/{project}/input")
-async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
+async def upload(
+    request: Request, project: str, here: Studio, name: str = "", number: int = 0
+) -> dict[str, Any]:
     """Take a picture or drawing of any kind, as raw bytes."""
-    here.store.project(project)
+    end = _end(here, project, number)
     called = plain_name(name, "picture")
     ending = PurePosixPath(called).suffix.lower()
-    file = here.store.home(project) / f"input{ending if PLAIN_ENDING.fullmatch(ending) else '.bin'}"
+    ending = ending if PLAIN_ENDING.fullmatch(ending) else ".bin"
+    file = here.store.home(project) / f"input{end}{ending}"
     await save_body(request, file)
-    return await _new_input(here, project, called, file)
+    return await _new_input(here, project, called, file, number)
 
 
 @routes("POST", "/projects/{project}/animal")
-async def animal(request: Request, project: str, here: Studio) -> dict[str, Any]:
+async def animal(request: Request, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Take one of the bundled animals."""
     name = str((await body_object(request)).get("name"))
-    here.store.project(project)
+    end = _end(here, project, number)
     content = animal_file(name).read_bytes()
-    file = here.store.home(project) / "input.png"
+    file = here.store.home(project) / f"input{end}.png"
     file.write_bytes(content)
-    return await _new_input(here, project, f"{ANIMALS[name]}.png", file)
+    return await _new_input(here, project, f"{ANIMALS[name]}.png", file, number)
 
 
-async def _new_input(here: Studio, project: str, name: str, file: Path) -> dict[str, Any]:
-    """Forget the picture before, what was painted over it, and the search for its tiles."""
-    await run_in_threadpool(here.queue.forget, project, "read", "search")
-    home = here.store.home(project)
-    for old in [*home.glob("input.*"), *(home / f"{mask}.png" for mask in MASKS)]:
+@routes("POST", "/projects/{project}/second")
+async def same_again(project: str, here: Studio) -> dict[str, Any]:
+    """Take the first picture as the second one, too, with what was painted over it."""
+    own, home = here.store.project(project), here.store.home(project)
+    if own["input"] is None:
+        raise OrbiflowError("there is no picture yet; choose one first")
+    copy = home / f"input{OF_PICTURE[1]}.{own['input']['type']}"
+    shutil.copyfile(next(home.glob("input.*")), copy)
+    name = own["input"]["name"]
+    return await _new_input(here, project, name, copy, 1, reading=own["reading"], masks=MASKS)
+
+
+@routes("DELETE", "/projects/{project}/second")
+async def delete_second(project: str, here: Studio) -> dict[str, Any]:
+    """Take the second picture away, with what was painted over it, and end the search for both."""
+    here.store.project(project)
+    await run_in_threadpool(here.queue.forget, project, READS[1], "search")
+    for file in here.store.home(project).glob(f"*{OF_PICTURE[1]}.*"):
+        file.unlink(missing_ok=True)
+    here.store.change(project, "silhouette", second=None)
+    return {}
+
+
+def _end(here: Studio, project: str, number: int) -> str:
+    """Return what the names of the files of a picture end in."""
+    here.store.project(project)
+    if number not in range(len(OF_PICTURE)):
+        raise Refused(404, "a project has two pictures at most")
+    return OF_PICTURE[number]
+
+
+async def _new_input(
+    here: Studio,
+    project: str,
+    name: str,
+    file: Path,
+    number: int,
+    *,
+    reading: dict[str, Any] | None = None,
+    masks: tuple[str, ...] = (),
+) -> dict[str, Any]:
+    """Forget the picture before, what was painted over it, and the search for its tiles.
+
+    The new one is read as `reading` says, with what these masks of the first picture say.
+    """
+    await run_in_threadpool(here.queue.forget, project, READS[number], "search")
+    home, end = here.store.home(project), OF_PICTURE[number]
+    for old in [*home.glob(f"input{end}.*"), *(home / f"{mask}{end}.png" for mask in MASKS)]:
         if old != file:
             old.unlink(missing_ok=True)
-    changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
+    for mask in masks:
+        if (painted := home / f"{mask}.png").exists():
+            shutil.copyfile(painted, home / f"{mask}{end}.png")
+    changes = {"input": {"name": name, "type": file.suffix.lstrip(".")}, "reading": reading or {}}
+    here.store.change(project, "silhouette", number, silhouette=None, **changes)
     if here.store.project(project)["name"] in NAMES.values():
-        changes["name"] = PurePosixPath(name).stem
-    here.store.change(project, "silhouette", silhouette=None, reading={}, **changes)
+        here.store.change(project, name=PurePosixPath(name).stem)
     here.store.change(project)
-    return await _read_anew(here, project)
+    return await _read_anew(here, project, number)
 
 
-async def _read_anew(here: Studio, project: str) -> dict[str, Any]:
+async def _read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
     whole = here.store.project(project)
-    if whole["input"] is None:
+    own = whole["second"] if number else whole
+    if own is None or own["input"] is None:
         raise OrbiflowError("there is no picture yet; choose one first")
-    await run_in_threadpool(here.queue.forget, project, "read", state="waiting")
+    await run_in_threadpool(here.queue.forget, project, READS[number], state="waiting")
+    called = own["input"]["name"]
     return await here.submit(
-        project, "read", {"called": whole["input"]["name"], **whole["reading"]}
+        project, READS[number], {"called": called, "number": number, **own["reading"]}
     )
 
 
 @routes("PUT", "/projects/{project}/reading")
-async def reading(request: Request, project: str, here: Studio) -> dict[str, Any]:
-    """Read the picture anew, with other settings."""
+async def reading(request: Request, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
+    """Read a picture anew, with other settings."""
+    _end(here, project, number)
     given = {k: v for k, v in (await body_object(request)).items() if v is not None}
-    here.store.change(project, "silhouette", reading=ReadingSettings(**given).to_json())
-    return await _read_anew(here, project)
+    here.store.change(project, "silhouette", number, reading=ReadingSettings(**given).to_json())
+    return await _read_anew(here, project, number)
 
 
 @routes("PUT", "/projects/{project}/{mask}")
-async def put_mask(request: Request, project: str, mask: str, here: Studio) -> dict[str, Any]:
-    """Take what was painted over the picture."""
-    file = _mask_file(here, project, mask)
+async def put_mask(
+    request: Request, project: str, mask: str, here: Studio, number: int = 0
+) -> dict[str, Any]:
+    """Take what was painted over a picture."""
+    file = _mask_file(here, project, mask, number)
     fresh = file.with_suffix(".new")
     await save_body(request, fresh)
     with fresh.open("rb") as start:
         if start.read(len(PNG)) != PNG:
             raise OrbiflowError("what is painted must be a PNG")
     fresh.replace(file)
-    return await _mask_changed(here, project, mask)
+    return await _mask_changed(here, project, mask, number)
 
 
 @routes("DELETE", "/projects/{project}/{mask}")
-async def delete_mask(project: str, mask: str, here: Studio) -> dict[str, Any]:
-    """Forget what was painted over the picture."""
-    _mask_file(here, project, mask).unlink(missing_ok=True)
-    return await _mask_changed(here, project, mask)
+async def delete_mask(project: str, mask: str, here: Studio, number: int = 0) -> dict[str, Any]:
+    """Forget what was painted over a picture."""
+    _mask_file(here, project, mask, number).unlink(missing_ok=True)
+    return await _mask_changed(here, project, mask, number)
 
 
-def _mask_file(here: Studio, project: str, mask: str) -> Path:
+def _mask_file(here: Studio, project: str, mask: str, number: int) -> Path:
     if mask not in MASKS:
         raise Refused(404, "there is nothing here; go back to the start page")
-    here.store.project(project)
-    return here.store.home(project) / f"{mask}.png"
+    end = _end(here, project, number)
+    if number and here.store.project(project)["second"] is None:
+        raise Missing("there is no second picture (any more); add one first")
+    return here.store.home(project) / f"{mask}{end}.png"
 
 
-async def _mask_changed(here: Studio, project: str, mask: str) -> dict[str, Any]:
+async def _mask_changed(here: Studio, project: str, mask: str, number: int) -> dict[str, Any]:
     here.store.change(project, "silhouette")
-    return await _read_anew(here, project) if mask == "mend" else {}
+    return await _read_anew(here, project, number) if mask == "mend" else {}
 
 
 @routes("GET", "/projects/{project}/{picture}.png")
 async def get_picture(project: str, picture: str, here: Studio) -> FileResponse:
-    """Return the backdrop, or what was painted over it."""
+    """Return a backdrop, or what was painted over it."""
     here.store.project(project)
     file = here.store.home(project) / f"{picture}.png"
-    if picture not in (*MASKS, "backdrop") or not file.exists():
+    known = {f"{name}{end}" for end in OF_PICTURE for name in (*MASKS, "backdrop")}
+    if picture not in known or not file.exists():
         raise Refused(404, "there is no such picture (any more)")
     return FileResponse(file)
 

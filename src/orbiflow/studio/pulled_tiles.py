@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import shapely
+from scipy.spatial import KDTree
 
 from orbiflow.arguments import as_array
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
     Bending,
@@ -17,6 +19,7 @@ from orbiflow.tiles import (
     Likeness,
     Rating,
     SearchFacts,
+    Tile,
     TileMap,
     TileVariations,
     arc_lengths,
@@ -29,26 +32,94 @@ from orbiflow.tiles import (
     orient,
     points_along,
     ring_length,
+    signed_area,
     triangulate,
 )
 
 POINTS = 240
 """About how many points of the outline can be pulled: longer sides are divided."""
 
-COMPARED_POINTS = 240  # points at which a pulled outline is compared with its silhouette
+COMPARED_POINTS = 240  # points at which pulled outlines are compared with their silhouettes
 BODY_SPACING = 2.5  # distance of points inside the body, in mean sides of the outline
 NEGLIGIBLE_ENTRY = 1e-12  # entry of the space's matrix that is nothing but rounding
 AREA_BOUNDS = (0.05, 20.0)  # area of a pulled tile, and of its lattice's cell, in those of before
+SAME_POINT_DISTANCE = 1e-7  # in the tile's size: vertices of figures this near to others are these
+PULLED = ("its outline was pulled by hand",)
 CROSSED = "the outline crosses itself there, so tiles would overlap: pull it less far"
 OTHER_SIZE = "the tile has become much too small or too large: pull it less far"
 
 
-def variations(tile: EscherTile) -> TileVariations:
-    """Return the polygons that a tile can be pulled to, which tile as it does.
+class PullSpace:
+    """The polygons that a tile can be pulled to, which tile as it does.
 
+    They are those of its outline, and those of the path between two figures, whose vertices are free.
     The same tile gives the same space, so that parameters mean the same to whoever made it.
+
+    - `outline`: The variations of the tile.
+    - `points`: Its vertices (N, 2), then those of the path.
+    - `rings`: The numbers of the vertices of each figure.
+    - `kept`: The places among these of the vertices that the figure had.
+    - `start`: The parameters of the tile as it is; `matrix` takes parameters to vertices.
     """
-    return TileVariations(divided_tile(tile.tile, POINTS))
+
+    def __init__(self, tile: EscherTile) -> None:
+        self.outline = TileVariations(divided_tile(tile.tile, POINTS))
+        ring, matrix = self.outline.first.polygon, self.outline.matrix
+        self.points, self.rings, self.kept = ring, [np.arange(len(ring))], [np.arange(len(ring))]
+        if tile.parts:
+            figures = [part.prototile.polygon for part in tile.parts]
+            self.points, self.rings, self.kept = _divided_rings(ring, figures)
+        free = matrix.shape[1] - len(self.outline.maps) - 2
+        self._path = slice(free, free + 2 * (len(self.points) - len(ring)))
+        self.start = np.insert(self.outline.start, free, self.points[len(ring) :].ravel())
+        self.matrix = np.zeros((2 * len(self.points), len(self.start)))
+        own = np.delete(np.arange(len(self.start)), self._path)
+        self.matrix[: len(matrix), own] = matrix
+        self.matrix[len(matrix) :, self._path] = np.eye(self._path.stop - free)
+
+    @property
+    def first(self) -> Tile:
+        """The tile as it is, its longer sides divided."""
+        return self.outline.first
+
+    def polygon(self, parameters: Array) -> Array:
+        """Return the vertices (N, 2) for parameters (P,)."""
+        return (self.matrix @ parameters).reshape(-1, 2)
+
+    def tile(self, parameters: Array) -> Tile:
+        """Return the tile for parameters (P,)."""
+        return self.outline.tile(np.delete(parameters, self._path), same_area=False)
+
+
+def _divided_rings(
+    outline: Array, figures: Sequence[Array]
+) -> tuple[Array, list[Integers], list[Integers]]:
+    """Return the points, rings and kept places of a `PullSpace` for the polygons of its figures."""
+    points, near = outline, SAME_POINT_DISTANCE * float(np.ptp(outline, axis=0).max())
+    rings, kept = list[Integers](), list[Integers]()
+    for figure in figures:
+        found: Any = KDTree(points).query(figure)
+        inner, numbers = found[0] > near, found[1]
+        numbers[inner] = len(points) + np.arange(inner.sum())
+        points = np.concatenate([points, figure[inner]])
+        ring, places = list[int](), list[int]()
+        for start, end in zip(numbers.tolist(), np.roll(numbers, -1).tolist(), strict=True):
+            places.append(len(ring))
+            ring += [start, *_between(outline, start, end, near)]
+        rings.append(np.array(ring))
+        kept.append(np.array(places))
+    return points, rings, kept
+
+
+def _between(outline: Array, start: int, end: int, near: float) -> list[int]:
+    """Return the vertices of an outline on the side of a figure from one of its vertices to another."""
+    count = len(outline)
+    if max(start, end) >= count:
+        return []
+    found = np.arange(start + 1, start + (end - start) % count) % count
+    side = shapely.LineString(outline[[start, end]])
+    on_side = shapely.distance(shapely.points(outline[found]), side) < near
+    return found.tolist() if on_side.all() else []
 
 
 def space_json(tile: EscherTile) -> dict[str, Any]:
@@ -58,29 +129,56 @@ def space_json(tile: EscherTile) -> dict[str, Any]:
       to the coordinates x, y of each vertex.
     - `start`: The parameters of the tile as it is. The last ones are those of `maps`, matrices whose
       sum M moves the group by p -> M p + b, and b.
-    - `polygon`: The vertices of the tile as it is.
+    - `polygon`: The vertices as they are: of the outline, `outer` of them, then those between figures.
+    - `rings`: The numbers of the vertices of each figure.
     - `body`: `points` and `triangles` that fill the tile. The first points are the vertices, then
-      come points at `shares` of the `sides` from one vertex to the next, then those inside.
+      come points at `shares` of the `sides` from one vertex to another, then those inside.
     """
-    space = variations(tile)
-    ring = space.first.polygon
-    spacing = BODY_SPACING * ring_length(ring) / len(ring)
-    body, count = triangulate(orient(ring, counter_clockwise=True), spacing), len(ring)
-    number, sides, shares = np.arange(len(body.points)), body.sides, body.shares
-    if space.first.signed_area < 0:  # the vertices are there in reverse, from the same first one
-        number[:count] = -number[:count] % count
-        sides, shares = count - 1 - sides, 1 - shares
+    space = PullSpace(tile)
     return {
         **_sparse(space.matrix),
         "start": space.start.tolist(),
-        "maps": space.maps.tolist(),
-        "polygon": ring.tolist(),
-        "body": {
-            "points": body.points[number].tolist(),
-            "triangles": number[body.triangles].tolist(),
-            "sides": sides.tolist(),
-            "shares": shares.tolist(),
-        },
+        "maps": space.outline.maps.tolist(),
+        "polygon": space.points.tolist(),
+        "outer": len(space.first.polygon),
+        "rings": [ring.tolist() for ring in space.rings],
+        "body": _body(space),
+    }
+
+
+def _body(space: PullSpace) -> dict[str, Any]:
+    """Return what fills the figures, as one body."""
+    tied, free = list[Array](), list[Array]()
+    triangles, sides, shares = list[Any](), list[Any](), list[Any]()
+    for ring in space.rings:
+        polygon = space.points[ring]
+        spacing = BODY_SPACING * ring_length(polygon) / len(ring)
+        mesh = triangulate(orient(polygon, counter_clockwise=True), spacing)
+        # in one that is turned the vertices are in reverse, from the same first one
+        own = ring if signed_area(polygon) > 0 else np.roll(ring[::-1], 1)
+        on_sides, inside = np.split(mesh.points[mesh.size :], [len(mesh.sides)])
+        # the numbers of these points among all that are tied, and among all that are free
+        kinds = np.repeat([0, 1, 2], [mesh.size, len(on_sides), len(inside)])
+        numbers = np.concatenate(
+            [
+                own,
+                sum(map(len, tied)) + np.arange(len(on_sides)),
+                sum(map(len, free)) + np.arange(len(inside)),
+            ]
+        )
+        triangles.append(np.stack([kinds, numbers])[:, mesh.triangles])
+        sides.append(np.stack([own, np.roll(own, -1)], axis=1)[mesh.sides])
+        shares.append(mesh.shares)
+        tied.append(on_sides)
+        free.append(inside)
+    points = np.concatenate([space.points, *tied, *free])
+    first = np.cumsum([0, len(space.points), sum(map(len, tied))])
+    kinds, numbers = np.concatenate(triangles, axis=1)
+    return {
+        "points": points.tolist(),
+        "triangles": (first[kinds] + numbers).tolist(),
+        "sides": np.concatenate(sides).tolist(),
+        "shares": np.concatenate(shares).tolist(),
     }
 
 
@@ -97,13 +195,13 @@ def _sparse(matrix: Array) -> dict[str, Any]:
 
 
 def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
-    """Return the certified tile for parameters of `variations`, with the tile's map carried on.
+    """Return the certified tile for parameters of its `PullSpace`, with the maps carried on.
 
     Raises:
         OrbiflowError: for parameters that are not of this tile's space.
-        CertificationError: if the outline crosses itself or has collapsed, in plain words.
+        CertificationError: if an outline crosses itself or has collapsed, in plain words.
     """
-    space = variations(tile)
+    space = PullSpace(tile)
     if np.shape(parameters) != space.start.shape:
         raise OrbiflowError(
             "the parameters of a pulled tile are not of this one, which may have become better "
@@ -111,64 +209,88 @@ def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
         )
     given = as_array(parameters, "the parameters of a pulled tile", space.start.shape)
     _check(space, given)
-    found = EscherTile(
-        space.tile(given, same_area=False),
-        name=tile.name,
-        y_down=tile.y_down,
-        silhouette=tile.silhouette,
-        notes=("its outline was pulled by hand",),
-        likeness=Likeness(min_neck=tile.likeness.min_neck),
-    )
+    whole, points = space.tile(given), space.polygon(given)
+    if not tile.parts:
+        found = _figure(tile, whole, space.first.polygon, COMPARED_POINTS)
+    else:
+        parts = list[Any]()
+        for part, ring, kept in zip(tile.parts, space.rings, space.kept, strict=True):
+            back, before = part.place.inverse, part.figure
+            corners = tuple(kept[list(before.tile.corners)].tolist())
+            own = Tile(back(points[ring]), whole.group.conjugate(*back), corners=corners)
+            count = COMPARED_POINTS // len(tile.parts)
+            figure = _figure(before, own, back(space.points[ring]), count)
+            parts.append(part._replace(figure=figure))
+        found = EscherTile(
+            whole,
+            name=tile.name,
+            y_down=tile.y_down,
+            silhouette=tile.silhouette,
+            no_map=tile.no_map,
+            notes=PULLED,
+            parts=tuple(parts),
+        )
+        if all(part.figure.rating for part in found.parts):
+            found = replace(found, rating=Rating.of_likeness(found.score))
     if not found.certificate.valid:
         raise CertificationError("; ".join(found.certificate.reasons))
-    thinnest = narrowest_neck(found.tile.polygon)
-    before = tile
-    if tile.bending is None:
-        from orbiflow.tiles import with_map  # which needs torch
-
-        before = with_map(tile)
-    return _with_map(
-        found.changed(likeness=replace(found.likeness, thinnest=thinnest)), before, space
-    )
+    return found
 
 
-def _check(space: TileVariations, parameters: Array) -> None:
+def _check(space: PullSpace, parameters: Array) -> None:
     """Refuse, in plain words, an outline that cannot be a tile's."""
-    outline = shapely.Polygon(space.polygon(parameters))
-    linear = np.tensordot(parameters[-2 - len(space.maps) : -2], space.maps, 1)
+    points, count = space.polygon(parameters), len(space.first.polygon)
+    outline, maps = shapely.Polygon(points[:count]), space.outline.maps
+    linear = np.tensordot(parameters[-2 - len(maps) : -2], maps, 1)
     areas = (outline.area / abs(space.first.signed_area), float(np.linalg.det(linear)))
     if not all(AREA_BOUNDS[0] < area < AREA_BOUNDS[1] for area in areas):
         raise CertificationError(OTHER_SIZE)
-    if not outline.is_valid:
+    figures = (shapely.Polygon(points[ring]) for ring in space.rings)
+    if not (outline.is_valid and all(figure.is_valid for figure in figures)):
         raise CertificationError(CROSSED)
 
 
-def _with_map(found: EscherTile, before: EscherTile, space: TileVariations) -> EscherTile:
-    """Return a pulled tile with the map of the tile before carried on, and its likeness by that."""
+def _figure(before: EscherTile, tile: Tile, ring: Array, count: int) -> EscherTile:
+    """Return a figure that was pulled to `tile` from a ring, with its map and likeness carried on.
+
+    It is compared with its silhouette at so many points.
+    """
+    likeness = Likeness(min_neck=before.likeness.min_neck, thinnest=narrowest_neck(tile.polygon))
+    found = EscherTile(
+        tile,
+        name=before.name,
+        y_down=before.y_down,
+        silhouette=before.silhouette,
+        notes=PULLED,
+        likeness=likeness,
+    )
+    if before.bending is None:
+        from orbiflow.tiles import with_map  # which needs torch
+
+        before = with_map(before)
     bending, frame = before.bending, before.frame
     if bending is None or frame is None:
         return found.changed(no_map=before.no_map or "its run left no map")
-    ends = frame.to_normal(space.first.polygon), frame.to_normal(found.tile.polygon)
     try:
-        bending = carried_on(bending, *ends)
+        bending = carried_on(bending, frame.to_normal(ring), frame.to_normal(tile.polygon))
     except OrbiflowError as error:
         return found.changed(map_source=TileMap(frame=frame), no_map=str(error))
-    rest, images = _outlines(bending)
+    rest, images = _outlines(bending, count)
     cost = before.likeness.fidelity.cost if before.likeness.fidelity else 0.0
     kept = fidelity(complex_points(rest), complex_points(images), cost)
     found = found.changed(
         map_source=TileMap(frame=frame, bending=bending),
         search=SearchFacts(objective="likeness"),
         likeness=replace(
-            found.likeness, fidelity=kept, rest=frame.to_input(rest), bent=frame.to_input(images)
+            likeness, fidelity=kept, rest=frame.to_input(rest), bent=frame.to_input(images)
         ),
     )
     return replace(found, rating=Rating.of_likeness(found.score))
 
 
-def _outlines(bending: Bending) -> tuple[Array, Array]:
+def _outlines(bending: Bending, count: int) -> tuple[Array, Array]:
     """Return the silhouette's outline at evenly spaced points, and where they go."""
     ring = bending.rest[border(bending.triangles)]
     lengths = arc_lengths(ring)
-    rest = points_along(ring, np.arange(COMPARED_POINTS) / COMPARED_POINTS * lengths[-1])
+    rest = points_along(ring, np.arange(count) / count * lengths[-1])
     return rest, bending.forward(rest)

@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 from orbiflow.drawing import png_bytes
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic, write_json
-from orbiflow.studio.words import page_words
+from orbiflow.studio.words import OF_PICTURE, page_words
 from orbiflow.tiles import (
     FileContent,
     ReadingSettings,
@@ -24,38 +24,48 @@ from orbiflow.tiles import (
     polygons_in,
 )
 
-SILHOUETTE, BACKDROP, MEND = "silhouette.json", "backdrop.png", "mend.png"
 BACKDROP_SIDE_PIXELS = 1200  # pixels of the backdrop's longer side
 SUPERSAMPLING = 3  # along each side of a pixel of what is drawn
 PAPER, INK = (255, 255, 255), (70, 78, 92)
 
 
-def input_file(home: Path) -> Path:
-    """Return the file that was uploaded."""
-    found = next(home.glob("input.*"), None)
+def input_file(home: Path, number: int = 0) -> Path:
+    """Return the file that was uploaded as the first or second picture."""
+    found = next(home.glob(f"input{OF_PICTURE[number]}.*"), None)
     if found is None:
         raise InputFileError("there is no picture yet; choose one first")
     return found
 
 
-def read_input(home: Path, called: str, reading: ReadingSettings) -> Target:
-    """Read a project's picture and write its backdrop and its silhouette."""
-    content = FileContent(input_file(home).read_bytes(), called)
+def has_second(home: Path) -> bool:
+    """Whether a project has a second picture."""
+    return any(home.glob(f"input{OF_PICTURE[1]}.*"))
+
+
+def silhouette_file(home: Path, number: int = 0) -> Path:
+    """Return the file of what was read of a picture."""
+    return home / f"silhouette{OF_PICTURE[number]}.json"
+
+
+def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 0) -> Target:
+    """Read one of a project's pictures and write its backdrop and its silhouette."""
+    content = FileContent(input_file(home, number).read_bytes(), called)
     target = Target.from_bytes(
         content.data, called, threshold=reading.threshold, invert=reading.invert
     )
     picture = _picture(target, content)
-    mended = reading.shaped(_mended(target, home, picture.size))
-    write_atomic(home / BACKDROP, png_bytes(picture))
+    end = OF_PICTURE[number]
+    mended = reading.shaped(_mended(target, home / f"mend{end}.png", picture.size))
+    write_atomic(home / f"backdrop{end}.png", png_bytes(picture))
     document = {"shown": _shown(mended, picture.size), "target": _stored(mended)}
-    write_json(home / SILHOUETTE, document)
+    write_json(silhouette_file(home, number), document)
     return mended
 
 
-def load_target(home: Path) -> Target:
-    """Return the silhouette that was read last."""
+def load_target(home: Path, number: int = 0) -> Target:
+    """Return the silhouette of a picture, as it was read last."""
     try:
-        stored = json.loads((home / SILHOUETTE).read_text())["target"]
+        stored = json.loads(silhouette_file(home, number).read_text())["target"]
     except FileNotFoundError:
         raise InputFileError("there is no silhouette yet; choose a picture first") from None
     stored["outline"] = np.array(stored["outline"])
@@ -101,9 +111,8 @@ def _drawn(target: Target, size: tuple[int, int], mode: str, ink: Any, paper: An
     return picture.reduce(SUPERSAMPLING)
 
 
-def _mended(target: Target, home: Path, size: tuple[int, int]) -> Target:
+def _mended(target: Target, file: Path, size: tuple[int, int]) -> Target:
     """Return the silhouette with what was painted white added and what was painted black removed."""
-    file = home / MEND
     if not file.exists():
         return target
     painted, _ = open_image(FileContent(file.read_bytes(), "the corrections"))

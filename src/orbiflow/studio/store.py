@@ -20,10 +20,11 @@ from typing import Any
 
 from orbiflow.errors import OrbiflowError
 
-VERSION = 1
+VERSION = 2
 TABLES = """
 CREATE TABLE projects(id TEXT PRIMARY KEY, kind TEXT, name TEXT, created REAL, changed REAL,
-    input TEXT, reading TEXT DEFAULT '{}', silhouette TEXT, view TEXT DEFAULT '{}', changed_by TEXT);
+    input TEXT, reading TEXT DEFAULT '{}', silhouette TEXT, view TEXT DEFAULT '{}', changed_by TEXT,
+    second TEXT);
 CREATE TABLE tiles(id INTEGER PRIMARY KEY, project TEXT, score REAL, card TEXT);
 CREATE TABLE tasks(id INTEGER PRIMARY KEY AUTOINCREMENT, project TEXT, operation TEXT, settings TEXT,
     lane TEXT, state TEXT DEFAULT 'waiting', share REAL DEFAULT 0, what TEXT DEFAULT '',
@@ -35,9 +36,10 @@ CREATE INDEX tasks_of ON tasks(project);
 CREATE INDEX tasks_in ON tasks(state);
 CREATE INDEX events_of ON events(project, id);
 """
+FROM_1 = "ALTER TABLE projects ADD COLUMN second TEXT;"
 UNDONE = ("waiting", "running", "paused")
-JSON = {"input", "reading", "silhouette", "view", "settings", "result", "card"}
-"""Columns that hold JSON."""
+JSON = {"input", "reading", "silhouette", "view", "settings", "result", "card", "second"}
+"""Columns that hold JSON; `second` has input, reading and silhouette of a second picture."""
 
 SUMMARY = """
 SELECT p.id, p.kind, p.name, p.changed, p.silhouette IS NOT NULL AS drawn,
@@ -72,8 +74,9 @@ class Store:
             "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL; PRAGMA wal_autocheckpoint=0;"
         )
         (version,) = self._data.execute("PRAGMA user_version").fetchone()
-        if version == 0:
-            self._data.executescript(f"BEGIN; {TABLES} PRAGMA user_version={VERSION}; COMMIT;")
+        if version in (0, 1):
+            tables = FROM_1 if version else TABLES
+            self._data.executescript(f"BEGIN; {tables} PRAGMA user_version={VERSION}; COMMIT;")
         elif version != VERSION:
             self._data.close()
             raise OrbiflowError(
@@ -159,10 +162,17 @@ class Store:
         """Return what is known of a project, apart from its tiles and tasks."""
         return self._row("SELECT * FROM projects WHERE id = ?", project, what="project")
 
-    def change(self, project: str, kind: str = "project", **changes: Any) -> None:
-        """Change columns of a project, and record an event of this kind."""
+    def change(self, project: str, kind: str = "project", number: int = 0, **changes: Any) -> None:
+        """Change columns of a project, or of its picture `number`, and record an event of this kind.
+
+        There is a second picture when its `input` is set.
+        """
         with self._changing(project):
-            self.project(project)
+            own = self.project(project)
+            if number:
+                if own["second"] is None and "input" not in changes:
+                    raise Missing("there is no second picture (any more); add one first")
+                changes = {"second": {**(own["second"] or {}), **changes}}
             self._update("projects", project, {**changes, "changed": time.time()})
             self._record(project, kind)
 

@@ -22,6 +22,7 @@ from orbiflow.runtime import (
     as_part,
     cores,
     ignore,
+    is_object,
     make_folder,
     operation,
     write_json,
@@ -37,6 +38,7 @@ from orbiflow.studio.tile_files import (
     tile_folder,
     tile_number,
 )
+from orbiflow.studio.words import OF_PICTURE
 from orbiflow.tiles import ReadingSettings
 
 if TYPE_CHECKING:
@@ -52,6 +54,7 @@ def read(
     called: str = "picture",
     reading: ReadingSettings = ReadingSettings(),
     *,
+    number: int = 0,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -59,13 +62,14 @@ def read(
 
     Args:
         called: What messages call the picture.
+        number: 0 for the first picture, 1 for the second.
     """
     from orbiflow.studio.silhouette_file import read_input
 
     cancel.check()
     on_event(Progress(0.1, "reading the picture"))
-    target = read_input(job.project, called, reading)
-    return Outcome({"read": True, "vertices": len(target.outline)})
+    target = read_input(job.project, called, reading, number)
+    return Outcome({"read": [number], "vertices": len(target.outline)})
 
 
 @operation("studio search", keeps_partial=True, starts_processes=True)
@@ -76,10 +80,12 @@ def search(
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
-    """Search for tiles of a project's silhouette, and write each as soon as it is found."""
-    from orbiflow.studio.silhouette_file import load_target
+    """Search for tiles of a project's silhouettes, and write each as soon as it is found."""
+    from orbiflow.studio.silhouette_file import has_second, load_target
     from orbiflow.tiles import escherize, searched_classes
 
+    if has_second(job.project):
+        return _search_pairs(job, settings, on_event, cancel)
     target = load_target(job.project)
     whole = _search_settings(job.project, settings)
     names = searched_classes(target, whole)
@@ -114,15 +120,45 @@ def search(
     return Outcome({"tiles": len(result.tiles)}, "done" if result.tiles else "nothing found")
 
 
+def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel) -> Outcome:
+    """Search for tiles of both silhouettes: those of a stage replace the ones before, in order."""
+    from orbiflow.studio.silhouette_file import load_target
+    from orbiflow.tiles import escherize
+
+    if choice.objective != "likeness":
+        raise OrbiflowError(
+            "two pictures are searched for tiles that look alike; choose “Looks alike”"
+        )
+    one, two = (load_target(job.project, number) for number in (0, 1))
+    settings = _search_settings(job.project, choice).replace(workers=cores())
+    _announce_again(job, on_event)
+    shown: dict[str, list[int]] = {stage: [] for stage in STAGES}
+
+    def show(tile: EscherTile, stage: str) -> None:
+        number = tile_number(job.task, len(shown[stage]))
+        shown[stage].append(number)
+        put_tile(job.project, number, stage, tile, on_event)
+
+    result = escherize(one, settings, second=two, on_tile=show, on_event=on_event, cancel=cancel)
+    found = {"tiles": len(result.tiles)}
+    if result.interrupted:
+        return Outcome(found, "cancelled")
+    gone = sorted(set(_numbers(job)) - set(shown[STAGES[-1]]))
+    for number in gone:
+        shutil.rmtree(job.project / "tiles" / str(number), ignore_errors=True)
+    return Outcome({**found, "gone": gone}, "done" if result.tiles else "nothing found")
+
+
 def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
     from orbiflow.tiles import EscherizeSettings
 
     settings = EscherizeSettings(effort=choice.effort, objective=choice.objective, seed=choice.seed)
-    emphasis, pins = project / "emphasis.png", project / "pins.png"
-    if emphasis.exists():
-        settings = settings.replace(emphasis=emphasis)
-    if pins.exists() and choice.objective == "likeness":
-        settings = settings.replace(pin=(str(pins),))
+    for end, prefix in zip(OF_PICTURE, PREFIXES, strict=True):
+        emphasis, pins = project / f"emphasis{end}.png", project / f"pins{end}.png"
+        if emphasis.exists():
+            settings = settings.replace(**{f"{prefix}emphasis": emphasis})
+        if pins.exists() and choice.objective == "likeness":
+            settings = settings.replace(**{f"{prefix}pin": (str(pins),)})
     if choice.like is None:
         return settings.replace(classes=choice.classes) if choice.classes else settings
     return settings.replace(
@@ -150,46 +186,55 @@ def _is_done(job: Job, place: int) -> bool:
 
 def _announce_again(job: Job, on_event: Sink) -> None:
     """Announce tiles that this task found before it was interrupted."""
-    for number in sorted(
-        int(folder.name) for folder in (job.project / "tiles").glob("[0-9]*") if folder.is_dir()
-    ):
-        if number // PLACES == job.task and (found := best_stage(job.project, number)):
+    for number in _numbers(job):
+        if found := best_stage(job.project, number):
             announce_tile(number, found.name, on_event)
+
+
+def _numbers(job: Job) -> list[int]:
+    """Return the numbers of the tiles that a task has found so far, in order."""
+    folders = (job.project / "tiles").glob("[0-9]*")
+    numbers = sorted(int(folder.name) for folder in folders if folder.is_dir())
+    return [number for number in numbers if number // PLACES == job.task]
 
 
 @operation("studio open")
 def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Take up a project's file that was uploaded into an empty project."""
-    from orbiflow.studio.project_file import ENDING, read_tiles, reading_of, unpack
-    from orbiflow.studio.silhouette_file import read_input
+    from orbiflow.studio.project_file import ENDING, read_pictures, read_tiles, reading_of, unpack
 
     project = job.project
     with tempfile.TemporaryDirectory(dir=project) as folder:
         home = Path(folder)
         document = unpack(project / f"opened{ENDING}", home)
-        (picture,) = [*home.glob("input.*")][:1] or [None]
-        called, reading = reading_of(document)
+        pictures: dict[int, dict[str, Any]] = {}
+        for number, end in enumerate(OF_PICTURE):
+            for file in [*home.glob(f"input{end}.*")][:1]:
+                called, reading = reading_of(document, number)
+                about = {"name": called, "type": file.suffix.lstrip(".")}
+                pictures[number] = {"input": about, "reading": reading.to_json()}
         tiles = read_tiles(home, document)
-        for file in {*home.glob("input.*"), *home.glob("*.png")}:
+        for file in {*home.glob("input*.*"), *home.glob("*.png")}:
             file.replace(project / file.name)
-        if picture is not None:
-            read_input(project, called, reading)
+        read_pictures(project, document)
     numbers = {number: tile_number(job.task, place) for place, (_, number, _) in enumerate(tiles)}
     for tile, number, parent in tiles:
         cancel.check()
         known = None if parent is None else numbers.get(parent)
         put_tile(project, numbers[number], STAGES[-1], tile, on_event, parent=known)
+    second = pictures.get(1)
     opened = {
         "name": str(document["name"]),
         "view": document["view"],
-        "reading": reading.to_json(),
-        "input": picture and {"name": called, "type": picture.suffix.lstrip(".")},
+        **pictures.get(0, {}),
+        "second": second and {**second, "silhouette": None},
     }
-    return Outcome({"read": picture is not None, "opened": opened})
+    return Outcome({"read": sorted(pictures), "opened": opened})
 
 
-SPACE = "space.json"
+SPACE = "pull.json"
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
+PREFIXES = ("", "second_")  # of settings and arguments of the first figure, and of the second
 
 
 @operation("studio space")
@@ -244,7 +289,7 @@ def with_drawing(
     Args:
         drawing: What the project remembers as its drawing, as JSON; "" for nothing.
         result: The tile's folder.
-        files: The files that the take-away is given; its `picture` goes below the drawing.
+        files: The files that the take-away is given; the pictures go below the drawing.
         settings: The settings of `export` or `art`.
         scratch: A folder for what is written on the way.
     """
@@ -255,19 +300,24 @@ def with_drawing(
         parts = json.loads(drawing or "{}")
     except (ValueError, RecursionError):
         raise OrbiflowError("the drawing is no JSON; reload the page") from None
-    if not parts or not (parts.get("strokes") or parts.get("eyes")):
+    drawings = [parts, parts.get("second")] if is_object(parts) else []
+    if not any(is_object(own) and (own.get("strokes") or own.get("eyes")) for own in drawings):
         return result, files, settings
     given = read_result(result)
     tile, scratch = with_any_map(given), make_folder(scratch)
     if tile is not given:
         result = save_tiles([tile], scratch / "tile")
-    under: Path | None = files.get("picture")
-    if under is not None and under.suffix not in PICTURE_ENDINGS:
-        under = under.with_name("backdrop.png")
-    made = drawing_settings(parts, tile, scratch, under)
-    if made["picture"] is not None:
-        files = {**files, "picture": made["picture"]}
-    return result, files, {**settings, "eyes": made["eyes"]} if made["eyes"] else settings
+    for number, (own, part) in enumerate(zip(drawings, tile.figures, strict=False)):
+        end, prefix = OF_PICTURE[number], PREFIXES[number]
+        under: Path | None = files.get(f"{prefix}picture")
+        if under is not None and under.suffix not in PICTURE_ENDINGS:
+            under = under.with_name(f"backdrop{end}.png")
+        made = drawing_settings(own, part.figure, scratch, under, f"drawing{end}")
+        if made["picture"] is not None:
+            files = {**files, f"{prefix}picture": made["picture"]}
+        if made["eyes"]:
+            settings = {**settings, f"{prefix}eyes": made["eyes"]}
+    return result, files, settings
 
 
 PREVIEW = "preview.png"
@@ -306,15 +356,13 @@ def take(
         makes: The operation that writes it: export, art, solid or animate.
         tile: The number of the tile.
         settings: Its settings, as JSON.
-        picture: Whether the picture that was uploaded goes onto the tile.
+        picture: Whether the pictures that were uploaded go onto the figures.
         drawing: What was drawn on the tile, as JSON.
         called: The name of the project, with which that of the file begins.
     """
-    from orbiflow.studio.silhouette_file import input_file
-
     folder = make_folder(export_folder(job.project, job.task))
-    files = {"picture": input_file(job.project)} if picture else {}
     given, result = json.loads(settings), tile_folder(job.project, tile)
+    files = _pictures(job.project, result) if picture else {}
     if drawing and makes in WITH_DRAWING:
         result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
     name = file_name(makes, given, result, called)
@@ -335,6 +383,19 @@ def take(
             "made": time.time(),
         }
     )
+
+
+def _pictures(home: Path, result: Path) -> dict[str, Any]:
+    """Return the pictures that were uploaded for the figures of a tile, by argument."""
+    from orbiflow.studio.silhouette_file import input_file
+    from orbiflow.tiles import read_result
+
+    found: dict[str, Any] = {}
+    for prefix, end, _ in zip(PREFIXES, OF_PICTURE, read_result(result).figures, strict=False):
+        for file in home.glob(f"input{end}.*"):
+            if file.suffix in (*PICTURE_ENDINGS, ".svg"):
+                found[f"{prefix}picture"] = file
+    return found or {"picture": input_file(home)}
 
 
 def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:

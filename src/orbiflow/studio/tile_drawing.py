@@ -30,8 +30,8 @@ class Stroke(NamedTuple):
 
 
 def with_any_map(tile: EscherTile) -> EscherTile:
-    """Return a tile that can be drawn on: one without a map is its own silhouette."""
-    if tile.bending is not None and tile.frame is not None:
+    """Return a tile that can be drawn on: one figure without a map is its own silhouette."""
+    if tile.parts or (tile.bending is not None and tile.frame is not None):
         return tile
     frame = Frame(np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
     mesh = triangulate(orient(frame.to_normal(tile.tile.polygon), counter_clockwise=True))
@@ -40,26 +40,26 @@ def with_any_map(tile: EscherTile) -> EscherTile:
 
 
 def drawing_settings(
-    drawing: Any, tile: EscherTile, folder: Path, picture: Path | None = None
+    drawing: Any, tile: EscherTile, folder: Path, picture: Path | None = None, name: str = "drawing"
 ) -> dict[str, Any]:
     """Write the lines of a drawing into a folder as exports take them; return `picture` and `eyes`.
 
     Args:
         drawing: `strokes`, each with `colour`, `width` and `points`, and `eyes` (x, y, radius), in the
             coordinates of the silhouette, or of a tile that has none.
-        tile: The tile, as `with_any_map` returns it.
+        tile: The tile, as `with_any_map` returns it, or one of its figures.
         folder: The folder for the file, which is written only if there are lines.
         picture: The artwork that is carried as well, so that the lines are drawn over it.
+        name: The name of the file, without its ending.
 
     Raises `OrbiflowError` for a drawing that is none, or too large.
     """
     strokes, eyes = read_drawing(drawing)
     ring = shapely.Polygon(tile.silhouette_outline)
     if strokes:
-        name = "drawing.svg" if picture is None else "drawing.png"
+        file = folder / f"{name}.{'svg' if picture is None else 'png'}"
         made = drawing_svg(strokes, tile) if picture is None else _png(strokes, tile, picture)
-        write_atomic(folder / name, made)
-        picture = folder / name
+        picture = write_atomic(file, made)
     # none but by rounding is outside
     return {
         "picture": picture,

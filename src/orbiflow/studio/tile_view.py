@@ -9,7 +9,7 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.drawing import cell_ring
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
-from orbiflow.tiles import EscherTile, Rating, as_tiling, border, colouring, narrowest_neck
+from orbiflow.tiles import EscherTile, Rating, border, colouring, narrowest_neck
 
 
 def tile_card(
@@ -17,15 +17,18 @@ def tile_card(
 ) -> dict[str, Any]:
     """Return what a list of tiles shows: its tiling, stars and words.
 
+    A tile that figures divide has `figures`, each with its name, stars, polygon and neck, where they
+    lie in the tile; and in its `group` the number of the figure of each aspect.
+
     Args:
         tile: A certified tile.
         number: Its number in the studio.
         stage: How far its search is: sketch, better, final; or pulled.
         parent: The number of the tile that it was made from by hand.
     """
-    rating, neck = tile.rating or Rating(1), narrowest_neck(tile.tile.polygon)
-    tiling, colours = as_tiling(tile.tile), colouring(tile.tile)
-    return {
+    rating, aspects = tile.rating or Rating(1), tile.tiling.aspects
+    colours = colouring(tile.tiling)
+    card = {
         "id": number,
         "class_name": tile.isohedral_class,
         "stage": stage,
@@ -35,54 +38,85 @@ def tile_card(
         "arrangement": tile.arrangement,
         "certified": tile.certificate.valid,
         "parent": parent,
-        "polygon": _rounded(tile.tile.polygon),
+        **_outline(tile.tile.polygon),
         "y_down": tile.y_down,
-        "neck": neck.ends.tolist(),
         "group": {
             "name": tile.group_name,
             "lattice": tile.tile.group.lattice.tolist(),
             "cosets": [
                 {"linear": coset.linear.tolist(), "translation": coset.translation.tolist()}
-                for coset in (tile.tile.group.cosets[k] for k in tiling.aspects.cosets)
+                for coset in (tile.tile.group.cosets[k] for k in aspects.cosets)
             ],
         },
-        "colours": {"sublattice": list(colours.sublattice), "table": colours.table.tolist()},
+        "colours": {
+            "sublattice": list(colours.sublattice),
+            "table": colours.table.tolist(),
+            "shares": list(colours.shares),
+        },
     }
+    if tile.parts:
+        card["group"]["figures"] = aspects.prototiles.tolist()
+        card["figures"] = [
+            {
+                "name": part.figure.name,
+                "stars": (part.figure.rating or rating).stars,
+                **_outline(part.prototile.polygon),
+            }
+            for part in tile.parts
+        ]
+    return card
 
 
-def _rounded(ring: Array) -> list[list[float]]:
-    """Return points with as many digits as show."""
+def _outline(ring: Array) -> dict[str, Any]:
+    """Return a polygon with as many digits as show, and the ends of its neck."""
     size = float(abs(ring).max()) or 1.0
-    return (np.round(ring / size, 6) * size).tolist()
+    polygon = (np.round(ring / size, 6) * size).tolist()
+    return {"polygon": polygon, "neck": narrowest_neck(ring).ends.tolist()}
 
 
 def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
-    """Return what the page of one tile shows: its card, and in the input's units:
+    """Return what the page of one tile shows: its card, `elements`, and each figure's `figure_view`.
+
+    `elements` is what the group's symmetries are, one of each kind up to the lattice, in the input's
+    units: the corners of a `cell`, `centres` with their order, `mirrors` and `glides` with a point and
+    a direction.
+    """
+    view = {**card, "elements": elements_json(tile.tile.group, tile.tile.center)}
+    if not tile.parts:
+        return {**view, **figure_view(tile, 0)}
+    shown = [{**own, **figure_view(tile, k)} for k, own in enumerate(card["figures"])]
+    return {**view, "figures": shown}
+
+
+def figure_view(tile: EscherTile, number: int) -> dict[str, Any]:
+    """Return what is shown of a tile's figure, in the tile's coordinates but where it says otherwise:
 
     - `silhouette_track`, `tile_track`: The silhouette's outline and where its points go; both are the
-      tile's polygon where there is no map.
-    - `elements`: What the group's symmetries are, one of each kind up to the lattice: the corners of a
-      `cell`, `centres` with their order, `mirrors` and `glides` with a point and a direction.
-    - `map`: The triangles of the map from the silhouette, or None.
-    - `covered`: The corners, least and greatest, of what the silhouette's picture covers.
+      figure's polygon where there is no map.
+    - `map`: The triangles of the map, whose points `rest` are in the silhouette's own coordinates, or
+      None.
+    - `covered`: The corners, least and greatest, of what the silhouette's picture covers, in its own.
+    - `y_down`: Whether y points down in these.
+    - `place`: Where these lie, as a matrix for a canvas.
     """
-    bending, frame = tile.bending, tile.frame
-    own = tile.tile.polygon.tolist()
+    figure, place = tile.figures[number]
+    bending, frame = figure.bending, figure.frame
+    own = place(figure.tile.polygon).tolist()
     view: dict[str, Any] = {
-        **card,
-        "elements": elements_json(tile.tile.group, tile.tile.center),
         "silhouette_track": own,
         "tile_track": own,
         "map": None,
         "covered": None,
+        "y_down": figure.y_down,
+        "place": [*place.linear.T.ravel().tolist(), *place.offset.tolist()],
     }
     if bending is None or frame is None:
         return view
-    rest, images = frame.to_input(bending.rest), frame.to_input(bending.images)
-    ring, covered = border(bending.triangles), tile.covered
+    rest, images = frame.to_input(bending.rest), place(frame.to_input(bending.images))
+    ring, covered = border(bending.triangles), figure.covered
     return {
         **view,
-        "silhouette_track": rest[ring].tolist(),
+        "silhouette_track": place(rest[ring]).tolist(),
         "tile_track": images[ring].tolist(),
         "map": {
             "rest": rest.tolist(),

@@ -16,6 +16,9 @@ NAMES = {"tile": "New tile", "density": "New density"}
 MASKS = ("mend", "pins", "emphasis")
 """What is painted over a picture."""
 
+OF_PICTURE = ("", "-2")
+"""What the names of the files of a project's first and second picture end in."""
+
 LABELS = {
     "tile_size": "the length of a tile",
     "area": "the width and height",
@@ -95,16 +98,21 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
 
     if kind == "project":
         return {name: project[name] for name in ("name", "view", "changed_by")}
-    silhouette = project["silhouette"]
-    if silhouette is not None:
-        silhouette = {**silhouette, "backdrop": url("backdrop")}
-    usual = {"threshold": None, "invert": None, "smooth": 0.0, "thicken": 0.0}
-    part = {
-        "input": project["input"],
-        "reading": usual | project["reading"],
-        "silhouette": silhouette,
-        **{mask: url(mask) for mask in MASKS},
-    }
+
+    def shown(given: dict[str, Any], number: int) -> dict[str, Any]:
+        silhouette, end = given["silhouette"], OF_PICTURE[number]
+        if silhouette is not None:
+            silhouette = {**silhouette, "backdrop": url(f"backdrop{end}")}
+        usual = {"threshold": None, "invert": None, "smooth": 0.0, "thicken": 0.0}
+        return {
+            "input": given["input"],
+            "reading": usual | given["reading"],
+            "silhouette": silhouette,
+            **{mask: url(f"{mask}{end}") for mask in MASKS},
+        }
+
+    second = project["second"]
+    part = {**shown(project, 0), "second": None if second is None else shown(second, 1)}
     if kind == "silhouette":
         return part
     names = ("id", "kind", "name", "created", "changed", "view")

@@ -30,11 +30,11 @@ from orbiflow.runtime import (
     Progress,
     cores,
 )
-from orbiflow.studio.kinds_of_work import kind_of_work
+from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.store import Missing, Store
-from orbiflow.studio.words import page_words, plain_name
+from orbiflow.studio.words import OF_PICTURE, page_words, plain_name
 
-READINGS = frozenset({"read", "density table"})
+READINGS = frozenset({*READS, "density table"})
 """Tasks whose results the later ones of their project use."""
 
 WARM_MODULES = (
@@ -341,14 +341,18 @@ class _Recorder:
         self.store.change_task(self.number, **changes)
 
     def _take_up(self, summary: dict[str, Any]) -> None:
-        """Keep a silhouette that was read, and what an opened file says of its project."""
+        """Keep what was read, what an opened file says of its project, and that tiles are gone."""
         with suppress(Missing):
             if opened := summary.get("opened"):
                 opened["name"] = plain_name(opened["name"], "Opened project")
                 self.store.change(self.project, **opened)
-            if summary.get("read"):
-                found = json.loads((self.home / "silhouette.json").read_text())
-                self.store.change(self.project, "silhouette", silhouette=found["shown"])
+            for number in summary.get("read", ()):
+                file = self.home / f"silhouette{OF_PICTURE[number]}.json"
+                found = json.loads(file.read_text())["shown"]
+                self.store.change(self.project, "silhouette", number, silhouette=found)
+        for number in summary.get("gone", ()):
+            with suppress(Missing):
+                self.store.delete_tile(self.project, number)
 
     def _plain(self, text: str) -> str:
         """Return a text in the page's words, without the paths of this machine."""

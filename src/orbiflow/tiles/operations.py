@@ -417,10 +417,12 @@ def animate(
 
     from orbiflow.drawing import palette
     from orbiflow.tiles import motion
+    from orbiflow.tiles.page import shades
     from orbiflow.tiles.tilings import colouring
 
     given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}")
-    for note in palette(settings.palette).shortage(colouring(given.tiling).count):
+    known = colouring(given.tiling)
+    for note in shades(palette(settings.palette), known).shortage(known.count):
         on_event(Note(note))
 
     def told(share: float) -> None:

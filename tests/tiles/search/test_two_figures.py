@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -186,7 +187,8 @@ def _flat(figure: EscherTile, colour: str) -> Over:
 def test_each_figure_carries_its_own_picture() -> None:
     tile = pair()
     overs = [_flat(p.figure, colour) for p, colour in zip(tile.parts, ("red", "blue"), strict=True)]
-    settings = ArtSettings(area="300x200px", tile_size="90px", outline="none")
+    given: dict[str, Any] = {"area": "300x200px", "tile_size": "90px", "outline": "none"}
+    settings = ArtSettings(**given)
     pixels = render_artwork(artwork(tile, settings, *overs)).reshape(-1, 3)
     red, blue = ((pixels == colour).all(axis=1).mean() for colour in ([255, 0, 0], [0, 0, 255]))
     area = [abs(own.signed_area) for own in tile.tiling.prototiles]
@@ -215,7 +217,7 @@ def test_every_cut_has_both_figures(cut: str) -> None:
 
 
 def test_a_file_for_programs_names_prototiles() -> None:
-    sheets, _ = scenes(pair(), ExportSettings(area="200x150mm"))
+    sheets, _ = scenes(pair(), ExportSettings(area=(200.0, 150.0)))
     document = json.loads(write_scene(sheets[0], "json"))
     assert len(document["prototiles"]) == 2
     for tile in document["tiles"]:

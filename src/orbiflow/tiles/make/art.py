@@ -158,7 +158,7 @@ def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over 
         page=page,
         pictures=tuple(over.picture for over in known),
         motifs=motifs,
-        notes=(*said, *filter(None, [told]), *chosen.shortage(page.count)),
+        notes=(*said, *filter(None, [told]), *page.palette(chosen).shortage(page.count)),
     )
 
 

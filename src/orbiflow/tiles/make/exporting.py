@@ -22,7 +22,7 @@ from orbiflow.tiles.make.sheets import calibrated, registered, split
 from orbiflow.tiles.make.skeletons import skeleton_scene
 from orbiflow.tiles.make.templates import template_scene
 from orbiflow.tiles.motifs import Over, read_overs, require_figures, with_map
-from orbiflow.tiles.page import Scene, flattened
+from orbiflow.tiles.page import Scene, flattened, shades
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring
@@ -193,7 +193,8 @@ def _described(
 
 def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...]:
     if settings.cut == "none" or settings.purpose == "stickers":
-        return palette(settings.palette).shortage(colouring(given.tiling).count)
+        known = colouring(given.tiling)
+        return shades(palette(settings.palette), known).shortage(known.count)
     width = settings.outline
     if width is None or width >= VISIBLE:
         return ()

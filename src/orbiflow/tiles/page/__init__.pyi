@@ -15,6 +15,7 @@ from .page import inset as inset
 from .page import longer_side as longer_side
 from .page import mark_corners as mark_corners
 from .page import rectangle_sides as rectangle_sides
+from .page import shades as shades
 from .page import symbol_of as symbol_of
 from .page import tiling_size as tiling_size
 from .scene import INK as INK

@@ -166,9 +166,7 @@ class Page:
 
         One that a user wrote out is taken as it is.
         """
-        if self.colour != "neighbour" or len(self.tiling.prototiles) == 1:
-            return chosen
-        return chosen.shaded(self._colouring.shares)
+        return shades(chosen, self._colouring) if self.colour == "neighbour" else chosen
 
     @cached_property
     def colours(self) -> Integers:
@@ -311,6 +309,11 @@ class Page:
         return tuple(
             PlacedTile(k, linear[k], at, ks, kept, number) for k, at, ks, kept, number in placed
         )
+
+
+def shades(chosen: Palette, known: Colouring) -> Palette:
+    """Return a palette in which each of several prototiles has a colour of its own, and its shades."""
+    return chosen if len(known.shares) == 1 else chosen.shaded(known.shares)
 
 
 def symbol_of(prototile: int, what: str = "tile") -> str:

@@ -48,7 +48,7 @@ def finished_pair(
             left = Tile(whole(polygon), parts[0].figure.tile.group)
             parts.append(Part.background(left, y_down=targets[0].y_down))
             break
-        tile = Tile(polygon, pair.tiling.group, corners=tuple(own.bent.corners.tolist()))
+        tile = Tile(polygon, pair.tiling.group, corners=tuple(_corners(pair, k).tolist()))
         figure = measured_tile(target, tile.transformed(*ways[k]), TileMap(), original)
         known = replace(figure.likeness, smoothed=smoothed, min_neck=pair.figures.min_neck)
         figure = with_bent(target, figure.changed(likeness=known), own, original)
@@ -96,8 +96,7 @@ def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
         lambda _level, _stiffness: body,
         plain=True,
     )
-    corners = _corners(pair, places[: part.size], k)
-    along, corners = cornered(np.arange(part.size) + pair.slides[k], corners)
+    along, corners = cornered(np.arange(part.size) + pair.slides[k], _corners(pair, k))
     vertices = pair.points[places] / scale
     outline = Laid.straight(along).points(vertices[: part.size])
     points = vertices[:, None]
@@ -118,8 +117,9 @@ def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
     return placed_best(bent, Overlap(normal * FLIP if mirrored else normal))
 
 
-def _corners(pair: CarvedPair, ring: Integers, k: int) -> Integers:
-    """Return which points of a figure's outline are corners of the union or ends of the path."""
+def _corners(pair: CarvedPair, k: int) -> Integers:
+    """Return which vertices of a figure are corners of the union or ends of the path."""
+    ring = pair.body.places[k][: pair.body.parts[k].size]
     lengths, start = pair.placement.lengths[0], pair.placement.starts[0]
     corners = (np.cumsum(lengths) - lengths + start) % pair.body.size
     glue, size = pair.glue, len(ring)

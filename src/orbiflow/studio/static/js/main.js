@@ -9,6 +9,11 @@ import { sentence } from "./words.js";
 const ROUTES = [
   [/^$/, () => import("./start/page.js")],
   [/^p\/([\w-]+)\/picture$/, () => import("./start/picture.js"), "picture"],
+  [
+    /^p\/([\w-]+)\/picture\/2$/,
+    async () => ({ show: (await import("./start/picture.js")).showSecond }),
+    "picture",
+  ],
   [/^p\/([\w-]+)$/, () => import("./search/page.js"), "tiles"],
   [/^p\/([\w-]+)\/t\/(\d+)$/, () => import("./closeup/page.js"), "closeup"],
   [/^p\/([\w-]+)\/take\/(\d+)$/, () => import("./takeaway/page.js"), "take"],

@@ -113,30 +113,64 @@ export function measured(polygon) {
  */
 const asMatrix = ({ linear: [[a, c], [b, d]], translation: [e, f] }) => [a, b, c, d, e, f];
 
-/** A polygon and its group, ready to be drawn. */
+/**
+ * The figures that divide a tile; one that is whole is its own.
+ *
+ * @template {{ figures?: any[] }} C
+ * @param {C} card
+ * @returns {C[]}
+ */
+export const figuresOf = (card) => card.figures ?? [card];
+
+/**
+ * The shades of a palette that a tiling's colours are, if each of several figures has some of its own.
+ *
+ * @param {Palette} palette
+ * @param {{ shares?: number[] }} [colours]
+ * @returns {Palette}
+ */
+export function shaded(palette, { shares = [] } = {}) {
+  if (shares.length < 2 || !palette.shades) return palette;
+  const own = (count, k) => palette.shades[k][count - 1] ?? palette.shades[k].at(-1);
+  return { ...palette, colours: shares.flatMap(own) };
+}
+
+/** Polygons and their group, ready to be drawn. */
 export class Tiling {
   /** @param {Outlined} card */
   constructor(card) {
-    const { lattice, cosets } = card.group;
+    const { lattice, cosets, figures } = card.group;
     this.yDown = card.y_down;
     this.basis = [lattice[0][0], lattice[1][0], lattice[0][1], lattice[1][1]]; // columns are vectors
     this.aspects = cosets.map(asMatrix);
+    this.kinds = figures ?? cosets.map(() => 0); // the figure of each aspect
     this.colours = card.colours;
-    this.change(card.polygon);
+    /** @type {Figure[]} */
+    this.figures = [];
+    figuresOf(card).forEach(({ polygon }, k) => this.change(polygon, k));
   }
 
   /**
-   * Take another polygon for the same group.
+   * Take another polygon of a figure for the same group.
    *
    * @param {Point[]} polygon
    */
-  change(polygon) {
-    this.polygon = polygon;
+  change(polygon, figure = 0) {
     const { area, x, y } = measured(polygon);
-    this.area = area;
-    this.middle = { x, y };
-    this.radius = Math.max(...polygon.map(([u, v]) => Math.hypot(u - x, v - y)));
-    this.path = pathOf(polygon);
+    const radius = Math.max(...polygon.map(([u, v]) => Math.hypot(u - x, v - y)));
+    this.figures[figure] = { polygon, area, middle: { x, y }, radius, path: pathOf(polygon) };
+  }
+
+  /** The mean area of the figures. */
+  get area() {
+    return this.figures.reduce((sum, { area }) => sum + area / this.figures.length, 0);
+  }
+
+  /** The centroid of all figures together. */
+  get middle() {
+    const whole = this.area * this.figures.length;
+    const mean = (of) => this.figures.reduce((sum, own) => sum + own.area * of(own) / whole, 0);
+    return { x: mean(({ middle }) => middle.x), y: mean(({ middle }) => middle.y) };
   }
 
   /**
@@ -180,15 +214,17 @@ export class Tiling {
     const back = inverse(view);
     const [p, q, r, s] = this.basis;
     const cells = inverse([p, q, r, s, 0, 0]);
-    const reach = this.radius * camera.scale;
-    const [right, bottom] = [width + reach, height + reach];
-    /** @type {Point[]} */
-    const edge = [[-reach, -reach], [right, -reach], [right, bottom], [-reach, bottom]];
-    const corners = edge.map((corner) => moved(back, corner));
     /** @type {Copy[]} */
     const found = [];
     this.aspects.forEach((element, aspect) => {
-      const [x, y] = moved(element, [this.middle.x, this.middle.y]);
+      const figure = this.kinds[aspect];
+      const { middle, radius } = this.figures[figure];
+      const reach = radius * camera.scale;
+      const [right, bottom] = [width + reach, height + reach];
+      /** @type {Point[]} */
+      const edge = [[-reach, -reach], [right, -reach], [right, bottom], [-reach, bottom]];
+      const corners = edge.map((corner) => moved(back, corner));
+      const [x, y] = moved(element, [middle.x, middle.y]);
       const at = corners.map(([u, v]) => moved(cells, [u - x, v - y]));
       const [low, high] = [0, 1].map((k) => at.map((point) => point[k])).reduce(
         (
@@ -203,7 +239,7 @@ export class Tiling {
           if (u < -reach || v < -reach || u > width + reach || v > height + reach) continue;
           if (found.length >= MOST_COPIES) return;
           const matrix = times(view, this.copy(aspect, m, n));
-          found.push({ aspect, cell: [m, n], colour: this.colour(aspect, m, n), matrix });
+          found.push({ aspect, figure, cell: [m, n], colour: this.colour(aspect, m, n), matrix });
         }
       }
     });
@@ -240,28 +276,28 @@ export function fill(palette, index) {
 
 /**
  * Draw a tiling over the whole of a canvas, `ratio` device pixels a CSS pixel.
- * `line`: width of the outline in CSS pixels, 0 for none. `only`: which copies, by default all.
+ * `line`: width of the outline in CSS pixels, 0 for none.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Tiling} tiling
  * @param {Camera} camera
  * @param {Palette} palette
- * @param {{ width: number, height: number, ratio?: number, line?: number, only?: (copy: Copy) => boolean }} how
+ * @param {{ width: number, height: number, ratio?: number, line?: number }} how
  */
 export function paint(
   context,
   tiling,
   camera,
   palette,
-  { width, height, ratio = 1, line = 1.2, only },
+  { width, height, ratio = 1, line = 1.2 },
 ) {
-  const path = tiling.path;
+  const own = shaded(palette, tiling.colours);
   context.lineJoin = "round";
-  for (const { colour, matrix, ...copy } of tiling.copies(camera, width, height)) {
-    if (only && !only({ colour, matrix, ...copy })) continue;
+  for (const { colour, matrix, figure } of tiling.copies(camera, width, height)) {
+    const { path } = tiling.figures[figure];
     const [a, b, c, d, e, f] = matrix;
     context.setTransform(a * ratio, b * ratio, c * ratio, d * ratio, e * ratio, f * ratio);
-    context.fillStyle = fill(palette, colour);
+    context.fillStyle = fill(own, colour);
     context.fill(path);
     context.strokeStyle = line ? palette.outline : context.fillStyle; // without a line: hide the seam
     context.lineWidth = (line || 0.7) / camera.scale;

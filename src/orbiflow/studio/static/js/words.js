@@ -7,6 +7,10 @@ export const EFFORT_TIMES = {
   fast: "Ten seconds or so.",
   normal: "A quarter of a minute or so: usually better.",
 };
+export const PAIR_TIMES = {
+  fast: "Half a minute or so.",
+  normal: "A minute or so: usually better.",
+};
 
 export const OBJECTIVES = { likeness: "Looks alike", overlap: "Covers it best" };
 export const OBJECTIVE_MEANINGS = {
@@ -37,14 +41,45 @@ export const alive = (task) => ["waiting", "running", "paused"].includes(task?.s
  */
 export const number = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
 
+/** @typedef {Pick<Card, "stars" | "figures">} Starred */
+
 /**
- * "★★★½" for sight and "3.5 of 5 stars" for hearing.
+ * "★★★½" for sight and "3.5 of 5 stars" for hearing; of two figures those of each.
  *
- * @param {number} stars
+ * @param {Starred} card
+ * @returns {string}
  */
-export const starText = (stars) => `${"★".repeat(Math.floor(stars))}${stars % 1 ? "½" : ""}`;
-/** @param {number} stars */
-export const starWords = (stars) => (stars ? `${stars} of 5 stars` : "not rated yet");
+export function starText({ stars, figures = [] }) {
+  if (!figures.length) return `${"★".repeat(Math.floor(stars))}${stars % 1 ? "½" : ""}`;
+  const one = figures.every(({ name }) => name === figures[0].name);
+  return figures.map((own) =>
+    `${one ? "" : `${brief(own.name)} `}${starText({ stars: own.stars })}`
+  )
+    .join(" · ");
+}
+/**
+ * @param {Starred} card
+ * @returns {string}
+ */
+export function starWords({ stars, figures }) {
+  if (!figures) return stars ? `${stars} of 5 stars` : "not rated yet";
+  return figures.map((own) => `${own.name}: ${starWords({ stars: own.stars })}`).join(", ");
+}
+
+/**
+ * The names of the figures that divide a tile, "" if it is one figure.
+ *
+ * @param {{ figures?: { name: string }[] }} card
+ */
+export const named = ({ figures = [] }) =>
+  [...new Set(figures.map(({ name }) => name))].join(" and ");
+
+/**
+ * A name that may be long, with as many letters as there is room for.
+ *
+ * @param {string} name
+ */
+export const brief = (name) => (name.length > 14 ? `${name.slice(0, 13)}…` : name);
 
 /** @param {string} text */
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

@@ -79,11 +79,18 @@ class Way {
   }
 }
 
-/** From the silhouette to the tile (`forward`) and back (`inverse`); without a map all stays. */
+const LIGHT = [-0.27, -0.315]; // of an eye, in its radius, where y points down
+
+/** From a figure's silhouette to the tile (`forward`) and back (`inverse`); without a map all stays. */
 export class Carry {
-  /** @param {TileMap | null} map */
-  constructor(map) {
+  /** @param {{ map: TileMap | null, place?: Matrix, y_down: boolean }} figure */
+  constructor({ map, place: [a, b, c, d] = [1, 0, 0, 1, 0, 0], y_down: yDown }) {
     this.map = map;
+    /** How much larger lengths of the silhouette are in the tile. */
+    this.scale = Math.sqrt(Math.abs(a * d - b * c));
+    const [x, y] = [LIGHT[0], yDown ? LIGHT[1] : -LIGHT[1]];
+    /** Where the light of an eye is, seen from its middle. */
+    this.light = [(a * x + c * y) / this.scale, (b * x + d * y) / this.scale];
     /** @type {Way | undefined} */
     this.ahead = undefined;
     /** @type {Way | undefined} */

@@ -1,6 +1,6 @@
 /** A tiling whose tile and group move, and the scene that is painted of it. */
 
-import { fill, pathOf, Tiling, times } from "../tiling.js";
+import { fill, pathOf, shaded, Tiling, times } from "../tiling.js";
 
 const COARSE = 0.6; // pixels below which a side of the outline is left out
 
@@ -11,8 +11,8 @@ export class LiveTiling extends Tiling {
     this.home = { aspects: this.aspects, basis: this.basis };
     /** @type {{ linear: [Point, Point], shift: Point }} */
     this.moved = { linear: [[1, 0], [0, 1]], shift: [0, 0] };
-    /** @type {{ scale: number, path: Path2D } | null} */
-    this.simple = null;
+    /** @type {{ scale: number, path: Path2D }[]} */
+    this.simple = [];
   }
 
   /**
@@ -48,65 +48,57 @@ export class LiveTiling extends Tiling {
     ];
   }
 
-  /** Take an outline, x0, y0, x1, y1 ... or points; `exact` measures it as well. */
-  outline(ring, { exact = true } = {}) {
-    const points = typeof ring[0] === "number" ? pairs(ring) : ring;
-    if (exact) this.change(points);
-    else {
-      this.polygon = points;
-      this.path = pathOf(points);
-    }
-    this.simple = null;
+  /** Take the outline of each figure; `exact` measures them as well. */
+  outlines(rings, { exact = true } = {}) {
+    rings.forEach((points, k) => {
+      if (exact) this.change(points, k);
+      else Object.assign(this.figures[k], { polygon: points, path: pathOf(points) });
+    });
+    this.simple = [];
   }
 
-  /** The outline with as many points as can be seen at a scale. */
-  pathAt(scale) {
-    if (this.simple && Math.abs(Math.log2(this.simple.scale / scale)) < 0.5) {
-      return this.simple.path;
-    }
+  /** The outline of a figure with as many points as can be seen at a scale. */
+  pathAt(scale, figure) {
+    const known = this.simple[figure];
+    if (known && Math.abs(Math.log2(known.scale / scale)) < 0.5) return known.path;
     const least = COARSE / scale;
-    let last = this.polygon[0];
-    const kept = this.polygon.filter((point, k) => {
+    const { polygon } = this.figures[figure];
+    let last = polygon[0];
+    const kept = polygon.filter((point, k) => {
       const far = k === 0 || Math.hypot(point[0] - last[0], point[1] - last[1]) >= least;
       if (far) last = point;
       return far;
     });
-    this.simple = { scale, path: pathOf(kept) };
-    return this.simple.path;
+    this.simple[figure] = { scale, path: pathOf(kept) };
+    return this.simple[figure].path;
   }
 }
 
-/** @param {ArrayLike<number>} flat */
-export function pairs(flat) {
-  /** @type {Point[]} */
-  const found = [];
-  for (let k = 0; k < flat.length; k += 2) found.push([flat[k], flat[k + 1]]);
-  return found;
-}
-
 /**
- * Paint a tiling with what lies on its tiles. `skin`: {canvas, matrix: its pixels to the prototile}.
- * `over(context)` draws more on each copy, in the prototile's own coordinates. Returns the copies.
+ * Paint a tiling with what lies on its tiles. `skins`: of each figure null, or {canvas, matrix: its pixels to
+ * the tile}. `over(context, copy)` draws more on each copy, in the tile's own coordinates. Returns the copies.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {LiveTiling} tiling
  * @param {import("../tiling.js").Camera} camera
  * @param {Palette} palette
- * @param {{ width: number, height: number, ratio: number, line: number, skin?: any, over?: any }} how
+ * @param {{ width: number, height: number, ratio: number, line: number, skins?: any[], over?: any }} how
  */
 export function paintScene(
   context,
   tiling,
   camera,
   palette,
-  { width, height, ratio, line, skin, over },
+  { width, height, ratio, line, skins, over },
 ) {
-  const path = tiling.pathAt(camera.scale * ratio);
+  const paths = tiling.figures.map((_, k) => tiling.pathAt(camera.scale * ratio, k));
+  const own = shaded(palette, tiling.colours);
   const copies = tiling.copies(camera, width, height);
   const fills = new Map();
   context.lineJoin = "round";
   for (const copy of copies) {
-    if (!fills.has(copy.colour)) fills.set(copy.colour, fill(palette, copy.colour));
+    const [path, skin] = [paths[copy.figure], skins?.[copy.figure]];
+    if (!fills.has(copy.colour)) fills.set(copy.colour, fill(own, copy.colour));
     const [a, b, c, d, e, f] = copy.matrix;
     /** @type {Matrix} */
     const matrix = [a * ratio, b * ratio, c * ratio, d * ratio, e * ratio, f * ratio];

@@ -136,20 +136,21 @@ export function colourPanel(about, look, needed, change) {
  * From silhouette to tile, outline, artwork.
  *
  * @param {any} look
- * @param {{ hasMap: boolean, hasArt: boolean }} has
+ * @param {{ count: number, hasMap: boolean, hasArt: boolean }} has
  * @param {(what: object) => void} change
  */
-export function shapePanel(look, { hasMap, hasArt }, change) {
+export function shapePanel(look, { count, hasMap, hasArt }, change) {
+  const pictures = count > 1 ? "pictures" : "picture";
   return h(
     "div",
     { class: "stack" },
     hasMap &&
-      slider("From your picture to the tile", {
+      slider(`From your ${pictures} to the tile`, {
         min: 0,
         max: 1,
         step: 0.01,
         value: 1,
-        said: (v) => (v >= 1 ? "the tile" : v <= 0 ? "your picture" : PERCENT(v)),
+        said: (v) => (v >= 1 ? "the tile" : v <= 0 ? `your ${pictures}` : PERCENT(v)),
       }, (share) => change({ share })),
     slider("Outline", {
       min: 0,
@@ -158,7 +159,7 @@ export function shapePanel(look, { hasMap, hasArt }, change) {
       value: look.line,
       said: (v) => (v ? `${v} px` : "none"),
     }, (line) => change({ line })),
-    hasArt && check("Show my picture on the tiles", look.art, (art) => change({ art })),
+    hasArt && check(`Show my ${pictures} on the tiles`, look.art, (art) => change({ art })),
   );
 }
 

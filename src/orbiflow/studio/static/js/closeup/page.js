@@ -2,14 +2,15 @@
 
 import { client } from "../api.js";
 import { button, choice, h, newest, put, style, toast, trying } from "../dom.js";
-import { capital } from "../words.js";
+import { figuresOf } from "../tiling.js";
+import { capital, named } from "../words.js";
 import { Carry } from "./carry.js";
 import { LiveTiling } from "./live.js";
 import { colourPanel, HELP, penPanel, pullPanel, shapePanel, signPanel } from "./looks.js";
 import { Pen } from "./pen.js";
 import { Pulling } from "./pulling.js";
 import { kindsOf, paintSigns, placed, signAt } from "./signs.js";
-import { between, paintSkin } from "./skin.js";
+import { between, paintSkin, Pictures } from "./skin.js";
 import { Stage } from "./stage.js";
 
 const CALM = 8000; // ms after which a refusal makes way
@@ -58,6 +59,7 @@ class Closeup {
     this.past = pasts.get(project.id) ?? { done: [], undone: [] };
     pasts.set(project.id, this.past);
     this.lit = null;
+    this.pictures = new Pictures(() => this.stale());
     this.keep = newest(
       () =>
         api.patch(this.home, {
@@ -77,6 +79,7 @@ class Closeup {
     this.offs = [
       events.on("card", (card) => this.#better(card)),
       events.on("project", (now) => this.#elsewhere(now)),
+      events.on("gone", ({ tile }) => tile === this.view?.id && navigate(`p/${project.id}`)),
     ];
     this.keys = (event) => this.#shortcut(event);
     addEventListener("keydown", this.keys);
@@ -103,8 +106,8 @@ class Closeup {
 
   /** Another tab has drawn. */
   #elsewhere({ view, changed_by: by }) {
-    if (by !== client && view?.drawing && this.carry && !this.pen.line) {
-      this.pen.use(this.carry, view.drawing);
+    if (by !== client && view?.drawing && this.carries && !this.pen.line) {
+      this.pen.use(this.carries, view.drawing);
     }
   }
 
@@ -129,8 +132,8 @@ class Closeup {
     });
     this.stage.layers.push((context) => this.#overlay(context));
     this.stage.onhover = (place) => this.#hover(place);
-    this.stage.options.skin = () => this.#skin();
-    this.stage.options.over = (context) => this.pen.over(context);
+    this.stage.options.skins = () => this.#skins();
+    this.stage.options.over = (context, copy) => this.pen.over(context, copy);
     this.undoButton = button("Undo", () => this.undo(), { kind: "icon", image: "undo" });
     this.redoButton = button("Redo", () => this.redo(), { kind: "icon", image: "redo" });
     this.stage.box.append(
@@ -171,7 +174,8 @@ class Closeup {
     if ((this.past.at ??= id) !== id && !quiet) Object.assign(this.past, { done: [], undone: [] });
     this.past.at = id;
     this.view = view;
-    this.carry = new Carry(view.map);
+    this.figures = figuresOf(view);
+    this.carries = this.figures.map((own) => new Carry(own));
     this.tiling = new LiveTiling(view);
     this.look.share = 1;
     this.space = null;
@@ -179,9 +183,11 @@ class Closeup {
     this.pulling.use(null);
     this.stage.show(this.tiling);
     this.#palette();
-    this.pen.use(this.carry, drawing);
+    this.pen.use(this.carries, drawing);
     this.heading.textContent = view.arrangement ? capital(view.arrangement) : "Close up";
-    this.kind.textContent = [view.class_name, view.group.name].filter(Boolean).join(" · ");
+    this.kind.textContent = [named(view), view.class_name, view.group.name].filter(Boolean).join(
+      " · ",
+    );
     this.#proved();
     this.#panels();
     this.#past();
@@ -197,7 +203,7 @@ class Closeup {
       const space = await this.api.get(`${this.home}/tiles/${view.id}/space`);
       if (this.closed || this.view !== view) return;
       this.space = space;
-      this.tiling.outline(space.polygon);
+      this.tiling.outlines(this.#rings());
       this.pulling.use(space);
       this.stage.redraw();
       this.root.dataset.ready = "pull";
@@ -232,7 +238,11 @@ class Closeup {
       this.signs = signPanel(view.elements, look, change, (key) => this.#light(key));
       put(
         this.panel,
-        shapePanel(look, { hasMap: Boolean(view.map), hasArt: this.#hasArt() }, change),
+        shapePanel(look, {
+          count: this.figures.length,
+          hasMap: this.figures.every(({ map }) => map),
+          hasArt: this.figures.some((_, k) => this.#backdropOf(k)),
+        }, change),
         this.signs,
         colourPanel(about, look, needed, change),
       );
@@ -256,8 +266,11 @@ class Closeup {
     }
   }
 
-  #hasArt() {
-    return Boolean(this.view.map && this.view.covered && this.project.silhouette?.backdrop);
+  /** The address of the picture that can be laid on a figure, if there is one. */
+  #backdropOf(k) {
+    const { map, covered } = this.figures[k];
+    const { silhouette } = (k ? this.project.second : this.project) ?? {};
+    return map && covered && silhouette?.backdrop;
   }
 
   #change(what) {
@@ -272,7 +285,8 @@ class Closeup {
   #palette() {
     const { look, about } = this;
     const known = about.palettes.find(({ name }) => name === look.palette) ?? about.palettes[0];
-    const palette = look.palette === "own" && look.custom ? { ...known, ...look.custom } : known;
+    const own = look.palette === "own" && look.custom;
+    const palette = own ? { ...known, ...look.custom, shades: undefined } : known;
     if (palette !== this.stage.options.palette) this.stale();
     Object.assign(this.stage.options, { palette, line: look.line });
     this.stage.redraw();
@@ -281,14 +295,20 @@ class Closeup {
   /** The outline on its way from the silhouette to the tile. */
   #between() {
     const { share } = this.look;
-    const { silhouette_track: from, tile_track: to, polygon } = this.view;
-    this.tiling.outline(
-      share >= 1
-        ? this.space?.polygon ?? polygon
-        : from.map(([x, y], k) => [x + share * (to[k][0] - x), y + share * (to[k][1] - y)]),
+    const there = ({ silhouette_track: from, tile_track: to }) =>
+      from.map(([x, y], k) => [x + share * (to[k][0] - x), y + share * (to[k][1] - y)]);
+    this.tiling.outlines(
+      share >= 1 ? this.#rings() : this.figures.map(there),
       { exact: share >= 1 },
     );
     this.stale();
+  }
+
+  /** The outline of each figure, as it can be pulled if that is known. */
+  #rings() {
+    return this.space
+      ? this.space.rings.map((ring) => ring.map((k) => this.space.polygon[k]))
+      : this.figures.map(({ polygon }) => polygon);
   }
 
   stale() {
@@ -296,39 +316,28 @@ class Closeup {
     this.stage.redraw();
   }
 
-  /** The picture of what lies on the tile, painted anew when it is too coarse. */
-  #skin() {
+  /** Pictures of what lies on each figure, painted anew when they are too coarse. */
+  #skins() {
     if (this.pen.moving || (this.look.share < 1 && !this.look.art)) return null;
     const scale = this.stage.camera.scale * Math.min(globalThis.devicePixelRatio || 1, 2);
     if (!this.skin || Math.abs(Math.log(this.skin.asked / scale)) > Math.log(SHARPER)) {
-      const { look, view, tiling } = this;
-      const map = between(view.map, look.share);
-      const art = look.art && this.#hasArt() && this.#picture()
-        ? { picture: this.backdrop, map, covered: view.covered }
-        : null;
-      const marks = look.share < 1 ? { lines: [], eyes: [] } : this.pen.marks;
-      this.skin = {
-        asked: scale,
-        own: paintSkin(tiling, {
-          art,
-          marks,
-          palette: this.stage.options.palette,
-          yDown: view.y_down,
-        }, scale),
-      };
+      const { look, tiling } = this;
+      const palette = this.stage.options.palette;
+      const own = this.figures.map((figure, k) => {
+        const url = look.art && this.#backdropOf(k);
+        const picture = url && this.pictures.at(url);
+        const art = picture && {
+          picture,
+          map: between(figure, look.share),
+          covered: figure.covered,
+          yDown: figure.y_down,
+        };
+        const marks = look.share < 1 ? { lines: [], eyes: [] } : this.pen.marks[k];
+        return paintSkin(tiling.figures[k], { art, marks, palette }, scale);
+      });
+      this.skin = { asked: scale, own };
     }
     return this.skin.own;
-  }
-
-  #picture() {
-    const url = this.project.silhouette.backdrop;
-    if (this.backdrop?.dataset.url !== url) {
-      this.backdrop = new Image();
-      this.backdrop.dataset.url = url;
-      this.backdrop.onload = () => this.stale();
-      this.backdrop.src = url;
-    }
-    return this.backdrop.complete && this.backdrop.naturalWidth > 0;
   }
 
   #overlay(context) {
@@ -428,7 +437,7 @@ class Closeup {
 
   #setDrawing(drawing) {
     this.#drawn(drawing, this.pen.drawing);
-    this.pen.use(this.carry, drawing);
+    this.pen.use(this.carries, drawing);
   }
 
   #keepDrawn(drawing) {
@@ -467,7 +476,7 @@ class Closeup {
     try {
       if (step.tile) await this.open(step.tile[side], { quiet: true });
       else {
-        this.pen.use(this.carry, step.drawing[side]);
+        this.pen.use(this.carries, step.drawing[side]);
         this.#keepDrawn(step.drawing[side]);
       }
       this.say(words);

@@ -12,6 +12,12 @@ const RUBBER = 0.03;
 const ROOM = 0.75; // share of the distance to the outline that an eye may fill
 const KEY_STEP = 7; // pixels that a key moves the pen
 
+/** What is drawn on a figure. */
+const drawnOn = (drawing, figure) => {
+  const { strokes = [], eyes = [] } = (figure ? drawing?.second : drawing) ?? {};
+  return { strokes, eyes };
+};
+
 export class Pen {
   /** `settings`: {tool: "pencil" | "rubber" | "eye", colour, width}; `on`: {drawn(drawing), said(text), marks()}. */
   constructor(stage, settings, on) {
@@ -19,14 +25,14 @@ export class Pen {
     this.settings = settings;
     this.on = on;
     this.drawing = { strokes: [], eyes: [] };
-    this.marks = { lines: [], eyes: [] };
+    this.marks = [{ lines: [], eyes: [] }]; // on each figure
     this.line = null;
   }
 
-  /** Take a tile's map and what was drawn. */
-  use(carry, drawing) {
-    this.carry = carry;
-    this.drawing = { strokes: drawing?.strokes ?? [], eyes: drawing?.eyes ?? [] };
+  /** Take the map of each of a tile's figures, and what was drawn: on the second figure under `second`. */
+  use(carries, drawing) {
+    this.carries = carries;
+    this.drawing = { ...drawing, ...drawnOn(drawing, 0) };
     this.#carried();
   }
 
@@ -35,27 +41,31 @@ export class Pen {
   }
 
   #carried() {
-    this.marks = {
-      lines: this.drawing.strokes.map(({ points, colour, width }) => ({
-        points: points.map((point) => this.carry.forward(point)),
-        colour,
-        width, // as exports keep it
-      })),
-      eyes: this.drawing.eyes.map(([x, y, radius]) => this.#eye([x, y], radius)),
-    };
+    this.marks = this.carries.map((carry, figure) => {
+      const { strokes, eyes } = drawnOn(this.drawing, figure);
+      return {
+        lines: strokes.map(({ points, colour, width }) => ({
+          points: points.map((point) => carry.forward(point)),
+          colour,
+          width: width * carry.scale, // as exports keep it
+        })),
+        eyes: eyes.map(([x, y, radius]) => this.#eye(figure, [x, y], radius)),
+      };
+    });
     this.moving = null;
     this.on.marks();
   }
 
-  #eye(point, radius) {
-    const at = this.carry.forward(point);
-    const grown = radius * this.carry.growth(point, 0.5 * EYE * this.size);
-    return { at, radius: Math.min(grown, ROOM * this.#room(at)) };
+  #eye(figure, point, radius) {
+    const carry = this.carries[figure];
+    const at = carry.forward(point);
+    const grown = radius * carry.growth(point, 0.5 * EYE * this.size / carry.scale);
+    return { at, radius: Math.min(grown, ROOM * this.#room(figure, at)), light: carry.light };
   }
 
-  /** The distance of a point of the tile from its outline. */
-  #room(at) {
-    const ring = this.stage.tiling.polygon;
+  /** The distance of a point of a figure from its outline. */
+  #room(figure, at) {
+    const ring = this.stage.tiling.figures[figure].polygon;
     return Math.min(...ring.map((a, k) => beside(at, a, ring[(k + 1) % ring.length]).apart));
   }
 
@@ -63,8 +73,8 @@ export class Pen {
     const found = this.stage.copyAt(place);
     if (!found) return false;
     this.before = this.drawing;
-    if (this.settings.tool === "eye") this.#addEye(found.at);
-    else if (this.settings.tool === "rubber") this.#rub(found.at);
+    if (this.settings.tool === "eye") this.#addEye(found);
+    else if (this.settings.tool === "rubber") this.#rub(found);
     else this.line = { copy: found.copy, points: [found.at] };
     this.stage.redraw();
     return true;
@@ -73,7 +83,7 @@ export class Pen {
   move(place) {
     const found = this.stage.copyAt(place);
     if (!found) return;
-    if (this.settings.tool === "rubber") this.#rub(found.at);
+    if (this.settings.tool === "rubber") this.#rub(found);
     else if (this.line) this.#draw(found);
     this.stage.redraw();
   }
@@ -104,42 +114,49 @@ export class Pen {
   }
 
   #keepLine() {
+    const { figure } = this.line.copy;
+    const carry = this.carries[figure];
     const points = simplified(this.line.points, NEAR * this.size, LONGEST * this.size);
-    const own = points.map((point) =>
-      this.carry.inverse(point).map((value) => short(value, this.size))
-    );
+    const size = this.size / carry.scale; // in the silhouette
+    const own = points.map((point) => carry.inverse(point).map((value) => short(value, size)));
     const stroke = {
       colour: this.settings.colour,
-      width: short(WIDTHS[this.settings.width] * this.size, this.size),
+      width: short(WIDTHS[this.settings.width] * size, size),
       points: own,
     };
-    this.#change({ strokes: [...this.drawing.strokes, stroke], eyes: this.drawing.eyes });
+    const { strokes, eyes } = drawnOn(this.drawing, figure);
+    this.#change(figure, { strokes: [...strokes, stroke], eyes });
   }
 
-  #addEye(at) {
-    const [x, y] = this.carry.inverse(at).map((value) => short(value, this.size));
-    const radius = short(EYE * this.size, this.size);
-    this.#change({ strokes: this.drawing.strokes, eyes: [...this.drawing.eyes, [x, y, radius]] });
+  #addEye({ copy: { figure }, at }) {
+    const carry = this.carries[figure];
+    const size = this.size / carry.scale;
+    const [x, y] = carry.inverse(at).map((value) => short(value, size));
+    const { strokes, eyes } = drawnOn(this.drawing, figure);
+    this.#change(figure, { strokes, eyes: [...eyes, [x, y, short(EYE * size, size)]] });
   }
 
-  #rub(at) {
+  #rub({ copy: { figure }, at }) {
     const reach = RUBBER * this.size;
+    const [before, marks] = [drawnOn(this.drawing, figure), this.marks[figure]];
     let hit = false;
-    const strokes = this.drawing.strokes.flatMap((stroke, k) => {
-      const parts = rubbed(this.marks.lines[k].points, at, reach + stroke.width / 2);
+    const strokes = before.strokes.flatMap((stroke, k) => {
+      const { points, width } = marks.lines[k];
+      const parts = rubbed(points, at, reach + width / 2);
       if (!parts) return [stroke];
       hit = true;
       return parts.map((part) => ({ ...stroke, points: part.map((i) => stroke.points[i]) }));
     });
-    const eyes = this.drawing.eyes.filter((_, k) => {
-      const { at: [x, y], radius } = this.marks.eyes[k];
+    const eyes = before.eyes.filter((_, k) => {
+      const { at: [x, y], radius } = marks.eyes[k];
       return Math.hypot(x - at[0], y - at[1]) > radius + reach / 2;
     });
-    if (hit || eyes.length < this.drawing.eyes.length) this.#change({ strokes, eyes });
+    if (hit || eyes.length < before.eyes.length) this.#change(figure, { strokes, eyes });
   }
 
-  #change(drawing) {
-    this.drawing = drawing;
+  /** Take what is drawn on a figure. */
+  #change(figure, own) {
+    this.drawing = figure ? { ...this.drawing, second: own } : { ...this.drawing, ...own };
     this.#carried();
   }
 
@@ -153,29 +170,30 @@ export class Pen {
       const riders = new Riders(space.body);
       this.moving = {
         puller,
-        lines: this.marks.lines.map((line) => ({
-          ...line,
-          seats: line.points.map((point) => riders.seat(point)),
+        marks: this.marks.map(({ lines, eyes }) => ({
+          lines: lines.map((line) => ({
+            ...line,
+            seats: line.points.map((point) => riders.seat(point)),
+          })),
+          eyes: eyes.map((eye) => ({ ...eye, seat: riders.seat(eye.at) })),
         })),
-        eyes: this.marks.eyes.map((eye) => ({ ...eye, seat: riders.seat(eye.at) })),
       };
     }
-    for (const line of this.moving.lines) {
-      line.points = line.seats.map((seat) => Riders.at(seat, body));
+    for (const { lines, eyes } of this.moving.marks) {
+      for (const line of lines) line.points = line.seats.map((seat) => Riders.at(seat, body));
+      for (const eye of eyes) eye.at = Riders.at(eye.seat, body);
     }
-    for (const eye of this.moving.eyes) eye.at = Riders.at(eye.seat, body);
   }
 
   /** Draw on a copy the line in hand, and all marks while the tile is pulled. */
-  over(context) {
+  over(context, { figure }) {
     if (!this.line && !this.moving) return;
     const { palette } = this.stage.options;
+    const { lines, eyes } = this.moving?.marks[figure] ?? { lines: [], eyes: [] };
     context.save();
-    context.clip(this.stage.tiling.path);
-    for (const { points, colour, width } of this.moving?.lines ?? []) {
-      lineInto(context, points, colour, width);
-    }
-    if (this.line) {
+    context.clip(this.stage.tiling.figures[figure].path);
+    for (const { points, colour, width } of lines) lineInto(context, points, colour, width);
+    if (this.line?.copy.figure === figure) {
       lineInto(
         context,
         this.line.points,
@@ -184,9 +202,7 @@ export class Pen {
       );
     }
     context.restore();
-    for (const { at, radius } of this.moving?.eyes ?? []) {
-      eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
-    }
+    for (const { at, radius, light } of eyes) eyeInto(context, at, radius, palette, light);
   }
 
   hover(place) {

@@ -24,10 +24,16 @@ const HALVINGS = 6; // by which the last good place is found
 const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
 
 export class Puller {
-  /** `space` is what the server tells of a tile's space; see space_json in changing.py. */
+  /** `space` is what the server tells of a tile's space; see space_json in pulled_tiles.py. */
   constructor(space) {
     this.maps = space.maps;
     this.count = space.rows / 2; // vertices
+    this.rings = space.rings;
+    /** @type {number[][]} what must not cross itself: figures, and the outline of several */
+    this.simple = space.rings;
+    if (space.rings.length > 1) {
+      this.simple = [...space.rings, Array.from({ length: space.outer }, (_, k) => k)];
+    }
     this.parametersCount = space.cols;
     this.group = space.cols - space.maps.length - 2; // first of the parameters that move the group
     this.start = Float64Array.from(space.start);
@@ -36,7 +42,7 @@ export class Puller {
     this.size = this.rest.length / 2; // points
     this.area = 0;
     this.middle = [0, 0];
-    this.#measure(space.polygon);
+    this.#measure(space.rings.map((ring) => ring.map((k) => space.polygon[k])));
     this.points = this.#everyPoint(space);
     this.#weigh();
     this.#findOrbits();
@@ -57,10 +63,11 @@ export class Puller {
     this.pin = null;
   }
 
-  #measure(polygon) {
-    const { area, x, y } = measured(polygon);
-    this.area = area;
-    this.middle = [x, y];
+  /** The mean area of the figures, and the middle of the first. */
+  #measure(polygons) {
+    const all = polygons.map(measured);
+    this.area = all.reduce((sum, { area }) => sum + area / all.length, 0);
+    this.middle = [all[0].x, all[0].y];
   }
 
   /** Every point of the body as rows of one matrix; the group moves about the middle of the tile. */
@@ -80,11 +87,11 @@ export class Puller {
       });
       rows.push(row);
     }
-    body.sides.forEach((side, k) => {
+    body.sides.forEach(([from, to], k) => {
       const share = body.shares[k];
       for (const j of [0, 1]) {
         const row = new Map();
-        for (const [vertex, part] of [[side, 1 - share], [(side + 1) % this.count, share]]) {
+        for (const [vertex, part] of [[from, 1 - share], [to, share]]) {
           for (const [column, value] of rows[2 * vertex + j]) {
             row.set(column, (row.get(column) ?? 0) + part * value);
           }
@@ -164,19 +171,26 @@ export class Puller {
     }
   }
 
-  /** Whether a vertex is the centre of a rotation, and so stays where it is. */
-  isHeld(vertex) {
-    return this.orbit[vertex] < 0;
+  /** Whether a vertex of a figure is the centre of a rotation, and so stays where it is. */
+  isHeld(vertex, figure = 0) {
+    const ring = this.rings[figure];
+    return this.orbit[ring[vertex % ring.length]] < 0;
   }
 
   /**
-   * Take hold of the outline, `share` of the way from a vertex to the next. Beyond `reach`, a distance,
+   * Take hold of a figure's outline, `share` of the way from a vertex to the next. Beyond `reach`, a distance,
    * all stays; with `lattice` the way in which copies lie may change as well.
    */
-  grab(vertex, share, reach, { lattice = true } = {}) {
+  grab(vertex, share, reach, { lattice = true, figure = 0 } = {}) {
+    const ring = this.rings[figure];
     this.ahead = null;
-    this.pin = { vertex, next: (vertex + 1) % this.count, share, target: null };
-    this.#grip(GRIP * reach);
+    this.pin = {
+      vertex: ring[vertex],
+      next: ring[(vertex + 1) % ring.length],
+      share,
+      target: null,
+    };
+    this.#grip(ring, vertex, GRIP * reach);
     this.pin.target = this.held();
     this.free.fill(1);
     if (!lattice) this.free.fill(0, this.group, this.parametersCount);
@@ -185,14 +199,16 @@ export class Puller {
   }
 
   /** The hand is soft: it holds the mean of the outline nearby, so that no spike comes out. */
-  #grip(width) {
-    const { pin, count, rest } = this;
+  #grip(ring, place, width) {
+    const { pin, rest } = this;
+    const count = ring.length;
     const [x, y] = this.grip();
     const weight = (i) =>
       Math.exp(-3 * ((rest[2 * i] - x) ** 2 + (rest[2 * i + 1] - y) ** 2) / width ** 2);
     const found = new Map([[pin.vertex, 1 - pin.share], [pin.next, pin.share]]);
-    for (const [from, step] of [[pin.vertex, -1], [pin.next, 1]]) {
-      for (let k = 0, i = from; k < count / 4; k += 1, i = (i + step + count) % count) {
+    for (const [from, step] of [[place, -1], [place + 1, 1]]) {
+      for (let k = 0; k < count / 4; k += 1) {
+        const i = ring[(from + step * k + count) % count];
         const own = weight(i);
         if (k > 1 && own < 0.05) break;
         found.set(i, (found.get(i) ?? 0) + own);
@@ -392,11 +408,12 @@ export class Puller {
     part(free);
   }
 
-  /** Whether the outline crosses itself here or a little farther. */
+  /** Whether an outline crosses itself here or a little farther. */
   #blocked() {
-    const ring = this.polygon();
-    return crosses(ring) ||
-      crosses(ring.map((value, k) => this.rest[k] + SLACK * (value - this.rest[k])));
+    const here = this.polygon();
+    const farther = here.map((value, k) => this.rest[k] + SLACK * (value - this.rest[k]));
+    const along = (points, ring) => ring.flatMap((k) => [points[2 * k], points[2 * k + 1]]);
+    return this.simple.some((ring) => crosses(along(here, ring)) || crosses(along(farther, ring)));
   }
 
   #solve(steps) {
@@ -425,9 +442,19 @@ export class Puller {
     }
   }
 
-  /** The outline: x0, y0, x1, y1 ... */
+  /** All vertices: x0, y0, x1, y1 ... */
   polygon() {
     return multiply(this.points, this.z, new Float64Array(2 * this.count));
+  }
+
+  /**
+   * The outline of each figure.
+   *
+   * @returns {Point[][]}
+   */
+  outlines() {
+    const points = this.polygon();
+    return this.rings.map((ring) => ring.map((k) => [points[2 * k], points[2 * k + 1]]));
   }
 
   /** How far the outline is from where it rests, at most, in sizes of the tile. */

@@ -26,7 +26,7 @@ export class Pulling {
     this.puller = space ? new Puller(space) : null;
     this.hand = null;
     this.waiting = false;
-    if (this.chosen && this.puller) this.chosen.vertex %= this.puller.count;
+    if (this.chosen && this.puller) this.chosen = this.#point(this.chosen.number);
   }
 
   get size() {
@@ -51,13 +51,14 @@ export class Pulling {
   }
 
   #take({ copy, vertex, share }) {
-    if (this.puller.isHeld(share < 0.5 ? vertex : (vertex + 1) % this.puller.count)) {
+    if (this.puller.isHeld(share < 0.5 ? vertex : vertex + 1, copy.figure)) {
       this.on.said(
         "This point is a turning point of the pattern. It moves when the grid does, or pull next to it.",
       );
     }
     this.puller.grab(vertex, share, this.settings.reach * this.size, {
       lattice: this.settings.lattice,
+      figure: copy.figure,
     });
     this.hand = { copy, vertex, share, offset: [0, 0] };
   }
@@ -128,10 +129,9 @@ export class Pulling {
   }
 
   #show() {
-    const ring = this.puller.polygon();
     const { tiling } = this.stage;
     tiling.place(this.puller.placement());
-    tiling.outline(ring, { exact: false });
+    tiling.outlines(this.puller.outlines(), { exact: false });
     this.on.changed({ stopped: this.stopped, body: this.puller.body() });
   }
 
@@ -158,7 +158,7 @@ export class Pulling {
       if (share < 1) setTimeout(() => this.stage.redraw());
       else {
         this.stage.before = null;
-        this.stage.tiling.outline(this.puller.polygon());
+        this.stage.tiling.outlines(this.puller.outlines());
         this.on.changed({ stopped: false, body: null });
       }
     };
@@ -194,18 +194,32 @@ export class Pulling {
 
   #choose(step) {
     if (this.hand) this.up();
-    const { count } = this.puller;
+    const { count } = this;
     const stride = Math.max(1, Math.round(count / 120));
-    const { width, height } = this.stage;
-    const copy = this.chosen?.copy &&
-      this.stage.copies.find((c) =>
-        c.aspect === this.chosen.copy.aspect && String(c.cell) === String(this.chosen.copy.cell)
-      );
-    const own = copy ?? this.#middleCopy([width / 2, height / 2]);
-    const vertex = this.chosen ? (this.chosen.vertex + step * stride + count) % count : 0;
-    this.chosen = { copy: own, vertex };
+    this.chosen = this.#point(this.chosen ? this.chosen.number + step * stride : 0);
     this.#seek();
-    this.on.said(`Point ${vertex + 1} of ${count}. Hold shift and press an arrow key to move it.`);
+    const number = this.chosen.number + 1;
+    this.on.said(`Point ${number} of ${count}. Hold shift and press an arrow key to move it.`);
+  }
+
+  /** How many points can be chosen, of all figures. */
+  get count() {
+    return this.puller.rings.reduce((sum, ring) => sum + ring.length, 0);
+  }
+
+  /** The point of a number, on the copy that is chosen or in the middle. */
+  #point(given) {
+    const number = (given + this.count) % this.count;
+    let [figure, vertex] = [0, number];
+    for (; vertex >= this.puller.rings[figure].length; figure += 1) {
+      vertex -= this.puller.rings[figure].length;
+    }
+    const known = this.chosen?.copy;
+    const copy = known?.figure === figure &&
+      this.stage.copies.find((own) =>
+        own.aspect === known.aspect && String(own.cell) === String(known.cell)
+      );
+    return { number, vertex, copy: copy || this.#middleCopy(figure) };
   }
 
   /** Bring the chosen point into view. */
@@ -219,12 +233,16 @@ export class Pulling {
     this.stage.redraw();
   }
 
-  #middleCopy(place) {
+  /** The copy of a figure that is nearest to the middle of the canvas. */
+  #middleCopy(figure) {
+    const { width, height, copies, tiling } = this.stage;
+    const { x: u, y: v } = tiling.figures[figure].middle;
     const apart = ({ matrix }) => {
-      const [x, y] = moved(matrix, [this.stage.tiling.middle.x, this.stage.tiling.middle.y]);
-      return Math.hypot(x - place[0], y - place[1]);
+      const [x, y] = moved(matrix, [u, v]);
+      return Math.hypot(x - width / 2, y - height / 2);
     };
-    return this.stage.copies.reduce((a, b) => (apart(b) < apart(a) ? b : a));
+    return copies.filter((own) => own.figure === figure)
+      .reduce((a, b) => (apart(b) < apart(a) ? b : a));
   }
 
   #nudge([x, y]) {
@@ -283,7 +301,7 @@ export class Pulling {
    * @returns {{ copy: Copy, point: Point }}
    */
   #pointOf({ copy, vertex, share }) {
-    const ring = this.stage.tiling.polygon;
+    const ring = this.stage.tiling.figures[copy.figure].polygon;
     const [a, b] = [ring[vertex % ring.length], ring[(vertex + 1) % ring.length]];
     return { copy, point: [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])] };
   }

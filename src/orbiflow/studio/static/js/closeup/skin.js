@@ -1,6 +1,6 @@
 /** What lies on a tile, as one picture of the prototile: the artwork, lines and eyes. */
 
-import { inverse } from "../tiling.js";
+import { inverse, moved } from "../tiling.js";
 
 const MOST = 1400; // pixels along a side
 const BLEED = 0.7; // pixels by which triangles overlap, so that no seam shows
@@ -12,9 +12,9 @@ const BLEED = 0.7; // pixels by which triangles overlap, so that no seam shows
  * @param {Point} at
  * @param {number} radius
  * @param {Palette} palette
- * @param {boolean} yDown
+ * @param {Point} light where its light is, in radii from its middle
  */
-export function eyeInto(context, [x, y], radius, palette, yDown) {
+export function eyeInto(context, [x, y], radius, palette, light) {
   const disc = (u, v, r, colour) => {
     context.fillStyle = colour;
     context.beginPath();
@@ -25,8 +25,8 @@ export function eyeInto(context, [x, y], radius, palette, yDown) {
   disc(x, y, 0.9 * radius, palette.paper ?? "#ffffff");
   disc(x, y, 0.58 * radius, palette.outline);
   disc(
-    x - 0.27 * radius,
-    y - (yDown ? 0.315 : -0.315) * radius,
+    x + light[0] * radius,
+    y + light[1] * radius,
     0.2 * radius,
     palette.paper ?? "#ffffff",
   );
@@ -47,6 +47,27 @@ export function lineInto(context, points, colour, width) {
   points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
   if (points.length === 1) context.lineTo(points[0][0] + 1e-3 * width, points[0][1]);
   context.stroke();
+}
+
+/** Pictures by their addresses; `came()` when one is there. */
+export class Pictures {
+  constructor(came) {
+    this.came = came;
+    /** @type {Map<string, HTMLImageElement>} */
+    this.known = new Map();
+  }
+
+  /** The picture at an address, null until it is there. */
+  at(url) {
+    if (!this.known.has(url)) {
+      const image = new Image();
+      image.onload = this.came;
+      image.src = url;
+      this.known.set(url, image);
+    }
+    const image = this.known.get(url);
+    return image.complete && image.naturalWidth > 0 ? image : null;
+  }
 }
 
 /** Lay triangles of a picture onto their images. `shares` are places in the picture, 0 to 1. */
@@ -85,35 +106,35 @@ function triangles(context, picture, { images, shares, list }, scale) {
 }
 
 /**
- * The map to what lies a share of the way from the silhouette to the tile.
+ * The map to what lies a share of the way from a figure's silhouette, in its place, to the tile.
  *
- * @param {TileMap | null} map
+ * @param {{ map: TileMap | null, place?: Matrix }} figure
  * @param {number} share
  * @returns {TileMap | null}
  */
-export function between(map, share) {
+export function between({ map, place = [1, 0, 0, 1, 0, 0] }, share) {
   if (!map || share >= 1) return map;
-  const { rest, images } = map;
   /** @type {(image: Point, k: number) => Point} */
-  const there = ([x, y], k) => [
-    rest[k][0] + share * (x - rest[k][0]),
-    rest[k][1] + share * (y - rest[k][1]),
-  ];
-  return { ...map, images: images.map(there) };
+  const there = ([x, y], k) => {
+    const [u, v] = moved(place, map.rest[k]);
+    return [u + share * (x - u), v + share * (y - v)];
+  };
+  return { ...map, images: map.images.map(there) };
 }
 
 /**
- * Paint the prototile's skin at a scale (pixels a unit), or null if nothing lies on it.
- * `art`: {picture, map, covered, yDown} or null; `marks`: {lines: [{points, colour, width}], eyes: [{at, radius}]}.
+ * Paint a figure's skin at a scale (pixels a unit), or null if nothing lies on it.
+ * `art`: {picture, map, covered, yDown} or null; `marks`: {lines: [{points, colour, width}], eyes: [{at, radius,
+ * light}]}.
  *
- * @param {import("../tiling.js").Tiling} tiling
- * @param {{ art: any, marks: any, palette: Palette, yDown: boolean }} what
+ * @param {Figure} figure
+ * @param {{ art: any, marks: any, palette: Palette }} what
  * @param {number} scale
  */
-export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
+export function paintSkin(figure, { art, marks, palette }, scale) {
   if (!art && !marks.lines.length && !marks.eyes.length) return null;
-  const xs = tiling.polygon.map((p) => p[0]);
-  const ys = tiling.polygon.map((p) => p[1]);
+  const xs = figure.polygon.map((p) => p[0]);
+  const ys = figure.polygon.map((p) => p[1]);
   const [low, high] = [[Math.min(...xs), Math.min(...ys)], [Math.max(...xs), Math.max(...ys)]];
   const size = Math.max(high[0] - low[0], high[1] - low[1]);
   const own = Math.min(scale, MOST / size);
@@ -129,7 +150,7 @@ export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
     const [from, to] = art.covered;
     const shares = art.map.rest.map(([x, y]) => {
       const v = (y - from[1]) / (to[1] - from[1]);
-      return [(x - from[0]) / (to[0] - from[0]), yDown ? v : 1 - v];
+      return [(x - from[0]) / (to[0] - from[0]), art.yDown ? v : 1 - v];
     });
     triangles(
       context,
@@ -138,13 +159,13 @@ export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
       own,
     );
     context.globalCompositeOperation = "destination-in";
-    context.fill(tiling.path);
+    context.fill(figure.path);
     context.globalCompositeOperation = "source-over";
   }
   context.save();
-  context.clip(tiling.path); // a line ends where its tile does
+  context.clip(figure.path); // a line ends where its tile does
   for (const { points, colour, width } of marks.lines) lineInto(context, points, colour, width);
   context.restore();
-  for (const { at, radius } of marks.eyes) eyeInto(context, at, radius, palette, yDown);
+  for (const { at, radius, light } of marks.eyes) eyeInto(context, at, radius, palette, light);
   return { canvas, matrix: inverse(matrix), scale: own };
 }

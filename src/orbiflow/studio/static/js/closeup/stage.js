@@ -34,7 +34,7 @@ export class Stage {
     this.box = h("div", { class: "closeup-stage" }, this.canvas);
     this.pointers = new Map();
     this.layers = [];
-    /** @type {{ line: number, palette: Palette, skin?: () => any, over?: any }} */
+    /** @type {{ line: number, palette: Palette, skins?: () => any[], over?: any }} */
     this.options = { line: 1.4, palette: null };
     this.tester = document.createElement("canvas").getContext("2d");
     this.frames = 0;
@@ -79,7 +79,7 @@ export class Stage {
 
   paint() {
     const { context, width, height, ratio } = sized(this.canvas);
-    const { line, palette, skin, over } = this.options;
+    const { line, palette, skins, over } = this.options;
     this.width = width;
     this.height = height;
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -90,7 +90,7 @@ export class Stage {
       height,
       ratio,
       line,
-      skin: skin?.(),
+      skins: skins?.(),
       over,
     });
     for (const layer of this.layers) layer(context);
@@ -237,8 +237,10 @@ export class Stage {
   /** The copy under a place: {copy, at: the place in the prototile}, or null. */
   copyAt(place) {
     for (let k = this.copies.length - 1; k >= 0; k -= 1) {
-      const at = moved(inverse(this.copies[k].matrix), place);
-      if (this.tester.isPointInPath(this.tiling.path, ...at)) return { copy: this.copies[k], at };
+      const copy = this.copies[k];
+      const at = moved(inverse(copy.matrix), place);
+      const { path } = this.tiling.figures[copy.figure];
+      if (this.tester.isPointInPath(path, ...at)) return { copy, at };
     }
     return null;
   }
@@ -246,10 +248,10 @@ export class Stage {
   /** The point of an outline nearest to a place within pixels: {copy, vertex, share, apart}, or null. */
   outlineAt(place, within) {
     let best = null;
-    const ring = this.tiling.polygon;
     const reach = within / this.camera.scale;
     for (const copy of this.copies) {
       const at = moved(inverse(copy.matrix), place);
+      const ring = this.tiling.figures[copy.figure].polygon;
       ring.forEach((a, vertex) => {
         const { share, apart } = beside(at, a, ring[(vertex + 1) % ring.length]);
         if (apart < (best?.apart ?? reach)) best = { copy, vertex, share, apart };

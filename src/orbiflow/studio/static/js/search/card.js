@@ -66,17 +66,18 @@ export function cardView(project, actions) {
     root.classList.toggle("rough", card.stage !== "final");
     link.href = `#/p/${project.id}/t/${card.id}`;
     take.href = `#/p/${project.id}/take/${card.id}`;
-    stars.textContent = starText(card.stars);
-    stars.setAttribute("aria-label", starWords(card.stars));
-    word.textContent = card.stars ? capital(card.word) : "";
+    stars.textContent = starText(card);
+    stars.setAttribute("aria-label", starWords(card));
+    word.textContent = card.stars && !card.figures ? capital(card.word) : "";
     lies.textContent = capital(card.arrangement);
     name.textContent = card.parent ? `${card.class_name}, pulled` : card.class_name;
     stage.textContent = card.stage === "final" ? "" : STAGES[card.stage] ?? "";
     const about = `${capital(card.word || "a tile")}, ${card.arrangement}`;
     link.setAttribute(
       "aria-label",
-      `Open: ${about}. ${starWords(card.stars)}. Class ${card.class_name}.`,
+      `Open: ${about}. ${starWords(card)}. Class ${card.class_name}.`,
     );
+    more.hidden = Boolean(card.figures) !== Boolean(project.second);
     more.setAttribute("aria-label", `More like this: ${about}`);
     take.setAttribute("aria-label", `Take away: ${about}`);
     if (anew) paint();

@@ -11,6 +11,7 @@ import {
   number,
   OBJECTIVE_MEANINGS,
   OBJECTIVES,
+  PAIR_TIMES,
   sentence,
   STATES,
 } from "../words.js";
@@ -135,9 +136,10 @@ class SearchPage {
           "How long",
           "effort",
           this.about.efforts.map((own) => [own, EFFORTS[own] ?? own]),
-          EFFORT_TIMES,
+          this.project.second ? PAIR_TIMES : EFFORT_TIMES,
         ),
-        wish("What counts", "objective", Object.entries(OBJECTIVES), OBJECTIVE_MEANINGS),
+        !this.project.second &&
+          wish("What counts", "objective", Object.entries(OBJECTIVES), OBJECTIVE_MEANINGS),
       ),
     );
   }
@@ -180,7 +182,7 @@ class SearchPage {
     return trying(async () => {
       await this.api.post(`${this.place}/tasks`, {
         operation: "search",
-        settings: { effort, objective, ...more },
+        settings: { effort, ...(!this.project.second && { objective }), ...more },
       });
       toast(words);
     });
@@ -205,7 +207,7 @@ class SearchPage {
   /** Say how far the search is. */
   tell() {
     const { task, project } = this;
-    const words = stateWords(task, project.tiles.length);
+    const words = stateWords(task, project);
     if (this.said.textContent !== words) this.said.textContent = words;
     this.said.classList.toggle("error", task?.state === "failed");
     this.bar.hidden = !alive(task);
@@ -273,9 +275,9 @@ class SearchPage {
  * What there is to say of a search.
  *
  * @param {Task | undefined} task
- * @param {number} tiles
+ * @param {Project} project
  */
-function stateWords(task, tiles) {
+function stateWords(task, { tiles: { length: tiles }, second }) {
   if (!task) return "Nothing has been searched yet.";
   if (task.state === "failed") return sentence(task.error);
   if (task.state === "waiting") {
@@ -283,7 +285,10 @@ function stateWords(task, tiles) {
       ? `Waiting: ${number(task.place, "other thing")} to do first.`
       : "It starts in a moment.";
   }
-  if (task.state === "running") return task.what ? capital(task.what) : "Looking for tiles";
+  if (task.state === "running") {
+    if (second && !tiles) return "Looking for tiles of both: the first takes a moment";
+    return task.what ? capital(task.what) : "Looking for tiles";
+  }
   if (task.state !== "done") return `${STATES[task.state]}.`;
   if (!tiles) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
   return `${number(tiles, "tile")}, best first. Each one covers the plane: we proved it.`;

@@ -6,7 +6,7 @@ import { alive, bytes, sentence } from "../words.js";
 
 const PICTURES = "image/*,.svg,.json,.geojson,.dat,.wkt";
 const TABLES = /\.(csv|tsv|txt|npy|parquet)$/i;
-const stem = (name) => name.replace(/\.\w+$/, "");
+export const stem = (name) => name.replace(/\.\w+$/, "");
 const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
 
 /** A field for files that a button opens. */
@@ -43,6 +43,8 @@ function filled(project) {
 }
 
 export class Bringing {
+  number = 0; // of the picture in its project
+
   /** @param {Page} page */
   constructor({ api, navigate, about }) {
     this.api = api;
@@ -159,7 +161,30 @@ export class Bringing {
   }
 
   animal({ name, title }) {
-    return this.begin(title, (id) => this.api.post(`projects/${id}/animal`, { name }));
+    return this.begin(
+      title,
+      (id) => this.api.post(`projects/${id}/animal?number=${this.number}`, { name }),
+    );
+  }
+
+  /** The animals that are there to try. */
+  animals({ animals }) {
+    return h(
+      "ul",
+      { class: "animals" },
+      animals.map((own) =>
+        h(
+          "li",
+          {},
+          h(
+            "button",
+            { type: "button", class: "animal", onclick: () => this.animal(own) },
+            h("img", { src: own.picture, alt: "", loading: "lazy" }),
+            h("span", {}, own.title),
+          ),
+        )
+      ),
+    );
   }
 
   take(file) {
@@ -172,10 +197,8 @@ export class Bringing {
         "error",
       );
     }
-    return this.begin(
-      stem(name),
-      (id) => this.api.put(`projects/${id}/input?name=${encodeURIComponent(name)}`, file),
-    );
+    const query = `name=${encodeURIComponent(name)}&number=${this.number}`;
+    return this.begin(stem(name), (id) => this.api.put(`projects/${id}/input?${query}`, file));
   }
 
   open(file) {

@@ -40,7 +40,7 @@ export async function show(root, page) {
       "section",
       { "aria-labelledby": "ours" },
       h("h2", { id: "ours" }, "Or take one of ours"),
-      animals(page.about, bring),
+      bring.animals(page.about),
     ),
     projects,
     h(
@@ -72,29 +72,6 @@ function paintSample(canvas) {
     ratio,
     line: 1.4,
   });
-}
-
-function animals(about, bring) {
-  return h(
-    "ul",
-    { class: "animals" },
-    about.animals.map((own) =>
-      h(
-        "li",
-        {},
-        h(
-          "button",
-          {
-            type: "button",
-            class: "animal",
-            onclick: () => bring.animal(own),
-          },
-          h("img", { src: own.picture, alt: "", loading: "lazy" }),
-          h("span", {}, own.title),
-        ),
-      )
-    ),
-  );
 }
 
 /** Show the projects that there are, newest first; the others when they are asked for. */

@@ -7,6 +7,7 @@ import { paintingControls, readingControls } from "./controls.js";
 import { Marks } from "./marks.js";
 import { paintBrush, paintSilhouette, paintStrokes, tinted, touches } from "./overlay.js";
 import { pointing } from "./pointing.js";
+import { addSecond, bothPictures } from "./second.js";
 
 const LAYERS = ["mend", "pins", "emphasis"];
 const MANY = 6; // parts left out, from which a picture is a photograph with a background
@@ -15,17 +16,34 @@ const KEYS = "With the keyboard: arrow keys move the brush, Space begins and end
 /**
  * @param {HTMLElement} root
  * @param {Page} page
+ * @param {number} [number] 1 for the second of two pictures
  */
-export async function show(root, page) {
+export async function show(root, page, number = 0) {
+  if (number && !page.project.second) {
+    page.navigate(`p/${page.project.id}/picture`, { replace: true });
+    return () => {};
+  }
   await style("start");
-  const own = new PicturePage(page);
+  const own = new PicturePage(page, number);
   own.build(root);
   return () => own.close();
 }
 
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
+export const showSecond = (root, page) => show(root, page, 1);
+
 class PicturePage {
-  /** @param {Page} page */
-  constructor({ api, events, project, navigate }) {
+  /**
+   * @param {Page} page
+   * @param {number} number
+   */
+  constructor(page, number) {
+    const { api, events, project, navigate } = page;
+    this.page = page;
+    this.number = number;
     this.api = api;
     this.events = events;
     this.project = project;
@@ -39,9 +57,9 @@ class PicturePage {
     this.tints = new Map(); // the marks in their colours, painted anew when strokes change
     this.known = 0; // strokes that the outline on the screen knows
     this.sent = 0; // strokes that the server has
-    this.reading = { threshold: null, invert: null, smooth: 0, thicken: 0, ...project.reading };
+    this.reading = { threshold: null, invert: null, smooth: 0, thicken: 0, ...this.own.reading };
     this.read = newest(async () =>
-      this.began(await api.put(`${this.place}/reading`, this.reading))
+      this.began(await api.put(`${this.place}/reading?number=${number}`, this.reading))
     );
     this.send = Object.fromEntries(
       LAYERS.map((layer) => [layer, newest(() => this.upload(layer), 200)]),
@@ -64,6 +82,7 @@ class PicturePage {
       "The green shape is what we read. If something is missing or too much, mend it here.",
     );
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
+    this.both = bothPictures(this.page, this.number);
     this.back = button("Undo", () => this.changed(this.marks.undo()), {
       kind: "quiet",
       image: "undo",
@@ -79,6 +98,7 @@ class PicturePage {
       "div",
       { class: "stack side" },
       h("div", { class: "go" }, this.find),
+      this.both.root,
       this.said,
       this.controls.root,
       paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]),
@@ -132,13 +152,23 @@ class PicturePage {
     this.off.forEach((stop) => stop());
   }
 
+  /**
+   * What the project has of this picture; nothing when it was taken away.
+   *
+   * @returns {Partial<Picture>}
+   */
+  get own() {
+    return (this.number ? this.project.second : this.project) ?? {};
+  }
+
   get title() {
-    return this.project.silhouette ? "Is this your animal?" : "Your picture";
+    const which = this.number ? "second " : "";
+    return this.own.silhouette ? `Is this your ${which}animal?` : `Your ${which}picture`;
   }
 
   /** Show the silhouette that the project has now. */
   async ready() {
-    const { silhouette } = this.project;
+    const { silhouette } = this.own;
     if (silhouette && silhouette.backdrop !== this.shown) {
       const image = new Image();
       image.src = silhouette.backdrop;
@@ -162,17 +192,17 @@ class PicturePage {
     this.stage.style.setProperty("--shape", `${width} / ${height}`);
     this.stage.style.setProperty("--ratio", String(width / height));
     const marks = new Marks(width, height);
-    const found = LAYERS.filter((layer) => this.project[layer]);
+    const found = LAYERS.filter((layer) => this.own[layer]);
     await Promise.all(
       found.map((layer) =>
-        trying(() => marks.load(layer, this.project[layer], { both: layer === "mend" }))
+        trying(() => marks.load(layer, this.own[layer], { both: layer === "mend" }))
       ),
     );
     this.marks = marks;
   }
 
   paint() {
-    const { project: { silhouette }, picture, marks, pen } = this;
+    const { own: { silhouette }, picture, marks, pen } = this;
     if (!silhouette || !picture) return;
     const { context, width, ratio } = sized(this.canvas);
     const pixel = marks.width / width;
@@ -221,7 +251,7 @@ class PicturePage {
     if (!stroke || (stroke.shape === "lasso" && stroke.points.length < 3)) return this.paint();
     if (
       ["pins", "emphasis"].includes(stroke.layer) &&
-      !touches(stroke, this.project.silhouette.outline)
+      !touches(stroke, this.own.silhouette.outline)
     ) {
       toast("Paint on the animal itself: that is outside of it.");
       return this.paint();
@@ -242,7 +272,7 @@ class PicturePage {
 
   async upload(layer) {
     const count = this.marks.strokes.length;
-    const address = `${this.place}/${layer}`;
+    const address = `${this.place}/${layer}?number=${this.number}`;
     if (this.marks.has(layer)) {
       this.began(
         await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" })),
@@ -269,14 +299,17 @@ class PicturePage {
   }
 
   get task() {
-    return this.project.tasks.find(({ operation }) => operation === "read");
+    const own = this.number ? "read second" : "read";
+    return this.project.tasks.find(({ operation }) => operation === own);
   }
 
   /** Say what was read, and which buttons do something. */
   tell() {
-    const { project: { silhouette }, marks, task } = this;
+    const { own: { silhouette }, project, marks, task } = this;
     const busy = alive(task);
-    this.find.disabled = !silhouette || this.searching;
+    const unread = !project.silhouette || (project.second && !project.second.silhouette);
+    this.find.disabled = Boolean(unread || this.searching);
+    this.both.update();
     this.back.disabled = !marks.strokes.length;
     this.again.disabled = !marks.undone.length;
     this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
@@ -310,12 +343,15 @@ class PicturePage {
   /** What is shown if there is no silhouette, and none to come. */
   nothing(error) {
     const leave = async () => {
+      if (this.number) return addSecond(this.page);
       if (!this.project.tiles.length) await this.api.remove(this.place);
       this.navigate("");
     };
+    const without = () => this.both.remove();
     return [
       error || h("p", { class: "soft" }, "There is no picture yet."),
       h("p", {}, button("Choose another picture", () => trying(leave), { kind: "primary" })),
+      this.number > 0 && h("p", {}, button("Go on without it", without, { kind: "quiet" })),
     ];
   }
 
@@ -325,10 +361,11 @@ class PicturePage {
     return trying(async () => {
       await Promise.all([this.read, ...Object.values(this.send)].map((pending) => pending.done()));
       await this.settled();
-      const { objective = "likeness", effort = "normal" } = this.project.view?.search ?? {};
+      const { second, view } = this.project;
+      const { objective = "likeness", effort = "normal" } = view?.search ?? {};
       await this.api.post(`${this.place}/tasks`, {
         operation: "search",
-        settings: { objective, effort },
+        settings: { effort, ...(!second && { objective }) },
       });
       this.navigate(`p/${this.project.id}`);
     }).then(() => {

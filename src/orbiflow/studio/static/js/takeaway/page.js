@@ -10,7 +10,7 @@ import { isMade, madeBefore, picture, words } from "./made.js";
 import { trueSize } from "./truesize.js";
 
 const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
-const NEVER = ["tile", "result", "out", "force", "picture", "drawing", "eyes"]; // what the page itself sets, or drawings hold
+const NEVER = ["tile", "result", "out", "force", "picture", "drawing", "eyes", "second_eyes"]; // what the page itself sets, or drawings hold
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 /**
@@ -165,16 +165,28 @@ class TakeawayPage {
 
   /** What can be laid on the tiles: {name, box, text} of each. */
   laidOn(kind) {
-    const { strokes, eyes } = this.project.view?.drawing ?? {};
+    const two = Boolean(this.card.figures);
+    const { drawing = {} } = this.project.view ?? {};
+    const isDrawn = [drawing, two && drawing.second].some((own) =>
+      own && (own.strokes?.length || own.eyes?.length)
+    );
+    const pictures = [this.project, two && this.project.second].filter((own) =>
+      own && PICTURES.includes(own.input?.type)
+    );
     const layer = (name, text, checked) => ({
       name,
       text,
       box: h("input", { type: "checkbox", checked, onchange: () => this.changed() }),
     });
     return [
-      (strokes?.length || eyes?.length) && layer("drawing", "With what you drew on it", true),
-      PICTURES.includes(this.project.input?.type) &&
-      layer("picture", "With your picture on each tile, in its own colours", false),
+      isDrawn && layer("drawing", "With what you drew on it", true),
+      pictures.length > 0 && layer(
+        "picture",
+        `With your ${two ? "pictures on the tiles" : "picture on each tile"}, in ${
+          two ? "their" : "its"
+        } own colours`,
+        false,
+      ),
     ].filter((own) => own && DRAWN.includes(kind));
   }
 

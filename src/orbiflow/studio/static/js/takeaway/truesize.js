@@ -1,7 +1,7 @@
 /** The tile as large as it will be, on a screen that was measured with a bank card. */
 
 import { button, h, put, slider } from "../dom.js";
-import { pathOf } from "../tiling.js";
+import { figuresOf, pathOf } from "../tiling.js";
 
 const CARD = [85.6, 53.98]; // mm: ISO/IEC 7810 ID-1
 const KEY = "orbiflow.px-per-mm";
@@ -102,14 +102,20 @@ function markNeck(context, [x, y], words, wide, look) {
 /**
  * A view of a card's tile: {root, show(size in mm, the width in mm below which a neck is told)}.
  *
- * @param {Card} card
+ * @param {Card} tile
  */
-export function trueSize({ polygon, y_down: yDown, neck = null }) {
+export function trueSize(tile) {
+  const yDown = tile.y_down;
+  const figures = figuresOf(tile).map((figure) => ({ ...figure, ...smallest(figure.polygon) }));
+  const { long, short, corners } = figures.reduce((a, b) => (b.long > a.long ? b : a));
+  const polygon = figures.flatMap((figure) => figure.polygon);
+  const length = ([[a, b], [c, d]]) => Math.hypot(c - a, d - b);
+  const neck = figures.map((figure) => figure.neck).filter(Boolean)
+    .reduce((a, b) => (a && length(a) <= length(b) ? a : b), null);
   const canvas = h("canvas", { class: "true-tile", role: "img" });
   const said = h("p", { class: "soft small" });
   const thin = h("p", { class: "small" });
   const card = h("div", { class: "bank-card", "aria-hidden": "true" }, h("span", {}, "bank card"));
-  const { long, short, corners } = smallest(polygon);
   let [size, least] = [40, 0];
   const fit = slider("Make this as large as a bank card held to the screen", {
     min: 2,
@@ -166,10 +172,11 @@ export function trueSize({ polygon, y_down: yDown, neck = null }) {
     context.strokeStyle = look.color;
     context.lineWidth = 1.5 / unit;
     context.lineJoin = "round";
-    const path = pathOf(polygon);
     context.fillStyle = look.getPropertyValue("--accent-soft");
-    context.fill(path);
-    context.stroke(path);
+    for (const path of figures.map((figure) => pathOf(figure.polygon))) {
+      context.fill(path);
+      context.stroke(path);
+    }
     context.setLineDash([4 / unit, 4 / unit]);
     context.lineWidth = 1 / unit;
     context.stroke(pathOf(corners));
@@ -177,12 +184,14 @@ export function trueSize({ polygon, y_down: yDown, neck = null }) {
     const [length, across, lying, standing] = [long, short, ...upright(polygon).slice(2)].map((
       side,
     ) => ((side * size) / long).toFixed(1));
+    const lie = figures.length > 1 ? "they lie" : "it lies";
+    const around = figures.length > 1 ? "the larger one" : "it";
     canvas.setAttribute(
       "aria-label",
-      `The tile in its true size, ${lying} by ${standing} mm as it lies, in a rectangle of ${length} by ${across} mm`,
+      `The tile in its true size, ${lying} by ${standing} mm as ${lie}, in a rectangle of ${length} by ${across} mm`,
     );
     said.textContent =
-      `${lying} × ${standing} mm as it lies; the smallest rectangle around it has ${length} × ${across} mm. ${
+      `${lying} × ${standing} mm as ${lie}; the smallest rectangle around ${around} has ${length} × ${across} mm. ${
         localStorage.getItem(KEY)
           ? "Your screen is measured."
           : "Screens differ: measure yours once."
