@@ -15,7 +15,7 @@ from outlines import animal
 
 NAMES = "squirrel.dat", "nagata/dolphin_60.dat"
 FEW: dict[str, Any] = {
-    "ratios": 1, "points": 48, "glues": 20, "placed": 80, "held": 8, "starts": 6, "carved": 3,
+    "ratios": 1, "points": 64, "glues": 20, "placed": 80, "held": 8, "starts": 6, "carved": 3,
     "ranked": 2, "finalists": 2,
 }  # fmt: skip
 

@@ -30,13 +30,16 @@ from orbiflow.tiles import (
     SolidSettings,
     artwork,
     colouring,
+    complex_points,
     copies_meeting,
     dirichlet_tiling,
     escherize,
+    fidelity,
     make_solid,
     read_result,
     render_artwork,
     report,
+    resampled,
     save_tiles,
     scenes,
     write_run,
@@ -96,6 +99,17 @@ def test_maps_of_both_figures_have_inverses(seed: int, number: int) -> None:
     polygon = shapely.Polygon(figure.tile.polygon).buffer(1e-9 * size)
     assert shapely.contains_xy(polygon, *moved.T).all()
     np.testing.assert_allclose(figure.inverse(moved), points[inside], atol=1e-6 * size)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_maps_keep_what_the_marks_say(number: int) -> None:
+    figure = pair().parts[number].figure
+    known = figure.likeness.fidelity
+    assert known is not None
+    outline = resampled(figure.silhouette_outline, 240)
+    moved = figure.forward(outline)
+    kept = fidelity(complex_points(outline), complex_points(moved), known.cost)
+    assert kept.mark == pytest.approx(known.mark, abs=0.4)
 
 
 def test_a_window_is_covered_once() -> None:
@@ -164,7 +178,7 @@ def test_prototiles_have_colours_of_their_own(seed: int, name: str) -> None:
     group = wallpaper_group(name)
     points = np.random.default_rng(seed).random((2, 2)) @ group.lattice.T
     try:
-        tiling = dirichlet_tiling(group, points)
+        tiling = dirichlet_tiling(group, list(points))
     except OrbiflowError:  # two points near a mirror or centre may be one
         return
     colours = colouring(tiling)
