@@ -226,7 +226,7 @@ def test_levels_and_moves_do_not_tear_a_pair() -> None:
     for pair, level in product(coarse, (1, 2)):
         more = finer(pair, level)
         np.testing.assert_allclose(*_outlines(more), atol=1e-9)
-        assert more.body.size == pair.body.size * (2, 4)[level - 1]
+        assert more.body.size == pair.body.size * (2, 8)[level - 1]
     best = min(coarse, key=lambda pair: pair.cost)
     assert moved(best).cost <= best.cost * 1.05
     carved = carved_pair(best, 15)

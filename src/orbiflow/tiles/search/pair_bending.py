@@ -34,7 +34,7 @@ from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import CORNER_DEPTH, important_vertices, triangulate, with_corners
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
-MULTIPLES = (1, 2, 4)  # points of each level for each point of the first
+MULTIPLES = (1, 2, 8)  # points of each level for each point of the first
 HELD_ROUNDS = 5  # steps of the minimisation among tiles
 SPRUNG_ROUNDS = 3  # steps of springs that compare neighbours
 BACKGROUND = Stiffness(salience=0.0, pose=0.0)  # of a figure that may have any shape

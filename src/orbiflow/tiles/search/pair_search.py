@@ -9,6 +9,7 @@ from itertools import product
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
+import shapely
 
 from orbiflow.arguments import as_choice
 from orbiflow.errors import OrbiflowError, SettingError
@@ -24,9 +25,11 @@ from orbiflow.runtime import (
     work,
 )
 from orbiflow.settings import Count, Range, Seed, Settings
+from orbiflow.tiles.geometry import plane_points
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.gluing import Placement, glues, placements
 from orbiflow.tiles.search.pair_bending import (
+    MULTIPLES,
     BentPair,
     Figures,
     Stiff,
@@ -136,7 +139,7 @@ class PairSearch(Settings):
         first = float(np.random.default_rng(self.seed).random()) if self.seed else 0.0
         known = {
             "stiff": tuple(map(_stiff, goals)),
-            "phase": 4 * first,
+            "phase": MULTIPLES[-1] * first,
             "min_neck": min(least_neck(goal.target.normal, self.min_neck) for goal in goals),
             "background": goals[1].is_background,
         }
@@ -220,7 +223,14 @@ def search_pair(
     nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "moving corners", 0.9)
     last = unlike(_ranked([*ranked, *nearby]), own.finalists)
     done = team.each(_detailed, last, "carving with all detail", 1.0)
-    return _ranked(done) if own.force else _certified(done)
+    return _whole(_ranked(done)) if own.force else _certified(done)
+
+
+def _whole(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
+    """Return pairs of which no figure crosses itself, though they may overlap each other's copies."""
+    rings = [[plane_points(ring) for ring in (*p.body.rings(p.points), *p.laid)] for p in pairs]
+    kept = (bool(np.all(shapely.is_valid(list(map(shapely.Polygon, own))))) for own in rings)
+    return [pair for pair, is_kept in zip(pairs, kept, strict=True) if is_kept]
 
 
 def _certified(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
