@@ -248,16 +248,22 @@ def _finer(
     body: Elastic, finer: Elastic, placements: Placements, points: Complex
 ) -> tuple[Placements, Complex]:
     """Return the same placements, and shapes (N, C) like those given, of a body with more points."""
+    multiple = finer.size // body.size
+    rest = np.repeat(finer.rest[:, None], points.shape[1], axis=1)
+    more = placements._replace(
+        lengths=placements.lengths * multiple, starts=placements.starts * multiple
+    )
+    return more, followed(body, finer, points, rest)
+
+
+def followed(body: Elastic, finer: Elastic, points: Complex, start: Complex) -> Complex:
+    """Return shapes (N, C) of a body with more points that follow coarse ones, from a start (N, C)."""
     n, multiple = body.size, finer.size // body.size
     closed = np.vstack([points[:n], points[:1]])
     below, part = np.divmod(np.arange(finer.size), multiple)
     share = (part / multiple)[:, None]
     outline = (1 - share) * closed[below] + share * closed[below + 1]
-    rest = np.repeat(finer.rest[:, None], outline.shape[1], axis=1)
-    more = placements._replace(
-        lengths=placements.lengths * multiple, starts=placements.starts * multiple
-    )
-    return more, finer.pulled(rest, outline, FOLLOWING_STRENGTH, 6)
+    return finer.pulled(start, outline, FOLLOWING_STRENGTH, 6)
 
 
 def _detailed(lot: _Lot, kind: IsohedralClass, settings: LikenessSearch) -> Bent | None:

@@ -19,7 +19,7 @@ import numpy as np
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import apart, best_similarity, reverse, ring_length
 from orbiflow.tiles.likeness import Elastic, Stiffness, kept_of
-from orbiflow.tiles.search.bending import FOLLOWING_STRENGTH
+from orbiflow.tiles.search.bending import followed
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
     COMPARISON_STRENGTH,
@@ -264,9 +264,10 @@ def finer(pair: BentPair, level: int, *, rounds: int = HELD_ROUNDS) -> BentPair:
     multiple = MULTIPLES[level] // MULTIPLES[pair.level]
     glue, own = pair.glue.times(multiple), pair.placement
     body = glued_body(pair.figures, level, glue)
+    shapes = (pair.points[places] for places in pair.body.places)
     one, two = (
-        _followed(part, old, pair.points[places], multiple)
-        for part, old, places in zip(body.parts, pair.body.parts, pair.body.places, strict=True)
+        followed(old, part, z[:, None], _turned(part, old, z))
+        for part, old, z in zip(body.parts, pair.body.parts, shapes, strict=True)
     )
     own = own._replace(lengths=own.lengths * multiple, starts=own.starts * multiple)
     space = TileSpace(pair.kind, own)
@@ -278,15 +279,10 @@ def finer(pair: BentPair, level: int, *, rounds: int = HELD_ROUNDS) -> BentPair:
     return held(found, rounds) if rounds else found
 
 
-def _followed(body: Elastic, old: Elastic, z: Complex, multiple: int) -> Complex:
-    """Return the shape (N, 1) of a finer body whose outline is that of a coarser one's shape."""
-    outline = z[: old.size]
-    at, part = np.divmod(np.arange(body.size), multiple)
-    share = part / multiple
-    goal = (1 - share) * outline[at] + share * outline[(at + 1) % old.size]
+def _turned(body: Elastic, old: Elastic, z: Complex) -> Complex:
+    """Return a body (N, 1) in the pose of a coarser one's shape (N,)."""
     turn = np.exp(1j * np.angle(best_similarity(old.rest, z)))
-    start = body.rest * turn + goal.mean()
-    return body.pulled(start[:, None], goal[:, None], FOLLOWING_STRENGTH, 6)
+    return (body.rest * turn + z[: old.size].mean())[:, None]
 
 
 def _tiles(body: PairBody, space: TileSpace, z: Complex) -> Complex:
