@@ -13,6 +13,7 @@ import argparse
 import time
 from pathlib import Path
 
+import numpy as np
 from common import BUNDLED, ROOT
 
 from orbiflow.runtime import Event, Preview
@@ -57,7 +58,8 @@ def searched(
     row = f"{name:32} {best.name:5} {stars[0]:3g} {stars[1]:4g}  {marks[0]:5.2f} {marks[1]:5.2f}"
     count, look = len(found.tiles), min(first, default=0.0)
     print(f"{row} {mixing(best.tiling):7.2f} {count:6} {look:7.1f} {seconds:6.0f}", flush=True)
-    return best.tiling, seconds, min(stars) >= ENOUGH_STARS
+    upright = np.diag([1.0, -1.0 if best.y_down else 1.0])
+    return best.tiling.transformed(upright, np.zeros(2)), seconds, min(stars) >= ENOUGH_STARS
 
 
 def main() -> None:

@@ -164,7 +164,7 @@ def test_options_of_a_search_are_those_of_escherize() -> None:
         return {field.option.names for field in find(name).fields if not field.positional}
 
     of_one = {"--emphasis", "--strength", "--pin", "--pin-angle"}
-    of_one |= {"--second-emphasis", "--second-pin", "--second-called"}
+    of_one |= {"--background", "--second-emphasis", "--second-pin", "--second-called"}
     own, other = options("batch"), options("escherize")
     assert {names[0] for names in other - own} == {*of_one, "--called", "--shown-out", "--verbose"}
 
