@@ -6,10 +6,12 @@ import contextlib
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from orbiflow.errors import SettingError
 from orbiflow.runtime import (
+    NEVER,
     Cancel,
     Cancelled,
     ClassFailed,
@@ -17,16 +19,16 @@ from orbiflow.runtime import (
     Preview,
     Sink,
     TileFound,
-    one_blas_thread,
-    one_thread,
+    ignore,
 )
 from orbiflow.tiles.search.finished_tiles import ClassFailure, rated
 from orbiflow.tiles.search.likeness_search import ROUNDED_SHARES, rounded_off
 from orbiflow.tiles.search.pair_carving import CarvedPair
-from orbiflow.tiles.search.pair_search import PairSearch, first_pair, search_pair
+from orbiflow.tiles.search.pair_search import PairSearch, Team, first_pair, search_pair
 from orbiflow.tiles.search.pair_tiles import finished_pair
 from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.search.search_record import INTERRUPTED, OnTile, without_twins
+from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile, SearchFacts
 
 NOTHING = "no tile of both figures is certified"
@@ -87,8 +89,8 @@ class PairRecord:
         """Return pairs as tiles with their ratings, best first, no two of them alike."""
         targets, originals = ([goal.target for goal in own] for own in (self._rounded, self.goals))
         facts = SearchFacts(self.settings.objective, starts=self.settings.placed)
-        with one_thread(), one_blas_thread():
-            found = [finished_pair(targets, pair, originals, self._share) for pair in pairs]
+        finish = partial(_finished, targets, originals, self._share)
+        found = Team(self.settings.workers, ignore, NEVER).each(finish, pairs, "finishing", 1.0)
         likely = [goal.target for goal in self.goals if not goal.is_background]
         tiles = rated([tile.changed(search=facts) for tile in found], *likely)
         tiles.sort(key=lambda tile: -tile.score)
@@ -110,6 +112,12 @@ class PairRecord:
             self.on_event(ClassFailed(failure.name, failure.reason))
         left = [tile.isohedral_class for tile in tiles] if tiles else self.names
         return Found(tiles, failures, frozenset() if self._is_done else frozenset(left))
+
+
+def _finished(
+    targets: list[Target], originals: list[Target], share: float, pair: CarvedPair
+) -> EscherTile:
+    return finished_pair(targets, pair, originals, share)
 
 
 def _thick_enough(

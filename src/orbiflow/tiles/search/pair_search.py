@@ -89,8 +89,8 @@ class PairSearch(Settings):
     method_name: ClassVar[str] = "pairs"
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "fast": {
-            **{"ratios": 3, "glues": 60, "placed": 1200, "per_glue": 10},
-            **{"held": 40, "starts": 80, "carved": 36, "ranked": 10, "finalists": 8},
+            **{"ratios": 3, "glues": 50, "placed": 1000, "per_glue": 10},
+            **{"held": 36, "starts": 70, "carved": 30, "ranked": 8, "finalists": 6},
         },
         "normal": {},
     }
@@ -187,7 +187,7 @@ def first_pair(
 ) -> list[CarvedPair]:
     """Return certified pairs of two silhouettes in some seconds, best first, if there are any."""
     few = settings.replace(**LOOK)
-    return _certified(_rough(few, few.figures(goals), _Team(few.workers, ignore, cancel))[1])
+    return _certified(_rough(few, few.figures(goals), Team(few.workers, ignore, cancel))[1])
 
 
 def search_pair(
@@ -215,7 +215,7 @@ def search_pair(
         Cancelled: If the token was cancelled.
     """
     own = settings or PairSearch()
-    team = _Team(own.workers, on_event, cancel)
+    team = Team(own.workers, on_event, cancel)
     starts, carved = _rough(own, own.figures(goals), team)
     on_pairs("better", _certified(_ranked(carved)[: own.finalists]))
     before = dict(zip(map(id, carved), starts, strict=True))
@@ -238,7 +238,7 @@ def _certified(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
 
 
 def _rough(
-    settings: PairSearch, figures: Sequence[Figures], team: _Team
+    settings: PairSearch, figures: Sequence[Figures], team: Team
 ) -> tuple[list[BentPair], list[CarvedPair]]:
     """Return pairs with half of the points, before they are carved and after it."""
     found = team.each(partial(_placed, settings), figures, "gluing", 0.3)
@@ -254,7 +254,7 @@ def _rough(
     return starts, team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
 
 
-class _Team:
+class Team:
     """Does one kind of work after another, in some processes, and tells how far it is."""
 
     def __init__(self, workers: int, on_event: Sink, cancel: Cancel) -> None:

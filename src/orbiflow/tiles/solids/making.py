@@ -209,7 +209,10 @@ class Plan(NamedTuple):
     @property
     def ring(self) -> Array:
         """The figure's outline (N, 2)."""
-        return self.layout.outline.closed[self.number].flattened(FLATNESS)
+        curve = self.layout.outline.closed[self.number]
+        rings = [curve.flattened(flatness) for flatness in (FLATNESS, FLATNESS / 16)]
+        # hair-thin parts cross where a line is taken for their curves
+        return next((ring for ring in rings if shapely.Polygon(ring).is_valid), rings[0])
 
     @property
     def piece(self) -> shapely.Polygon:
