@@ -17,8 +17,9 @@ from orbiflow.tiles import CLASSES, IsohedralClass, Tiling, certify, isohedral_c
 from orbiflow.tiles.geometry import complex_points, plane_points, resampled
 from orbiflow.tiles.likeness import Elastic
 from orbiflow.tiles.search import gluing
+from orbiflow.tiles.search.bending import unlike
 from orbiflow.tiles.search.gluing import Glued, _gains, _Tables, glues, placements, sums_along
-from orbiflow.tiles.search.pair_bending import BentPair, Figures, bent, finer, moved, unlike
+from orbiflow.tiles.search.pair_bending import BentPair, Figures, bent, finer, moved
 from orbiflow.tiles.search.pair_body import Glue, PairBody
 from orbiflow.tiles.search.pair_carving import CarvedPair, carved_pair
 from orbiflow.tiles.search.pair_search import PairSearch, search_pair
@@ -222,7 +223,7 @@ def test_levels_and_moves_do_not_tear_a_pair() -> None:
         for own in placements(_union(one, two, glued.glue), glued, NINE, 0.02, 2)
     ]
     coarse = bent(figures, placed, 3)
-    assert len(unlike(coarse, 3)) <= 3
+    assert len(unlike(coarse, 3, BentPair.is_twin)) <= 3
     for pair, level in product(coarse, (1, 2)):
         more = finer(pair, level)
         np.testing.assert_allclose(*_outlines(more), atol=1e-9)

@@ -23,6 +23,7 @@ def eye_numbers(text: str) -> tuple[float, ...]:
         raise OrbiflowError(f"{text!a:.60} is not x,y or x,y,radius") from None
 
 
+Eye: TypeAlias = Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")]
 ON_TILE = Group("On the tile")
 
 
@@ -35,24 +36,10 @@ class MotifSettings(Settings):
     strokes: Annotated[Strokes | None, ON_TILE] = None
     """Engrave with hatching, echoes of the outline, or feathers."""
 
-    eyes: Annotated[
-        tuple[
-            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")], ...
-        ],
-        Repeated(),
-        Option("--eye"),
-        ON_TILE,
-    ] = ()
+    eyes: Annotated[tuple[Eye, ...], Repeated(), Option("--eye"), ON_TILE] = ()
     """An eye, in the silhouette's coordinates. May be repeated."""
 
-    second_eyes: Annotated[
-        tuple[
-            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")], ...
-        ],
-        Repeated(),
-        Option("--second-eye"),
-        ON_TILE,
-    ] = ()
+    second_eyes: Annotated[tuple[Eye, ...], Repeated(), Option("--second-eye"), ON_TILE] = ()
     """An eye of the second figure, in its own silhouette's coordinates. May be repeated."""
 
     def of_figure(self, number: int) -> Self:

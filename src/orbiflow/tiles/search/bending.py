@@ -120,7 +120,7 @@ def _all_carved(
     first = [bent for bent in simple[: settings.carved] if bent.fidelity.mark >= least]
     worth = [bent for bent in crossed if bent.fidelity.mark > least]
     worth.sort(key=lambda bent: -bent.fidelity.mark)
-    chosen = first + _unlike(worth, MAX_REPAIRED * (1 if simple else 2), _twins)
+    chosen = first + unlike(worth, MAX_REPAIRED * (1 if simple else 2), _twins)
     done: list[Bent] = []
     race = Race()
     for bent in chosen:
@@ -131,7 +131,7 @@ def _all_carved(
 
 def _best_first(found: list[Bent]) -> list[Bent]:
     """Return the tiles without twins, by their scores."""
-    return _unlike(sorted(found, key=lambda bent: -bent.score), len(found), _twins)
+    return unlike(sorted(found, key=lambda bent: -bent.score), len(found), _twins)
 
 
 def _twins(a: Bent, b: Bent) -> bool:
@@ -343,10 +343,10 @@ def _unlike_outlines(outlines: Complex, order: Iterable[int], count: int) -> Int
     def twins(a: int, b: int) -> bool:
         return apart(outlines[a], outlines[b]) <= TWIN_DISTANCE
 
-    return np.array(_unlike(order, count, twins), dtype=np.int64)
+    return np.array(unlike(order, count, twins), dtype=np.int64)
 
 
-def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], bool]) -> list[Item]:
+def unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], bool]) -> list[Item]:
     """Return the first `count` items at most, without twins of earlier ones."""
     kept: list[Item] = []
     for item in items:

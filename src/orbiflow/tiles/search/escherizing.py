@@ -129,6 +129,8 @@ def escherize(
     """
     begin = time.perf_counter()
     settings = as_instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
+    if second is None:
+        settings.check_single()
     goal = settings.goal(target)
     goal = replace(goal, emphasis=emphasis or goal.emphasis, pins=pins or goal.pins)
     if second is not None or settings.background:

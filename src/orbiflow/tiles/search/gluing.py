@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Complex, Integers
 from orbiflow.tiles.geometry import plane_points
+from orbiflow.tiles.search.bending import unlike
 from orbiflow.tiles.search.pair_body import Glue
 from orbiflow.tiles.search.tile_orbits import relations_of
 from orbiflow.tiles.search.tile_space import edge_lengths
@@ -88,6 +89,11 @@ def glues(one: Complex, two: Complex, count: int) -> list[Glued]:
     a, b = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
     lengths = range(max(3, round(SHORTEST_PATH * n)), int(LONGEST_PATH * min(n, m)))
     found: list[Glued] = []
+
+    def near(own: Glued, other: Glued) -> bool:
+        ends = zip(own.glue, other.glue, (n, m), strict=False)
+        return max(abs((x - y + size / 2) % size - size / 2) for x, y, size in ends) < NEAR
+
     for length in lengths:
         apart = squares[0][a + length] - squares[0][a] + squares[1][b + length] - squares[1][b]
         missed = ((apart - 2 * agreed[length][a, (b + length - 1) % m]) / unit).ravel()
@@ -97,7 +103,7 @@ def glues(one: Complex, two: Complex, count: int) -> list[Glued]:
             (Glue(int(i), int(j), length), float(missed[k]))
             for (i, j), k in zip(ends, best, strict=True)
         )
-        found += _unlike(_overlapping(one, two, glued), (n, m), -(-3 * count // len(lengths)))
+        found += unlike(_overlapping(one, two, glued), -(-3 * count // len(lengths)), near)
     return sorted(found)[:count]
 
 
@@ -116,25 +122,6 @@ def _overlapping(
         if over < MOST_OVERLAP:
             cost = float(missed + OVERLAP_COST * over)
             yield Glued(cost - 2 * LOST_STEP * glue.length, glue, cost)
-
-
-def _unlike(found: Iterator[Glued], sizes: tuple[int, int], count: int) -> list[Glued]:
-    """Return the first so many whose ends are apart."""
-    kept: list[Glued] = []
-    for own in found:
-        near = (
-            max(
-                abs((x - y + size / 2) % size - size / 2)
-                for x, y, size in zip(own.glue, other.glue, sizes, strict=False)
-            )
-            < NEAR
-            for other in kept
-        )
-        if not any(near):
-            kept.append(own)
-        if len(kept) == count:
-            break
-    return kept
 
 
 class _Layout(NamedTuple):

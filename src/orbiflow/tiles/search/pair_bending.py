@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import product
@@ -212,17 +212,6 @@ class BentPair:
 def together(costs: Array) -> Array:
     """Return what pairs (C,) cost whose figures cost (2, C)."""
     return costs.sum(axis=0) + costs.max(axis=0)
-
-
-def unlike(pairs: Iterable[Pair], count: int) -> list[Pair]:
-    """Return the first so many, without twins of earlier ones."""
-    kept: list[Pair] = []
-    for pair in pairs:
-        if len(kept) == count:
-            break
-        if not any(pair.is_twin(other) for other in kept):
-            kept.append(pair)
-    return kept
 
 
 def _as_placements(found: Sequence[Placement]) -> Placements:

@@ -27,6 +27,7 @@ from orbiflow.runtime import (
 from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.geometry import plane_points
 from orbiflow.tiles.likeness import least_neck
+from orbiflow.tiles.search.bending import unlike
 from orbiflow.tiles.search.gluing import Placement, glues, placements
 from orbiflow.tiles.search.pair_bending import (
     MULTIPLES,
@@ -37,7 +38,6 @@ from orbiflow.tiles.search.pair_bending import (
     finer,
     glued_body,
     moved,
-    unlike,
 )
 from orbiflow.tiles.search.pair_carving import CarvedPair, carved_pair, finer_slides
 from orbiflow.tiles.search.search_method import Goal
@@ -219,9 +219,9 @@ def search_pair(
     starts, carved = _rough(own, own.figures(goals), team)
     on_pairs("better", _certified(_ranked(carved)[: own.finalists]))
     before = dict(zip(map(id, carved), starts, strict=True))
-    ranked = unlike(_ranked(carved), own.ranked)
+    ranked = unlike(_ranked(carved), own.ranked, CarvedPair.is_twin)
     nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "moving corners", 0.9)
-    last = unlike(_ranked([*ranked, *nearby]), own.finalists)
+    last = unlike(_ranked([*ranked, *nearby]), own.finalists, CarvedPair.is_twin)
     done = team.each(_detailed, last, "carving with all detail", 1.0)
     return _whole(_ranked(done)) if own.force else _certified(done)
 
@@ -248,9 +248,11 @@ def _rough(
     bending = team.each(partial(_bent, settings), jobs, "bending", 0.5)
     pairs = [pair for some in bending for pair in some]
     pairs.sort(key=lambda pair: pair.cost)
-    middle = team.each(partial(finer, level=1), unlike(pairs, settings.starts), "refining", 0.55)
+    middle = team.each(
+        partial(finer, level=1), unlike(pairs, settings.starts, BentPair.is_twin), "refining", 0.55
+    )
     middle.sort(key=lambda pair: -pair.promise)
-    starts = unlike(middle, settings.carved)
+    starts = unlike(middle, settings.carved, BentPair.is_twin)
     return starts, team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
 
 
