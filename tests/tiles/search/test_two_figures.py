@@ -337,7 +337,9 @@ def test_a_background_may_have_any_shape(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         again.parts[1].figure.forward(point), point, atol=1e-9 * np.ptp(point)
     )
-    assert len(make_solid(again).parts) == 2
+    assert (
+        len(make_solid(again, SolidSettings(clearance=0, chamfer=0)).parts) == 2
+    )  # necks are narrow
     jsonschema.validate(
         json.loads(json.dumps(report(found))), json.loads((DOCS / "result.schema.json").read_text())
     )
