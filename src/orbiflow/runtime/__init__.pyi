@@ -46,6 +46,7 @@ from .processes import process_context as process_context
 from .processes import work as work
 from .side_by_side import SideBySide as SideBySide
 from .side_by_side import Tell as Tell
+from .team import Team as Team
 from .tensor_files import array_bytes as array_bytes
 from .tensor_files import read_arrays as read_arrays
 from .tensor_files import read_tensors as read_tensors

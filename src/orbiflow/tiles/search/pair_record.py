@@ -18,13 +18,14 @@ from orbiflow.runtime import (
     Note,
     Preview,
     Sink,
+    Team,
     TileFound,
     ignore,
 )
 from orbiflow.tiles.search.finished_tiles import ClassFailure, rated
 from orbiflow.tiles.search.likeness_search import ROUNDED_SHARES, rounded_off
 from orbiflow.tiles.search.pair_carving import CarvedPair
-from orbiflow.tiles.search.pair_search import PairSearch, Team, first_pair, search_pair
+from orbiflow.tiles.search.pair_search import PairSearch, first_pair, search_pair
 from orbiflow.tiles.search.pair_tiles import finished_pair
 from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.search.search_record import INTERRUPTED, OnTile, without_twins
@@ -90,7 +91,9 @@ class PairRecord:
         targets, originals = ([goal.target for goal in own] for own in (self._rounded, self.goals))
         facts = SearchFacts(self.settings.objective, starts=self.settings.placed)
         finish = partial(_finished, targets, originals, self._share)
-        found = Team(self.settings.workers, ignore, NEVER).each(finish, pairs, "finishing", 1.0)
+        found = Team(__name__, self.settings.workers, ignore, NEVER).each(
+            finish, pairs, "finishing", 1.0
+        )
         likely = [goal.target for goal in self.goals if not goal.is_background]
         tiles = rated([tile.changed(search=facts) for tile in found], *likely)
         tiles.sort(key=lambda tile: -tile.score)

@@ -13,17 +13,7 @@ import shapely
 
 from orbiflow.arguments import as_choice
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import (
-    NEVER,
-    Cancel,
-    Progress,
-    Sink,
-    ignore,
-    one_blas_thread,
-    one_thread,
-    process_context,
-    work,
-)
+from orbiflow.runtime import NEVER, Cancel, Sink, Team, ignore
 from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.geometry import plane_points
 from orbiflow.tiles.likeness import least_neck
@@ -187,7 +177,9 @@ def first_pair(
 ) -> list[CarvedPair]:
     """Return certified pairs of two silhouettes in some seconds, best first, if there are any."""
     few = settings.replace(**LOOK)
-    return _certified(_rough(few, few.figures(goals), Team(few.workers, ignore, cancel))[1])
+    return _certified(
+        _rough(few, few.figures(goals), Team(__name__, few.workers, ignore, cancel))[1]
+    )
 
 
 def search_pair(
@@ -215,7 +207,7 @@ def search_pair(
         Cancelled: If the token was cancelled.
     """
     own = settings or PairSearch()
-    team = Team(own.workers, on_event, cancel)
+    team = Team(__name__, own.workers, on_event, cancel)
     starts, carved = _rough(own, own.figures(goals), team)
     on_pairs("better", _certified(_ranked(carved)[: own.finalists]))
     before = dict(zip(map(id, carved), starts, strict=True))
@@ -254,48 +246,6 @@ def _rough(
     middle.sort(key=lambda pair: -pair.promise)
     starts = unlike(middle, settings.carved, BentPair.is_twin)
     return starts, team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
-
-
-class Team:
-    """Does one kind of work after another, in some processes, and tells how far it is."""
-
-    def __init__(self, workers: int, on_event: Sink, cancel: Cancel) -> None:
-        self.workers, self.on_event, self.cancel, self.share = workers, on_event, cancel, 0.0
-        self.context = process_context((__name__,)) if workers > 1 else None
-
-    def each(
-        self, do: Callable[[Any], Any], items: Sequence[Any], what: str, share: float
-    ) -> list[Any]:
-        """Return what is done of each item, up to a share of the whole work."""
-        found: list[Any] = [None] * len(items)
-        begin, self.share = self.share, share
-
-        def ended(count: int) -> None:
-            self.on_event(Progress(begin + (share - begin) * count / max(1, len(items)), what))
-
-        ended(0)
-        if self.context is None or len(items) < 2:
-            with one_thread(), one_blas_thread():
-                for k, item in enumerate(items):
-                    self.cancel.check()
-                    found[k] = do(item)
-                    ended(k + 1)
-            return found
-        job, count = partial(_job, do), 0
-        own = work(job, items, self.workers, context=self.context, cancel=self.cancel)
-        with contextlib.closing(own) as news:
-            for one in news:
-                if one.done:
-                    count += 1
-                    found[one.index] = one.value
-                    ended(count)
-        self.cancel.check()
-        return found
-
-
-def _job(do: Callable[[Any], Any], item: Any, _tell: object, _cancel: object) -> Any:
-    with one_thread(), one_blas_thread():
-        return do(item)
 
 
 def _placed(settings: PairSearch, figures: Figures) -> list[Placement]:
