@@ -42,7 +42,7 @@ ROOMS = [
     *("runtime", "symmetry", "fields", "flows", "drawing", "batch"),
     *(f"tiles.{room}" for room in TILES),
     *(f"density.{room}" for room in DENSITY),
-    *("tiles", "density", "loading", "studio", "cli"),
+    *("tiles", "density", "solids", "loading", "studio", "cli"),
 ]
 """Each room may import those before it; a wing's own files come after its rooms."""
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from orbiflow.tiles.solids import read_solid, solid_picture
+from orbiflow.drawing import read_triangles, solid_picture
 
 WIDTH, HEIGHT, COLUMNS = 560, 420, 3
 
@@ -22,7 +22,7 @@ def main() -> None:
     sheet = Image.new("RGB", (WIDTH * COLUMNS, HEIGHT * rows), "white")
     for k, path in enumerate(options.files):
         sheet.paste(
-            solid_picture(read_solid(path), (WIDTH, HEIGHT)),
+            solid_picture(read_triangles(path), (WIDTH, HEIGHT)),
             (k % COLUMNS * WIDTH, k // COLUMNS * HEIGHT),
         )
     sheet.save(options.out, quality=82)

@@ -8,6 +8,8 @@ OPERATIONS = {
     "solid": "orbiflow.tiles.operations:solid",
     "animate": "orbiflow.tiles.operations:animate",
     "classes": "orbiflow.tiles.operations:classes",
+    "fill": "orbiflow.solids.operations:fill",
+    "build": "orbiflow.solids.operations:build",
     "density summary": "orbiflow.density.operations.summary:summary",
     "density fit": "orbiflow.density.operations.fitting:fit",
     "density score": "orbiflow.density.operations.queries:score",
@@ -41,6 +43,7 @@ WORK = {
 RUN_FOLDERS = {
     "result.json": "orbiflow.tiles:written_files",
     "density.safetensors": "orbiflow.density:written_files",
+    "solids.json": "orbiflow.solids:written_files",
 }
 """The file that is read where the folder of a run is given, and the function, "module:function", that
 returns the names of all files of the run in a folder."""

@@ -19,13 +19,15 @@ EXTRAS = {
     "uvicorn": "studio",
     "platformdirs": "studio",
     "gemmi": "crystals",
+    "skimage": "solids",
+    "trimesh": "solids",
     "pyarrow": "parquet",
     "distributed": "dask",
 }
 """The extra that brings each package."""
 
-DENSITY_ROOM, DENSITY_EXTRA = "orbiflow.density", "density"
-"""The room whose extra brings what the extra `flows` has as well."""
+WINGS = {"orbiflow.density": ("flows", "density"), "orbiflow.solids": ("crystals", "solids")}
+"""Rooms whose own extra, the second one, brings what the first one has as well."""
 
 
 class MissingExtraError(OrbiflowError, ImportError):
@@ -62,8 +64,9 @@ def naming_extras(who: str) -> Generator[None]:
             raise
         rooms = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)]
         extra = EXTRAS[package]
-        if extra == "flows" and any(room.startswith(DENSITY_ROOM) for room in rooms):
-            extra = DENSITY_EXTRA
+        for wing, (part, whole) in WINGS.items():
+            if extra == part and any(room.startswith(wing) for room in rooms):
+                extra = whole
         raise MissingExtraError(who, package, extra) from error
 
 

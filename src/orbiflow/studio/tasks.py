@@ -404,9 +404,9 @@ def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
         shutil.copyfile(first, folder / PREVIEW)
         return True
     if call.operation.name == "solid" and first.stat().st_size < MAX_DRAWN_BYTES:
-        from orbiflow.tiles import read_solid, solid_picture
+        from orbiflow.drawing import read_triangles, solid_picture
 
-        solid_picture(read_solid(first)).save(folder / PREVIEW)
+        solid_picture(read_triangles(first)).save(folder / PREVIEW)
         return True
     if call.operation.name != "export":
         return False

@@ -138,10 +138,6 @@ from .silhouette.target import Target as Target
 from .solids.making import Solid as Solid
 from .solids.making import make_solid as make_solid
 from .solids.making import solid_file as solid_file
-from .solids.making import write_3mf as write_3mf
-from .solids.making import write_stl as write_stl
-from .solids.picture import read_solid as read_solid
-from .solids.picture import solid_picture as solid_picture
 from .solids.settings import SolidSettings as SolidSettings
 from .tile import EscherTile as EscherTile
 from .tile import SearchFacts as SearchFacts

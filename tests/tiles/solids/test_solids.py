@@ -14,20 +14,10 @@ from PIL import Image
 
 from artworks import EYE, size_of, squirrel
 from exported import tile_of, tiles
+from orbiflow.drawing import read_triangles, write_3mf, write_stl
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, SettingError
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import (
-    SolidSettings,
-    Tile,
-    as_tile,
-    make_solid,
-    polygons_in,
-    read_solid,
-    solid_file,
-    solid_picture,
-    write_3mf,
-    write_stl,
-)
+from orbiflow.tiles import SolidSettings, Tile, as_tile, make_solid, polygons_in, solid_file
 from orbiflow.tiles.make import ExportSettings, dark_parts, laid_out
 from orbiflow.tiles.page import Curve, Motif, Part, Style, longer_side
 from orbiflow.tiles.solids.making import Level, Plan, shape, stacked
@@ -325,30 +315,12 @@ def test_files_are_read_again_to_be_drawn(kind: Kind, name: str, tmp_path: Path)
     own: dict[str, Any] = {"area": (90, 90)} if kind == "puzzle" else {}
     made = make_solid(tile_of("IH4"), SolidSettings(kind=kind, **own))
     (tmp_path / name).write_bytes(solid_file(made, name[2:]))
-    parts = read_solid(tmp_path / name)
+    parts = read_triangles(tmp_path / name)
     assert len(parts) == len(made.parts)
     for part, body in zip(parts, made.parts.values(), strict=True):
         first, second, third = part.transpose(1, 0, 2)
         volume = np.einsum("ij,ij->i", first, np.cross(second, third)).sum() / 6
         assert volume == pytest.approx(body.volume(), rel=1e-4)
-
-
-def test_the_picture_of_a_solid_shows_what_is_in_front() -> None:
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
-
-    def slab(size: float, low: float, high: float) -> Any:
-        ring = shapely.Polygon(size * corners)
-        mesh = stacked(Level(low, ring), Level(high, ring)).to_mesh64()
-        return np.asarray(mesh.vert_properties)[mesh.tri_verts]
-
-    below, above, hidden = slab(30, 0, 3), slab(12, 3, 6), slab(6, 1, 2)
-    picture = np.asarray(solid_picture([below, above, hidden], (160, 120)), float)
-    low, top = picture[90, 80], picture[50, 80]
-    assert np.ptp(low) > 60  # of the colours of a palette
-    assert np.abs(low / low.sum() - top / top.sum()).max() > 0.1
-    assert picture[2, 2].tolist() == [255] * 3
-    lone = np.asarray(solid_picture([below, above], (160, 120)), float)
-    assert np.array_equal(lone, picture)
 
 
 def test_files_are_the_same_every_time() -> None:

@@ -1,14 +1,12 @@
-"""The solid of a tile: its shape from cross-sections, what the user should know, its file, STL or 3MF.
+"""The solid of a tile: its shape from cross-sections, and what the user should know.
 
 Lengths are in mm; cross-sections have y down as on a page, and z is up.
 """
 
 from __future__ import annotations
 
-import io
 import math
-import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -22,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow import __version__
 from orbiflow.arguments import as_choice
 from orbiflow.arrays import Array
-from orbiflow.drawing import rendered
+from orbiflow.drawing import write_3mf, write_stl
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Outcome
 from orbiflow.tiles.geometry import orient, polygons_in
@@ -32,37 +30,6 @@ from orbiflow.tiles.page import Motif
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.tile import EscherTile, TileSource
-
-STL_TRIANGLE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
-
-
-def write_stl(parts: Mapping[str, Manifold], title: str = "") -> bytes:
-    """Return a binary STL of all parts, with 80 characters of the title in its header."""
-    meshes = [body.to_mesh() for body in parts.values()]
-    corners = np.concatenate([mesh.vert_properties[mesh.tri_verts] for mesh in meshes])
-    # a normal of 0 leaves it to the reader, who has the order of the corners
-    triangles = np.zeros(len(corners), dtype=STL_TRIANGLE)
-    triangles["corners"] = corners
-    header = title.encode("ascii", "replace")[:80].ljust(80)
-    return header + len(corners).to_bytes(4, "little") + triangles.tobytes()
-
-
-def write_3mf(parts: Mapping[str, Manifold], title: str = "") -> bytes:
-    """Return a 3MF file with each part as an object of its own, in millimetres."""
-    meshes = {name: body.to_mesh64() for name, body in parts.items()}
-    files = {
-        "[Content_Types].xml": "content_types.xml",
-        "_rels/.rels": "relationships.xml",
-        "3D/3dmodel.model": "model.xml",
-    }
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, template in files.items():
-            text = rendered("orbiflow.tiles.solids", template, meshes=meshes, title=title)
-            entry = zipfile.ZipInfo(name)  # without a date
-            archive.writestr(entry, text, zipfile.ZIP_DEFLATED)
-    return buffer.getvalue()
-
 
 WRITERS = {"stl": write_stl, "3mf": write_3mf}
 DARK = 0.9  # share of the tile beyond which a drawing that is raised shows nothing

@@ -1,0 +1,104 @@
+"""Files of solids to print: STL and 3MF, in mm, the same bytes every time."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from manifold3d import Manifold
+
+from orbiflow.arrays import Array
+from orbiflow.drawing.web_page import rendered
+from orbiflow.errors import OrbiflowError
+
+STL_TRIANGLE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
+"""A triangle in a binary STL file."""
+
+CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+
+
+def write_stl(parts: Mapping[str, Manifold], title: str = "") -> bytes:
+    """Return a binary STL of all parts, with 80 characters of the title in its header."""
+    meshes = [body.to_mesh() for body in parts.values()]
+    corners: Array = np.concatenate([_corners(mesh) for mesh in meshes])
+    # a normal of 0 leaves it to the reader, who has the order of the corners
+    triangles = np.zeros(len(corners), dtype=STL_TRIANGLE)
+    triangles["corners"] = corners
+    header = title.encode("ascii", "replace")[:80].ljust(80)
+    return header + len(corners).to_bytes(4, "little") + triangles.tobytes()
+
+
+def _corners(mesh: Any) -> Array:
+    return mesh.vert_properties[mesh.tri_verts]
+
+
+def write_3mf(
+    parts: Mapping[str, Manifold],
+    title: str = "",
+    *,
+    colours: Mapping[str, str] | None = None,
+    places: Mapping[str, Sequence[Array]] | None = None,
+) -> bytes:
+    """Return a 3MF file with each part as an object of its own, in millimetres.
+
+    Args:
+        parts: Closed bodies by name.
+        title: What the file says about itself.
+        colours: The colour of each part that has one, as #rrggbb.
+        places: Of a part that is there several times, the matrices (3, 4) of its copies: linear part
+            and shift, as `Manifold.transform` takes them. A part that is not named is there once.
+
+    Raises `OrbiflowError` for a place that is a reflection, which printers' programs read differently:
+    mirror the part.
+    """
+    meshes = {name: body.to_mesh64() for name, body in parts.items()}
+    texts = {name: list(map(_transform, own)) for name, own in (places or {}).items()}
+    values = {"meshes": meshes, "title": title, "colours": colours or {}, "places": texts}
+    files = {
+        "[Content_Types].xml": "solid_content_types.xml",
+        "_rels/.rels": "solid_relationships.xml",
+        "3D/3dmodel.model": "solid_model.xml",
+    }
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, template in files.items():
+            entry = zipfile.ZipInfo(name)  # without a date
+            text = rendered("orbiflow.drawing", template, **values)
+            archive.writestr(entry, text, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()
+
+
+def _transform(place: Array) -> str:
+    """Return a place (3, 4) as the twelve numbers of a 3MF file, for points as rows."""
+    matrix = np.asarray(place, float)
+    if matrix.shape != (3, 4) or not np.linalg.det(matrix[:, :3]) > 0:
+        raise OrbiflowError("a place is a matrix (3, 4) that does not reflect")
+    return " ".join(f"{number:.9g}" for number in (matrix.T + 0.0).ravel())
+
+
+def read_triangles(path: Path) -> list[Array]:
+    """Return the triangles (n, 3, 3) of each part in a file that this package has written."""
+    if path.suffix == ".stl":
+        return [np.frombuffer(path.read_bytes()[84:], STL_TRIANGLE)["corners"].astype(float)]
+    with zipfile.ZipFile(path) as archive:
+        model = ElementTree.fromstring(archive.read("3D/3dmodel.model"))
+    found = dict[str, Array]()
+    for own in model.iter(f"{CORE}object"):
+        points, corners = (
+            [list(row.attrib.values()) for row in own.iter(CORE + tag)]
+            for tag in ("vertex", "triangle")
+        )
+        found[own.get("id", "")] = np.array(points, float)[np.array([c[:3] for c in corners], int)]
+    placed = list[Array]()
+    for item in model.iter(f"{CORE}item"):
+        corners = found[item.get("objectid", "")]
+        if text := item.get("transform"):
+            rows = np.array(text.split(), float).reshape(4, 3)
+            corners = corners @ rows[:3] + rows[3]
+        placed.append(corners)
+    return placed

@@ -1,0 +1,16 @@
+from .certificate import SolidCertificate as SolidCertificate
+from .certificate import certify_solid as certify_solid
+from .families import GroupFamily as GroupFamily
+from .likeness import SolidLikeness as SolidLikeness
+from .mesh import Mesh as Mesh
+from .reading import ReadMesh as ReadMesh
+from .reading import read_mesh as read_mesh
+from .run_folder import as_solid as as_solid
+from .run_folder import read_run as read_run
+from .run_folder import write_run as write_run
+from .run_folder import written_files as written_files
+from .search import fill as fill
+from .settings import BuildSettings as BuildSettings
+from .settings import FillSettings as FillSettings
+from .solid import EscherSolid as EscherSolid
+from .solid import read_solid as read_solid

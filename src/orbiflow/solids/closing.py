@@ -1,0 +1,257 @@
+"""The exact tile of a function: one cell of each orbit, where the function is largest, as a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import ArrayLike
+
+from orbiflow.arrays import Array, Integers
+from orbiflow.errors import OrbiflowError
+from orbiflow.solids.complexes import Complex
+from orbiflow.solids.growth import BallOfCells, CellBox
+
+Function = Callable[[Array], Array]
+"""Takes points (n, 3) to values (n,); the larger, the more a point is inside."""
+
+SURFACE_WEIGHT = 0.5
+"""What a face of the boundary costs, in spacings of cells per unit of the function's slope."""
+
+POLISHING_PASSES, FREEING_PASSES, WIDENINGS, CARVINGS = 6, 2, 1, 24
+POINTS_AT_ONCE = 400_000
+
+
+@dataclass(frozen=True, eq=False)
+class CellTile:
+    """A set of cells, at most one of each orbit of a complex, that is a ball.
+
+    - `complex`: The complex.
+    - `cells`: The cells (n, 4), in the order of their orbits.
+    - `missing`: How many orbits have no cell: if any, the copies leave these cells uncovered.
+    - `moved`: How many cells are not where the function is largest on their orbit.
+    - `loss`: By how much the function is less than its largest on the orbits, on average, in spacings
+      of cells.
+    - `raw_pieces`: The pieces of the set of largest values, which the ball replaces.
+    - `raw_strays`: How many cells of that set are not of its largest piece.
+    """
+
+    complex: Complex
+    cells: Integers
+    missing: int
+    moved: int
+    loss: float
+    raw_pieces: int
+    raw_strays: int
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether it is a fundamental domain, and so one piece without handles or cavities."""
+        return self.missing == 0
+
+
+def close_tile(
+    function: Function, lower: ArrayLike, upper: ArrayLike, complex: Complex
+) -> CellTile:
+    """Return the ball of cells, one of each orbit, on which a function is almost largest.
+
+    The cells where the function is largest on their orbits are its exact tile (design point 19). A
+    ball grows in it from the cell whose loss would be most, always by the cell whose loss would be
+    most and that keeps it a ball. So cuts come where little is lost. The other orbits' best cells that
+    keep it a ball follow. Then cells move within their orbits where that makes the values larger or
+    the boundary smaller.
+
+    Args:
+        function: What is wanted inside: minus the signed distance of a body in its place, say, perhaps
+            times a weight of its own at each point.
+        lower, upper: Corners (3,) of a box that contains all places where the function may be large
+            enough. Orbits that are not in the box widen it.
+        complex: The cells.
+    """
+    low, high = np.asarray(lower, float), np.asarray(upper, float)
+    found = _closed_in(function, low, high, complex)
+    for _ in range(WIDENINGS):
+        if found.is_ball:
+            break
+        reach = (high - low) / 4  # orbits may touch the ball only outside of the box
+        low, high = low - reach, high + reach
+        found = min(found, _closed_in(function, low, high, complex), key=lambda own: own.missing)
+    return found
+
+
+def _closed_in(function: Function, lower: Array, upper: Array, complex: Complex) -> CellTile:
+    """Return a ball of cells in a box, as `close_tile` does."""
+    box, values = _evaluated(function, lower, upper, complex)
+    orbits = np.where(np.isfinite(values), complex.orbit_of(box.cells(np.arange(len(values)))), -1)
+    best, margins = _largest(values, orbits, complex.cells_per_tile)
+    piece = _pieces(box, best)
+    main = piece == np.bincount(piece).argmax()
+    ball = BallOfCells(box, orbits, complex.cells_per_tile)
+    ball.attach(int(best[np.where(main, margins, -np.inf).argmax()]))
+    ball.grow(best[np.argsort(-margins, kind="stable")])
+    _grow_the_rest(ball, values, values[best])
+    slope = _slope(values, orbits, box)
+    size = SURFACE_WEIGHT * complex.spacing * slope
+    for _ in range(FREEING_PASSES):
+        if ball.is_complete:
+            break
+        _polish(ball, values, size)
+        _free_orbits(ball, values, values[best])
+        _grow_the_rest(ball, values, values[best])
+    for _ in range(POLISHING_PASSES):
+        if not _polish(ball, values, size):
+            break
+    members = ball.members()
+    own = ball.orbit_of[members]
+    lost = values[best[own]] - values[members]
+    return CellTile(
+        complex,
+        box.cells(members),
+        missing=complex.cells_per_tile - len(members),
+        moved=int(np.sum(best[own] != members)),
+        loss=float(lost.mean()) / (slope * complex.spacing),
+        raw_pieces=int(piece.max()) + 1,
+        raw_strays=int(np.sum(~main)),
+    )
+
+
+def _evaluated(
+    function: Function, lower: Array, upper: Array, complex: Complex
+) -> tuple[CellBox, Array]:
+    """Return a box of cells in which all orbits are, and the function's values at their centres.
+
+    Cells that must not be used have the value -inf.
+    """
+    low, high = lower, upper
+    for _ in range(8):
+        corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), -1)
+        blocks = np.linalg.solve(complex.steps, corners.reshape(-1, 3).T).T
+        start = np.floor(blocks.min(axis=0)).astype(np.int64) - 2
+        box = CellBox(complex, start, np.ceil(blocks.max(axis=0)).astype(np.int64) + 2 - start)
+        numbers = np.flatnonzero(box.is_inner())
+        centers = complex.centers(box.cells(numbers))
+        inside = np.all((centers >= low) & (centers <= high), axis=1)
+        numbers, centers = numbers[inside], centers[inside]
+        present = np.zeros(complex.cells_per_tile, bool)
+        present[complex.orbit_of(box.cells(numbers))] = True
+        if present.all():
+            parts = np.array_split(centers, len(centers) // POINTS_AT_ONCE + 1)
+            values = np.full(box.number_of_cells, -np.inf)
+            values[numbers] = np.concatenate([function(part) for part in parts])
+            if np.isnan(values).any():
+                raise OrbiflowError("the function of the tile is not a number at some points")
+            return box, values
+        reach = 0.15 * (high - low).max() + 2 * complex.spacing
+        low, high = low - reach, high + reach
+    raise OrbiflowError("the box is too small for a tile: choose its corners around the body")
+
+
+def _largest(values: Array, orbits: Integers, number: int) -> tuple[Integers, Array]:
+    """Return for each orbit the cell of largest value, and by how much it exceeds the second."""
+    usable = np.flatnonzero(orbits >= 0)
+    ordered = usable[np.argsort(values[usable], kind="stable")]
+    best = np.empty(number, np.int64)
+    best[orbits[ordered]] = ordered  # of several assignments the last holds
+    second = np.full(number, -np.inf)
+    rest = ordered[best[orbits[ordered]] != ordered]
+    second[orbits[rest]] = values[rest]
+    return best, values[best] - np.maximum(second, values.min(where=np.isfinite(values), initial=0))
+
+
+def _pieces(box: CellBox, numbers: Integers) -> Integers:
+    """Return for each of some cells the number of its connected piece."""
+    place = np.full(box.number_of_cells, -1)
+    place[numbers] = np.arange(len(numbers))
+    behind = box.neighbors(numbers)
+    other = np.where(behind >= 0, place[behind], -1)
+    rows, columns = np.nonzero(other >= 0)
+    size = len(numbers)
+    links = (np.ones(len(rows)), (rows, other[rows, columns]))
+    graph = scipy.sparse.coo_matrix(links, (size, size))
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _slope(values: Array, orbits: Integers, box: CellBox) -> float:
+    """Return the function's usual change over a spacing, divided by it."""
+    inner = np.flatnonzero(orbits >= 0)[:: max(1, len(orbits) // 20_000)]
+    behind = box.neighbors(inner)[:, 0]
+    changes = np.abs(values[behind] - values[inner])
+    changes = changes[np.isfinite(changes)]
+    return float(np.mean(changes)) / box.complex.spacing + 1e-300
+
+
+def _grow_the_rest(
+    ball: BallOfCells, values: Array, largest: Array, noise: Callable[[int], Array] | None = None
+) -> None:
+    """Attach cells of the orbits that are not in the ball, those that lose least first.
+
+    `noise` returns so many numbers, which change the order.
+    """
+    open_orbits = np.array(ball.holder) < 0
+    if open_orbits.any():
+        orbits = ball.orbit_of
+        cells = np.flatnonzero((orbits >= 0) & open_orbits[orbits])
+        lost = largest[orbits[cells]] - values[cells]
+        if noise is not None:
+            lost = lost + noise(len(cells))
+        ball.grow(cells[np.argsort(lost, kind="stable")])
+
+
+def _free_orbits(ball: BallOfCells, values: Array, largest: Array) -> None:
+    """Carve the ball around cells that cannot be attached and grow it again, if that lets them in."""
+    rng = np.random.default_rng(0)
+    orbits, spacing = ball.orbit_of, ball.box.complex.spacing
+    for trial in range(CARVINGS):
+        missing = np.flatnonzero(np.array(ball.holder) < 0)
+        if not len(missing):
+            return
+        members = ball.members()
+        touching = np.unique(ball.box.neighbors(members))
+        touching = touching[(touching >= 0) & np.isin(orbits[touching], missing)]
+        if not len(touching):
+            return
+        cell = int(rng.choice(touching))
+        offsets = ball.box.centers(members) - ball.box.centers(np.array([cell]))
+        near = np.linalg.norm(offsets, axis=1) < spacing * rng.uniform(1.5, 9.0)
+        before = ball.holder.copy()
+        ball.detach_all(rng.permutation(members[near]).tolist())
+        if ball.can_attach(cell):
+            ball.attach(cell)
+        spread = spacing * rng.exponential() * np.abs(largest).mean()
+        _grow_the_rest(ball, values, largest, partial(rng.normal, 0.0, spread))
+        if ball.holder.count(-1) > len(missing) - (trial % 2 == 0):
+            ball.restore(before)
+
+
+def _polish(ball: BallOfCells, values: Array, size: float) -> int:
+    """Move cells within their orbits for larger values or less boundary; return how many moved."""
+    members = ball.members()
+    behind = ball.box.neighbors(members).ravel()
+    targets = np.unique(behind[behind >= 0])
+    orbits = ball.orbit_of
+    inside = np.frombuffer(ball.inside, np.uint8)
+    targets = targets[(orbits[targets] >= 0) & (inside[targets] == 0)]
+    sources = np.array(ball.holder)[orbits[targets]]
+    targets, sources = targets[sources >= 0], sources[sources >= 0]
+    gains = values[targets] - values[sources]
+    gains += size * (ball.shared_areas(targets) - ball.shared_areas(sources))
+    moved = 0
+    for k in np.argsort(-gains, kind="stable")[: int(np.sum(gains > 0))].tolist():
+        source, target = int(sources[k]), int(targets[k])
+        if not ball.inside[source]:
+            continue
+        before = values[source] + size * _shared_area(ball, source)
+        if not ball.move(source, target):
+            continue
+        if values[target] + size * _shared_area(ball, target) > before + 1e-9 * size:
+            moved += 1
+        else:
+            ball.move(target, source)
+    return moved
+
+
+def _shared_area(ball: BallOfCells, cell: int) -> float:
+    return float(ball.shared_areas(np.array([cell]))[0])

@@ -1,0 +1,149 @@
+"""How far points are from a closed surface, inside or outside, and which points are inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from orbiflow.arrays import Array, Integers
+from orbiflow.solids.mesh import Mesh
+
+NEIGHBOURS = 8  # points of the surface that a distance is taken from
+AT_ONCE = 200_000  # points that are asked for, so that memory stays small
+EVEN = 1.3  # distance of points on a surface over the mean, to be even
+
+
+@dataclass(frozen=True, eq=False)
+class SignedDistance:
+    """The signed distance to a surface, given by points on it and their outer normals; negative inside.
+
+    Near the surface it is the mean of the distances to the tangent planes of the nearest points
+    (implicit moving least squares: Kolluri, 2008), so that it is smooth; far away it is the distance to
+    the nearest point with that mean's sign. A weight at each point multiplies it: that of the nearest
+    points.
+
+    - `points`, `normals`: (N, 3).
+    - `spacing`: The mean distance of neighbouring points.
+    - `weights`: (N,), or None for 1.
+
+    >>> normals = np.random.default_rng(0).normal(size=(4000, 3))
+    >>> normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    >>> sphere = SignedDistance(2 * normals, normals, 0.12)
+    >>> sphere(np.array([[0.0, 0.0, 1.9], [0.0, 3.0, 0.0]])).round(2).tolist()
+    [-0.1, 1.0]
+    """
+
+    points: Array
+    normals: Array
+    spacing: float
+    weights: Array | None = None
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Finds the surface's points."""
+        return cKDTree(self.points)
+
+    @classmethod
+    def of_mesh(cls, mesh: Mesh, spacing: float) -> SignedDistance:
+        """Return the distance to a mesh, from points that lie on it about so far from each other."""
+        points, normals = surface_points(mesh, spacing)
+        return cls(points, normals, spacing)
+
+    def __call__(self, points: Array) -> Array:
+        """Return the distances (n,) of points (n, 3)."""
+        return self.with_nearest(points)[0]
+
+    def with_nearest(self, points: Array) -> tuple[Array, Integers]:
+        """Return the distances (n,) of points (n, 3), and the nearest of the surface's points (n,)."""
+        found, near = np.empty(len(points)), np.empty(len(points), dtype=np.intp)
+        for start in range(0, len(points), AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            found[part], near[part] = self._of(points[part])
+        return found, near
+
+    def _of(self, points: Array) -> tuple[Array, Integers]:
+        away: Array
+        near: Integers
+        away, near = cast(Any, self.tree.query(points, NEIGHBOURS))
+        least = away[:, :1]
+        share = np.exp(-(away**2 - least**2) / (self.spacing**2 + (0.5 * least) ** 2))
+        share /= share.sum(axis=1, keepdims=True)
+        planes = np.einsum("nkj,nkj->nk", points[:, None] - self.points[near], self.normals[near])
+        flat = (share * planes).sum(axis=1)
+        far = np.clip(least[:, 0] / (2 * self.spacing) - 1, 0, 1)
+        found = (1 - far) * flat + far * np.where(flat < 0, -least[:, 0], least[:, 0])
+        if self.weights is not None:
+            found *= (share * self.weights[near]).sum(axis=1)
+        return found, near[:, 0]
+
+
+def surface_points(mesh: Mesh, spacing: float) -> tuple[Array, Array]:
+    """Return points (n, 3) on a mesh, about `spacing` from each other, and outer normals (n, 3).
+
+    Vertices are among them; larger triangles are divided evenly.
+    """
+    corners, normals = mesh.corners, mesh.normals[mesh.faces]
+    flat = mesh.face_vectors / np.maximum(
+        np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True), 1e-300
+    )
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+    counts = np.minimum(np.ceil(sides / (EVEN * spacing)).astype(int), 64)
+    points, directions = [mesh.points], [mesh.normals]
+    for count in np.unique(counts[counts > 1]):
+        own = counts == count
+        i, j = (k.ravel() for k in np.meshgrid(np.arange(count + 1), np.arange(count + 1)))
+        shares = np.stack([i, j, count - i - j], axis=1)[i + j <= count] / count
+        shares = shares[shares.max(axis=1) < 1]
+        points.append(np.einsum("sk,fkj->fsj", shares, corners[own]).reshape(-1, 3))
+        # half of the face's own normal, or creases would be rounded off over large faces
+        found = 0.5 * np.einsum("sk,fkj->fsj", shares, normals[own]) + 0.5 * flat[own][:, None]
+        directions.append(found.reshape(-1, 3))
+    spots, ways = np.concatenate(points), np.concatenate(directions)
+    _, first = np.unique(
+        np.round(spots / (0.3 * spacing)).astype(np.int64), axis=0, return_index=True
+    )
+    ways = ways[first]
+    return spots[first], ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
+
+
+def points_inside(mesh: Mesh, spacing: float) -> Array:
+    """Return the points (n, 3) of a cubic grid, one for all meshes, that are inside a closed mesh."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    # a little off, so that no column of the grid runs along an edge
+    off = np.array([1.3e-5, 2.7e-5, 0.0])
+    low = spacing * (np.floor(low / spacing) + off)
+    counts = np.maximum(np.ceil((high - low) / spacing).astype(int), 1)
+    wound = np.zeros(counts, dtype=np.int32)
+    column, height, sign = _crossings(mesh, low, spacing, counts)
+    level = np.clip(np.ceil(height).astype(int), 0, counts[2])
+    kept = level < counts[2]
+    np.add.at(wound, (*column[kept].T, level[kept]), sign[kept])
+    return low + spacing * np.argwhere(np.cumsum(wound, axis=2) > 0)
+
+
+def _crossings(
+    mesh: Mesh, low: Array, spacing: float, counts: Integers
+) -> tuple[Integers, Array, Integers]:
+    """Return where a grid's columns cross faces: (n, 2), at which step, and +1 where they enter."""
+    corners = (mesh.corners - low) / spacing
+    flat = corners[..., :2]
+    first = np.maximum(np.ceil(flat.min(axis=1)).astype(int), 0)
+    last = np.minimum(np.floor(flat.max(axis=1)).astype(int), counts[:2] - 1)
+    sizes = np.maximum(last - first + 1, 0)
+    number = sizes.prod(axis=1)
+    face = np.repeat(np.arange(len(corners)), number)
+    k = np.arange(len(face)) - np.repeat(np.cumsum(number) - number, number)
+    column = first[face] + np.stack([k // sizes[face, 1], k % sizes[face, 1]], axis=1)
+    a, b, c = np.moveaxis(corners[face], 1, 0)
+    one, two, at = b - a, c - a, column - a[:, :2]
+    twice = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    twice = np.where(twice == 0, 1e-300, twice)
+    u = (at[:, 0] * two[:, 1] - at[:, 1] * two[:, 0]) / twice
+    v = (one[:, 0] * at[:, 1] - one[:, 1] * at[:, 0]) / twice
+    met = (u >= 0) & (v >= 0) & (u + v <= 1)
+    height = a[:, 2] + u * one[:, 2] + v * two[:, 2]
+    return column[met], height[met], -np.sign(twice[met]).astype(int)

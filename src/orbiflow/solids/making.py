@@ -1,0 +1,335 @@
+"""Things to hold in the hand, made of a tile that fills space.
+
+Lengths are in mm; z is up, and the corner of the bed is at 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from manifold3d import Manifold
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import write_3mf, write_stl
+from orbiflow.errors import OrbiflowError
+from orbiflow.solids.assembly import Assembly, Leaving, Pieces
+from orbiflow.solids.bodies import moved_body, united
+from orbiflow.solids.mesh import Mesh
+from orbiflow.solids.offsets import offset_body
+from orbiflow.solids.pictures import figure_axes
+from orbiflow.solids.print_advice import lying, print_advice
+from orbiflow.solids.settings import BuildSettings
+from orbiflow.solids.solid import EscherSolid
+from orbiflow.solids.stacks import STACK_PALETTE, SpaceTile, StackedCopy, colour_number, stack_of
+from orbiflow.solids.sweeping import lifted
+
+CLEARANCE, WALL, FLOOR = 0.25, 3.0, 2.0
+"""Gap between printed copies, and thickness of the walls and the floor of blocks and boxes, in mm."""
+
+APART = 4.0
+"""Distance in mm of parts on the bed."""
+
+SOCKET = 0.5
+"""How high a starting block reaches, as a share of the tile's height."""
+
+BOX_HEIGHT = 0.7
+"""Height of a puzzle's box, as a share of the pieces' height."""
+
+GRAIN = 0.01
+"""How far in mm a surface may move where bodies are cut out of blocks; no printer shows it."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """Parts to print, in mm.
+
+    - `parts`: Closed bodies by name.
+    - `colours`: The colour of each part that has one, #rrggbb.
+    - `places`: Of parts that are there several times, the matrices (3, 4) of their copies.
+    - `notes`: What to know, a sentence each.
+    """
+
+    parts: dict[str, Manifold]
+    colours: dict[str, str] = field(default_factory=dict)
+    places: dict[str, list[Array]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def bodies(self) -> dict[str, Manifold]:
+        """Return each copy as a body of its own, in its place."""
+        found = dict[str, Manifold]()
+        for name, body in self.parts.items():
+            for k, place in enumerate(self.places.get(name, [np.eye(3, 4)]), 1):
+                own = f"{name}, {k}" if name in self.places else name
+                found[own] = body.transform(place)
+        return found
+
+    def file(self, format: str, title: str = "") -> bytes:
+        """Return the content of a file, "3mf" with colours or "stl" without."""
+        if format == "3mf":
+            return write_3mf(self.parts, title, colours=self.colours, places=self.places)
+        return write_stl(self.bodies(), title)
+
+
+def make(own: EscherSolid, settings: BuildSettings) -> Made:
+    """Return what settings ask for."""
+    gap, wall, floor = settings.clearance, settings.wall, settings.floor
+    match settings.kind:
+        case "tile":
+            return make_tile(own, clearance=gap, nozzle=settings.nozzle)
+        case "stack":
+            return make_stack(own, copies=settings.copies, clearance=gap, upright=own.upright)
+        case "block":
+            return make_block(own, clearance=gap, wall=wall, floor=floor)
+        case "puzzle":
+            return make_puzzle(
+                own,
+                copies=settings.copies,
+                clearance=gap,
+                wall=wall,
+                floor=floor,
+                assembled=settings.assembled,
+            )
+
+
+def make_tile(own: SpaceTile, *, clearance: float = CLEARANCE, nozzle: float = 0.4) -> Made:
+    """Return one tile, smaller all around by half of the clearance, as it is best printed.
+
+    Args:
+        own: A tile that fills space.
+        clearance: The gap in mm between copies.
+        nozzle: The width of the printer's line in mm, for the notes.
+
+    Raises `OrbiflowError` if nothing is left of it.
+    """
+    mesh = _in_mm(own.tile, own)
+    body = offset_body(mesh, -clearance / 2)
+    body = _on_bed(moved_body(body, lying(mesh)))
+    advice = print_advice(body, nozzle=nozzle, name="The tile")
+    return Made({"tile": body}, {"tile": STACK_PALETTE.fill(0)}, notes=advice.sentences)
+
+
+def make_stack(
+    own: SpaceTile, *, copies: int = 8, clearance: float = CLEARANCE, upright: Array | None = None
+) -> Made:
+    """Return a stack of copies as they fill space, a part for each colour, standing like the figure.
+
+    Args:
+        own: A tile that fills space.
+        copies: How many copies.
+        clearance: The gap in mm between them.
+        upright: As for `solid_sheet`.
+    """
+    axes = figure_axes(own.target) if upright is None else np.asarray(upright, float)
+    stack = stack_of(own.group, own.tile, copies)
+    body = offset_body(_in_mm(own.tile, own), -clearance / 2)
+    placed = _placed(body, stack, own, axes.T)
+    corner = _corner(placed)
+    firsts, places, colours = dict[str, int](), dict[str, list[Array]](), dict[str, str]()
+    for k, copy in enumerate(stack):
+        number = colour_number(own.group, copy)
+        # a reflection cannot be a place in a file
+        name = f"position {number + 1}{', mirrored' * copy.is_mirrored}"
+        first = stack[firsts.setdefault(name, k)]
+        turn = axes.T @ copy.linear @ first.linear.T @ axes
+        here, there = (own.millimetres * axes.T @ c.shift - corner for c in (copy, first))
+        places.setdefault(name, []).append(np.column_stack([turn, here - turn @ there]))
+        colours[name] = STACK_PALETTE.fill(number)
+    parts = {name: placed[k].translate((-corner).tolist()) for name, k in firsts.items()}
+    return Made(parts, colours, places, [f"{copies} copies with a gap of {clearance:g} mm."])
+
+
+def make_block(
+    own: SpaceTile,
+    *,
+    clearance: float = CLEARANCE,
+    wall: float = WALL,
+    floor: float = FLOOR,
+    leaving: Leaving | None = None,
+) -> Made:
+    """Return a block to start a stack on: its bottom is flat, and a copy fits into its top.
+
+    The block is what copies below fill, cut off by a box. The copy is let in from above, in the
+    direction in which copies are best drawn out of a stack; where something would be in its way, the
+    block is opened.
+
+    Args:
+        own: A tile that fills space.
+        clearance: The gap in mm between block and copy.
+        wall: How much wider than the copy the block is, on each side, in mm.
+        floor: How thick it is below the copy, in mm.
+        leaving: How copies leave a stack. Default: it is found.
+    """
+    pieces = Pieces(own.group, own.tile, clearance / own.millimetres)
+    leaving = leaving or pieces.leaving_stack()
+    turn = _upwards(leaving.direction)
+    mesh = _in_mm(own.tile, own).moved(turn)
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    top = low[2] + SOCKET * (high[2] - low[2])
+    # as deep as what is cut out of it, and the floor
+    deep = _box([*(low[:2] - wall), 2 * low[2] - high[2]], [*(high[:2] + wall), top])
+    larger = _coarser(offset_body(_in_mm(own.tile, own), clearance / 2))
+    cut = united(_copies_above(own, larger, turn, deep)) ^ deep
+    bottom = cut.bounding_box()[2] - floor
+    block = _box([*(low[:2] - wall), bottom], [*(high[:2] + wall), top])
+    notes = list[str]()
+    if not leaving.is_free:
+        cut = cut + lifted(moved_body(larger, turn), top + 1.0)
+        notes.append(
+            f"Where a copy is lifted out, {100 * leaving.blocked:.2g} % of it meet what is around: "
+            "the block was opened for it."
+        )
+    found = (block - cut).decompose()
+    base = max(found, key=lambda body: body.volume())
+    tile = moved_body(offset_body(_in_mm(own.tile, own), -clearance / 2), turn)
+    parts = _all_on_bed({"starting block": base, "tile": tile})
+    notes += print_advice(parts["starting block"], name="The starting block").sentences
+    return Made(parts, {"starting block": "#d9d3c7", "tile": STACK_PALETTE.fill(0)}, notes=notes)
+
+
+def _copies_above(own: SpaceTile, body: Manifold, turn: Array, block: Manifold) -> list[Manifold]:
+    """Return the copies of a body, itself too, that meet a block and are not below the tile."""
+    center, up = own.tile.centroid, turn[2]
+    box = np.reshape(block.bounding_box(), (2, 3)) / own.millimetres
+    radius = float(np.linalg.norm(own.tile.points - center, axis=1).max())
+    reach = radius + float(np.linalg.norm(box - turn @ center, axis=1).max())
+    placed = [
+        moved_body(body, turn @ g.linear, own.millimetres * turn @ g.translation)
+        for g in own.group.elements_near(center, reach, source=center)
+        if (g.linear @ center + g.translation - center) @ up > -1e-6 * radius
+    ]
+    return [copy for copy in placed if _meet(copy, block)]
+
+
+def make_puzzle(
+    own: SpaceTile,
+    *,
+    copies: int = 8,
+    clearance: float = CLEARANCE,
+    wall: float = WALL,
+    floor: float = FLOOR,
+    assembled: bool = False,
+) -> Made:
+    """Return copies to put together, and an open box in which they sit when they are.
+
+    The box's inside is cut by the pieces themselves, and open upwards: in the direction in which
+    copies are best drawn out of a stack.
+
+    Args:
+        own: A tile that fills space.
+        copies: How many pieces.
+        clearance: The gap in mm between pieces, and between them and the box.
+        wall, floor: The thickness in mm of the box.
+        assembled: Leave the pieces in the box; else they lie beside it, each as it is best printed.
+    """
+    pieces = Pieces(own.group, own.tile, clearance / own.millimetres)
+    stack = stack_of(own.group, own.tile, copies)
+    assembly = pieces.assembly(stack)
+    direction, notes = _box_direction(pieces, stack, assembly)
+    turn = _upwards(direction)
+    mesh = _in_mm(own.tile, own)
+    smaller = offset_body(mesh, -clearance / 2)
+    room = united(_placed(_coarser(offset_body(mesh, clearance / 2)), stack, own, turn))
+    corners = np.array(room.bounding_box()).reshape(2, 3)
+    height = BOX_HEIGHT * (corners[1, 2] - corners[0, 2])
+    outer = [corners[0] - (wall, wall, floor), [*(corners[1, :2] + wall), corners[0, 2] + height]]
+    box = _box(*outer) - _coarser(lifted(room, corners[1, 2] + 1.0))
+    box = max(box.decompose(), key=lambda body: body.volume())
+    placed = _placed(smaller, stack, own, turn)
+    names = [f"piece {k}" for k in range(1, copies + 1)]
+    parts = {"box": box, **dict(zip(names, placed, strict=True))}
+    if not assembled:
+        parts = {"box": box, **_beside(box, smaller, stack, lying(mesh), names)}
+    colours = {"box": "#d9d3c7"}
+    for name, copy in zip(names, stack, strict=True):
+        colours[name] = STACK_PALETTE.fill(colour_number(own.group, copy))
+    parts = _all_on_bed(parts)
+    notes = [assembly.words, *notes, *print_advice(parts["box"], name="The box").sentences]
+    return Made(parts, colours, notes=notes)
+
+
+def _box_direction(
+    pieces: Pieces, stack: Sequence[StackedCopy], assembly: Assembly
+) -> tuple[Array, list[str]]:
+    """Return where up is for a box, in which all pieces are put in from above if they can be."""
+    leaving = pieces.leaving_stack().direction
+    out = -np.sum([step.direction for step in assembly.steps[1:]], axis=0)
+    tried = [leaving] if np.linalg.norm(out) < 0.5 else [out / np.linalg.norm(out), leaving]
+    tried += [-step.direction for step in assembly.steps[1:3]]
+    for direction in [] if assembly.is_interlocked else tried:
+        if pieces.order_along(stack, direction) is not None:
+            return direction, ["In the box they are put in one by one, straight from above."]
+    return leaving, ["In the box not all of them go in straight from above."]
+
+
+def _in_mm(mesh: Mesh, own: SpaceTile) -> Mesh:
+    return Mesh(own.millimetres * mesh.points, mesh.faces)
+
+
+def _placed(
+    body: Manifold, stack: Sequence[StackedCopy], own: SpaceTile, turn: Array
+) -> list[Manifold]:
+    """Return the copies of a body in mm, turned."""
+    return [
+        moved_body(body, turn @ copy.linear, own.millimetres * turn @ copy.shift) for copy in stack
+    ]
+
+
+def _upwards(direction: Array) -> Array:
+    """Return the rotation (3, 3) that takes a direction up."""
+    up = direction / np.linalg.norm(direction)
+    aside = np.cross(up, np.eye(3)[np.abs(up).argmin()])
+    aside /= np.linalg.norm(aside)
+    return np.stack([aside, np.cross(up, aside), up])
+
+
+def _coarser(body: Manifold) -> Manifold:
+    """Return a body with fewer triangles whose surface has hardly moved."""
+    found = body.simplify(GRAIN)
+    return body if found.is_empty() else found
+
+
+def _box(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Manifold:
+    low, sides = np.asarray(low, float), np.asarray(high, float) - np.asarray(low, float)
+    if sides.min() <= 0:
+        raise OrbiflowError("the block has no height; choose a larger size")
+    return Manifold.cube(sides.tolist()).translate(low.tolist())
+
+
+def _meet(one: Manifold, other: Manifold) -> bool:
+    (low, high), (its_low, its_high) = (
+        np.array(body.bounding_box()).reshape(2, 3) for body in (one, other)
+    )
+    return bool((low < its_high).all() and (its_low < high).all())
+
+
+def _corner(bodies: Sequence[Manifold]) -> Array:
+    """Return the least corner (3,) of the box around bodies."""
+    return np.array([body.bounding_box()[:3] for body in bodies]).min(axis=0)
+
+
+def _on_bed(body: Manifold) -> Manifold:
+    return body.translate((-_corner([body])).tolist())
+
+
+def _all_on_bed(parts: dict[str, Manifold]) -> dict[str, Manifold]:
+    shift = (-_corner(list(parts.values()))).tolist()
+    return {name: body.translate(shift) for name, body in parts.items()}
+
+
+def _beside(
+    box: Manifold, tile: Manifold, stack: Sequence[StackedCopy], turn: Array, names: Sequence[str]
+) -> dict[str, Manifold]:
+    """Return pieces in rows beside a box, standing on its level; mirrored ones are mirror images."""
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    kinds = [_on_bed(moved_body(tile, m @ turn)) for m in (np.eye(3), mirror)]
+    step = np.array(kinds[0].bounding_box()[3:5]) + APART
+    _, y, z, right, *_ = box.bounding_box()
+    columns = int(np.ceil(np.sqrt(len(names))))
+    found = dict[str, Manifold]()
+    for k, (name, copy) in enumerate(zip(names, stack, strict=True)):
+        row, column = divmod(k, columns)
+        place = (right + APART + column * step[0], y + row * step[1], z)
+        found[name] = kinds[copy.is_mirrored].translate(place)
+    return found

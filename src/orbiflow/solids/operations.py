@@ -1,0 +1,142 @@
+"""The operations on solids: find those that fill space, make things of them."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from orbiflow.runtime import (
+    NEVER,
+    Cancel,
+    Note,
+    Outcome,
+    Sink,
+    Table,
+    Written,
+    check_output_file,
+    check_output_folder,
+    ignore,
+    operation,
+    write_atomic,
+)
+from orbiflow.settings import DefaultText, InMemory, Option
+from orbiflow.solids.settings import BuildSettings, FillSettings
+
+if TYPE_CHECKING:
+    from orbiflow.solids.run_folder import SolidSource
+    from orbiflow.solids.solid import EscherSolid
+else:  # what annotations mean when they are read, without heavy imports
+    SolidSource = Annotated[Any, InMemory("the folder of a run, or the folder of a solid in it")]
+
+Y_UP = (".obj", ".gltf", ".glb")
+"""Endings of files whose y axis usually points up."""
+
+
+@operation("fill", starts_processes=True)
+def fill(
+    mesh: Path,
+    out: Annotated[Path, Option("-o")] = Path("out"),
+    settings: FillSettings = FillSettings(),
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Find a solid that looks like a mesh and whose copies fill space without a gap, and prove it.
+
+    Writes overview.png, index.html, which turns it, and solids.json; and for each solid a folder with
+    tile.stl, sheet.png, stack.gif, page.html and solid.safetensors.
+
+    Args:
+        mesh: The mesh: STL, OBJ, PLY, 3MF, glTF or GLB, in mm.
+        out: Folder for the results, made if need be.
+    """
+    from orbiflow.solids import run_folder, search
+    from orbiflow.solids.reading import read_mesh
+
+    begin = time.perf_counter()
+    check_output_folder(out, mesh)
+    run_folder.result_folder(out)
+    read = read_mesh(mesh)
+    goal_size = search.usual_size(read.mesh) if settings.size is None else None
+    for text in read.notes:
+        on_event(Note(text))
+    if goal_size is not None:
+        on_event(
+            Note(f"the file's size is no size to print: the longest side is made {goal_size:g} mm")
+        )
+    up = settings.up or ("y" if mesh.suffix.lower() in Y_UP else "z")
+    found = search.fill(
+        read.mesh, settings.replace(up=up), name=mesh.stem, on_event=on_event, cancel=cancel
+    )
+    seconds = time.perf_counter() - begin
+    summary = {"mesh": str(mesh), "seconds": seconds}
+    if not found:
+        on_event(Note("no solid was found that is one piece and fills space", warning=True))
+        return Outcome({**summary, "solids": []}, "nothing found")
+    run_folder.write_run(found, out, tell=on_event, summary=summary)
+    on_event(_table(found))
+    where = f"look at {out / run_folder.OVERVIEW} first, or open {out / run_folder.INDEX}"
+    on_event(Note(f"written to {out} in {time.perf_counter() - begin:.0f} s; {where}"))
+    entries = [run_folder.measures(rank, own) for rank, own in enumerate(found, 1)]
+    return Outcome({**summary, "folder": str(out), "solids": entries}, "done")
+
+
+def _table(solids: list[EscherSolid]) -> Table:
+    """Return a table of solids, best first."""
+    rows = [
+        (
+            own.group_name,
+            f"{own.likeness.overlap:.2f}",
+            f"{own.likeness.shadows:.2f}",
+            f"{own.likeness.kept:.2f}",
+            f"{own.likeness.strain:.2f}",
+            " x ".join(f"{side:.0f}" for side in own.size) + " mm",
+        )
+        for own in solids
+    ]
+    columns = ("group", "overlap", "shadows", "kept", "bent", "size")
+    return Table("Solids, best first", columns, tuple(rows))
+
+
+@operation("build")
+def build(
+    result: SolidSource,
+    out: Annotated[Path | None, Option("-o"), DefaultText("named after the solid")] = None,
+    settings: BuildSettings = BuildSettings(),
+    *,
+    solid: Annotated[str | None, DefaultText("1, or the solid whose folder is given")] = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Make things to print of a solid that fills space: one, a stack, a starting block, a puzzle.
+
+    They lie as they are printed. Notes say how thin they are, what hangs over, and whether the pieces
+    can be put together.
+
+    Args:
+        result: The folder of `orbiflow fill`, or of a solid in it.
+        out: The file, .3mf or .stl.
+        solid: Which one: a group, such as P21, or a rank; 1 is best.
+
+    Raises:
+        CertificationError: If the copies of the solid do not fill space.
+        OrbiflowError: If the settings cannot be met.
+    """
+    settings = settings.for_file(out)
+
+    from orbiflow.solids import making, run_folder
+
+    own = run_folder.as_solid(result, solid)
+    out = out or Path(f"{own.name}-{settings.kind}.{settings.file_format}")
+    check_output_file(out, *([Path(result)] if isinstance(result, str | Path) else []))
+    own.require_certified()
+    own = own.sized(settings.size)
+    cancel.check()
+    made = making.make(own, settings)
+    title = f"{settings.kind} of {own.name} in {own.group_name}, in mm"
+    write_atomic(out, made.file(settings.file_format, title))
+    for event in (*map(Note, made.notes), Written(out)):
+        on_event(event)
+    summary = {"file": str(out), "kind": settings.kind, "group": own.group_name}
+    return Outcome({**summary, "parts": len(made.bodies()), "notes": list(made.notes)})

@@ -1,0 +1,159 @@
+"""Meshes in 3MF files: archives of XML, in which objects are built from meshes and other objects.
+
+trimesh would need two packages more for it, and would take a file's word for its size.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from xml.etree import ElementTree
+
+import numpy as np
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.solids.soup import MAX_BYTES, Soup, check_counts
+
+MAX_FILES = 1000
+"""Files in an archive at most."""
+
+MAX_RATIO = 200
+"""How many times its size an archive may unpack to at most; XML of numbers has about ten."""
+
+MAX_DEPTH, MAX_ITEMS = 8, 10_000
+"""Objects within objects, and meshes that are placed."""
+
+MILLIMETRES = {
+    "micron": 1e-3,
+    "millimeter": 1.0,
+    "centimeter": 10.0,
+    "inch": 25.4,
+    "foot": 304.8,
+    "meter": 1000.0,
+}
+"""The length of each unit of a 3MF file."""
+
+Objects = dict[tuple[str, str], ElementTree.Element]
+"""Objects by their file and number."""
+
+
+def read_3mf(data: bytes) -> Soup:
+    """Return all triangles that a 3MF file places, in mm.
+
+    Raises `OrbiflowError` for what is no 3MF file, and for one that unpacks to far more than it has.
+    """
+    roots = {name: _parsed(text) for name, text in _models(data).items()}
+    if not roots:
+        raise OrbiflowError("holds no 3D model; export it again")
+    objects = {
+        (name, own.get("id", "")): own
+        for name, root in roots.items()
+        for own in root.iter("object")
+    }
+    placed = list[Soup]()
+    main, root = next(iter(roots.items()))
+    unit = MILLIMETRES.get(root.get("unit", "millimeter"))
+    if unit is None:
+        raise OrbiflowError(f"is in an unknown unit, {root.get('unit')!r}; export it in mm")
+    for item in (item for build in root.iter("build") for item in build.iter("item")):
+        _place(item, main, np.diag([unit, unit, unit, 1.0]), objects, placed, 0)
+    return Soup.joined([own.points for own in placed], [own.faces for own in placed])
+
+
+def _models(data: bytes) -> dict[str, bytes]:
+    """Return the XML of an archive's models, the main one first, unpacked within the bounds."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            entries = archive.infolist()
+            size = sum(entry.file_size for entry in entries)
+            if size > MAX_BYTES or size > MAX_RATIO * len(data) + 2**20 or len(entries) > MAX_FILES:
+                raise OrbiflowError(
+                    f"unpacks to {size / 2**20:.0f} MB in {len(entries)} files, more than a mesh has"
+                )
+            models = [own for own in entries if own.filename.lower().endswith(".model")]
+            models.sort(key=lambda own: (own.filename.lower() != "3d/3dmodel.model", own.filename))
+            texts = dict[str, bytes]()
+            for entry in models:
+                with archive.open(entry) as file:
+                    # the archive may lie about the size of its files
+                    text = file.read(entry.file_size + 1)
+                if len(text) > entry.file_size:
+                    raise OrbiflowError("unpacks to more than it says; export it again")
+                texts[entry.filename.lower()] = text
+            return texts
+    except OrbiflowError:
+        raise
+    # a broken archive's numbers lead anywhere: ValueError is of places before its start
+    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError) as error:
+        raise OrbiflowError(f"is not a 3MF file, or is cut off: {error}") from error
+
+
+def _parsed(text: bytes) -> ElementTree.Element:
+    """Return the root of a model whose tags have lost their name spaces; it may define no entities."""
+    check_counts(text.count(b"<vertex"), text.count(b"<triangle"))
+    # in UTF-16, too, in which a declaration would not be seen
+    if b"<!" in text.replace(b"<!--", b"").replace(b"\0", b""):
+        raise OrbiflowError(
+            "has a document type of its own, which no 3MF file needs; export it again"
+        )
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise OrbiflowError(f"is not a 3MF file, or is cut off: {error}") from error
+    for own in root.iter():
+        own.tag = str(own.tag).rpartition("}")[2]
+    return root
+
+
+def _place(
+    use: ElementTree.Element,
+    file: str,
+    outer: Array,
+    objects: Objects,
+    placed: list[Soup],
+    depth: int,
+) -> None:
+    """Add the meshes of what an item or a component uses, in their places, to a list.
+
+    `outer` (4, 4) is where it is used from, `file` the one that it stands in; it may name another.
+    """
+    if depth > MAX_DEPTH or len(placed) > MAX_ITEMS:
+        raise OrbiflowError("has too many objects within objects; export it as one mesh")
+    named = [value for name, value in use.attrib.items() if name.rpartition("}")[2] == "path"]
+    file = named[0].lstrip("/").lower() if named else file
+    number = use.get("objectid", "")
+    if (own := objects.get((file, number))) is None:
+        raise OrbiflowError(f"places object {number!r}, which is not there; export it again")
+    if own.get("type", "model") != "model":
+        return  # a support of the print, or another thing that is no part of the body
+    matrix = outer @ _matrix(use.get("transform"))
+    if (mesh := own.find("mesh")) is not None:
+        points = _numbers(mesh, "vertex", ("x", "y", "z"), float)
+        faces = _numbers(mesh, "triangle", ("v1", "v2", "v3"), np.int64)
+        if np.linalg.det(matrix[:3, :3]) < 0:
+            faces = faces[:, ::-1]
+        placed.append(Soup(points @ matrix[:3, :3].T + matrix[:3, 3], faces))
+        check_counts(sum(len(s.points) for s in placed), sum(len(s.faces) for s in placed))
+    for component in own.iter("component"):
+        _place(component, file, matrix, objects, placed, depth + 1)
+
+
+def _matrix(text: str | None) -> Array:
+    """Return the (4, 4) matrix of a transform, whose twelve numbers are for points as rows."""
+    if text is None:
+        return np.eye(4)
+    try:
+        rows = np.array(text.split(), float).reshape(4, 3)
+    except ValueError:
+        raise OrbiflowError(f"has a transform of {text[:40]!r}; export it again") from None
+    return np.vstack([rows.T, [0.0, 0.0, 0.0, 1.0]])
+
+
+def _numbers(mesh: ElementTree.Element, tag: str, names: tuple[str, ...], kind: type) -> Array:
+    try:
+        rows = [[own.attrib[name] for name in names] for own in mesh.iter(tag)]
+        return np.array(rows, dtype="U32").astype(kind).reshape(-1, 3)
+    except (KeyError, ValueError, OverflowError):
+        raise OrbiflowError(f"has a {tag} that is not complete; export it again") from None

@@ -1,0 +1,180 @@
+"""The folder of a search for solids: a folder for each, an overview, and solids.json."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.runtime import (
+    ResultFolder,
+    Sink,
+    Written,
+    ignore,
+    read_json,
+    write_atomic,
+    write_json,
+)
+from orbiflow.solids.pictures import solid_gif, solid_sheet
+from orbiflow.solids.solid import SOLID, EscherSolid, read_solid
+from orbiflow.solids.web_page import stack_page
+
+SOLIDS = "solids.json"
+"""The file that lists the solids of a run, best first."""
+
+OVERVIEW, INDEX = "overview.png", "index.html"
+SOLID_FILES = (SOLID, "tile.stl", "sheet.png", "stack.gif", "page.html")
+"""The files in each solid's folder."""
+
+SCHEMA_VERSION = 1
+
+
+def result_folder(out: Path) -> ResultFolder:
+    """Return the folder that a run is written to, which holds nothing else."""
+    return ResultFolder(out, written_files)
+
+
+def folder_name(rank: int, solid: EscherSolid) -> str:
+    """Return the name of a solid's folder: its rank and its group.
+
+    >>> from types import SimpleNamespace
+    >>> folder_name(1, SimpleNamespace(group_name="P 1 21/c 1"))
+    '1-P121_c1'
+    """
+    short = solid.group_name.replace(" ", "")
+    return f"{rank}-" + "".join(c if c.isalnum() or c == "-" else "_" for c in short)
+
+
+def written_files(folder: Path) -> set[str]:
+    """Return the paths of the files that an earlier search wrote into a folder, by its solids.json.
+
+    They are relative, with slashes; there are none if there is no such run.
+    """
+    try:
+        document = json.loads((folder / SOLIDS).read_text(encoding="utf-8"))
+        names = [str(entry["folder"]) for entry in document["solids"]]
+        ours = isinstance(document["schema_version"], int)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        ours, names = False, []
+    if not ours:
+        return set()
+    return {SOLIDS, OVERVIEW, INDEX} | {f"{name}/{file}" for name in names for file in SOLID_FILES}
+
+
+def measures(rank: int, solid: EscherSolid) -> dict[str, Any]:
+    """Return what solids.json says of a solid."""
+    proof = solid.certificate
+    return {
+        "folder": folder_name(rank, solid),
+        "group": solid.group_name,
+        "number_of_cosets": solid.group.order,
+        **solid.likeness.as_dict(),
+        "size": solid.size.tolist(),
+        "volume": solid.volume,
+        "certified": proof.valid,
+        "triangles": proof.faces,
+        "pair_error": proof.pair_error,
+        "overlap_with_copies": proof.overlap,
+        "uncovered": proof.gap,
+        "seconds": solid.seconds,
+    }
+
+
+def write_run(
+    solids: Sequence[EscherSolid],
+    out: Path,
+    *,
+    tell: Sink = ignore,
+    summary: dict[str, Any] | None = None,
+) -> list[Path]:
+    """Write solids, best first, into a folder; return its files.
+
+    Raises `OutputError` if the folder holds anything else, or cannot be written.
+    """
+    from orbiflow.drawing import write_stl
+    from orbiflow.solids.bodies import as_body
+
+    folder = result_folder(out)
+    entries = [measures(rank, solid) for rank, solid in enumerate(solids, 1)]
+    names: list[str] = []
+    with folder.replaced() as staged:
+        for entry, solid in zip(entries, solids, strict=True):
+            own = staged / entry["folder"]
+            own.mkdir()
+            title = f"{solid.name}, {solid.group_name}"
+            scaled = solid.tile.moved(solid.millimetres * np.eye(3))
+            contents: dict[str, str | bytes] = {
+                SOLID: solid.to_bytes(),
+                "tile.stl": write_stl({"tile": as_body(scaled)}, f"{title}, in mm"),
+                "sheet.png": _png(solid),
+                "stack.gif": solid_gif(solid, upright=solid.upright),
+                "page.html": stack_page(solid, title=title, upright=solid.upright),
+            }
+            for name, content in contents.items():
+                write_atomic(own / name, content)
+                names.append(f"{entry['folder']}/{name}")
+            if solid is solids[0]:
+                write_atomic(staged / OVERVIEW, contents["sheet.png"])
+                write_atomic(staged / INDEX, contents["page.html"])
+                names += [OVERVIEW, INDEX]
+        document = {"schema_version": SCHEMA_VERSION, **(summary or {}), "solids": entries}
+        write_json(staged / SOLIDS, document)
+    paths = [folder.path / name for name in (*names, SOLIDS)]
+    for path in paths:
+        tell(Written(path))
+    return paths
+
+
+def _png(solid: EscherSolid) -> bytes:
+    buffer = io.BytesIO()
+    solid_sheet(solid, upright=solid.upright).save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
+
+
+def read_run(path: str | Path) -> list[EscherSolid]:
+    """Return the solids of a run's folder, best first.
+
+    Raises `InputFileError` if it holds none, or a file is damaged.
+    """
+    path = Path(path)
+    file = path / SOLIDS if path.is_dir() else path
+    document = read_json(file, "a run of orbiflow fill")
+    try:
+        names = [str(entry["folder"]) for entry in document["solids"]]
+    except (KeyError, TypeError) as error:
+        raise InputFileError(f"{file}: it lists no solids ({error})") from error
+    if any(Path(name).name != name for name in names):
+        raise InputFileError(f"{file}: the folders of solids must be inside its own")
+    return [read_solid(file.parent / name) for name in names]
+
+
+SolidSource: TypeAlias = EscherSolid | str | Path
+"""A solid in memory, the folder of a run, or of a solid in it."""
+
+
+def as_solid(source: SolidSource, which: str | None = None) -> EscherSolid:
+    """Return a solid: one in memory, or of a run's folder, by rank or group; 1 is the best.
+
+    Raises:
+        InputFileError: If nothing is there.
+        OrbiflowError: If the run has no such solid.
+    """
+    if isinstance(source, EscherSolid):
+        return source
+    path = Path(source)
+    if (path / SOLID).is_file() or path.suffix == ".safetensors":
+        return read_solid(path)
+    solids = read_run(path)
+    for rank, solid in enumerate(solids, 1):
+        short = solid.group_name.replace(" ", "")
+        if which is None or which.strip() in (str(rank), solid.group_name, short):
+            return solid
+    names = ", ".join(solid.group_name for solid in solids)
+    raise OrbiflowError(
+        f"{path} holds no solid {which!r}; there are {names}, and ranks 1 to {len(solids)}"
+    )

@@ -1,0 +1,261 @@
+"""The search for solids that fill space: pose, bend, close (design point 22)."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import NEVER, Cancel, Sink, Team, ignore
+from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
+from orbiflow.solids.body import Body
+from orbiflow.solids.closing import close_tile
+from orbiflow.solids.complexes import cell_complex
+from orbiflow.solids.distance import SignedDistance, points_inside, surface_points
+from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
+from orbiflow.solids.likeness import measured, rigid_motion
+from orbiflow.solids.mesh import Mesh
+from orbiflow.solids.poses import Pose, best_poses
+from orbiflow.solids.settings import FillSettings
+from orbiflow.solids.solid import EscherSolid
+from orbiflow.solids.surfaces import tile_surface
+
+GRAIN = 0.058  # of the points inside a body by which poses are compared
+FINE = 0.03  # of the points on its surface
+ROUGH_SPACING, FINE_SPACING = 0.085, 0.055  # of the nodes of a body that bends
+CLOSED_GRAIN = 0.02  # of the points on the bent surface that a tile is made of
+MARGIN = 0.15  # how far from the bent body its tile may reach
+PROBES = 5_000  # points of space that are asked how many copies hold them
+SMALLEST, LARGEST, USUAL_SIZE = 15.0, 400.0, 60.0  # longest sides in mm that are printed
+STRAIN_COST = 0.25  # of strain, in shares of space that are uncovered or covered twice
+
+
+AXES = {
+    "x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
+    "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    "z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+}
+"""What is right, backwards and up where each axis points up."""
+
+
+class Effort(NamedTuple):
+    """How much is tried: random poses and climbs of each group, quick bends, and solids."""
+
+    groups: int
+    tried: int
+    climbed: int
+    per_group: int
+    quick: int
+    full: int
+
+
+EFFORTS = {
+    "fast": Effort(4, 800, 6, 2, 8, 2),
+    "normal": Effort(len(USUAL_GROUPS), 1500, 12, 3, 24, 6),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What solids are to look like.
+
+    - `name`: What it is called.
+    - `mesh`: Its surface, with volume 1 and its centre of mass at 0.
+    - `weight`: How much more points matter, in its coordinates, or None.
+    - `millimetres`: The length of one unit.
+    - `axes`: What is right, backwards and up for it, as columns (3, 3).
+    """
+
+    name: str
+    mesh: Mesh
+    weight: Callable[[Array], Array] | None
+    millimetres: float
+    axes: Array
+
+    @classmethod
+    def of(cls, mesh: Mesh, settings: FillSettings, name: str = "solid") -> Goal:
+        """Return the goal of a closed mesh in mm.
+
+        Raises:
+            OrbiflowError: If it is not closed or has no volume.
+        """
+        if not mesh.is_closed or mesh.volume <= 0:
+            raise OrbiflowError(
+                "the mesh must be closed, with faces counter-clockwise from outside"
+            )
+        side, center = mesh.volume ** (1 / 3), mesh.centroid
+        unit = Mesh((mesh.points - center) / side, mesh.faces)
+        longest = float(np.ptp(unit.points, axis=0).max())
+        size = settings.size or usual_size(mesh)
+        millimetres = size / longest if size else side
+        weight = partial(_emphasis, settings, center, side) if settings.emphasis else None
+        return cls(name, unit, weight, millimetres, np.array(AXES[settings.up or "z"]).T)
+
+    @property
+    def bounds(self) -> Array:
+        """The least and greatest coordinates (2, 3)."""
+        return np.stack([self.mesh.points.min(axis=0), self.mesh.points.max(axis=0)])
+
+    @cached_property
+    def inner_points(self) -> Array:
+        """Points (n, 3) evenly inside."""
+        return points_inside(self.mesh, GRAIN)
+
+    def body(self, spacing: float) -> Body:
+        """Return the body that bends, with nodes so far from each other."""
+        distance = SignedDistance.of_mesh(self.mesh, FINE)
+        return Body.of(distance, self.bounds, spacing, self.weight)
+
+
+def usual_size(mesh: Mesh) -> float | None:
+    """Return the longest side in mm of a mesh whose own is no size to print, else None."""
+    longest = float(np.ptp(mesh.points, axis=0).max())
+    return None if SMALLEST <= longest <= LARGEST else USUAL_SIZE
+
+
+def _emphasis(settings: FillSettings, center: Array, side: float, points: Array) -> Array:
+    found = np.ones(len(points))
+    for own in settings.spheres:
+        found = found * own.weights(center + side * points)
+    return found
+
+
+def fill(
+    mesh: Mesh,
+    settings: FillSettings | None = None,
+    *,
+    name: str = "solid",
+    on_solid: Callable[[EscherSolid], object] = lambda _: None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> list[EscherSolid]:
+    """Return solids that look like a mesh and fill space, certified, the best first.
+
+    Args:
+        mesh: A closed mesh, in mm.
+        settings: Which groups are tried, and how much.
+        name: What results call it.
+        on_solid: Called with each solid that is found.
+        on_event: Called with `Progress`.
+        cancel: Checked before each step.
+
+    Raises:
+        GroupError: For a group that is unknown, or has mirrors.
+        OrbiflowError: If the mesh is not closed, or too thin to be followed.
+        Cancelled: If the token was cancelled.
+    """
+    settings = settings or FillSettings()
+    effort, goal = EFFORTS[settings.effort], Goal.of(mesh, settings, name)
+    names = settings.groups or USUAL_GROUPS[: effort.groups]
+    families = [GroupFamily.named(own) for own in names]
+    team = Team(__name__, settings.workers or os.cpu_count() or 1, on_event, cancel)
+    seeds = np.random.SeedSequence(settings.seed).spawn(len(families))
+    jobs = list(zip(families, seeds, strict=True))
+    placed = team.each(partial(starting_poses, effort, goal.inner_points), jobs, "placing", 0.1)
+    poses = [pose for some in placed for pose in some[: effort.per_group]]
+    poses.sort(key=lambda pose: -pose.cover)
+    rough = goal.body(ROUGH_SPACING)
+    quick = team.each(partial(quick_bend, rough), poses[: effort.quick], "bending", 0.35)
+    order = np.argsort([cost for cost, _ in quick], kind="stable")
+    best = [poses[k] for k in order[: effort.full]]
+    body = goal.body(FINE_SPACING)
+    found: list[EscherSolid] = []
+    for own in team.each(partial(_solid, goal, body, settings.detail), best, "closing", 1.0):
+        if own is not None:
+            on_solid(own)
+            found.append(own)
+    found.sort(key=lambda own: -own.likeness.score)
+    return found[: settings.tiles]
+
+
+def starting_poses(
+    effort: Effort, points: Array, job: tuple[GroupFamily, np.random.SeedSequence]
+) -> list[Pose]:
+    """Return the poses of points (n, 3) of a body in a family that cover most, the best first."""
+    family, seed = job
+    random = np.random.default_rng(seed)
+    return best_poses(family, points, random, tried=effort.tried, climbed=effort.climbed)
+
+
+def quick_bend(body: Body, pose: Pose) -> tuple[float, Pose]:
+    """Return what a pose costs once its body has bent a little."""
+    found = bent(BentBody.of(body, pose), QUICK_STAGES)
+    lost, twice = coverage(found)
+    return lost + twice + STRAIN_COST * found.strain, pose
+
+
+def coverage(found: BentBody) -> tuple[float, float]:
+    """Return the share of space that copies of a bent body leave uncovered, and cover twice or more."""
+    low, high = found.surface.points.min(axis=0), found.surface.points.max(axis=0)
+    lattice, counts = found.lattice, np.zeros(PROBES, dtype=int)
+    corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
+    box = np.linalg.solve(lattice, corners.T).T
+    ranges = [
+        np.arange(np.floor(a), np.ceil(b) + 1) for a, b in zip(box.min(0), box.max(0), strict=True)
+    ]
+    cells = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
+    probes = np.random.default_rng(0).uniform(size=(PROBES, 3))
+    for turn, shift in zip(found.family.turns, found.family.shifts, strict=True):
+        at = probes @ turn.T + shift
+        images = ((at - np.floor(at) - 1)[:, None] + cells).reshape(-1, 3) @ lattice.T
+        near = np.flatnonzero(((images >= low) & (images <= high)).all(axis=1))
+        inside = near[found.distance(images[near]) < 0]
+        counts += np.bincount(inside // len(cells), minlength=PROBES)
+    return float((counts == 0).mean()), float(np.maximum(counts - 1, 0).mean())
+
+
+def _box(mesh: Mesh) -> tuple[Array, Array]:
+    return mesh.points.min(axis=0) - MARGIN, mesh.points.max(axis=0) + MARGIN
+
+
+def _solid(goal: Goal, body: Body, detail: int, pose: Pose) -> EscherSolid | None:
+    """Return the solid of a pose, or None if it is not one piece without handles that fills space."""
+    begin = time.process_time()
+    found = bent(BentBody.of(body, pose), STAGES)
+    fine = Mesh(body.carried(found.nodes, goal.mesh.points), goal.mesh.faces)
+    distance = _weighed(fine, found)
+    group = pose.family.group(found.stretches)
+    closed = close_tile(lambda x: -distance(x), *_box(fine), cell_complex(group, detail))
+    if not closed.is_ball:
+        return None
+    tile = tile_surface(closed, lambda x: -distance(x)).mesh
+    turn, shift = rigid_motion(body.rest, found.nodes)
+    target = goal.mesh.moved(turn, shift)
+    likeness = measured(tile, target, found.surface, body.importance[: body.size], found.strain)
+    seconds = time.process_time() - begin
+    solid = EscherSolid(
+        name=goal.name,
+        group=group,
+        tile=tile,
+        target=target,
+        bent=fine,
+        millimetres=goal.millimetres,
+        likeness=likeness,
+        upright=turn @ goal.axes,
+        seconds=seconds,
+    )
+    return solid if solid.certificate.valid else None
+
+
+def _weighed(fine: Mesh, found: BentBody) -> SignedDistance:
+    """Return the distance to a bent surface times how much its parts matter.
+
+    So gaps and overlaps are settled at the cost of the less important side.
+    """
+    points, normals = surface_points(fine, CLOSED_GRAIN)
+    near = cKDTree(found.surface.points).query(points, 4)[1]
+    weights = found.body.importance[near].mean(axis=1)
+    return SignedDistance(points, normals, CLOSED_GRAIN, weights)
+
+
+def best_of(solids: Sequence[EscherSolid]) -> EscherSolid | None:
+    """Return the solid that looks most like its target, if there is one."""
+    return max(solids, key=lambda own: own.likeness.score, default=None)

@@ -1,0 +1,156 @@
+"""Stacks: some copies of a tile under its group, their colours, and how they are moved apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import Palette
+from orbiflow.solids.bodies import as_body, as_mesh
+from orbiflow.solids.mending import simplified
+from orbiflow.solids.mesh import Mesh
+from orbiflow.symmetry import CrystallographicGroup
+
+STACK_PALETTE = Palette(
+    (
+        *("#e9b44c", "#2f7f86", "#d9613f", "#47689f", "#8fae6b", "#b5658c", "#ecdcb2", "#6a5878"),
+        *("#5fa8a8", "#c98b3c", "#7d3f3a", "#a8b5d6"),
+    ),
+    "#221c18",
+    "#ffffff",
+)
+"""The colours of copies in a stack."""
+
+FEW_COSETS = {1: 4, 2: 2}
+"""For groups with so few cosets: the number of colours that copies of each coset share."""
+
+
+class SpaceTile(Protocol):
+    """A solid whose copies under a group fill space, and what it was made of.
+
+    - `group`: The group.
+    - `tile`: The solid, of a volume of about 1.
+    - `target`, `bent`: The figure in its place over the tile, and bent to fill space.
+    - `millimetres`: The length of a unit in mm.
+    """
+
+    @property
+    def group(self) -> CrystallographicGroup: ...
+    @property
+    def tile(self) -> Mesh: ...
+    @property
+    def target(self) -> Mesh: ...
+    @property
+    def bent(self) -> Mesh: ...
+    @property
+    def millimetres(self) -> float: ...
+
+
+class StackedCopy(NamedTuple):
+    """A copy of a tile in a stack: x -> linear x + shift.
+
+    - `coset`: The number of its coset in the group.
+    - `cell`: (3,) how many times each lattice vector it is from that coset's representative.
+    """
+
+    linear: Array
+    shift: Array
+    coset: int
+    cell: tuple[int, int, int]
+
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether it is a mirror image of the tile."""
+        return float(np.linalg.det(self.linear)) < 0
+
+    @property
+    def place(self) -> Array:
+        """The matrix (3, 4) of linear part and shift."""
+        return np.column_stack([self.linear, self.shift])
+
+
+def stack_of(group: CrystallographicGroup, tile: Mesh, count: int) -> list[StackedCopy]:
+    """Return a compact stack of so many copies of a tile, itself first.
+
+    They are the copies whose centres of mass are nearest to a place; of several places in half a cell
+    about the tile the one is taken whose copies are closest together.
+    """
+    source = tile.centroid
+    spacing = (group.cell_volume / group.order) ** (1 / 3)
+    best, found = np.inf, list[StackedCopy]()
+    for halves in product((0.0, 0.25, 0.5), repeat=3):
+        copies = _nearest(group, source, source + group.lattice @ halves, count, spacing)
+        centers = np.stack([own.linear @ source + own.shift for own in copies])
+        spread = float(((centers - centers.mean(axis=0)) ** 2).sum())
+        if spread < best * (1 - 1e-9) and any(_is_itself(own) for own in copies):
+            best, found = spread, copies
+    return sorted(found, key=lambda own: not _is_itself(own))
+
+
+def _nearest(
+    group: CrystallographicGroup, source: Array, center: Array, count: int, spacing: float
+) -> list[StackedCopy]:
+    """Return the copies whose images of a place are nearest to a centre, in an order that is fixed."""
+    radius = spacing * (0.8 + 0.7 * count ** (1 / 3))
+    elements = group.elements_near(center, radius, source=source)
+    while len(elements) < count:
+        radius *= 1.25
+        elements = group.elements_near(center, radius, source=source)
+    numbered = [_numbered(group, own.linear, own.translation) for own in elements]
+
+    def order(own: StackedCopy) -> tuple[float, int, tuple[int, int, int]]:
+        distance = np.linalg.norm(own.linear @ source + own.shift - center)
+        return round(float(distance) / spacing, 6), own.coset, own.cell
+
+    return sorted(numbered, key=order)[:count]
+
+
+def _is_itself(copy: StackedCopy) -> bool:
+    return copy.coset == 0 and copy.cell == (0, 0, 0)
+
+
+def _numbered(group: CrystallographicGroup, linear: Array, shift: Array) -> StackedCopy:
+    """Return an element of a group with the number of its coset and its cell."""
+    offsets = (shift - group.translations) @ group.inverse_lattice.T
+    cells = np.round(offsets)
+    misfit = np.abs(offsets - cells).max(axis=1)
+    misfit += np.abs(group.linear_parts - linear).max(axis=(1, 2))
+    coset = int(misfit.argmin())
+    i, j, k = (int(n) for n in cells[coset])
+    return StackedCopy(linear, shift, coset, (i, j, k))
+
+
+def colour_number(group: CrystallographicGroup, copy: StackedCopy) -> int:
+    """Return the number of a copy's colour: one for each coset, more where there are few cosets."""
+    share = FEW_COSETS.get(group.order, 1)
+    return copy.coset * share + _turn(copy, share)
+
+
+def copy_colour(group: CrystallographicGroup, copy: StackedCopy) -> str:
+    """Return the colour of a copy, #rrggbb; copies of one coset side by side have two shades."""
+    colour = STACK_PALETTE.fill(colour_number(group, copy))
+    if group.order in FEW_COSETS or _turn(copy, 2) == 0:
+        return colour
+    channels = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+    return "#" + "".join(f"{round(0.86 * own):02x}" for own in channels)
+
+
+def _turn(copy: StackedCopy, count: int) -> int:
+    """Return a number below 1, 2 or 4 that differs, as far as it can, for cells side by side."""
+    i, j, k = copy.cell
+    return (i + 2 * j + 3 * k) % 4 if count == 4 else (i + j + k) % count
+
+
+def copy_centers(tile: Mesh, copies: Sequence[StackedCopy]) -> Array:
+    """Return the centres of mass (n, 3) of copies of a tile."""
+    center = tile.centroid
+    return np.stack([own.linear @ center + own.shift for own in copies])
+
+
+def lighter(mesh: Mesh, most: int) -> Mesh:
+    """Return a closed mesh of at most `most` triangles that looks the same from afar."""
+    return mesh if len(mesh.faces) <= most else as_mesh(simplified(as_body(mesh), most))

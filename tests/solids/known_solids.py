@@ -1,0 +1,81 @@
+"""Groups, functions and solids for the tests of what fills space."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+
+from orbiflow.arrays import Array
+from orbiflow.solids.closing import CellTile, Function, close_tile
+from orbiflow.solids.complexes import cell_complex
+from orbiflow.solids.mesh import Mesh
+from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, space_group
+
+CELLS = {
+    "P 1": (1.0, 1.1, 0.9, 80, 95, 100),
+    "P -1": (1.0, 1.2, 0.9, 85, 100, 95),
+    "P 1 21 1": (1.0, 1.2, 0.9, 90, 105, 90),
+    "P 1 21/c 1": (1.0, 1.1, 1.2, 90, 100, 90),
+    "C 1 2 1": (1.4, 1.0, 0.9, 90, 100, 90),
+    "P 21 21 21": (1.0, 1.2, 0.9, 90, 90, 90),
+    "P c a 21": (1.2, 1.0, 0.9, 90, 90, 90),
+    "I 21 21 21": (1.0, 1.2, 0.9, 90, 90, 90),
+    "P 41": (1.0, 1.0, 1.3, 90, 90, 90),
+    "P 3": (1.0, 1.0, 0.8, 90, 90, 120),
+    "P 31": (1.0, 1.0, 1.2, 90, 90, 120),
+    "P 61": (1.0, 1.0, 1.6, 90, 90, 120),
+    "R 3": (1.0, 1.0, 1.4, 90, 90, 120),
+    "P 21 3": (1.0, 1.0, 1.0, 90, 90, 90),
+}
+"""Cells of groups of all kinds: without rotations, with axes of all orders, centred ones."""
+
+names = st.sampled_from(sorted(CELLS))
+seeds = st.integers(0, 2**31)
+
+
+def group_named(name: str) -> CrystallographicGroup:
+    """Return a group of `CELLS`, whose tiles have the volume 1."""
+    group = space_group(name, CELLS[name])
+    return group.conjugate((group.order / group.cell_volume) ** (1 / 3) * np.eye(3))
+
+
+def random_function(group: CrystallographicGroup, seed: int) -> tuple[Function, Array]:
+    """Return a smooth function that is large around a point (3,), and this point."""
+    rng = np.random.default_rng(seed)
+    middle = DirichletDomain(group).site
+    waves, phases = rng.normal(0, 2.5, (4, 3)), rng.uniform(0, 2 * np.pi, 4)
+
+    def function(points: Array) -> Array:
+        offsets = points - middle
+        bumps = np.sin(offsets @ waves.T + phases).sum(axis=1)
+        return -(offsets**2).sum(axis=1) + 0.08 * bumps
+
+    return function, middle
+
+
+def random_tile(name: str, seed: int, cubes: int = 500) -> tuple[CellTile, Function]:
+    """Return the ball of cells of a random function, and the function."""
+    group = group_named(name)
+    function, middle = random_function(group, seed)
+    return close_tile(function, middle - 1, middle + 1, cell_complex(group, cubes)), function
+
+
+def dirichlet_solid(group: CrystallographicGroup) -> Mesh:
+    """Return the points nearer to a site than to its images: each face is a fan about its middle."""
+    from scipy.spatial import ConvexHull
+
+    corners = DirichletDomain(group).corners()
+    hull = ConvexHull(corners)
+    points, faces = list(corners), []
+    planes, which = np.unique(hull.equations.round(6), axis=0, return_inverse=True)
+    for k, plane in enumerate(planes):
+        ring = np.unique(hull.simplices[which == k])
+        middle = corners[ring].mean(axis=0)
+        first = corners[ring[0]] - middle
+        across = np.cross(plane[:3], first)
+        offsets = corners[ring] - middle
+        angles = np.arctan2(offsets @ across, offsets @ first * np.linalg.norm(plane[:3]))
+        ring = ring[np.argsort(angles)]
+        faces += [[a, b, len(points)] for a, b in zip(ring, np.roll(ring, -1), strict=True)]
+        points.append(middle)
+    return Mesh(np.array(points), np.array(faces))

@@ -1,0 +1,136 @@
+"""Balls of cells on which a function is almost largest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.solids.closing import close_tile
+from orbiflow.solids.complexes import cell_complex
+from orbiflow.solids.growth import BallOfCells, CellBox
+from solids.known_solids import group_named, names, random_function, random_tile, seeds
+
+
+@given(names, seeds)
+def test_a_tile_has_one_cell_of_each_orbit_at_little_loss(name, seed):
+    tile, _ = random_tile(name, seed)
+    orbits = tile.complex.orbit_of(tile.cells)
+    np.testing.assert_array_equal(orbits, np.arange(tile.complex.cells_per_tile))
+    assert tile.is_ball
+    assert tile.loss < 0.1
+    assert tile.moved < 0.2 * len(tile.cells)
+
+
+@given(names, seeds)
+@settings(max_examples=6)
+def test_cells_are_a_ball_by_counting_their_parts(name, seed):
+    tile, _ = random_tile(name, seed, cubes=200)
+    shape = tile.complex.shape
+    d = shape.denominator
+    cells = tile.cells
+    # the closed cells' union: corners, edges, faces and cells, each counted once
+    points, edges, faces = set(), set(), set()
+    for *block, kind in cells.tolist():
+        corners = [tuple(c) for c in (d * np.array(block) + shape.corners[kind]).tolist()]
+        for face in shape.faces[kind]:
+            ring = [corners[k] for k in face]
+            points.update(ring)
+            faces.add(frozenset(ring))
+            edges.update(frozenset(e) for e in zip(ring, ring[1:] + ring[:1], strict=True))
+    assert len(points) - len(edges) + len(faces) - len(cells) == 1
+
+
+def test_a_body_in_two_parts_becomes_one_piece_that_has_both():
+    group = group_named("P 1")
+    _, middle = random_function(group, 0)
+    ends = middle + np.array([[-0.42, 0, 0], [0.42, 0, 0.0]])
+
+    def function(points):
+        return -np.linalg.norm(points[:, None] - ends, axis=2).min(axis=1)
+
+    tile = close_tile(function, middle - 1, middle + 1, cell_complex(group, 1000))
+    assert tile.is_ball
+    centers = tile.complex.centers(tile.cells)
+    for end in ends:
+        assert np.linalg.norm(centers - end, axis=1).min() < 2 * tile.complex.spacing
+
+
+def test_a_ring_is_cut_so_that_no_handle_is_left():
+    group = group_named("P 1")
+    _, middle = random_function(group, 0)
+
+    def function(points):
+        x, y, z = (points - middle).T
+        return -np.hypot(np.hypot(x, y) - 0.33, z)
+
+    tile = close_tile(function, middle - 1, middle + 1, cell_complex(group, 3000))
+    assert tile.is_ball
+    assert tile.raw_pieces >= 1
+
+
+def test_a_small_box_is_widened_until_all_orbits_are_in_it():
+    group = group_named("P 21 21 21")
+    function, middle = random_function(group, 1)
+    tile = close_tile(function, middle - 0.1, middle + 0.1, cell_complex(group, 300))
+    assert tile.is_ball
+
+
+def test_a_function_that_is_not_a_number_is_refused():
+    group = group_named("P 1")
+    with pytest.raises(OrbiflowError, match="not a number"):
+        close_tile(
+            lambda x: np.full(len(x), np.nan), -np.ones(3), np.ones(3), cell_complex(group, 200)
+        )
+
+
+def cube_ball(number: int = 6) -> BallOfCells:
+    grid = cell_complex(group_named("P 1"), 8000)
+    box = CellBox(grid, np.zeros(3, int), np.full(3, number))
+    orbits = np.where(box.is_inner(), np.arange(box.number_of_cells), -1)
+    return BallOfCells(box, orbits, box.number_of_cells)
+
+
+def number_of(ball: BallOfCells, *block: int) -> int:
+    return int(ball.box.numbers(np.array([[*block, 0]]))[0])
+
+
+def test_cells_that_touch_in_an_edge_or_corner_are_not_attached():
+    ball = cube_ball()
+    ball.attach(number_of(ball, 2, 2, 2))
+    assert not ball.can_attach(number_of(ball, 3, 3, 2))
+    assert not ball.can_attach(number_of(ball, 3, 3, 3))
+    assert not ball.can_attach(number_of(ball, 4, 2, 2))
+    assert ball.can_attach(number_of(ball, 3, 2, 2))
+
+
+def test_a_ring_of_cells_never_closes():
+    ball = cube_ball()
+    ring = [(1, 1), (1, 2), (1, 3), (2, 3), (3, 3), (3, 2), (3, 1)]
+    for x, y in ring:
+        ball.attach(number_of(ball, x, y, 2))
+    assert not ball.can_attach(number_of(ball, 2, 1, 2))
+
+
+def test_a_cell_is_not_detached_where_the_hole_would_touch_the_outside():
+    ball = cube_ball()
+    for x in (1, 2, 3):
+        for y in (1, 2, 3):
+            for z in (1, 2):
+                ball.attach(number_of(ball, x, y, z))
+    middle = number_of(ball, 2, 2, 2)
+    assert ball.detach(middle)  # a dent
+    ball.attach(middle)
+    assert ball.detach(number_of(ball, 1, 1, 2))
+    # its corner is on the boundary since its neighbour has gone: the dent would meet it there
+    assert not ball.detach(middle)
+
+
+def test_a_move_that_is_not_possible_changes_nothing():
+    ball = cube_ball()
+    for x in (1, 2, 3):
+        ball.attach(number_of(ball, x, 2, 2))
+    before = ball.members().tolist()
+    assert not ball.move(number_of(ball, 2, 2, 2), number_of(ball, 2, 3, 2))
+    assert ball.members().tolist() == before

@@ -1,0 +1,305 @@
+"""Meshes from files: read, mended and said, or refused by name."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from orbiflow.errors import InputFileError
+from orbiflow.solids.mending import MAX_FACES
+from orbiflow.solids.mesh import Mesh, joined
+from orbiflow.solids.reading import ReadMesh, read_mesh
+from solids.mesh_files import archive, ball, box, inside_out, obj, stl, stl_text, three_mf
+
+
+def read(folder: Path, name: str, content: bytes) -> ReadMesh:
+    path = folder / name
+    path.write_bytes(content)
+    found = read_mesh(path)
+    assert found.mesh.is_closed
+    assert found.mesh.volume > 0
+    return found
+
+
+def refused(folder: Path, name: str, content: bytes, words: str) -> None:
+    path = folder / name
+    path.write_bytes(content)
+    with pytest.raises(InputFileError, match=words) as caught:
+        read_mesh(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def glb(mesh: Mesh, kind: str = "glb") -> Any:
+    return trimesh.Trimesh(mesh.points, mesh.faces, process=False).export(file_type=kind)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.stl", stl(box(1, 2, 3))),
+        ("a.STL", stl_text(box(1, 2, 3))),
+        ("a.obj", obj(box(1, 2, 3))),
+        ("a.obj", obj(box(1, 2, 3)).replace(b"\n", b"\r\n")),
+        ("a.ply", glb(box(1, 2, 3), "ply")),
+        ("a.3mf", three_mf(box(1, 2, 3))),
+        ("a.3mf", three_mf(box(1, 2, 3), items='<item objectid="2"/>')),
+    ],
+)
+def test_formats(name: str, content: bytes, tmp_path: Path) -> None:
+    mesh, notes = read(tmp_path, name, content)
+    assert np.sort(np.ptp(mesh.points, axis=0)) == pytest.approx([1, 2, 3], abs=1e-6)
+    assert mesh.volume == pytest.approx(6)
+    assert (len(mesh.points), len(mesh.faces), notes) == (8, 12, [])
+
+
+def test_gltf_is_in_metres(tmp_path: Path) -> None:
+    mesh, _ = read(tmp_path, "a.glb", glb(box(0.001, 0.002, 0.003)))
+    assert np.ptp(mesh.points, axis=0) == pytest.approx([1, 2, 3])
+
+
+def test_gltf_takes_numbers_from_its_own_folder_only(tmp_path: Path) -> None:
+    files: Any = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    assert read_mesh(tmp_path / "model.gltf").mesh.volume == pytest.approx(1e9)
+    header = json.loads(files["model.gltf"])
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    for uri, words in [
+        ("../gltf_buffer_0.bin", "outside its own folder"),
+        ("https://example.org/a.bin", "export it as GLB"),
+        ("file:///etc/passwd", "export it as GLB"),
+        ("/etc/passwd", "export it as GLB"),
+        ("%2e%2e/gltf_buffer_0.bin", "outside its own folder"),
+        ("missing.bin", "cannot be read"),
+    ]:
+        header["buffers"][0]["uri"] = uri
+        refused(inner, "a.gltf", json.dumps(header).encode(), words)
+
+
+def test_gltf_that_is_hostile(tmp_path: Path) -> None:
+    start = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]}
+    for more, words in [
+        ({"nodes": [{"children": [1]}, {"children": [0]}]}, "their own parents"),
+        ({"nodes": [{"children": [1, 1]}, {}]}, "two parents"),
+        ({"nodes": [{}] * 20_000}, "too many nodes"),
+        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "KHR_draco_mesh_compression"),
+        ({"meshes": [{"primitives": [{"attributes": {"POSITION": 7}}]}]}, "not a glTF file"),
+        (
+            {
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                "accessors": [{"count": 10**9}],
+            },
+            "at most",
+        ),
+    ]:
+        refused(tmp_path, "a.gltf", json.dumps({**start, **more}).encode(), words)
+    content = glb(box())
+    refused(tmp_path, "a.glb", content[:-40], "cut off")
+    refused(tmp_path, "a.glb", b"glTF", "not a GLB file")
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale"), [("micron", 1e-3), ("centimeter", 10), ("inch", 25.4), ("meter", 1000)]
+)
+def test_units_of_3mf(unit: str, scale: float, tmp_path: Path) -> None:
+    mesh, _ = read(tmp_path, "a.3mf", three_mf(box(1, 2, 3), unit))
+    assert mesh.volume == pytest.approx(6 * scale**3)
+
+
+def test_3mf_that_is_hostile(tmp_path: Path) -> None:
+    bomb = archive("<model>" + " " * 60_000_000)
+    assert len(bomb) < 100_000
+    refused(tmp_path, "a.3mf", bomb, "unpacks to 57 MB")
+    entity = '<!DOCTYPE a [<!ENTITY b "bb">]><model>&b;</model>'
+    refused(tmp_path, "a.3mf", archive(entity), "document type of its own")
+    refused(tmp_path, "a.3mf", three_mf(box())[:300], "cut off")
+    refused(tmp_path, "a.3mf", archive("<model><build/></model>"), "holds no triangles")
+    refused(tmp_path, "a.3mf", three_mf(box(), items='<item objectid="9"/>'), "'9', which is not")
+    refused(tmp_path, "a.3mf", three_mf(box(), "mile"), "unknown unit, 'mile'")
+    ring = (
+        '<model><resources><object id="1"><components><component objectid="1"/></components>'
+        '</object></resources><build><item objectid="1"/></build></model>'
+    )
+    refused(tmp_path, "a.3mf", archive(ring), "objects within objects")
+
+
+def test_files_that_are_cut_off_or_lie(tmp_path: Path) -> None:
+    content = stl(ball())
+    refused(tmp_path, "a.stl", content[:-70], r"cut off: [\d,]+ triangles are announced")
+    many = content[:80] + (10**9).to_bytes(4, "little") + content[84:]
+    refused(tmp_path, "a.stl", many, "at most 4,000,000 triangles")
+    refused(tmp_path, "a.stl", stl_text(box())[:400], "cut off")
+    refused(tmp_path, "a.stl", b"hello", "not an STL")
+    refused(tmp_path, "a.obj", b"", "holds no triangles")
+    refused(
+        tmp_path,
+        "a.ply",
+        b"ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n",
+        "most",
+    )
+    refused(
+        tmp_path, "a.ply", b"ply\nformat ascii 1.0\nelement vertex 999\nend_header\n", "cut off"
+    )
+    refused(tmp_path, "a.step", b"", "a mesh is read from .stl")
+    with pytest.raises(InputFileError, match=r"b\.stl: cannot be read: No such file"):
+        read_mesh(tmp_path / "b.stl")
+
+
+def test_obj_with_polygons_relative_numbers_and_a_missing_library(tmp_path: Path) -> None:
+    quads = b"""mtllib ../../secrets.mtl
+usemtl skin
+v 0 0 0 1 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 1 1 1
+v 0 1 1
+vn 0 0 1
+vt 0 0
+f 4//1 3//1 2//1 1//1
+f -4 -3 -2 -1
+f 1/1 2/1 6/1 5/1
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 \\
+8
+l 1 2
+"""
+    mesh, notes = read(tmp_path, "a.obj", quads)
+    assert mesh.volume == pytest.approx(1)
+    assert notes == []
+    refused(tmp_path, "a.obj", quads.replace(b"f 2 3 7 6", b"f 2 3 7 99"), "not there")
+    refused(tmp_path, "a.obj", quads.replace(b"f 2 3 7 6", b"f 2 3 seven 6"), "b'seven'")
+    refused(tmp_path, "a.obj", quads.replace(b"v 1 0 1", b"v 1 nan 1"), "NaN")
+    refused(tmp_path, "a.obj", quads.replace(b"v 1 0 1", b"v 1 one 1"), "not a number")
+
+
+def test_what_is_mended(tmp_path: Path) -> None:
+    whole = box(10, 20, 30)
+    mesh, notes = read(tmp_path, "a.stl", stl(inside_out(whole)))
+    assert (mesh.volume, notes) == (
+        pytest.approx(6000),
+        ["The surface was inside out, and was turned."],
+    )
+    mesh, notes = read(tmp_path, "a.stl", stl(whole.of_faces(whole.face_vectors[:, 2] <= 0)))
+    assert (mesh.volume, notes) == (pytest.approx(6000), ["1 hole was closed."])
+    some = whole.faces.copy()
+    some[3] = some[3, ::-1]
+    mesh, notes = read(tmp_path, "a.stl", stl(Mesh(whole.points, some)))
+    assert (mesh.volume, notes) == (
+        pytest.approx(6000),
+        ["1 face was turned to agree with their neighbours."],
+    )
+    twice = Mesh(whole.points, np.concatenate([whole.faces, whole.faces[:1], [[0, 0, 1]]]))
+    mesh, notes = read(tmp_path, "a.obj", obj(twice))
+    assert (mesh.volume, notes) == (
+        pytest.approx(6000),
+        ["2 degenerate or repeated faces were left out."],
+    )
+
+
+def test_holes_that_are_large_and_curved_are_refused(tmp_path: Path) -> None:
+    globe = ball(10)
+    # a piece of the globe is cut away along a line that is far from flat
+    far = globe.corners.mean(axis=1)
+    kept = far[:, 2] < 4 + 3 * np.sin(3 * np.arctan2(far[:, 1], far[:, 0]))
+    refused(tmp_path, "a.stl", stl(globe.of_faces(kept)), r"has a hole 1\d\.?\d* mm across")
+    small, notes = read(tmp_path, "a.stl", stl(globe.of_faces(np.arange(1, len(globe.faces)))))
+    assert small.volume == pytest.approx(globe.volume, rel=1e-3)
+    assert notes == ["1 hole was closed."]
+
+
+def test_several_bodies(tmp_path: Path) -> None:
+    one, other = ball(2), ball(2, (2, 0, 0))
+    mesh, notes = read(tmp_path, "a.stl", stl(joined([one, other])))
+    assert one.volume < mesh.volume < 2 * one.volume
+    assert notes == ["2 overlapping bodies were united."]
+    scrap = ball(0.3, (5, 5, 5))
+    mesh, notes = read(tmp_path, "a.stl", stl(joined([one, scrap])))
+    assert mesh.volume == pytest.approx(one.volume)
+    assert notes == ["1 small separate piece was left out."]
+    refused(tmp_path, "a.stl", stl(joined([one, ball(2, (9, 0, 0))])), "2 bodies that do not touch")
+    for cavity in (ball(1), inside_out(ball(1))):
+        mesh, notes = read(tmp_path, "a.stl", stl(joined([one, cavity])))
+        assert mesh.volume == pytest.approx(one.volume)
+        assert notes == ["Cavities inside the body were filled."]
+
+
+def test_edges_of_more_than_two_faces(tmp_path: Path) -> None:
+    # two boxes that touch along an edge, and are joined by a third
+    pair = joined([box(), box(at=(1, 1, 0)), box(2, 2, 1, (0, 0, 0.5))])
+    mesh, _ = read(tmp_path, "a.obj", obj(pair))
+    assert mesh.volume == pytest.approx(4 + 2 * 0.5)
+    wall = Mesh(
+        np.concatenate([box().points, [[0, 0, 3.0]]]), np.concatenate([box().faces, [[0, 1, 8]]])
+    )
+    refused(tmp_path, "a.obj", obj(wall), "three or more faces")
+
+
+def test_what_encloses_nothing(tmp_path: Path) -> None:
+    refused(tmp_path, "a.stl", stl(box(1, 1, 1e-4)), "flat mesh")
+    sheet = box().of_faces(box().face_vectors[:, 2] > 0)
+    refused(tmp_path, "a.stl", stl(sheet), "flat mesh")
+    ribbon = list[list[int]]()
+    t = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    middle = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+    across = 0.3 * np.stack(
+        [np.cos(t) * np.cos(t / 2), np.sin(t) * np.cos(t / 2), np.sin(t / 2)], axis=1
+    )
+    points = np.concatenate([middle - across, middle + across])
+    for k in range(24):
+        a, b = k, k + 24
+        c, d = ((k + 1), k + 25) if k < 23 else (24, 0)
+        ribbon += [[a, c, b], [c, d, b]]
+    refused(tmp_path, "a.obj", obj(Mesh(points, np.array(ribbon))), "one side only")
+
+
+def test_a_huge_mesh_is_simplified(tmp_path: Path) -> None:
+    globe = ball(10, segments=400)
+    assert len(globe.faces) > MAX_FACES
+    mesh, notes = read(tmp_path, "a.stl", stl(globe))
+    assert MAX_FACES / 3 < len(mesh.faces) <= MAX_FACES
+    assert mesh.volume == pytest.approx(globe.volume, rel=1e-3)
+    assert notes == [
+        f"The mesh was simplified from {len(globe.faces):,} triangles to {len(mesh.faces):,}."
+    ]
+
+
+@pytest.mark.parametrize("name", ["a.stl", "b.stl", "a.obj", "a.ply", "b.ply", "a.3mf", "a.glb"])
+def test_broken_files_are_refused_by_name(name: str, tmp_path: Path) -> None:
+    globe = ball(3, segments=8)
+    own = trimesh.Trimesh(globe.points, globe.faces, process=False)
+    contents: dict[str, Any] = {
+        "a.stl": stl(globe),
+        "b.stl": stl_text(globe),
+        "a.obj": obj(globe),
+        "a.ply": own.export(file_type="ply"),
+        "b.ply": own.export(file_type="ply", encoding="ascii"),
+        "a.3mf": three_mf(globe),
+        "a.glb": own.export(file_type="glb"),
+    }
+    whole = contents[name]
+    whole = whole.encode() if isinstance(whole, str) else whole
+    rng, refusals = np.random.default_rng(5), list[str]()
+    for k in range(40):
+        broken = bytearray(whole)
+        for place in rng.integers(len(whole) if k % 2 else 300, size=rng.integers(1, 9)):
+            broken[place] = rng.integers(256)
+        if k % 3 == 0:
+            start = rng.integers(len(whole))
+            del broken[start : start + 40]
+        (tmp_path / name).write_bytes(bytes(broken))
+        try:
+            assert read_mesh(tmp_path / name).mesh.is_closed
+        except InputFileError as error:
+            refusals.append(str(error))
+    assert len(refusals) > 10
+    assert all(words.startswith(str(tmp_path / name)) for words in refusals)
