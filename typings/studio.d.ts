@@ -137,6 +137,7 @@ interface Reading {
 
 /** What a project remembers of its pages. */
 interface Views {
+  fill?: any;
   search?: { effort: string; objective: string; palette: string };
   closeup?: any;
   drawing?: any;
@@ -155,7 +156,7 @@ interface Picture {
 interface Project extends Picture {
   id: string;
   name: string;
-  kind: "tile" | "density";
+  kind: "tile" | "density" | "solid";
   head?: number;
   second: Picture | null;
   tasks: Task[];

@@ -20,16 +20,26 @@ class Team:
     - `workers`: The number of processes; 1 stays in this one.
     - `on_event`: Called with `Progress`.
     - `cancel`: Checked before each item.
+    - `share`: The share of the whole work that is done before.
     """
 
-    def __init__(self, module: str, workers: int, on_event: Sink, cancel: Cancel) -> None:
-        self.workers, self.on_event, self.cancel, self.share = workers, on_event, cancel, 0.0
+    def __init__(
+        self, module: str, workers: int, on_event: Sink, cancel: Cancel, share: float = 0.0
+    ) -> None:
+        self.workers, self.on_event, self.cancel, self.share = workers, on_event, cancel, share
         self.context = process_context((module,)) if workers > 1 else None
 
     def each(
-        self, do: Callable[[Any], Any], items: Sequence[Any], what: str, share: float
+        self,
+        do: Callable[[Any], Any],
+        items: Sequence[Any],
+        what: str,
+        share: float,
+        tell: Callable[[Any], object] = lambda _: None,
     ) -> list[Any]:
         """Return what is done of each item, in their order, up to a share of the whole work.
+
+        `tell` is called with each as soon as it is done.
 
         Raises `Cancelled` if the token was cancelled.
         """
@@ -45,6 +55,7 @@ class Team:
                 for k, item in enumerate(items):
                     self.cancel.check()
                     found[k] = do(item)
+                    tell(found[k])
                     ended(k + 1)
             return found
         job, count = partial(_job, do), 0
@@ -54,6 +65,7 @@ class Team:
                 if one.done:
                     count += 1
                     found[one.index] = one.value
+                    tell(one.value)
                     ended(count)
         self.cancel.check()
         return found

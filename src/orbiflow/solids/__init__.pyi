@@ -3,6 +3,9 @@ from .certificate import certify_solid as certify_solid
 from .families import GroupFamily as GroupFamily
 from .likeness import SolidLikeness as SolidLikeness
 from .mesh import Mesh as Mesh
+from .operations import Y_UP as Y_UP
+from .pictures import solid_gif as solid_gif
+from .pictures import solid_sheet as solid_sheet
 from .reading import ReadMesh as ReadMesh
 from .reading import read_mesh as read_mesh
 from .run_folder import as_solid as as_solid
@@ -10,7 +13,11 @@ from .run_folder import read_run as read_run
 from .run_folder import write_run as write_run
 from .run_folder import written_files as written_files
 from .search import fill as fill
+from .search import usual_size as usual_size
 from .settings import BuildSettings as BuildSettings
 from .settings import FillSettings as FillSettings
 from .solid import EscherSolid as EscherSolid
 from .solid import read_solid as read_solid
+from .web_page import figure_data as figure_data
+from .web_page import stack_data as stack_data
+from .web_page import stack_page as stack_page

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+import scipy.ndimage
 import scipy.sparse
 from numpy.typing import ArrayLike
 
@@ -21,8 +22,13 @@ Function = Callable[[Array], Array]
 SURFACE_WEIGHT = 0.5
 """What a face of the boundary costs, in spacings of cells per unit of the function's slope."""
 
-POLISHING_PASSES, FREEING_PASSES, WIDENINGS, CARVINGS = 6, 2, 1, 24
+BLUR, FAITH, MOST_SPACINGS = 1.2, 0.03, 4.0
+"""Radius, in spacings, over which a ball is blurred; what a spacing of the function counts beside it,
+and up to how many."""
+
+POLISHING_PASSES, FREEING_PASSES, WIDENINGS, CARVINGS = 6, 1, 1, 8
 POINTS_AT_ONCE = 400_000
+FEW_MISSING = 50  # orbits that a larger box would not let in
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +67,8 @@ def close_tile(
     The cells where the function is largest on their orbits are its exact tile (design point 19). A
     ball grows in it from the cell whose loss would be most, always by the cell whose loss would be
     most and that keeps it a ball. So cuts come where little is lost. The other orbits' best cells that
-    keep it a ball follow. Then cells move within their orbits where that makes the values larger or
-    the boundary smaller.
+    keep it a ball follow. A second ball grows in the blurred first one, without its crumbs and threads.
+    Then cells move within their orbits where that makes the values larger or the boundary smaller.
 
     Args:
         function: What is wanted inside: minus the signed distance of a body in its place, say, perhaps
@@ -74,7 +80,7 @@ def close_tile(
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     found = _closed_in(function, low, high, complex)
     for _ in range(WIDENINGS):
-        if found.is_ball:
+        if found.is_ball or found.missing <= FEW_MISSING:
             break
         reach = (high - low) / 4  # orbits may touch the ball only outside of the box
         low, high = low - reach, high + reach
@@ -86,27 +92,27 @@ def _closed_in(function: Function, lower: Array, upper: Array, complex: Complex)
     """Return a ball of cells in a box, as `close_tile` does."""
     box, values = _evaluated(function, lower, upper, complex)
     orbits = np.where(np.isfinite(values), complex.orbit_of(box.cells(np.arange(len(values)))), -1)
-    best, margins = _largest(values, orbits, complex.cells_per_tile)
+    best, _ = _largest(values, orbits, complex.cells_per_tile)
     piece = _pieces(box, best)
     main = piece == np.bincount(piece).argmax()
-    ball = BallOfCells(box, orbits, complex.cells_per_tile)
-    ball.attach(int(best[np.where(main, margins, -np.inf).argmax()]))
-    ball.grow(best[np.argsort(-margins, kind="stable")])
-    _grow_the_rest(ball, values, values[best])
-    slope = _slope(values, orbits, box)
-    size = SURFACE_WEIGHT * complex.spacing * slope
+    unit = _slope(values, orbits, box) * complex.spacing
+    rough = _grown(box, orbits, values)
+    wanted = _settled(box, orbits, values / unit, rough.members())
+    ball, largest = _grown(box, orbits, wanted), _largest(wanted, orbits, complex.cells_per_tile)[0]
+    size = SURFACE_WEIGHT * FAITH
     for _ in range(FREEING_PASSES):
         if ball.is_complete:
             break
-        _polish(ball, values, size)
-        _free_orbits(ball, values, values[best])
-        _grow_the_rest(ball, values, values[best])
+        _polish(ball, wanted, size)
+        _free_orbits(ball, wanted, wanted[largest])
+        _grow_the_rest(ball, wanted, wanted[largest])
     for _ in range(POLISHING_PASSES):
-        if not _polish(ball, values, size):
+        if not _polish(ball, wanted, size):
             break
     members = ball.members()
     own = ball.orbit_of[members]
     lost = values[best[own]] - values[members]
+    slope = unit / complex.spacing
     return CellTile(
         complex,
         box.cells(members),
@@ -116,6 +122,41 @@ def _closed_in(function: Function, lower: Array, upper: Array, complex: Complex)
         raw_pieces=int(piece.max()) + 1,
         raw_strays=int(np.sum(~main)),
     )
+
+
+def _grown(box: CellBox, orbits: Integers, values: Array) -> BallOfCells:
+    """Return a ball that grows by the cells of largest values, first where a cell would lose most."""
+    number = box.complex.cells_per_tile
+    best, margins = _largest(values, orbits, number)
+    piece = _pieces(box, best)
+    main = piece == np.bincount(piece).argmax()
+    ball = BallOfCells(box, orbits, number)
+    ball.attach(int(best[np.where(main, margins, -np.inf).argmax()]))
+    ball.grow(best[np.argsort(-margins, kind="stable")])
+    _grow_the_rest(ball, values, values[best])
+    return ball
+
+
+def _settled(box: CellBox, orbits: Integers, values: Array, members: Integers) -> Array:
+    """Return values for which crumbs and threads of a ball of cells go to the copies around them.
+
+    They are the share of the ball around each cell, and a little of the given values, in spacings.
+    """
+    spacing, inner = box.complex.spacing, np.flatnonzero(orbits >= 0)
+    points, asked = box.centers(members), box.centers(inner)
+    low = points.min(axis=0) - 8 * spacing
+    counts = np.ceil((points.max(axis=0) - low) / spacing).astype(int) + 9
+    places = (points - low) / spacing
+    corner = np.floor(places).astype(int)
+    density = np.zeros(counts)
+    for offset in np.ndindex(2, 2, 2):
+        share = np.where(offset, places - corner, 1 - places + corner).prod(axis=1)
+        np.add.at(density, tuple((corner + offset).T), share)
+    density = scipy.ndimage.gaussian_filter(density, BLUR)
+    around = scipy.ndimage.map_coordinates(density, ((asked - low) / spacing).T, order=1)
+    found = np.full(len(orbits), -np.inf)
+    found[inner] = around + FAITH * np.clip(values[inner], -MOST_SPACINGS, MOST_SPACINGS)
+    return found
 
 
 def _evaluated(

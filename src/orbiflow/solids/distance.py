@@ -14,6 +14,7 @@ from orbiflow.solids.mesh import Mesh
 
 NEIGHBOURS = 8  # points of the surface that a distance is taken from
 AT_ONCE = 200_000  # points that are asked for, so that memory stays small
+SLANTED = 0.6  # cosine between normal and direction below which one point may mislead
 EVEN = 1.3  # distance of points on a surface over the mean, to be even
 
 
@@ -23,8 +24,8 @@ class SignedDistance:
 
     Near the surface it is the mean of the distances to the tangent planes of the nearest points
     (implicit moving least squares: Kolluri, 2008), so that it is smooth; far away it is the distance to
-    the nearest point with that mean's sign. A weight at each point multiplies it: that of the nearest
-    points.
+    the nearest point with that mean's sign. Inside, a weight at each point multiplies it: that of the
+    nearest points.
 
     - `points`, `normals`: (N, 3).
     - `spacing`: The mean distance of neighbouring points.
@@ -55,17 +56,27 @@ class SignedDistance:
 
     def __call__(self, points: Array) -> Array:
         """Return the distances (n,) of points (n, 3)."""
-        return self.with_nearest(points)[0]
+        found = np.empty(len(points))
+        for start in range(0, len(points), AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            found[part] = self._quickly(points[part])
+        return found
+
+    def _quickly(self, points: Array) -> Array:
+        """Return distances, by one point of the surface where that is in no doubt: far away."""
+        away: Array
+        near: Integers
+        away, near = cast(Any, self.tree.query(points, 1))
+        plane = ((points - self.points[near]) * self.normals[near]).sum(axis=1)
+        found = np.copysign(away, plane)
+        if self.weights is not None:
+            found *= np.where(found < 0, self.weights[near], 1.0)
+        some = np.flatnonzero((away < 4 * self.spacing) | (abs(plane) < SLANTED * away))
+        found[some], _ = self.with_nearest(points[some])
+        return found
 
     def with_nearest(self, points: Array) -> tuple[Array, Integers]:
         """Return the distances (n,) of points (n, 3), and the nearest of the surface's points (n,)."""
-        found, near = np.empty(len(points)), np.empty(len(points), dtype=np.intp)
-        for start in range(0, len(points), AT_ONCE):
-            part = slice(start, start + AT_ONCE)
-            found[part], near[part] = self._of(points[part])
-        return found, near
-
-    def _of(self, points: Array) -> tuple[Array, Integers]:
         away: Array
         near: Integers
         away, near = cast(Any, self.tree.query(points, NEIGHBOURS))
@@ -75,9 +86,9 @@ class SignedDistance:
         planes = np.einsum("nkj,nkj->nk", points[:, None] - self.points[near], self.normals[near])
         flat = (share * planes).sum(axis=1)
         far = np.clip(least[:, 0] / (2 * self.spacing) - 1, 0, 1)
-        found = (1 - far) * flat + far * np.where(flat < 0, -least[:, 0], least[:, 0])
+        found = (1 - far) * flat + far * np.copysign(least[:, 0], flat)
         if self.weights is not None:
-            found *= (share * self.weights[near]).sum(axis=1)
+            found *= np.where(found < 0, (share * self.weights[near]).sum(axis=1), 1.0)
         return found, near[:, 0]
 
 

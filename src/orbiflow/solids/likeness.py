@@ -26,18 +26,21 @@ class SolidLikeness:
     - `overlap`: Intersection over union (IoU) of both volumes after the best rigid motion.
     - `shadows`: The mean IoU of both shadows from seven directions.
     - `kept`: The share of the bent body's surface, thin parts weighing more, that is on the solid's.
+    - `smooth`: The area of the bent body over the solid's, at most 1: crumbs and threads lower it.
     - `strain`: How much the body had to bend: its springs' mean change of length.
     """
 
     overlap: float
     shadows: float
     kept: float
+    smooth: float
     strain: float
 
     @property
     def score(self) -> float:
         """What solids are ordered by."""
-        return self.shadows * self.kept**0.5 * (1 - min(self.strain, 1.0)) ** 0.5
+        bent = 1 - min(self.strain, 1.0)
+        return self.shadows * (self.kept * bent) ** 0.5 * self.smooth
 
     def as_dict(self) -> dict[str, float]:
         """Return the same values, ready for JSON."""
@@ -65,7 +68,8 @@ def measured(
     ]
     away = abs(SignedDistance.of_mesh(tile, GRAIN)(bent.points))
     kept = float(importance @ (away < DETAIL) / importance.sum())
-    return SolidLikeness(overlap, float(np.mean(shadows)), kept, strain)
+    smooth = min(1.0, bent.area / tile.area)
+    return SolidLikeness(overlap, float(np.mean(shadows)), kept, smooth, strain)
 
 
 def _shadow_overlap(one: Array, two: Array, side: Array) -> float:

@@ -20,6 +20,10 @@ from orbiflow.solids.soup import Soup
 MAX_FACES = 60_000
 """Triangles of a mesh that is read; finer ones are simplified."""
 
+COARSEST = 0.01
+"""The most that a surface moves where it is simplified, as a share of its size."""
+
+
 SAME_PLACE = 1e-6
 """Distance, as a share of the size, within which points are one where the surface needs it."""
 
@@ -57,21 +61,24 @@ def mended(soup: Soup, notes: list[str]) -> Mesh:
     if body.num_tri() > MAX_FACES:
         notes.append(f"The mesh was simplified from {body.num_tri():,} triangles to {{}}.")
         body = simplified(body, MAX_FACES)
+        if body.num_tri() > MAX_FACES:
+            raise OrbiflowError(
+                f"cannot be simplified to {MAX_FACES:,} triangles; simplify the mesh yourself"
+            )
         notes[-1] = notes[-1].format(f"{body.num_tri():,}")
     return as_mesh(body)
 
 
 def simplified(body: Manifold, most: int) -> Manifold:
-    """Return a body of at most `most` triangles, whose surface has moved as little as that allows."""
+    """Return a body of at most `most` triangles, or as few as leave it its looks."""
     box = np.array(body.bounding_box()).reshape(2, 3)
-    tolerance = 1e-5 * float(np.linalg.norm(box[1] - box[0]))
-    found = body
-    while found.num_tri() > most:
-        found, tolerance = body.simplify(tolerance), 2 * tolerance
-    if found.is_empty():
-        raise OrbiflowError(
-            f"cannot be simplified to {most:,} triangles; simplify the mesh yourself"
-        )
+    size = float(np.linalg.norm(box[1] - box[0]))
+    found, tolerance = body, 1e-5 * size
+    # with a coarser tolerance the library breaks thin parts and has more triangles again
+    while found.num_tri() > most and tolerance < COARSEST * size:
+        tried, tolerance = body.simplify(tolerance), 1.6 * tolerance
+        if 0 < tried.num_tri() < found.num_tri():
+            found = tried
     return found
 
 

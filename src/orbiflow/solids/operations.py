@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -74,7 +75,10 @@ def fill(
     if not found:
         on_event(Note("no solid was found that is one piece and fills space", warning=True))
         return Outcome({**summary, "solids": []}, "nothing found")
-    run_folder.write_run(found, out, tell=on_event, summary=summary)
+    workers = settings.workers or os.cpu_count() or 1
+    run_folder.write_run(
+        found, out, workers=workers, summary=summary, on_event=on_event, cancel=cancel
+    )
     on_event(_table(found))
     where = f"look at {out / run_folder.OVERVIEW} first, or open {out / run_folder.INDEX}"
     on_event(Note(f"written to {out} in {time.perf_counter() - begin:.0f} s; {where}"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,16 +9,21 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from orbiflow.drawing import png_bytes, write_stl
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import (
+    NEVER,
+    Cancel,
     ResultFolder,
     Sink,
+    Team,
     Written,
     ignore,
     read_json,
     write_atomic,
     write_json,
 )
+from orbiflow.solids.bodies import as_body
 from orbiflow.solids.pictures import solid_gif, solid_sheet
 from orbiflow.solids.solid import SOLID, EscherSolid, read_solid
 from orbiflow.solids.web_page import stack_page
@@ -32,6 +36,7 @@ SOLID_FILES = (SOLID, "tile.stl", "sheet.png", "stack.gif", "page.html")
 """The files in each solid's folder."""
 
 SCHEMA_VERSION = 1
+SEARCHED = 0.9  # share of the whole work when solids are found and only pictures are missing
 
 
 def result_folder(out: Path) -> ResultFolder:
@@ -89,51 +94,59 @@ def write_run(
     solids: Sequence[EscherSolid],
     out: Path,
     *,
-    tell: Sink = ignore,
+    workers: int = 1,
     summary: dict[str, Any] | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
 ) -> list[Path]:
     """Write solids, best first, into a folder; return its files.
 
-    Raises `OutputError` if the folder holds anything else, or cannot be written.
-    """
-    from orbiflow.drawing import write_stl
-    from orbiflow.solids.bodies import as_body
+    Args:
+        solids: The solids.
+        out: The folder.
+        workers: Processes that draw them.
+        summary: What solids.json says beside them.
+        on_event: Called with `Progress` and `Written`.
+        cancel: Checked before each solid.
 
+    Raises:
+        OutputError: If the folder holds anything else, or cannot be written.
+        Cancelled: If the token was cancelled; nothing is then written.
+    """
     folder = result_folder(out)
     entries = [measures(rank, solid) for rank, solid in enumerate(solids, 1)]
-    names: list[str] = []
+    team = Team(__name__, workers, on_event, cancel, SEARCHED)
+    drawn = team.each(solid_files, solids, "drawing", 1.0)
+    files = {
+        f"{entry['folder']}/{name}": content
+        for entry, contents in zip(entries, drawn, strict=True)
+        for name, content in contents.items()
+    }
+    files |= {OVERVIEW: drawn[0]["sheet.png"], INDEX: drawn[0]["page.html"]}
     with folder.replaced() as staged:
-        for entry, solid in zip(entries, solids, strict=True):
-            own = staged / entry["folder"]
-            own.mkdir()
-            title = f"{solid.name}, {solid.group_name}"
-            scaled = solid.tile.moved(solid.millimetres * np.eye(3))
-            contents: dict[str, str | bytes] = {
-                SOLID: solid.to_bytes(),
-                "tile.stl": write_stl({"tile": as_body(scaled)}, f"{title}, in mm"),
-                "sheet.png": _png(solid),
-                "stack.gif": solid_gif(solid, upright=solid.upright),
-                "page.html": stack_page(solid, title=title, upright=solid.upright),
-            }
-            for name, content in contents.items():
-                write_atomic(own / name, content)
-                names.append(f"{entry['folder']}/{name}")
-            if solid is solids[0]:
-                write_atomic(staged / OVERVIEW, contents["sheet.png"])
-                write_atomic(staged / INDEX, contents["page.html"])
-                names += [OVERVIEW, INDEX]
+        for entry in entries:
+            (staged / entry["folder"]).mkdir()
+        for name, content in files.items():
+            write_atomic(staged / name, content)
         document = {"schema_version": SCHEMA_VERSION, **(summary or {}), "solids": entries}
         write_json(staged / SOLIDS, document)
-    paths = [folder.path / name for name in (*names, SOLIDS)]
+    paths = [folder.path / name for name in (*files, SOLIDS)]
     for path in paths:
-        tell(Written(path))
+        on_event(Written(path))
     return paths
 
 
-def _png(solid: EscherSolid) -> bytes:
-    buffer = io.BytesIO()
-    solid_sheet(solid, upright=solid.upright).save(buffer, "PNG", optimize=True)
-    return buffer.getvalue()
+def solid_files(solid: EscherSolid) -> dict[str, bytes]:
+    """Return the content of each of the `SOLID_FILES` of a solid."""
+    title = f"{solid.name}, {solid.group_name}"
+    scaled = solid.tile.moved(solid.millimetres * np.eye(3))
+    return {
+        SOLID: solid.to_bytes(),
+        "tile.stl": write_stl({"tile": as_body(scaled)}, f"{title}, in mm"),
+        "sheet.png": png_bytes(solid_sheet(solid, upright=solid.upright)),
+        "stack.gif": solid_gif(solid, size=400, frames=36, upright=solid.upright),
+        "page.html": stack_page(solid, title=title, upright=solid.upright).encode(),
+    }
 
 
 def read_run(path: str | Path) -> list[EscherSolid]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -32,6 +32,7 @@ GRAIN = 0.058  # of the points inside a body by which poses are compared
 FINE = 0.03  # of the points on its surface
 ROUGH_SPACING, FINE_SPACING = 0.085, 0.055  # of the nodes of a body that bends
 CLOSED_GRAIN = 0.02  # of the points on the bent surface that a tile is made of
+FINENESS = (1.0, 0.8)  # cells over those wanted: another grid may close where one does not
 MARGIN = 0.15  # how far from the bent body its tile may reach
 PROBES = 5_000  # points of space that are asked how many copies hold them
 SMALLEST, LARGEST, USUAL_SIZE = 15.0, 400.0, 60.0  # longest sides in mm that are printed
@@ -47,19 +48,21 @@ AXES = {
 
 
 class Effort(NamedTuple):
-    """How much is tried: random poses and climbs of each group, quick bends, and solids."""
+    """How much is tried: groups; of each group random poses, climbs and their steps, and poses that go
+    on; of all groups quick bends, and solids."""
 
     groups: int
     tried: int
     climbed: int
+    steps: int
     per_group: int
     quick: int
     full: int
 
 
 EFFORTS = {
-    "fast": Effort(4, 800, 6, 2, 8, 2),
-    "normal": Effort(len(USUAL_GROUPS), 1500, 12, 3, 24, 6),
+    "fast": Effort(4, 1000, 8, 250, 3, 12, 2),
+    "normal": Effort(len(USUAL_GROUPS), 1500, 24, 500, 4, 36, 8),
 }
 
 
@@ -167,11 +170,14 @@ def fill(
     order = np.argsort([cost for cost, _ in quick], kind="stable")
     best = [poses[k] for k in order[: effort.full]]
     body = goal.body(FINE_SPACING)
-    found: list[EscherSolid] = []
-    for own in team.each(partial(_solid, goal, body, settings.detail), best, "closing", 1.0):
-        if own is not None:
-            on_solid(own)
-            found.append(own)
+    closed = team.each(
+        partial(_solid, goal, body, settings.detail),
+        best,
+        "closing",
+        1.0,
+        lambda own: None if own is None else on_solid(own),
+    )
+    found: list[EscherSolid] = [own for own in closed if own is not None]
     found.sort(key=lambda own: -own.likeness.score)
     return found[: settings.tiles]
 
@@ -182,7 +188,9 @@ def starting_poses(
     """Return the poses of points (n, 3) of a body in a family that cover most, the best first."""
     family, seed = job
     random = np.random.default_rng(seed)
-    return best_poses(family, points, random, tried=effort.tried, climbed=effort.climbed)
+    return best_poses(
+        family, points, random, tried=effort.tried, climbed=effort.climbed, steps=effort.steps
+    )
 
 
 def quick_bend(body: Body, pose: Pose) -> tuple[float, Pose]:
@@ -221,12 +229,15 @@ def _solid(goal: Goal, body: Body, detail: int, pose: Pose) -> EscherSolid | Non
     begin = time.process_time()
     found = bent(BentBody.of(body, pose), STAGES)
     fine = Mesh(body.carried(found.nodes, goal.mesh.points), goal.mesh.faces)
-    distance = _weighed(fine, found)
+    depth = _depth(fine, found)
     group = pose.family.group(found.stretches)
-    closed = close_tile(lambda x: -distance(x), *_box(fine), cell_complex(group, detail))
-    if not closed.is_ball:
+    grids = (cell_complex(group, round(share * detail)) for share in FINENESS)
+    closed = next(
+        filter(lambda own: own.is_ball, (close_tile(depth, *_box(fine), g) for g in grids)), None
+    )
+    if closed is None:
         return None
-    tile = tile_surface(closed, lambda x: -distance(x)).mesh
+    tile = tile_surface(closed, depth).mesh
     turn, shift = rigid_motion(body.rest, found.nodes)
     target = goal.mesh.moved(turn, shift)
     likeness = measured(tile, target, found.surface, body.importance[: body.size], found.strain)
@@ -245,17 +256,14 @@ def _solid(goal: Goal, body: Body, detail: int, pose: Pose) -> EscherSolid | Non
     return solid if solid.certificate.valid else None
 
 
-def _weighed(fine: Mesh, found: BentBody) -> SignedDistance:
-    """Return the distance to a bent surface times how much its parts matter.
+def _depth(fine: Mesh, found: BentBody) -> Callable[[Array], Array]:
+    """Return how deep points are inside a bent surface, times how much its parts matter there.
 
-    So gaps and overlaps are settled at the cost of the less important side.
+    So overlaps are settled at the cost of the less important side. Outside it is minus the distance,
+    and gaps go to the nearest copy: with weights, parts would be claimed that nothing holds.
     """
     points, normals = surface_points(fine, CLOSED_GRAIN)
     near = cKDTree(found.surface.points).query(points, 4)[1]
     weights = found.body.importance[near].mean(axis=1)
-    return SignedDistance(points, normals, CLOSED_GRAIN, weights)
-
-
-def best_of(solids: Sequence[EscherSolid]) -> EscherSolid | None:
-    """Return the solid that looks most like its target, if there is one."""
-    return max(solids, key=lambda own: own.likeness.score, default=None)
+    distance = SignedDistance(points, normals, CLOSED_GRAIN, weights)
+    return lambda x: -distance(x)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
-from typing import Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
-import numpy as np
-
-from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import (
     Count,
@@ -21,6 +19,9 @@ from orbiflow.settings import (
     Settings,
 )
 from orbiflow.units import Length, LengthOrZero
+
+if TYPE_CHECKING:
+    from orbiflow.arrays import Array
 
 MOST_WEIGHT = 100.0
 DEFAULT_WEIGHT = 5.0
@@ -39,6 +40,8 @@ class Sphere(NamedTuple):
 
     def weights(self, points: Array) -> Array:
         """Return how much more points (n, 3) matter (n,): less and less near the sphere's edge."""
+        import numpy as np
+
         away = np.linalg.norm(points - self.center, axis=1) / self.radius
         return 1 + (self.weight - 1) / (1 + np.exp((away - 1) / 0.1))
 
@@ -53,7 +56,7 @@ def sphere(text: str) -> Sphere:
         values = [float(part) for part in re.split(r"[,\s]+", text.strip())]
     except ValueError:
         values = []
-    if len(values) not in (4, 5) or not np.isfinite(values).all():
+    if len(values) not in (4, 5) or not all(map(math.isfinite, values)):
         raise OrbiflowError(
             f"{text!r} is no sphere; write x,y,z,radius in the file's coordinates, and perhaps a weight"
         )

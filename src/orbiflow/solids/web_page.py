@@ -94,6 +94,20 @@ def stack_data(
     }
 
 
+def figure_data(figure: Mesh, upright: Array | None = None) -> dict[str, Any]:
+    """Return what `stack.js` draws of a figure alone, as JSON has it: see `stack_page`."""
+    axes = figure_axes(figure) if upright is None else np.asarray(upright, float)
+    ball = _ball(figure)
+    return {
+        "start": START,
+        "axes": axes.T.tolist(),
+        "meshes": {"target": _packed_mesh(figure)},
+        "colours": {"target": _shares(TARGET_COLOUR)},
+        "balls": {"target": ball, "stack": ball},
+        "copies": [],
+    }
+
+
 def _legend(own: SpaceTile, copies: int) -> dict[str, str]:
     """Return what each colour stands for."""
     group, stack = own.group, stack_of(own.group, own.tile, copies)

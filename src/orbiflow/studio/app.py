@@ -24,7 +24,7 @@ from orbiflow.drawing import PALETTES, Palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
-from orbiflow.studio import density_routes, project_routes
+from orbiflow.studio import density_routes, project_routes, solid_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema, presets
@@ -76,7 +76,7 @@ def create_app(
         await asyncio.to_thread(queue.close)
         store.close()
 
-    every = [*routes, *density_routes.routes, *project_routes.routes]
+    every = [*routes, *density_routes.routes, *solid_routes.routes, *project_routes.routes]
     pages = StaticFiles(directory=STATIC, html=True)
     kinds = (Refused, OrbiflowError, HTTPException, Exception)
     app = Starlette(

@@ -66,6 +66,10 @@ KINDS = {
     "art": Kind("studio take", makes="art"),
     "solid": Kind("studio take", makes="solid"),
     "animate": Kind("studio take", makes="animate"),
+    "mesh read": Kind("studio mesh", "quick"),
+    "fill": Kind("studio fill"),
+    "film": Kind("studio film"),
+    "build": Kind("studio take", makes="build"),
     "density table": Kind("studio table", "quick"),
     "density fit": Kind("studio density"),
     "density map": Kind("studio density map", "quick"),
@@ -177,5 +181,6 @@ def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str
         "export": lambda: [own.purpose, f"{own.tile_size:g}mm"],
         "art": lambda: ["picture"],
         "solid": lambda: [own.kind],
+        "build": lambda: [own.kind],
     }.get(makes, list)()
     return f"{'-'.join([plain_letters(called, 'tile'), *filter(None, more)])}.{own.file_format}"

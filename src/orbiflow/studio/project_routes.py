@@ -36,13 +36,19 @@ from orbiflow.studio.words import (
 )
 from orbiflow.tiles import ReadingSettings
 
+NEEDS = {
+    "density": ("a density", "matplotlib"),
+    "solid": ("a solid", "skimage", "trimesh", "gemmi"),
+}
+"""Who needs which packages, for a project of a kind."""
+
 routes = Routes()
 
 
 @routes("GET", "/projects")
 async def projects(here: Studio) -> list[dict[str, Any]]:
     """List all projects."""
-    return [shown_summary(summary) for summary in here.store.summaries()]
+    return [shown_summary(here.store, summary) for summary in here.store.summaries()]
 
 
 @routes("POST", "/projects")
@@ -51,10 +57,11 @@ async def create(request: Request, here: Studio) -> dict[str, Any]:
     given = await body_object(request)
     kind = given.get("kind", "tile")
     if not isinstance(kind, str) or kind not in NAMES:
-        raise OrbiflowError("a project is of kind tile or density")
-    if kind == "density":
-        with naming_extras("a density"):
-            await run_in_threadpool(import_module, "matplotlib")
+        raise OrbiflowError(f"a project is of kind {', '.join(NAMES)}")
+    who, *packages = NEEDS.get(kind, ("",))
+    with naming_extras(who):
+        for package in packages:
+            await run_in_threadpool(import_module, package)
     name = plain_name(given.get("name"), NAMES[kind])
     made = here.store.create(kind, name, here.limits.projects)
     return shown_project(here.store, here.store.project(made))
@@ -141,7 +148,7 @@ async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
     if "drawing" in settings:  # as it is now
         drawn = view.get("drawing", {}) if settings["drawing"] is True else {}
         settings = {**settings, "drawing": json.dumps(drawn)}
-    if kind_of_work(operation).makes:
+    if kind_of_work(operation).makes or operation == "film":
         settings = {**settings, "called": own["name"]}
     return await here.submit(project, operation, settings)
 

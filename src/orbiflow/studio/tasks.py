@@ -30,13 +30,13 @@ from orbiflow.runtime import (
 from orbiflow.studio.kinds_of_work import WITH_DRAWING, file_name, making_call
 from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tile_files import (
-    PLACES,
     STAGES,
-    announce_tile,
+    announce_tiles,
     best_stage,
     put_tile,
     tile_folder,
     tile_number,
+    tiles_of,
 )
 from orbiflow.studio.words import OF_PICTURE
 from orbiflow.tiles import ReadingSettings
@@ -90,7 +90,7 @@ def search(
     whole = _search_settings(job.project, settings)
     names = searched_classes(target, whole)
     left = [name for k, name in enumerate(names) if not _is_done(job, k)]
-    _announce_again(job, on_event)
+    announce_tiles(job, on_event)
     if not left:
         return Outcome({"tiles": len(names)})
     seen: dict[tuple[str, str], int] = {}
@@ -131,7 +131,7 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
         )
     one, two = (load_target(job.project, number) for number in (0, 1))
     settings = _search_settings(job.project, choice).replace(workers=cores())
-    _announce_again(job, on_event)
+    announce_tiles(job, on_event)
     shown: dict[str, list[int]] = {stage: [] for stage in STAGES}
 
     def show(tile: EscherTile, stage: str) -> None:
@@ -143,7 +143,7 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
     found = {"tiles": len(result.tiles)}
     if result.interrupted:
         return Outcome(found, "cancelled")
-    gone = sorted(set(_numbers(job)) - set(shown[STAGES[-1]]))
+    gone = sorted(set(tiles_of(job)) - set(shown[STAGES[-1]]))
     for number in gone:
         shutil.rmtree(job.project / "tiles" / str(number), ignore_errors=True)
     return Outcome({**found, "gone": gone}, "done" if result.tiles else "nothing found")
@@ -182,20 +182,6 @@ def _classes_like(project: Path, number: int) -> tuple[str, ...]:
 def _is_done(job: Job, place: int) -> bool:
     found = best_stage(job.project, tile_number(job.task, place * PER_CLASS))
     return found is not None and found.name == STAGES[-1]
-
-
-def _announce_again(job: Job, on_event: Sink) -> None:
-    """Announce tiles that this task found before it was interrupted."""
-    for number in _numbers(job):
-        if found := best_stage(job.project, number):
-            announce_tile(number, found.name, on_event)
-
-
-def _numbers(job: Job) -> list[int]:
-    """Return the numbers of the tiles that a task has found so far, in order."""
-    folders = (job.project / "tiles").glob("[0-9]*")
-    numbers = sorted(int(folder.name) for folder in folders if folder.is_dir())
-    return [number for number in numbers if number // PLACES == job.task]
 
 
 @operation("studio open")
@@ -403,7 +389,7 @@ def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
     if first.suffix == ".png":
         shutil.copyfile(first, folder / PREVIEW)
         return True
-    if call.operation.name == "solid" and first.stat().st_size < MAX_DRAWN_BYTES:
+    if call.operation.name in ("solid", "build") and first.stat().st_size < MAX_DRAWN_BYTES:
         from orbiflow.drawing import read_triangles, solid_picture
 
         solid_picture(read_triangles(first)).save(folder / PREVIEW)

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import secrets
 import shutil
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import ItemDone, Sink, write_json
+from orbiflow.studio.settings import Job
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherTile
@@ -52,14 +54,24 @@ def put_tile(
     from orbiflow.studio.tile_view import tile_card, tile_view
     from orbiflow.tiles import save_tiles
 
-    place = home / "tiles" / str(number) / stage
-    if not place.is_dir():
-        staged = home / "tiles" / f".{number}.{secrets.token_hex(4)}.tmp"
-        staged.mkdir(parents=True)
+    def write(staged: Path) -> None:
         card = tile_card(tile, number, stage, parent)
         write_json(staged / CARD, card)
         write_json(staged / VIEW, tile_view(card, tile))
         save_tiles([tile], staged / SAVED)
+
+    put_stage(home, number, stage, write, on_event)
+
+
+def put_stage(
+    home: Path, number: int, stage: str, write: Callable[[Path], object], on_event: Sink
+) -> None:
+    """Let a function write a stage of a tile into a folder, and announce it."""
+    place = home / "tiles" / str(number) / stage
+    if not place.is_dir():
+        staged = home / "tiles" / f".{number}.{secrets.token_hex(4)}.tmp"
+        staged.mkdir(parents=True)
+        write(staged)
         place.parent.mkdir(parents=True, exist_ok=True)
         with suppress(OSError):  # a worker of a server that died was faster
             staged.rename(place)
@@ -70,3 +82,17 @@ def put_tile(
 def announce_tile(number: int, stage: str, on_event: Sink) -> None:
     """Send the event that a stage of a tile is there."""
     on_event(ItemDone(f"{number}/{stage}", "done", "tile"))
+
+
+def announce_tiles(job: Job, on_event: Sink) -> None:
+    """Announce tiles that a task found before it was interrupted."""
+    for number in tiles_of(job):
+        if found := best_stage(job.project, number):
+            announce_tile(number, found.name, on_event)
+
+
+def tiles_of(job: Job) -> list[int]:
+    """Return the numbers of the tiles that a task has found so far, in order."""
+    folders = (job.project / "tiles").glob("[0-9]*")
+    numbers = sorted(int(folder.name) for folder in folders if folder.is_dir())
+    return [number for number in numbers if number // PLACES == job.task]

@@ -10,7 +10,7 @@ from typing import Any
 from orbiflow.errors import Advice
 from orbiflow.studio.store import Store
 
-NAMES = {"tile": "New tile", "density": "New density"}
+NAMES = {"tile": "New tile", "density": "New density", "solid": "New solid"}
 """What a project of each kind is called before it has a name."""
 
 MASKS = ("mend", "pins", "emphasis")
@@ -125,7 +125,10 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
     }
 
 
-def shown_summary(summary: dict[str, Any]) -> dict[str, Any]:
+def shown_summary(store: Store, summary: dict[str, Any]) -> dict[str, Any]:
     """Return what the list of projects shows of one."""
-    thumb = f"/api/projects/{summary['id']}/backdrop.png" if summary.pop("drawn") else None
+    drawn = summary.pop("drawn")
+    if summary["kind"] == "solid":
+        drawn = (store.home(summary["id"]) / "backdrop.png").is_file()
+    thumb = f"/api/projects/{summary['id']}/backdrop.png" if drawn else None
     return {**summary, "busy": bool(summary["busy"]), "thumb": thumb}

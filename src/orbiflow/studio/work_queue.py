@@ -34,7 +34,7 @@ from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.words import OF_PICTURE, page_words, plain_name
 
-READINGS = frozenset({*READS, "density table"})
+READINGS = frozenset({*READS, "density table", "mesh read"})
 """Tasks whose results the later ones of their project use."""
 
 WARM_MODULES = (
@@ -306,7 +306,7 @@ class _Recorder:
 
     def record(self, event: Event) -> None:
         """Keep an event, if anybody is to know of it."""
-        with suppress(Missing):
+        with suppress(Missing, FileNotFoundError):  # a tile may have gone already
             match event:
                 case Progress(share=share, what=what):
                     if share >= self.share + MIN_PROGRESS_STEP or what != self.what:

@@ -18,6 +18,7 @@ const ROUTES = [
   [/^p\/([\w-]+)\/t\/(\d+)$/, () => import("./closeup/page.js"), "closeup"],
   [/^p\/([\w-]+)\/take\/(\d+)$/, () => import("./takeaway/page.js"), "take"],
   [/^d\/([\w-]+)$/, () => import("./density/page.js")],
+  [/^s\/([\w-]+)(?:\/t\/(\d+))?$/, () => import("./solid/page.js")],
 ];
 
 const page = document.querySelector("#page");

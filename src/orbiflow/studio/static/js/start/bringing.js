@@ -5,6 +5,7 @@ import { Feed } from "../events.js";
 import { alive, bytes, sentence } from "../words.js";
 
 const PICTURES = "image/*,.svg,.json,.geojson,.dat,.wkt";
+const MESHES = /\.(stl|obj|ply|3mf|gltf|glb)$/i;
 const TABLES = /\.(csv|tsv|txt|npy|parquet)$/i;
 export const stem = (name) => name.replace(/\.\w+$/, "");
 const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
@@ -60,6 +61,9 @@ export class Bringing {
       capture: "environment",
     });
     this.said = h("div", { class: "told", role: "status" });
+    this.mesh = chooser("A mesh from your computer", (file) => this.shape(file), {
+      accept: ".stl,.obj,.ply,.3mf,.gltf,.glb",
+    });
     this.saved = chooser("A project file", (file) => this.open(file), { accept: ".orbiflow" });
     /** @type {Record<string, (event: any) => any>} */
     this.heard = {
@@ -130,6 +134,7 @@ export class Bringing {
       this.file,
       this.photo,
       this.saved,
+      this.mesh,
     );
   }
 
@@ -187,16 +192,20 @@ export class Bringing {
     );
   }
 
+  /** Say that a file is too large, if it is. */
+  refuses({ name, size }) {
+    if (size <= this.most) return false;
+    const most = bytes(this.most);
+    this.tell(
+      `${name} has ${bytes(size)}; at most ${most} can be read. Make it smaller first.`,
+      "error",
+    );
+    return true;
+  }
+
   take(file) {
     const name = file.name || "picture.png";
-    if (file.size > this.most) {
-      return this.tell(
-        `${name} has ${bytes(file.size)}; at most ${
-          bytes(this.most)
-        } can be read. Make it smaller first.`,
-        "error",
-      );
-    }
+    if (this.refuses(file)) return undefined;
     const query = `name=${encodeURIComponent(name)}&number=${this.number}`;
     return this.begin(stem(name), (id) => this.api.put(`projects/${id}/input?${query}`, file));
   }
@@ -226,8 +235,22 @@ export class Bringing {
     });
   }
 
+  /** Begin with a mesh, and go and see it. */
+  shape(file) {
+    if (this.refuses(file)) return undefined;
+    const { name } = file;
+    return this.trying(async () => {
+      const { id } = await this.api.post("projects", { kind: "solid", name: stem(name) });
+      const raw = file.slice(0, file.size, "application/octet-stream");
+      const query = `name=${encodeURIComponent(name)}`;
+      await this.kept(id, () => this.api.put(`projects/${id}/mesh?${query}`, raw));
+      this.go(`s/${id}`);
+    }, `Reading ${name} …`);
+  }
+
   either(file) {
     if (file.name?.endsWith(".orbiflow")) return this.open(file);
+    if (MESHES.test(file.name)) return this.shape(file);
     return TABLES.test(file.name) ? this.count(file) : this.take(file);
   }
 

@@ -6,7 +6,17 @@ import { ago, number } from "../words.js";
 import { Bringing } from "./bringing.js";
 import { sample } from "./sample.js";
 
+const PAGES = { density: "d", solid: "s" }; // of projects that are no tiles
 const SOME = 24; // projects that are shown at first
+
+const MESH_WORDS =
+  "Drop a 3D mesh: STL, OBJ, PLY, 3MF, glTF. We bend it until copies of it fill space.";
+const TABLE_WORDS = "Angles, directions or axes in a table: see where they crowd.";
+const FILE_WORDS = "Go on with what you saved, here or elsewhere.";
+
+/** Another way to begin, in a few words. */
+const other = (title, image, begin, words) =>
+  h("div", {}, button(title, begin, { image }), h("p", { class: "soft small" }, words));
 
 /**
  * @param {HTMLElement} root
@@ -46,13 +56,9 @@ export async function show(root, page) {
     h(
       "section",
       { class: "others" },
-      button("Open a project file", () => bring.saved.click(), { image: "open" }),
-      button("Numbers instead of animals", () => bring.count(), { kind: "quiet", image: "arrow" }),
-      h(
-        "span",
-        { class: "soft small" },
-        "Angles, directions or axes in a table: see where they crowd.",
-      ),
+      other("A solid instead of a picture", "solid", () => bring.mesh.click(), MESH_WORDS),
+      other("Numbers instead of animals", "arrow", () => bring.count(), TABLE_WORDS),
+      other("Open a project file", "open", () => bring.saved.click(), FILE_WORDS),
     ),
   );
   watch.observe(art);
@@ -107,9 +113,9 @@ async function all(place, api) {
 }
 
 function link({ id, kind, name, thumb, tiles, busy, changed }) {
-  const path = kind === "density" ? `d/${id}` : tiles || busy ? `p/${id}` : `p/${id}/picture`;
+  const path = PAGES[kind] ? `${PAGES[kind]}/${id}` : tiles || busy ? `p/${id}` : `p/${id}/picture`;
   const facts = [
-    kind === "tile" ? number(tiles, "tile") : "a table",
+    kind === "density" ? "a table" : kind === "solid" && !tiles ? "a mesh" : number(tiles, kind),
     busy ? "at work" : ago(changed),
   ];
   return h(

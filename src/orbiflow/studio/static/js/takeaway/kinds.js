@@ -187,6 +187,44 @@ export const KINDS = {
   },
 };
 
+/** Things to print of a solid that fills space. */
+export const BUILD = {
+  title: "3D print",
+  image: "solid",
+  first: ["kind", "format", "size", "copies", "clearance"],
+  words: plain({
+    assembled: { title: "Leave the pieces in the box" },
+    copies: { title: "How many copies?", about: "" },
+    clearance: {
+      title: "Gap between neighbours",
+      about: "Copies that are printed need some room.",
+    },
+    kind: {
+      about: "",
+      title: "What kind of thing?",
+      options: {
+        tile: "One solid",
+        stack: "A stack, in colours",
+        block: "A block to start a stack on",
+        puzzle: "A puzzle in a box",
+      },
+    },
+    format: {
+      about: "",
+      title: "Kind of file",
+      usual: "3MF",
+      options: { "3mf": "3MF, with colours", stl: "STL" },
+    },
+    size: { title: "How long is its longest side?", about: "" },
+  }),
+};
+
+export const EVERY_KIND = {
+  ...KINDS,
+  build: BUILD,
+  film: { title: "Film", image: "film", words: {} },
+};
+
 const UNITS = { mm: 1, cm: 10, m: 1000, in: 25.4, pt: 25.4 / 72 };
 
 /** A length in mm from a number or a text such as "4 cm"; undefined if it is none. */

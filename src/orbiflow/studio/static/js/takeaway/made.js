@@ -2,7 +2,7 @@
 
 import { h, icon } from "../dom.js";
 import { ago, alive, bytes, capital, sentence } from "../words.js";
-import { KINDS, lengthIn } from "./kinds.js";
+import { EVERY_KIND as KINDS, lengthIn } from "./kinds.js";
 
 const SEEN = /\.(png|gif|svg)$/; // files that browsers show
 
@@ -71,8 +71,10 @@ export function words(task, stale) {
   if (task?.state === "failed") return [h("p", { class: "error" }, sentence(task.error))];
   if (task?.state === "cancelled") return [h("p", { class: "soft" }, "Stopped.")];
   if (!isMade(task)) return [];
+  const notes = task.result.notes ?? [];
   return [
-    ...(task.result.notes ?? []).map((text) => h("p", { class: "notice" }, sentence(text))),
+    notes.length > 0 &&
+    h("ul", { class: "notice" }, notes.map((text) => h("li", {}, sentence(text)))),
     stale && h("p", { class: "soft" }, "You changed something since. Make it again to have it."),
     h("div", { class: "row" }, files(task, "primary")),
   ];
@@ -86,7 +88,9 @@ export function words(task, stale) {
 function about({ operation, result }) {
   const { chosen = {}, facts = {}, made } = result;
   const { title, words: names } = KINDS[operation];
-  const options = ["purpose", "kind", "cut"].map((name) => names[name]?.options?.[chosen[name]]);
+  const options = ["purpose", "kind", "cut"].map((name) =>
+    names[name]?.options?.[chosen[name] ?? facts[name]]
+  );
   const length = lengthIn(chosen.tile_size ?? (KINDS[operation].solid && facts.tile_size));
   const pixels = operation === "art" && `${facts.width} × ${facts.height} pixels`;
   const solid = operation === "solid" && facts.size &&

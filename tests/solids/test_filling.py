@@ -1,0 +1,200 @@
+"""The whole way from a mesh to solids that fill space, their folder and what is made of them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from orbiflow.drawing import read_triangles
+from orbiflow.errors import (
+    CertificationError,
+    GroupError,
+    InputFileError,
+    OrbiflowError,
+    OutputError,
+    SettingError,
+)
+from orbiflow.runtime import Cancel, Cancelled, Note, Progress
+from orbiflow.solids import (
+    BuildSettings,
+    EscherSolid,
+    FillSettings,
+    Mesh,
+    as_solid,
+    fill,
+    read_run,
+    read_solid,
+    write_run,
+)
+from orbiflow.solids.operations import build
+from orbiflow.solids.operations import fill as fill_operation
+from orbiflow.solids.run_folder import INDEX, OVERVIEW, SOLID_FILES, SOLIDS, folder_name
+from orbiflow.solids.solid import SOLID
+from solids.known_bodies import creature
+from solids.small_fills import SMALL, creature_file, found, small_fills
+
+
+@pytest.fixture(scope="module", name="run")
+def run_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small run of the command."""
+    folder = tmp_path_factory.mktemp("fill")
+    with small_fills():
+        outcome = fill_operation(creature_file(folder), folder / "out", SMALL)
+    assert outcome.state == "done"
+    return folder / "out"
+
+
+def test_solids_are_certified_and_come_best_first() -> None:
+    solids = found()
+    assert len(solids) == 2
+    assert [own.likeness.score for own in solids] == sorted(
+        (own.likeness.score for own in solids), reverse=True
+    )
+    for own in solids:
+        assert own.certificate.is_ball
+        assert own.tile.volume == pytest.approx(1, rel=1e-9)
+        assert own.group.cell_volume == pytest.approx(own.group.order, rel=1e-9)
+        assert own.likeness.shadows > 0.75
+        assert own.likeness.overlap > 0.65
+        assert np.ptp(own.target.points, axis=0).max() > 0
+        np.testing.assert_allclose(own.upright.T @ own.upright, np.eye(3), atol=1e-9)
+
+
+def test_the_same_seed_gives_the_same_solids() -> None:
+    with small_fills():
+        again = fill(creature(), SMALL, name="creature")
+        others = fill(creature(), SMALL.replace(seed=1), name="creature")
+    np.testing.assert_array_equal(again[0].tile.points, found()[0].tile.points)
+    assert others[0].tile.points.shape != again[0].tile.points.shape
+
+
+def test_two_processes_find_what_one_does() -> None:
+    with small_fills():
+        again = fill(creature(), SMALL.replace(workers=2), name="creature")
+    for one, two in zip(again, found(), strict=True):
+        np.testing.assert_array_equal(one.tile.points, two.tile.points)
+
+
+def test_a_folder_is_read_again(run: Path) -> None:
+    document = json.loads((run / SOLIDS).read_text())
+    solids = read_run(run)
+    assert [entry["group"] for entry in document["solids"]] == [own.group_name for own in solids]
+    for rank, own in enumerate(solids, 1):
+        folder = run / folder_name(rank, own)
+        assert {path.name for path in folder.iterdir()} == set(SOLID_FILES)
+        assert own.certificate.valid
+        (part,) = read_triangles(folder / "tile.stl")
+        sides = np.ptp(part, axis=(0, 1))
+        np.testing.assert_allclose(sides, own.size, rtol=1e-5)
+        assert np.ptp(own.target.points, axis=0).max() * own.millimetres < 80
+        assert Image.open(folder / "sheet.png").size == (1600, 700)
+        assert Image.open(folder / "stack.gif").n_frames == 36
+    assert "<canvas" in (run / INDEX).read_text()
+    assert (run / OVERVIEW).read_bytes() == (
+        run / folder_name(1, solids[0]) / "sheet.png"
+    ).read_bytes()
+    assert as_solid(run, "2").group_name == solids[1].group_name
+    assert as_solid(run, solids[1].group_name.replace(" ", "")).group_name == solids[1].group_name
+    assert as_solid(run / folder_name(1, solids[0])).group_name == solids[0].group_name
+    with pytest.raises(OrbiflowError, match="ranks 1 to 2"):
+        as_solid(run, "P4")
+
+
+def test_a_solid_is_saved_bit_for_bit(tmp_path: Path) -> None:
+    own = found()[0]
+    (tmp_path / SOLID).write_bytes(own.to_bytes())
+    again = read_solid(tmp_path)
+    np.testing.assert_array_equal(again.tile.points, own.tile.points)
+    np.testing.assert_array_equal(again.group.lattice, own.group.lattice)
+    assert (again.likeness, again.millimetres, again.name) == (
+        own.likeness, own.millimetres, own.name,
+    )  # fmt: skip
+    damaged = bytearray((tmp_path / SOLID).read_bytes())
+    damaged[-100] ^= 1
+    (tmp_path / SOLID).write_bytes(damaged)
+    with pytest.raises(InputFileError, match="damaged"):
+        read_solid(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["tile", "stack", "block", "puzzle"])
+def test_things_are_made_of_it(run: Path, tmp_path: Path, kind: str) -> None:
+    notes = list[str]()
+    out = tmp_path / "made.3mf"
+    settings = BuildSettings(
+        kind=kind, size=50, **({"copies": 3} if kind in ("stack", "puzzle") else {})
+    )  # pyright: ignore[reportArgumentType]
+    outcome = build(
+        run, out, settings, on_event=lambda e: notes.append(e.text) if isinstance(e, Note) else None
+    )
+    assert outcome.summary["parts"] == {"tile": 1, "stack": 3, "block": 2, "puzzle": 4}[kind]
+    assert notes
+    parts = read_triangles(out)
+    assert all(len(part) > 100 for part in parts)
+    low = min(part[..., 2].min() for part in parts)
+    assert low == pytest.approx(0, abs=1e-3)
+
+
+def test_what_does_not_fill_space_is_not_built(tmp_path: Path) -> None:
+    own = found()[0]
+    points = own.tile.points.copy()
+    points[0] += 1e-3
+    broken = EscherSolid(
+        own.name, own.group, Mesh(points, own.tile.faces), own.target, own.bent, 10.0, own.likeness,
+        own.upright,
+    )  # fmt: skip
+    with pytest.raises(CertificationError, match="does not fill space"):
+        build(broken, tmp_path / "x.stl")
+    assert not (tmp_path / "x.stl").exists()
+
+
+def test_mistakes_are_named(tmp_path: Path) -> None:
+    with pytest.raises(GroupError, match="mirrors"):
+        fill(creature(), SMALL.replace(groups=("Pm",)))
+    with pytest.raises(GroupError, match="unknown"):
+        fill(creature(), SMALL.replace(groups=("nonsense",)))
+    with pytest.raises(OrbiflowError, match="closed"):
+        fill(creature().of_faces(np.arange(50)), SMALL)
+    with pytest.raises(SettingError, match="copies"):
+        BuildSettings(kind="tile", copies=3)
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"mine\.txt"):
+        write_run(found(), tmp_path)
+    with pytest.raises(InputFileError):
+        read_run(tmp_path)
+
+
+def test_a_run_replaces_an_earlier_one(run: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(run, folder)
+    write_run(found()[1:], folder)
+    (only,) = read_run(folder)
+    assert only.group_name == found()[1].group_name
+
+
+def test_it_tells_how_far_it_is_and_stops() -> None:
+    shares = list[float]()
+    with small_fills():
+        fill(
+            creature(),
+            SMALL,
+            on_event=lambda e: shares.append(e.share) if isinstance(e, Progress) else None,
+        )
+        assert shares == sorted(shares)
+        assert shares[-1] == pytest.approx(0.9)
+        cancel = Cancel()
+        cancel.cancel()
+        with pytest.raises(Cancelled):
+            fill(creature(), SMALL, cancel=cancel)
+
+
+def test_sizes_that_nobody_prints_become_usual() -> None:
+    with small_fills():
+        (own, *_) = fill(creature(), SMALL.replace(size=None, groups=("P-1",)))
+    longest = np.ptp(own.target.points, axis=0).max()  # of the turned target: only about its own
+    assert 40 < longest * own.millimetres < 90
+    assert FillSettings().size is None
