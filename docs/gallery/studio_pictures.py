@@ -129,6 +129,17 @@ def density(page: Page) -> None:
     keep(page, "density")
 
 
+def solid(page: Page, path: str) -> None:
+    """A solid that was found of a mesh, with its stack a little apart."""
+    page.goto(f"/#/{path}")
+    page.wait_for_selector(".solids li")
+    page.get_by_label("Turn slowly").uncheck()
+    page.get_by_role("slider", name="Apart").fill("25")
+    page.locator("h1").focus()
+    page.wait_for_timeout(1500)
+    keep(page, "solid")
+
+
 def phones(browser: Browser, address: str, own: str, tile: int) -> None:
     """Three pages on a phone, side by side; two of them in the dark."""
     seen: list[Image.Image] = []
@@ -157,7 +168,8 @@ def make_pictures(browser: Browser, address: str) -> None:
     page.set_default_timeout(PATIENCE)
     page.goto("/")
     ask = "async (path) => (await fetch(`/api/${path}`)).json()"
-    own = next(one["id"] for one in page.evaluate(ask, "projects") if one.get("tiles"))
+    every = [one for one in page.evaluate(ask, "projects") if one["tiles"]]
+    own = next(one["id"] for one in every if one["kind"] == "tile")
     project = page.evaluate(ask, f"projects/{own}")
     tile = project["tiles"][0]["id"]
     start_and_picture(page, own)
@@ -167,3 +179,5 @@ def make_pictures(browser: Browser, address: str) -> None:
     take_away(page, f"p/{own}/take/{tile}")
     phones(browser, address, own, tile)
     density(page)
+    for one in [one for one in every if one["kind"] == "solid"][:1]:  # no mesh is kept here
+        solid(page, f"s/{one['id']}")

@@ -27,6 +27,7 @@ from studio_screen import BACK, in_window, outline_in_window
 
 SIZES: tuple[ViewportSize, ...] = ({"width": 1440, "height": 900}, {"width": 390, "height": 844})
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+MESH = "v 0 0 0\nv 30 0 0\nv 0 40 0\nv 0 0 20\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 ROWS = "phi,psi\n" + "".join(f"{v},{50 * math.sin(v):.1f}\n" for v in range(-170, 170, 6))
 TASK = {"id": 10**9, "operation": "search", "share": 0.4, "what": "", "error": None, "place": 0}
 READY = ".card, .form, .closeup-canvas, .drop, canvas.reading[aria-busy=false], .density .panel"
@@ -136,6 +137,12 @@ class Visit:
         self.goto(f"d/{self.new_density()}")
         table = {"name": name, "mimeType": "text/csv", "buffer": rows.encode()}
         self.page.set_input_files("input[type=file]", [table])  # pyright: ignore[reportArgumentType]
+
+    def with_mesh(self, name: str = "corner.obj", text: str = MESH) -> None:
+        """Bring a mesh to the first page."""
+        self.goto("")
+        mesh = {"name": name, "mimeType": "model/obj", "buffer": text.encode()}
+        self.page.set_input_files("input[accept*='.stl']", [mesh])  # pyright: ignore[reportArgumentType]
 
     def dialog(self, name: str) -> None:
         """Open a dialog of the first page."""
@@ -258,6 +265,26 @@ def density_region(on: Visit) -> None:
     on.page.get_by_role("slider", name="is held at").fill("120")
 
 
+def solid_ready(on: Visit) -> None:
+    on.with_mesh()
+    on.page.wait_for_selector(".turned canvas")
+    on.page.locator("details").evaluate_all("all => all.forEach((own) => { own.open = true; })")
+
+
+def solid_refused(on: Visit) -> None:
+    on.with_mesh("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    on.page.wait_for_selector(".told .error")
+
+
+def solid_searching(on: Visit) -> None:
+    on.with_mesh()
+    on.page.wait_for_selector(".turned canvas")
+    own = on.page.url.split("/s/")[1]
+    on.task(own, operation="fill", state="running", what="closing")
+    on.page.reload()
+    on.page.wait_for_selector(".watch:not([hidden])")
+
+
 def lost(on: Visit) -> None:
     on.goto(f"p/{on.turtle}")
     on.page.evaluate("document.querySelector('.lost').hidden = false")
@@ -306,6 +333,9 @@ STATES: dict[str, Callable[[Visit], Any]] = {
     "density-fitting": density_fitting,
     "density-fitted": density_fitted,
     "density-region": density_region,
+    "solid-ready": solid_ready,
+    "solid-refused": solid_refused,
+    "solid-searching": solid_searching,
     "lost": lost,
     "gone": lambda on: on.goto("p/nothing", ".lonely"),
 }  # fmt: skip

@@ -32,6 +32,9 @@ TOPICS = {
         "SolidSettings solid make_solid AnimationSettings animate scenes Scene write_scene "
         "tile_picture tiling_picture tilings_png overlay_picture bending_picture "
     ),
+    "Solids that fill space": (
+        "read_mesh FillSettings fill EscherSolid read_solid BuildSettings build "
+    ),
     "Tilings": (
         "Tile Tiling certify isohedral_class CLASSES ISOHEDRAL_TYPES dirichlet_tile "
         "dirichlet_tiling colouring copies_meeting copies_inside patch neighbours edges "

@@ -61,6 +61,13 @@ from .runtime.events import Finished as Finished
 from .runtime.events import Note as Note
 from .runtime.events import Progress as Progress
 from .runtime.operations import find as find
+from .solids.operations import build as build
+from .solids.reading import read_mesh as read_mesh
+from .solids.search import fill as fill
+from .solids.settings import BuildSettings as BuildSettings
+from .solids.settings import FillSettings as FillSettings
+from .solids.solid import EscherSolid as EscherSolid
+from .solids.solid import read_solid as read_solid
 from .studio.project_file import open_project as open_project
 from .symmetry.catalogue import WALLPAPER_GROUPS as WALLPAPER_GROUPS
 from .symmetry.catalogue import wallpaper_group as wallpaper_group

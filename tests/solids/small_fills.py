@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from orbiflow.drawing import write_stl
-from orbiflow.solids import EscherSolid, FillSettings, fill, search
+from orbiflow.runtime import Event
+from orbiflow.solids import EscherSolid, FillSettings, fill, run_folder, search
 from orbiflow.solids.bodies import as_body
 from solids.known_bodies import creature
 
-SMALL = FillSettings(effort="fast", groups=("P-1", "P21"), detail=6000, workers=1, size=60)
+SMALL = FillSettings(effort="fast", groups=("P-1", "P21"), detail=5000, workers=1, size=60)
 
 
 @contextmanager
@@ -23,16 +24,31 @@ def small_fills() -> Iterator[None]:
     """Search for solids from few poses and coarse bodies, in this process and its forks."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(search.EFFORTS, "fast", search.Effort(2, 100, 2, 30, 1, 2, 2))
-        patch.setattr(search, "FINE_SPACING", 0.12)
-        patch.setattr(search, "ROUGH_SPACING", 0.15)
+        patch.setattr(search, "FINE_SPACING", 0.13)
+        patch.setattr(search, "ROUGH_SPACING", 0.16)
+        patch.setattr(search, "CLOSED_GRAIN", 0.05)
+        patch.setattr(search, "STAGES", ((0.5, 4), (2.0, 6), (8.0, 4)))
+        patch.setattr(run_folder, "SHEET_WIDTH", 480)
+        patch.setattr(run_folder, "FRAMES", 3)
         yield
 
 
 @cache
+def _found() -> tuple[tuple[EscherSolid, ...], tuple[Event, ...]]:
+    events = list[Event]()
+    with small_fills():
+        solids = fill(creature(), SMALL, name="creature", on_event=events.append)
+    return tuple(solids), tuple(events)
+
+
 def found() -> tuple[EscherSolid, ...]:
     """What a small search finds for the creature."""
-    with small_fills():
-        return tuple(fill(creature(), SMALL, name="creature"))
+    return _found()[0]
+
+
+def told() -> tuple[Event, ...]:
+    """What that search tells."""
+    return _found()[1]
 
 
 def creature_file(folder: Path) -> Path:

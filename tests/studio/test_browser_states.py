@@ -19,6 +19,7 @@ PASSING = [
     *("start-full", "start-many", "start-delete", "picture-doubts", "picture-failed"),
     *("search-waiting", "search-sketches", "search-paused", "search-nothing"),
     *("take-thin", "take-running", "take-refused", "density-empty", "lost"),
+    *("solid-ready", "solid-refused", "solid-searching"),
 ]
 
 

@@ -1,19 +1,22 @@
-"""Solids that fill space by a flow: a Dirichlet cell of the group, moved until it fits a body."""
+"""Solids that fill space by a flow: a simple fundamental domain, moved until it fits a body."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
 import torch
+from scipy.spatial import cKDTree
 from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
-from orbiflow.solids.closing import Function, close_tile
+from orbiflow.runtime import one_thread
+from orbiflow.solids.closing import CellTile, Function, close_tile
 from orbiflow.solids.complexes import cell_complex
 from orbiflow.solids.crossings import crossing_pairs
 from orbiflow.solids.matched import MatchedSurface
@@ -21,14 +24,24 @@ from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.surfaces import tile_surface
 from orbiflow.symmetry import CrystallographicGroup
 
-CELLS = 1_000  # of the Dirichlet cell
-SITES, NEAR = 300, 40  # places tried for its site; copies of the site that bound it
+START_CELLS = (4_000, 1_500, 600)
+"""Cells of the ball that is moved: fewer where more are none."""
+
+MARGIN = 0.15  # how far from the body its tile may reach
+DIRICHLET_CELLS, SITES, NEAR = 1_000, 300, 40
 REACH = 0.12  # the farthest that a point is asked to go in one step
-STEEPEST = 0.4  # of a step: an edge changes by less than this share of its length
+STEEPEST = 0.4  # an edge changes in one step by less than this share of its length
 SMOOTHNESS = 2.0  # of the fields, as `FourierField` has it
-TENSION, OUTER_TENSION = 0.002, 0.3
-SOLVER_STEPS, DAMPING = 6, 1e-3
-REPAIRS = 6
+
+TENSION, OUTER_TENSION = 0.001, 0.05
+"""What area costs, everywhere and per unit of distance outside the body: membranes retract."""
+
+THINNEST = 0.5
+"""The share of its own thickness by which a part may become thinner in one step."""
+
+SLIDING, DAMPING, SOLVER_STEPS = 1.0, 1e-2, 6
+EVENNESS = 0.15  # how far points move to the means of their neighbours after each step
+CHECKED, SMOOTHINGS, MOST_CROSSINGS = 3, 12, 1000
 
 
 class Stage(NamedTuple):
@@ -39,121 +52,209 @@ class Stage(NamedTuple):
     edge: float
 
 
-STAGES = (Stage(0.6, 20, 0.12), Stage(0.35, 30, 0.08), Stage(0.22, 30, 0.06), Stage(0.16, 20, 0.045))
+STAGES = (Stage(0.35, 9, 0.1), Stage(0.22, 15, 0.07), Stage(0.16, 9, 0.055))
 
 
-@dataclass
-class _Carried:
-    """A surface that is moved by fields, one after another, and where its points are now."""
+def flowed_tile(
+    function: Function,
+    body: Mesh,
+    group: CrystallographicGroup,
+    *,
+    stages: Sequence[Stage] = STAGES,
+    seconds: float | None = None,
+    check: Callable[[], object] = lambda: None,
+) -> Mesh:
+    """Return a solid that fits a body and fills space, as a symmetric flow makes it; always one piece.
 
-    start: MatchedSurface
-    now: Array
-    fields: list[FourierField]
+    It starts as a ball of few cells, or where none can be had as a Dirichlet cell of the group. Each
+    step moves its surface by the flow of a field that commutes with the group, which is fitted by
+    least squares to where the surface is wanted (Sobolev descent, design point 10). Then points move a
+    little to the means of their neighbours, by orbits. So faces stay in pairs and the volume is exact.
+    From time to time the surface is smoothed where triangles cross; the last one without is returned.
 
-    @property
-    def mesh(self) -> Mesh:
-        return Mesh(self.now, self.start.mesh.faces)
-
-    @property
-    def edge_lengths(self) -> Array:
-        a, b = self.now[self.start.mesh.edges.T]
-        return np.linalg.norm(a - b, axis=1)
-
-    def move(self, field: FourierField) -> None:
-        self.fields.append(field)
-        self.now = carried([field], self.now)
-
-    def divide(self, wanted: Array) -> None:
-        before = len(self.now)
-        self.start, _ = self.start.divided(wanted, self.edge_lengths)
-        self.now = np.concatenate([self.now, carried(self.fields, self.start.mesh.points[before:])])
-
-    def restart(self, start: MatchedSurface) -> None:
-        self.start, self.now = start, carried(self.fields, start.mesh.points)
-
-    def divide_longer(self, edge: float) -> None:
-        while (long := self.edge_lengths > edge).any():
-            self.divide(long)
-
-
-def carried(fields: Sequence[FourierField], points: Array) -> Array:
-    if not fields or not len(points):
-        return points
-    with torch.no_grad():
-        return Flow(fields, steps=1, method="midpoint", warn=False).carried(torch.from_numpy(points)).numpy()
+    Args:
+        function: How deep points are in the body, negative outside, as for `close_tile`.
+        body: The body in its place.
+        group: A space group without mirrors, whose tiles have the volume 1.
+        stages: Fields and steps, the coarse ones first.
+        seconds: Maximum processor time. Default: no limit.
+        check: Called before each step; may raise.
+    """
+    begin, own = time.process_time(), starting_surface(function, body, group)
+    best, smoother = own, Smoother(group, own)
+    for stage in stages:
+        waves = max(1, round(group.cell_volume ** (1 / 3) / stage.wavelength))
+        field, own = FourierField(group, waves, smoothness=SMOOTHNESS), best
+        for step in range(stage.steps):
+            check()
+            if seconds is not None and time.process_time() - begin > seconds:
+                return best.mesh
+            fine = divided_to(own, stage.edge)
+            if step == 0 or fine is not own:
+                smoother = Smoother(group, fine)
+            own = smoother.evened(moved(function, field, fine), EVENNESS)
+            if step % CHECKED == CHECKED - 1:
+                if (found := uncrossed(own, smoother)) is None:
+                    break
+                own = best = found
+    return best.mesh
 
 
-def best_site(function: Function, points: Array, group: CrystallographicGroup) -> Array:
-    """Return the point whose Dirichlet cell holds most of the points at which a function is positive."""
-    rng = np.random.default_rng(0)
-    held = points[function(points) > 0]
-    held = held[rng.permutation(len(held))[:2000]]
-    sites = np.concatenate([held.mean(axis=0)[None], held[:SITES]])
-    shares: list[float] = []
+def starting_surface(
+    function: Function, body: Mesh, group: CrystallographicGroup
+) -> MatchedSurface:
+    """Return the surface of a ball of few cells that is like the body, or of a Dirichlet cell."""
+    low, high = body.points.min(axis=0) - MARGIN, body.points.max(axis=0) + MARGIN
+    for cells in START_CELLS:
+        tile = close_tile(function, low, high, cell_complex(group, cells))
+        if tile.is_ball:
+            found = _surface(tile, function)
+            if not len(crossing_pairs(found.mesh.points, found.mesh.faces)):
+                return found
+    return dirichlet_cell(group, best_site(body, group))
+
+
+def best_site(body: Mesh, group: CrystallographicGroup) -> Array:
+    """Return the point (3,), of some in a body, whose Dirichlet cell holds most of the others."""
+    random = np.random.default_rng(0)
+    a, b = random.integers(0, len(body.points), (2, 4 * SITES))
+    # between two points of the surface: deep ones are likelier
+    held = (body.points[a] + body.points[b] + 2 * body.centroid) / 4
+    sites, shares = np.vstack([body.centroid, held[:SITES]]), list[float]()
     for site in sites:
         near = np.array([g(site) for g in group.elements_near(site, 3.0)[1:NEAR]])
-        away = ((held[:, None] - near) ** 2).sum(axis=2).min(axis=1)
-        shares.append(float(np.mean(((held - site) ** 2).sum(axis=1) < away)))
+        away = np.linalg.norm(held[:, None] - near, axis=2).min(axis=1)
+        shares.append(float(np.mean(np.linalg.norm(held - site, axis=1) < away)))
     return sites[int(np.argmax(shares))]
 
 
-def dirichlet_cell(group: CrystallographicGroup, site: Array, cells: int = CELLS) -> MatchedSurface:
+def dirichlet_cell(
+    group: CrystallographicGroup, site: Array, cells: int = DIRICHLET_CELLS
+) -> MatchedSurface:
+    """Return the surface of the points that are nearer to a site than to its copies."""
+
     def nearness(points: Array) -> Array:
         return -((points - site) ** 2).sum(axis=1)
 
-    complex = cell_complex(group, cells)
-    tile = close_tile(nearness, site - 0.8, site + 0.8, complex)
-    return MatchedSurface.of(complex.group, tile_surface(tile, nearness))
+    return _surface(
+        close_tile(nearness, site - 0.8, site + 0.8, cell_complex(group, cells)), nearness
+    )
 
 
-def areas_and_gradients(mesh: Mesh, weights: Array) -> tuple[Array, Array]:
-    """Return the areas (N,) around points, and the gradient (N, 3) of the weighted area."""
-    vectors = mesh.face_vectors
-    sizes = np.linalg.norm(vectors, axis=1, keepdims=True)
-    opposite = np.roll(mesh.corners, -2, axis=1) - np.roll(mesh.corners, -1, axis=1)
-    flat = vectors / np.maximum(sizes, 1e-300) * weights[mesh.faces].mean(axis=1)[:, None] / 2
-    areas = mesh._sums(np.repeat(sizes, 3, axis=0) / 6)[:, 0]
-    return areas, mesh._sums(np.cross(flat[:, None], opposite).reshape(-1, 3))
+def _surface(tile: CellTile, function: Function) -> MatchedSurface:
+    return MatchedSurface.of(tile.complex.group, tile_surface(tile, function))
 
 
-def step_towards(function: Function, field: FourierField, mesh: Mesh) -> FourierField:
-    """Return the field that moves a surface to where the function is as large on both sides."""
-    points, normals = torch.from_numpy(mesh.points), torch.from_numpy(mesh.normals)
+def divided_to(own: MatchedSurface, edge: float) -> MatchedSurface:
+    """Return a surface without edges longer than `edge`; the same if it has none."""
+    while (long := own.edge_lengths > edge).any():
+        own = own.divided(long)
+    return own
+
+
+def moved(function: Function, field: FourierField, own: MatchedSurface) -> MatchedSurface:
+    """Return a surface moved by the flow of a field towards where the function is 0.
+
+    The field is shortened so that none of the edges changes by much of its length.
+    """
+    with one_thread(), torch.no_grad():
+        found = fitted_field(function, field, own.mesh)
+        points = torch.from_numpy(own.mesh.points)
+        a, b = torch.from_numpy(own.mesh.edges.T)
+        speeds = found(points)
+        changes = (speeds[a] - speeds[b]).norm(dim=1) / (points[a] - points[b]).norm(dim=1)
+        share = min(1.0, STEEPEST / max(float(changes.max()), 1e-12))
+        flow = Flow(found.with_parameters(share * found.parameters_), steps=1, warn=False)
+        return own.with_points(flow.carried(points).numpy())
+
+
+def fitted_field(function: Function, field: FourierField, mesh: Mesh) -> FourierField:
+    """Return the field that moves a surface to where it is wanted: some steps of conjugate gradients.
+
+    Faces and their partners both pull: so the surface goes to the middle of gaps and overlaps.
+    """
     depth = np.clip(function(mesh.points), -REACH, REACH)
-    tension = TENSION + OUTER_TENSION * np.maximum(-depth, 0)
-    area, gradient = areas_and_gradients(mesh, tension)
-    areas, wanted, pull = map(torch.from_numpy, (area, depth, -gradient))
+    area, tension = areas_and_pull(mesh, TENSION + OUTER_TENSION * np.maximum(-depth, 0))
+    depth = np.maximum(depth, -THINNEST * thickness(mesh))
+    points, normals = torch.from_numpy(mesh.points), torch.from_numpy(mesh.normals)
+    areas, wanted, pull = map(torch.from_numpy, (area[:, None], depth[:, None], tension))
 
-    def pulled(values: Tensor) -> Tensor:
-        return field.adjoint(points, (areas * values)[:, None] * normals)
+    def resisted(values: Tensor) -> Tensor:
+        moves = field.with_parameters(values)(points)
+        along = (moves * normals).sum(dim=1, keepdim=True) * normals
+        return field.adjoint(points, areas * (along + SLIDING * moves)) + DAMPING * values
 
     found = torch.zeros(field.size, dtype=torch.float64)
-    rest = pulled(wanted) + field.adjoint(points, pull)
+    rest = field.adjoint(points, areas * wanted * normals + pull)
     way, square = rest.clone(), rest @ rest
     for _ in range(SOLVER_STEPS):
-        along = (field.with_parameters(way)(points) * normals).sum(dim=1)
-        image = pulled(along) + DAMPING * way
+        if not square > 0:
+            break
+        image = resisted(way)
         share = square / (way @ image)
         found, rest = found + share * way, rest - share * image
-        new = rest @ rest
-        way, square = rest + new / square * way, new
+        before, square = square, rest @ rest
+        way = rest + square / before * way
     return field.with_parameters(found)
 
 
-def flowed(function: Function, points: Array, group: CrystallographicGroup, stages=STAGES, log=None, start=None):
-    with torch.no_grad():
-        start = start or dirichlet_cell(group, best_site(function, points, group))
-        own = _Carried(start, start.mesh.points, [])
-        for stage in stages:
-            field = FourierField(group, round((group.cell_volume) ** (1 / 3) / stage.wavelength), smoothness=SMOOTHNESS)
-            own.restart(start)
-            for k in range(stage.steps):
-                own.divide_longer(stage.edge)
-                found = step_towards(function, field, own.mesh)
-                a, b = own.start.mesh.edges.T
-                v = found(torch.from_numpy(own.now)).numpy()
-                slope = np.linalg.norm(v[a] - v[b], axis=1) / own.edge_lengths
-                share = min(1.0, STEEPEST / slope.max())
-                own.move(field.with_parameters(share * found.parameters_))
-                if log: log(stage, k, field, own, share, np.linalg.norm(v,axis=1).mean())
-    return own
+def areas_and_pull(mesh: Mesh, tension: Array) -> tuple[Array, Array]:
+    """Return the areas (N,) around points, and how tension (N,) in the surface pulls them (N, 3)."""
+    n, where = len(mesh.points), mesh.faces.ravel()
+    vectors = mesh.face_vectors
+    sizes = np.linalg.norm(vectors, axis=1)
+    flat = vectors / np.maximum(sizes, 1e-300)[:, None] * tension[mesh.faces].mean(axis=1)[:, None]
+    opposite = np.roll(mesh.corners, -1, axis=1) - np.roll(mesh.corners, -2, axis=1)
+    pulls = np.cross(flat[:, None], opposite).reshape(-1, 3) / 2
+    areas = np.bincount(where, np.repeat(sizes / 6, 3), n)
+    return areas, np.stack([np.bincount(where, own, n) for own in pulls.T], axis=1)
+
+
+def thickness(mesh: Mesh) -> Array:
+    """Return how far behind each point (N,) the surface turns the other way, at most 1."""
+    away, near = cKDTree(mesh.points).query(mesh.points, min(24, len(mesh.points)))
+    steps = mesh.points[near] - mesh.points[:, None]
+    facing = np.einsum("nki,ni->nk", mesh.normals[near], mesh.normals) < 0
+    behind = np.einsum("nki,ni->nk", steps, mesh.normals) < -0.5 * away
+    return np.where(facing & behind, away, 1.0).min(axis=1)
+
+
+class Smoother:
+    """Moves points of a matched surface to the means of their neighbours, orbit by orbit."""
+
+    def __init__(self, group: CrystallographicGroup, own: MatchedSurface) -> None:
+        edges, n = own.mesh.edges, len(own.mesh.points)
+        beside = scipy.sparse.coo_array((np.ones(len(edges)), edges.T), (n, n)).tocsr()
+        self.beside = scipy.sparse.csr_array(beside + beside.T)
+        self._counts = self.beside.sum(axis=1)[:, None]
+        self._means = own.orbit_means(group)
+
+    def moves(self, points: Array, shares: Array | float) -> Array:
+        """Return moves (N, 3) of points over shares (N, 1) of the ways to their neighbours' means."""
+        pull = (self.beside @ points / self._counts - points) * shares
+        return (self._means @ pull.ravel()).reshape(-1, 3)
+
+    def evened(self, own: MatchedSurface, share: float) -> MatchedSurface:
+        """Return a surface all of whose points have moved over a share of the way."""
+        return own.with_points(own.mesh.points + self.moves(own.mesh.points, share))
+
+
+def uncrossed(own: MatchedSurface, smoother: Smoother) -> MatchedSurface | None:
+    """Return a surface smoothed where triangles cross, or None if some still do."""
+    points, faces, changed = own.mesh.points, own.mesh.faces, None
+    bad = np.empty((0, 2), np.int64)
+    for round_ in range(SMOOTHINGS):
+        kept = bad if changed is None else bad[~changed[bad].any(axis=1)]
+        bad = np.concatenate([kept, crossing_pairs(points, faces, changed)])
+        if not len(bad):
+            return own.with_points(points)
+        if len(bad) > MOST_CROSSINGS:
+            return None
+        hit = np.zeros(len(points))
+        hit[faces[np.unique(bad)]] = 1
+        for _ in range(1 + round_ // 5):  # the longer it takes, the wider
+            hit = np.minimum(hit + 0.5 * (smoother.beside @ hit > 0), 1)
+        moves = smoother.moves(points, 0.6 * hit[:, None])
+        points = points + moves
+        changed = np.any(np.any(moves != 0, axis=1)[faces], axis=1)
+    return None

@@ -7,11 +7,15 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse
+from scipy.spatial import cKDTree
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.surfaces import TileSurface
 from orbiflow.symmetry import CrystallographicGroup
+
+SAME_PLACE = 1e-8
+"""How near points are that are one."""
 
 LONGER = 1.3
 """How much longer than one that is divided another edge of its face may be, and stay whole."""
@@ -38,6 +42,12 @@ class MatchedSurface:
         return cls(own.mesh, group.linear_parts[own.cosets], shift, own.partners)
 
     @cached_property
+    def edge_lengths(self) -> Array:
+        """(E,) of `mesh.edges`."""
+        a, b = np.moveaxis(self.mesh.points[self.mesh.edges], 1, 0)
+        return np.linalg.norm(a - b, axis=1)
+
+    @cached_property
     def edge_of(self) -> Integers:
         """(M, 3) the number in `mesh.edges` of the edge from each corner to the next."""
         n = len(self.mesh.points)
@@ -58,17 +68,41 @@ class MatchedSurface:
         graph = scipy.sparse.coo_matrix(links, (n, n))
         return scipy.sparse.csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
-    def divided(self, wanted: Array, lengths: Array) -> tuple[MatchedSurface, Integers]:
-        """Return the surface with edges divided in their middles, and the new points' edges (n,).
+    def orbit_means(self, group: CrystallographicGroup) -> scipy.sparse.csr_array:
+        """Return the matrix (3 N, 3 N) that takes moves of points to their means over orbits.
+
+        If points move by such means, faces still match, wherever the points are by then.
+        """
+        points, n = self.mesh.points, len(self.mesh.points)
+        center = (points.min(axis=0) + points.max(axis=0)) / 2
+        reach = 2 * float(np.linalg.norm(points - center, axis=1).max())
+        tree = cKDTree(points)
+        blocks: list[tuple[Integers, Integers, Array]] = []
+        for element in group.elements_near(center, reach):
+            away, own = tree.query(element(points), distance_upper_bound=SAME_PLACE)
+            moved = np.flatnonzero(np.isfinite(away))
+            blocks.append((own[moved], moved, np.tile(element.linear, (len(moved), 1, 1))))
+        rows, columns, parts = (np.concatenate(own) for own in zip(*blocks, strict=True))
+        parts = parts / np.bincount(rows, minlength=n)[rows, None, None]
+        order = np.argsort(rows, kind="stable")
+        pointers = np.searchsorted(rows[order], np.arange(n + 1))
+        data = (parts[order], columns[order], pointers)
+        return scipy.sparse.bsr_array(data, shape=(3 * n, 3 * n)).tocsr()
+
+    def with_points(self, points: Array) -> MatchedSurface:
+        """Return the surface with its points elsewhere; pairs must still be pairs."""
+        return replace(self, mesh=Mesh(points, self.mesh.faces))
+
+    def divided(self, wanted: Array) -> MatchedSurface:
+        """Return the surface with edges divided in their middles.
 
         Others are divided, too: all edges of their orbits, and those of faces that would be left thin.
 
         Args:
             wanted: A mask (E,) of `mesh.edges`.
-            lengths: The lengths (E,) that tell which faces would be thin.
         """
         orbit, of_faces = self.orbit_of_edges, self.edge_of
-        sides, orbits = lengths[of_faces], orbit[of_faces]
+        sides, orbits = self.edge_lengths[of_faces], orbit[of_faces]
         while True:
             marked = np.zeros(orbit.max() + 1, bool)
             marked[orbit[wanted]] = True
@@ -95,7 +129,7 @@ class MatchedSurface:
             shift=self.shift[parents],
             partners=np.zeros(len(faces), np.int64),
         )
-        return replace(found, partners=found._partners_of(self.partners, parents)), cut
+        return replace(found, partners=found._partners_of(self.partners, parents))
 
     def _back(self, points: Array, faces: Integers) -> Array:
         """Return points (n, k, 3) moved by the inverse of the element behind a face (n,) each."""

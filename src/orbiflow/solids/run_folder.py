@@ -36,6 +36,7 @@ SOLID_FILES = (SOLID, "tile.stl", "sheet.png", "stack.gif", "page.html")
 """The files in each solid's folder."""
 
 SCHEMA_VERSION = 1
+SHEET_WIDTH, FRAMES = 1600, 36  # of a sheet in pixels, and of a GIF
 SEARCHED = 0.9  # share of the whole work when solids are found and only pictures are missing
 
 
@@ -143,8 +144,8 @@ def solid_files(solid: EscherSolid) -> dict[str, bytes]:
     return {
         SOLID: solid.to_bytes(),
         "tile.stl": write_stl({"tile": as_body(scaled)}, f"{title}, in mm"),
-        "sheet.png": png_bytes(solid_sheet(solid, upright=solid.upright)),
-        "stack.gif": solid_gif(solid, size=400, frames=36, upright=solid.upright),
+        "sheet.png": png_bytes(solid_sheet(solid, width=SHEET_WIDTH, upright=solid.upright)),
+        "stack.gif": solid_gif(solid, size=400, frames=FRAMES, upright=solid.upright),
         "page.html": stack_page(solid, title=title, upright=solid.upright).encode(),
     }
 

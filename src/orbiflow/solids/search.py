@@ -14,10 +14,11 @@ from scipy.spatial import cKDTree
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.extras import naming_extras
 from orbiflow.runtime import NEVER, Cancel, Sink, Team, ignore
 from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
 from orbiflow.solids.body import Body
-from orbiflow.solids.closing import close_tile
+from orbiflow.solids.closing import Function, close_tile
 from orbiflow.solids.complexes import cell_complex
 from orbiflow.solids.distance import SignedDistance, points_inside, surface_points
 from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
@@ -27,6 +28,7 @@ from orbiflow.solids.poses import Pose, best_poses
 from orbiflow.solids.settings import FillSettings
 from orbiflow.solids.solid import EscherSolid
 from orbiflow.solids.surfaces import tile_surface
+from orbiflow.symmetry import CrystallographicGroup
 
 GRAIN = 0.058  # of the points inside a body by which poses are compared
 FINE = 0.03  # of the points on its surface
@@ -156,6 +158,7 @@ def fill(
         Cancelled: If the token was cancelled.
     """
     settings = settings or FillSettings()
+    make = _tile_maker(settings)
     effort, goal = EFFORTS[settings.effort], Goal.of(mesh, settings, name)
     names = settings.groups or USUAL_GROUPS[: effort.groups]
     families = [GroupFamily.named(own) for own in names]
@@ -171,15 +174,25 @@ def fill(
     best = [poses[k] for k in order[: effort.full]]
     body = goal.body(FINE_SPACING)
     closed = team.each(
-        partial(_solid, goal, body, settings.detail),
+        partial(_solid, goal, body, make),
         best,
         "closing",
-        1.0,
+        0.9,
         lambda own: None if own is None else on_solid(own),
     )
     found: list[EscherSolid] = [own for own in closed if own is not None]
-    found.sort(key=lambda own: -own.likeness.score)
-    return found[: settings.tiles]
+    return _varied(sorted(found, key=_rank), settings.tiles)
+
+
+def _rank(own: EscherSolid) -> float:
+    return -own.likeness.score
+
+
+def _varied(solids: list[EscherSolid], count: int) -> list[EscherSolid]:
+    """Return so many solids, best first: the best of each group before others of one."""
+    firsts = {own.group_name: own for own in reversed(solids)}.values()
+    others = [own for own in solids if not any(own is first for first in firsts)]
+    return sorted([*sorted(firsts, key=_rank), *others][:count], key=_rank)
 
 
 def starting_poses(
@@ -224,20 +237,16 @@ def _box(mesh: Mesh) -> tuple[Array, Array]:
     return mesh.points.min(axis=0) - MARGIN, mesh.points.max(axis=0) + MARGIN
 
 
-def _solid(goal: Goal, body: Body, detail: int, pose: Pose) -> EscherSolid | None:
+def _solid(goal: Goal, body: Body, make: TileMaker, pose: Pose) -> EscherSolid | None:
     """Return the solid of a pose, or None if it is not one piece without handles that fills space."""
     begin = time.process_time()
     found = bent(BentBody.of(body, pose), STAGES)
     fine = Mesh(body.carried(found.nodes, goal.mesh.points), goal.mesh.faces)
     depth = _depth(fine, found)
     group = pose.family.group(found.stretches)
-    grids = (cell_complex(group, round(share * detail)) for share in FINENESS)
-    closed = next(
-        filter(lambda own: own.is_ball, (close_tile(depth, *_box(fine), g) for g in grids)), None
-    )
-    if closed is None:
+    tile = make(depth, fine, group)
+    if tile is None:
         return None
-    tile = tile_surface(closed, depth).mesh
     turn, shift = rigid_motion(body.rest, found.nodes)
     target = goal.mesh.moved(turn, shift)
     likeness = measured(tile, target, found.surface, body.importance[: body.size], found.strain)
@@ -254,6 +263,27 @@ def _solid(goal: Goal, body: Body, detail: int, pose: Pose) -> EscherSolid | Non
         seconds=seconds,
     )
     return solid if solid.certificate.valid else None
+
+
+TileMaker = Callable[[Function, Mesh, CrystallographicGroup], Mesh | None]
+"""Makes a tile of a group that is like a body, given how deep points are in it; None if it cannot."""
+
+
+def _tile_maker(settings: FillSettings) -> TileMaker:
+    if settings.method == "bending":
+        return partial(_closed_tile, settings.detail)
+    with naming_extras("method 'flow'"):
+        from orbiflow.solids.flowing import flowed_tile
+    return flowed_tile
+
+
+def _closed_tile(
+    detail: int, depth: Function, fine: Mesh, group: CrystallographicGroup
+) -> Mesh | None:
+    grids = (cell_complex(group, round(share * detail)) for share in FINENESS)
+    closed = (close_tile(depth, *_box(fine), grid) for grid in grids)
+    ball = next((own for own in closed if own.is_ball), None)
+    return None if ball is None else tile_surface(ball, depth).mesh
 
 
 def _depth(fine: Mesh, found: BentBody) -> Callable[[Array], Array]:

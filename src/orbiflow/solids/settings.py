@@ -97,6 +97,10 @@ class FillSettings(Settings, group="Search"):
     effort: Literal["fast", "normal"] = "normal"
     """How long the search takes: a minute, or some five."""
 
+    method: Literal["bending", "flow"] = "bending"
+    """How what is left between bent copies is divided: cell by cell, or by a symmetric flow of a simple
+    solid, which is always one piece (needs torch)."""
+
     size: Annotated[Length | None, DefaultText("that of the file, in mm")] = None
     """Longest side of the target's box."""
 

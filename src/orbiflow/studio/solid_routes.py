@@ -31,7 +31,7 @@ from orbiflow.studio.words import NAMES, plain_letters, plain_name
 
 SCRIPT = Path(__file__).parents[1] / "solids" / "stack.js"
 FILES = (SHEET, THUMB, PAGE)
-"""What can be had of a solid as it is."""
+"""Files of a solid that are served as they are."""
 
 routes = Routes()
 

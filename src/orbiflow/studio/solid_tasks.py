@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import time
 from functools import partial
@@ -47,6 +48,11 @@ if TYPE_CHECKING:
 MESH, FIGURE, BACKDROP = "mesh.json", "figure.json", "backdrop.png"
 SOLID, SHEET, THUMB, PAGE = "solid.safetensors", "sheet.png", "thumb.png", "page.html"
 ENDINGS = (".stl", ".obj", ".ply", ".3mf", ".gltf", ".glb")
+PLAIN_WORDS = {
+    "(or is cut off|of a kind that is not read): .*": r"\1; export it again",
+    "needs ('.*'), which cannot be read.*": r"needs \1 as well; export a .glb, which is one file",
+}
+"""What errors of the reader say of bytes and folders, and what helps."""
 
 
 @operation("studio mesh")
@@ -66,7 +72,10 @@ def mesh(
     try:
         found, notes = read_mesh(file)
     except OrbiflowError as error:
-        raise OrbiflowError(str(error).replace(str(file), called)) from error
+        text = str(error).replace(str(file), called)
+        for pattern, words in PLAIN_WORDS.items():
+            text = re.sub(pattern, words, text)
+        raise OrbiflowError(text) from error
     cancel.check()
     on_event(Progress(0.7, "drawing it"))
     up = "y" if file.suffix in Y_UP else "z"

@@ -314,12 +314,12 @@ export function newest(work, ms = 250) {
 
 const sheets = new Map();
 /**
- * Use a page's style sheet, and no other page's; resolves when it applies.
+ * Use a page's style sheets, and no other page's; resolves when they apply.
  *
- * @param {string} name
+ * @param {...string} names
  */
-export async function style(name) {
-  if (!sheets.has(name)) {
+export async function style(...names) {
+  for (const name of names.filter((own) => !sheets.has(own))) {
     const link = h("link", { rel: "stylesheet", href: `css/${name}.css` });
     const ready = new Promise((resolve) => {
       link.onload = link.onerror = resolve;
@@ -327,8 +327,8 @@ export async function style(name) {
     sheets.set(name, { link, ready });
     document.head.append(link);
   }
-  await sheets.get(name).ready;
-  for (const [other, { link }] of sheets) link.disabled = other !== name;
+  await Promise.all(names.map((name) => sheets.get(name).ready));
+  for (const [other, { link }] of sheets) link.disabled = !names.includes(other);
 }
 
 /**

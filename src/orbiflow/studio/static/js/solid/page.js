@@ -12,7 +12,7 @@ import { facts, percent, sides, stateWords } from "./words.js";
  * @param {Page} page
  */
 export async function show(root, page) {
-  await style("solid");
+  await style("takeaway", "solid");
   const own = new SolidPage(page);
   await own.build(root);
   return () => own.close();
@@ -68,7 +68,7 @@ class SolidPage {
       h("h2", { id: "found", tabindex: "-1" }, "Solids"),
       this.list,
     );
-    const notes = mesh.notes.map((text) => h("p", { class: "notice" }, text));
+    const notes = h("ul", { class: "notice" }, mesh.notes.map((text) => h("li", {}, text)));
     put(
       root,
       h(
@@ -82,7 +82,7 @@ class SolidPage {
             "div",
             { class: "stack" },
             this.stage.root,
-            notes,
+            mesh.notes.length > 0 && notes,
             this.others,
             this.takeaway.earlier,
           ),

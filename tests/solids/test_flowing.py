@@ -1,0 +1,121 @@
+"""Tiles by a symmetric flow: faces stay in pairs, volumes exact, and bodies are fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+
+from orbiflow.fields import FourierField
+from orbiflow.solids import Mesh, certify_solid
+from orbiflow.solids.distance import SignedDistance, points_inside
+from orbiflow.solids.flowing import (
+    Smoother,
+    Stage,
+    best_site,
+    dirichlet_cell,
+    flowed_tile,
+    moved,
+    uncrossed,
+)
+from orbiflow.solids.matched import MatchedSurface
+from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
+from solids.known_solids import group_named, names, seeds
+
+QUICK = (Stage(0.6, 6, 0.2),)
+
+
+def cell_of(group: CrystallographicGroup) -> MatchedSurface:
+    return dirichlet_cell(group, DirichletDomain(group).site, 150)
+
+
+def mean_overlap(one: Mesh, other: Mesh) -> float:
+    both = [{*map(bytes, np.rint(points_inside(m, 0.05) / 0.05).astype(int))} for m in (one, other)]
+    return len(both[0] & both[1]) / len(both[0] | both[1])
+
+
+def ellipsoid(center: np.ndarray) -> Mesh:
+    """A body of volume 1, longer than wide."""
+    unit = dirichlet_cell(group_named("P 1"), np.array([0.2, 0.3, 0.1]), 300).mesh
+    points = unit.points - unit.centroid
+    points = points / np.linalg.norm(points, axis=1, keepdims=True) * (0.8, 0.6, 0.5)
+    return Mesh(points + center, unit.faces)
+
+
+@given(names, seeds)
+@settings(max_examples=8)
+def test_a_divided_surface_that_a_flow_moves_fills_space(name, seed):
+    group, random = group_named(name), np.random.default_rng(seed)
+    own = cell_of(group)
+    own = own.divided(random.uniform(size=len(own.mesh.edges)) < 0.2)
+    size = 0.05 / len(own.mesh.points)
+
+    def function(points):
+        return size * np.sin(points @ random.normal(size=(3, 4))).sum(axis=1)
+
+    with torch.no_grad():
+        own = moved(function, FourierField(group, 2, smoothness=2.0), own)
+    own = uncrossed(own, Smoother(group, own))
+    assert own is not None
+    proof = certify_solid(group, own.mesh, boolean=False)
+    assert proof.valid, proof.reasons
+    assert proof.is_ball
+    assert proof.pair_error < 1e-9
+    assert proof.volume_error < 1e-12
+
+
+@given(names, seeds)
+@settings(max_examples=8)
+def test_parts_of_divided_faces_are_partners_as_the_certificate_finds_them(name, seed):
+    group, random = group_named(name), np.random.default_rng(seed)
+    own = cell_of(group)
+    for _ in range(2):
+        own = own.divided(random.uniform(size=len(own.mesh.edges)) < 0.1)
+    assert own.mesh.is_closed
+    assert own.mesh.euler_number == 2
+    np.testing.assert_array_equal(own.partners[own.partners], np.arange(len(own.partners)))
+    moves = Smoother(group, own).moves(
+        own.mesh.points, random.uniform(0, 0.1, (len(own.mesh.points), 1))
+    )
+    proof = certify_solid(group, own.with_points(own.mesh.points + moves).mesh, boolean=False)
+    assert not proof.unpaired_faces
+
+
+@pytest.mark.parametrize("name", ["P 1", "P 21 21 21"])
+def test_a_flow_fits_a_body_and_gives_the_same_each_time(name):
+    group = group_named(name)
+    body = ellipsoid(DirichletDomain(group).site)
+    distance = SignedDistance.of_mesh(body, 0.05)
+
+    def depth(points):
+        return -distance(points)
+
+    start = dirichlet_cell(group, best_site(body, group)).mesh
+    tile, again = (flowed_tile(depth, body, group, stages=QUICK) for _ in range(2))
+    np.testing.assert_array_equal(tile.points, again.points)
+    assert certify_solid(group, tile).is_ball
+    assert mean_overlap(tile, body) > mean_overlap(start, body)
+
+
+def test_what_no_ball_is_like_starts_as_a_dirichlet_cell(monkeypatch):
+    group = group_named("P 21 21 21")
+    body = ellipsoid(DirichletDomain(group).site)
+    distance = SignedDistance.of_mesh(body, 0.05)
+    monkeypatch.setattr("orbiflow.solids.flowing.START_CELLS", ())
+    tile = flowed_tile(lambda points: -distance(points), body, group, stages=QUICK, seconds=5)
+    assert certify_solid(group, tile).is_ball
+    start = dirichlet_cell(group, best_site(body, group)).mesh
+    assert mean_overlap(tile, body) > mean_overlap(start, body) + 0.05
+
+
+def test_time_and_checks_end_the_fit():
+    group = group_named("P 1")
+    body = ellipsoid(DirichletDomain(group).site)
+    distance = SignedDistance.of_mesh(body, 0.05)
+    calls = list[int]()
+    tile = flowed_tile(
+        lambda points: -distance(points), body, group, seconds=0.0, check=lambda: calls.append(1)
+    )
+    assert len(calls) == 1
+    assert certify_solid(group, tile).is_ball
