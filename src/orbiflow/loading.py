@@ -19,6 +19,7 @@ from orbiflow.density import (
 )
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, read_json, write_atomic, write_json
+from orbiflow.solids import SOLID, SOLIDS, EscherSolid, read_run, read_solid
 from orbiflow.tiles import (
     RESULT,
     TILE_MODEL,
@@ -60,7 +61,9 @@ class LoadedRun:
         )
 
 
-Loaded: TypeAlias = DensityEstimator | LoadedRun | EscherTile | TileMap
+Loaded: TypeAlias = (
+    DensityEstimator | LoadedRun | EscherTile | TileMap | EscherSolid | list[EscherSolid]
+)
 
 
 def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
@@ -71,22 +74,26 @@ def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
     - a folder of `orbiflow escherize`, or its result.json: a `LoadedRun`, whose tiles are certified
       anew;
     - the folder of one of its tiles, such as `out/turtle/IH4`: the `EscherTile`;
-    - a tile's model.safetensors without the run around it: its maps, a `TileMap`.
+    - a tile's model.safetensors without the run around it: its maps, a `TileMap`;
+    - a folder of `orbiflow fill`, or its solids.json: a list of `EscherSolid`, best first;
+    - the folder of one of its solids, or its solid.safetensors: the `EscherSolid`.
 
     Args:
         path: The folder or file.
-        uncertified: Return tiles that do not tile, too; their `certificate` says what is wrong.
+        uncertified: Return tiles and solids that do not fit together, too; their `certificate` says
+            what is wrong.
 
     Raises:
         InputFileError: if nothing is there, a folder holds neither or both, or a file is damaged.
         CertificationError: for a tile that does not tile, unless it may be uncertified.
     """
     path = as_path(path, "the folder")
+    known = (MODEL, RESULT, TILE_MODEL, SOLIDS, SOLID)
     if path.is_dir():
-        has = {name: (path / name).is_file() for name in (MODEL, RESULT, TILE_MODEL)}
+        has = {name: (path / name).is_file() for name in known}
     elif path.is_file():
-        has = {name: name == path.name for name in (MODEL, RESULT, TILE_MODEL)}
-        has[MODEL] |= path.suffix == ".safetensors" and not has[TILE_MODEL]
+        has = {name: name == path.name for name in known}
+        has[MODEL] |= path.suffix == ".safetensors" and not has[TILE_MODEL] | has[SOLID]
     else:
         raise InputFileError(
             f"{path}: no such folder; give what orbiflow density fit or orbiflow escherize wrote"
@@ -101,6 +108,8 @@ def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
             f"{path} holds no {MODEL} and no {RESULT}: give the folder that orbiflow density fit or "
             "orbiflow escherize wrote, or that of a tile in it"
         )
+    if found in ([SOLIDS], [SOLID]):
+        return _solids(path, found[0], uncertified)
     if found == [MODEL]:
         return _estimator(path)
     if found == [RESULT]:
@@ -170,6 +179,13 @@ def _estimator(path: Path) -> DensityEstimator:
 
 _SETTINGS = ("components", "repeats", "missing", "max_frequency", "segments", "seed")
 """Those of a fit that the estimator has as well."""
+
+
+def _solids(path: Path, name: str, uncertified: bool) -> EscherSolid | list[EscherSolid]:
+    solids = read_run(path) if name == SOLIDS else [read_solid(path)]
+    for own in [] if uncertified else solids:
+        own.require_certified()
+    return solids if name == SOLIDS else solids[0]
 
 
 def _run(path: Path, uncertified: bool) -> LoadedRun:

@@ -20,6 +20,7 @@ from orbiflow.errors import (
     OutputError,
     SettingError,
 )
+from orbiflow.loading import load
 from orbiflow.runtime import Cancel, Cancelled, Note, Progress
 from orbiflow.solids import (
     BuildSettings,
@@ -96,6 +97,12 @@ def test_a_folder_is_read_again(run: Path) -> None:
     assert as_solid(run, "2").group_name == solids[1].group_name
     assert as_solid(run, solids[1].group_name.replace(" ", "")).group_name == solids[1].group_name
     assert as_solid(run / folder_name(1, solids[0])).group_name == solids[0].group_name
+    loaded = load(run)
+    assert isinstance(loaded, list)
+    assert [own.group_name for own in loaded] == [own.group_name for own in solids]
+    one = load(run / folder_name(2, solids[1]))
+    assert isinstance(one, EscherSolid)
+    assert one.group_name == solids[1].group_name
     with pytest.raises(OrbiflowError, match="ranks 1 to 2"):
         as_solid(run, "P4")
 

@@ -8,6 +8,7 @@ from .pictures import solid_gif as solid_gif
 from .pictures import solid_sheet as solid_sheet
 from .reading import ReadMesh as ReadMesh
 from .reading import read_mesh as read_mesh
+from .run_folder import SOLIDS as SOLIDS
 from .run_folder import as_solid as as_solid
 from .run_folder import read_run as read_run
 from .run_folder import write_run as write_run
@@ -16,6 +17,7 @@ from .search import fill as fill
 from .search import usual_size as usual_size
 from .settings import BuildSettings as BuildSettings
 from .settings import FillSettings as FillSettings
+from .solid import SOLID as SOLID
 from .solid import EscherSolid as EscherSolid
 from .solid import read_solid as read_solid
 from .web_page import figure_data as figure_data

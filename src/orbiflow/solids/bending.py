@@ -17,7 +17,7 @@ from orbiflow.solids.families import GroupFamily
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.poses import Pose
 
-STAGES = ((0.2, 10), (0.6, 10), (2.0, 12), (6.0, 14), (12.0, 12))
+STAGES = ((0.2, 10), (0.6, 10), (2.0, 12), (6.0, 14))
 """How strongly the surface is pulled to where copies meet, and for how many steps."""
 QUICK_STAGES = ((0.3, 6), (1.0, 6), (3.0, 8))
 

@@ -41,7 +41,7 @@ THINNEST = 0.5
 
 SLIDING, DAMPING, SOLVER_STEPS = 1.0, 1e-2, 6
 EVENNESS = 0.15  # how far points move to the means of their neighbours after each step
-CHECKED, SMOOTHINGS, MOST_CROSSINGS = 3, 12, 1000
+SMOOTHINGS, MOST_CROSSINGS = 24, 1000
 
 
 class Stage(NamedTuple):
@@ -70,7 +70,7 @@ def flowed_tile(
     step moves its surface by the flow of a field that commutes with the group, which is fitted by
     least squares to where the surface is wanted (Sobolev descent, design point 10). Then points move a
     little to the means of their neighbours, by orbits. So faces stay in pairs and the volume is exact.
-    From time to time the surface is smoothed where triangles cross; the last one without is returned.
+    Where triangles cross the surface is smoothed; where that is in vain the stage ends before it.
 
     Args:
         function: How deep points are in the body, negative outside, as for `close_tile`.
@@ -81,23 +81,22 @@ def flowed_tile(
         check: Called before each step; may raise.
     """
     begin, own = time.process_time(), starting_surface(function, body, group)
-    best, smoother = own, Smoother(group, own)
+    smoother = Smoother(group, own)
     for stage in stages:
         waves = max(1, round(group.cell_volume ** (1 / 3) / stage.wavelength))
-        field, own = FourierField(group, waves, smoothness=SMOOTHNESS), best
+        field = FourierField(group, waves, smoothness=SMOOTHNESS)
         for step in range(stage.steps):
             check()
             if seconds is not None and time.process_time() - begin > seconds:
-                return best.mesh
+                return own.mesh
             fine = divided_to(own, stage.edge)
             if step == 0 or fine is not own:
                 smoother = Smoother(group, fine)
-            own = smoother.evened(moved(function, field, fine), EVENNESS)
-            if step % CHECKED == CHECKED - 1:
-                if (found := uncrossed(own, smoother)) is None:
-                    break
-                own = best = found
-    return best.mesh
+            found = uncrossed(smoother.evened(moved(function, field, fine), EVENNESS), smoother)
+            if found is None:
+                break
+            own = found
+    return own.mesh
 
 
 def starting_surface(

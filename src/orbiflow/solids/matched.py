@@ -77,12 +77,14 @@ class MatchedSurface:
         center = (points.min(axis=0) + points.max(axis=0)) / 2
         reach = 2 * float(np.linalg.norm(points - center, axis=1).max())
         tree = cKDTree(points)
-        blocks: list[tuple[Integers, Integers, Array]] = []
+        images, sources, turns = list[Integers](), list[Integers](), list[Array]()
         for element in group.elements_near(center, reach):
             away, own = tree.query(element(points), distance_upper_bound=SAME_PLACE)
-            moved = np.flatnonzero(np.isfinite(away))
-            blocks.append((own[moved], moved, np.tile(element.linear, (len(moved), 1, 1))))
-        rows, columns, parts = (np.concatenate(own) for own in zip(*blocks, strict=True))
+            found = np.flatnonzero(np.isfinite(away))
+            images.append(np.asarray(own)[found])
+            sources.append(found)
+            turns.append(np.tile(element.linear, (len(found), 1, 1)))
+        rows, columns, parts = (np.concatenate(k) for k in (images, sources, turns))
         parts = parts / np.bincount(rows, minlength=n)[rows, None, None]
         order = np.argsort(rows, kind="stable")
         pointers = np.searchsorted(rows[order], np.arange(n + 1))

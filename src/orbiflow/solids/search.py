@@ -38,6 +38,7 @@ FINENESS = (1.0, 0.8)  # cells over those wanted: another grid may close where o
 MARGIN = 0.15  # how far from the bent body its tile may reach
 PROBES = 5_000  # points of space that are asked how many copies hold them
 SMALLEST, LARGEST, USUAL_SIZE = 15.0, 400.0, 60.0  # longest sides in mm that are printed
+MOST_STRAIN = 0.5  # of a body that did not come apart while it bent
 STRAIN_COST = 0.25  # of strain, in shares of space that are uncovered or covered twice
 
 
@@ -241,6 +242,8 @@ def _solid(goal: Goal, body: Body, make: TileMaker, pose: Pose) -> EscherSolid |
     """Return the solid of a pose, or None if it is not one piece without handles that fills space."""
     begin = time.process_time()
     found = bent(BentBody.of(body, pose), STAGES)
+    if not found.strain < MOST_STRAIN:
+        return None
     fine = Mesh(body.carried(found.nodes, goal.mesh.points), goal.mesh.faces)
     depth = _depth(fine, found)
     group = pose.family.group(found.stretches)
@@ -249,7 +252,8 @@ def _solid(goal: Goal, body: Body, make: TileMaker, pose: Pose) -> EscherSolid |
         return None
     turn, shift = rigid_motion(body.rest, found.nodes)
     target = goal.mesh.moved(turn, shift)
-    likeness = measured(tile, target, found.surface, body.importance[: body.size], found.strain)
+    near = cKDTree(found.surface.points).query(fine.points)[1]
+    likeness = measured(tile, target, fine, body.importance[near], found.strain)
     seconds = time.process_time() - begin
     solid = EscherSolid(
         name=goal.name,

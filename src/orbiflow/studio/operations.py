@@ -23,7 +23,7 @@ PACKAGES = ("starlette", "uvicorn", "platformdirs")
 def studio(
     settings: StudioSettings = StudioSettings(), *, on_event: Sink = ignore, cancel: Cancel = NEVER
 ) -> Outcome:
-    """Make tiles and densities in a browser: a web page that this very machine serves.
+    """Make tiles, solids and densities in a browser: a page that this very machine serves.
 
     Projects are kept, and searches that were not done go on when the studio is started again. The
     server ends with Ctrl-C.
