@@ -66,7 +66,7 @@ def flowed_tile(
 ) -> Mesh:
     """Return a solid that fits a body and fills space, as a symmetric flow makes it; always one piece.
 
-    It starts as a ball of few cells, or where none can be had as a Dirichlet cell of the group. Each
+    It starts as a ball of few cells, or where none is possible as a Dirichlet cell of the group. Each
     step moves its surface by the flow of a field that commutes with the group, which is fitted by
     least squares to where the surface is wanted (Sobolev descent, design point 10). Then points move a
     little to the means of their neighbours, by orbits. So faces stay in pairs and the volume is exact.
