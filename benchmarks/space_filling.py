@@ -32,9 +32,9 @@ from orbiflow.solids.assembly import Pieces
 from orbiflow.solids.body import Body
 from orbiflow.solids.distance import points_inside
 from orbiflow.solids.pictures import solid_sheet
-from orbiflow.solids.search import EFFORTS, ROUGH_SPACING, Goal, quick_bend, starting_poses
+from orbiflow.solids.search import EFFORTS, Goal, quick_bend, starting_poses
 
-MOST_COSETS = 8  # of groups in the table: solids of larger ones have no room for limbs
+MOST_COSETS = 4  # of groups in the table: solids of larger ones have little room for limbs
 
 
 def main() -> None:
@@ -64,7 +64,7 @@ def _groups(files: list[Path], names: str, workers: int) -> None:
     costs = np.zeros((len(files), len(families)))
     for row, file in zip(costs, files, strict=True):
         goal = Goal.of(read_mesh(file).mesh, FillSettings())
-        job = partial(_cost, goal, goal.body(ROUGH_SPACING))
+        job = partial(_cost, goal, goal.body(EFFORTS["fast"].rough))
         row[:] = Team(__name__, workers, ignore, NEVER).each(job, families, file.stem, 1.0)
         print(
             file.stem,
@@ -79,7 +79,7 @@ def _groups(files: list[Path], names: str, workers: int) -> None:
 
 
 def _cost(goal: Goal, body: Body, family: GroupFamily) -> float:
-    effort = EFFORTS["normal"]
+    effort = EFFORTS["fast"]
     poses = starting_poses(effort, goal.inner_points, (family, np.random.SeedSequence(0)))
     return min(quick_bend(body, pose)[0] for pose in poses[: effort.per_group])
 

@@ -21,13 +21,13 @@ SMALL = FillSettings(effort="fast", groups=("P-1", "P21"), detail=5000, workers=
 
 @contextmanager
 def small_fills() -> Iterator[None]:
-    """Search for solids from few poses and coarse bodies, in this process and its forks."""
+    """Search for solids from few poses and coarse bodies."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(search.EFFORTS, "fast", search.Effort(2, 100, 2, 30, 1, 2, 2))
-        patch.setattr(search, "FINE_SPACING", 0.13)
-        patch.setattr(search, "ROUGH_SPACING", 0.16)
-        patch.setattr(search, "CLOSED_GRAIN", 0.05)
-        patch.setattr(search, "STAGES", ((0.5, 4), (2.0, 6), (8.0, 4)))
+        few = search.Effort(
+            groups=2, tried=100, climbed=2, steps=30, per_group=1, quick=2, full=2,
+            rough=0.16, fine=0.13, grain=0.05, stages=((0.5, 4), (2.0, 6), (8.0, 4)),
+        )  # fmt: skip
+        patch.setitem(search.EFFORTS, "fast", few)
         patch.setattr(run_folder, "SHEET_WIDTH", 480)
         patch.setattr(run_folder, "FRAMES", 3)
         yield

@@ -20,7 +20,7 @@ from orbiflow.solids.soup import Soup
 MAX_FACES = 60_000
 """Triangles of a mesh that is read; finer ones are simplified."""
 
-COARSEST = 0.01
+COARSEST = 0.03
 """The most that a surface moves where it is simplified, as a share of its size."""
 
 

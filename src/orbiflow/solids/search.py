@@ -32,8 +32,6 @@ from orbiflow.symmetry import CrystallographicGroup
 
 GRAIN = 0.058  # of the points inside a body by which poses are compared
 FINE = 0.03  # of the points on its surface
-ROUGH_SPACING, FINE_SPACING = 0.085, 0.055  # of the nodes of a body that bends
-CLOSED_GRAIN = 0.02  # of the points on the bent surface that a tile is made of
 FINENESS = (1.0, 0.8)  # cells over those wanted: another grid may close where one does not
 MARGIN = 0.15  # how far from the bent body its tile may reach
 PROBES = 5_000  # points of space that are asked how many copies hold them
@@ -51,8 +49,16 @@ AXES = {
 
 
 class Effort(NamedTuple):
-    """How much is tried: groups; of each group random poses, climbs and their steps, and poses that go
-    on; of all groups quick bends, and solids."""
+    """How much is tried, and how finely.
+
+    - `groups`: Number of groups.
+    - `tried`, `climbed`, `steps`, `per_group`: Of each, random poses, climbs and their steps, and poses
+      that go on.
+    - `quick`, `full`: Of all, quick bends, and solids.
+    - `rough`, `fine`: Spacings of a body's nodes in quick bends and in others.
+    - `grain`: Spacing of the points on the bent surface that a solid is made of.
+    - `stages`: Of the bends that solids are made of.
+    """
 
     groups: int
     tried: int
@@ -61,6 +67,10 @@ class Effort(NamedTuple):
     per_group: int
     quick: int
     full: int
+    rough: float = 0.085
+    fine: float = 0.055
+    grain: float = 0.02
+    stages: tuple[tuple[float, int], ...] = STAGES
 
 
 EFFORTS = {
@@ -169,13 +179,13 @@ def fill(
     placed = team.each(partial(starting_poses, effort, goal.inner_points), jobs, "placing", 0.1)
     poses = [pose for some in placed for pose in some[: effort.per_group]]
     poses.sort(key=lambda pose: -pose.cover)
-    rough = goal.body(ROUGH_SPACING)
+    rough = goal.body(effort.rough)
     quick = team.each(partial(quick_bend, rough), poses[: effort.quick], "bending", 0.35)
     order = np.argsort([cost for cost, _ in quick], kind="stable")
     best = [poses[k] for k in order[: effort.full]]
-    body = goal.body(FINE_SPACING)
+    body = goal.body(effort.fine)
     closed = team.each(
-        partial(_solid, goal, body, make),
+        partial(_solid, goal, body, make, effort),
         best,
         "closing",
         0.9,
@@ -238,14 +248,16 @@ def _box(mesh: Mesh) -> tuple[Array, Array]:
     return mesh.points.min(axis=0) - MARGIN, mesh.points.max(axis=0) + MARGIN
 
 
-def _solid(goal: Goal, body: Body, make: TileMaker, pose: Pose) -> EscherSolid | None:
+def _solid(
+    goal: Goal, body: Body, make: TileMaker, effort: Effort, pose: Pose
+) -> EscherSolid | None:
     """Return the solid of a pose, or None if it is not one piece without handles that fills space."""
     begin = time.process_time()
-    found = bent(BentBody.of(body, pose), STAGES)
+    found = bent(BentBody.of(body, pose), effort.stages)
     if not found.strain < MOST_STRAIN:
         return None
     fine = Mesh(body.carried(found.nodes, goal.mesh.points), goal.mesh.faces)
-    depth = _depth(fine, found)
+    depth = _depth(fine, found, effort.grain)
     group = pose.family.group(found.stretches)
     tile = make(depth, fine, group)
     if tile is None:
@@ -290,14 +302,14 @@ def _closed_tile(
     return None if ball is None else tile_surface(ball, depth).mesh
 
 
-def _depth(fine: Mesh, found: BentBody) -> Callable[[Array], Array]:
+def _depth(fine: Mesh, found: BentBody, grain: float) -> Callable[[Array], Array]:
     """Return how deep points are inside a bent surface, times how much its parts matter there.
 
     So overlaps are settled at the cost of the less important side. Outside it is minus the distance,
     and gaps go to the nearest copy: with weights, parts would be claimed that nothing holds.
     """
-    points, normals = surface_points(fine, CLOSED_GRAIN)
+    points, normals = surface_points(fine, grain)
     near = cKDTree(found.surface.points).query(points, 4)[1]
     weights = found.body.importance[near].mean(axis=1)
-    distance = SignedDistance(points, normals, CLOSED_GRAIN, weights)
+    distance = SignedDistance(points, normals, grain, weights)
     return lambda x: -distance(x)
