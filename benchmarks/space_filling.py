@@ -1,6 +1,6 @@
 """What space groups are worth for solids that fill space, and what whole searches find.
 
-    python benchmarks/space_filling.py [--effort fast|normal] [--out FOLDER] MESH ...
+    python benchmarks/space_filling.py [--effort fast|normal] [--method flow] [--out FOLDER] MESH ...
     python benchmarks/space_filling.py --groups all MESH ...      # what groups are worth
 
 A row of a search is of the first solid: how much it looks like the figure, how many of a million points
@@ -27,7 +27,7 @@ from PIL import Image, ImageDraw
 from orbiflow.drawing import ShadedPart, View, draw_solids, font
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Team, ignore
-from orbiflow.solids import EscherSolid, FillSettings, GroupFamily, fill, read_mesh
+from orbiflow.solids import EscherSolid, FillSettings, GroupFamily, fill, read_mesh, usual_up
 from orbiflow.solids.assembly import Pieces
 from orbiflow.solids.body import Body
 from orbiflow.solids.distance import points_inside
@@ -42,6 +42,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--groups", help="names between commas, or all: print the table of groups")
     parser.add_argument("--effort", choices=("fast", "normal"), default="normal")
+    parser.add_argument("--method", choices=("bending", "flow"), default="bending")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path)
     parser.add_argument("files", nargs="+", type=Path)
@@ -49,7 +50,7 @@ def main() -> None:
     if options.groups:
         _groups(options.files, options.groups, options.workers)
     else:
-        _searches(options.files, options.effort, options.workers, options.out)
+        _searches(options.files, options.effort, options.method, options.workers, options.out)
 
 
 def _groups(files: list[Path], names: str, workers: int) -> None:
@@ -85,7 +86,11 @@ def _cost(goal: Goal, body: Body, family: GroupFamily) -> float:
 
 
 def _searches(
-    files: list[Path], effort: Literal["fast", "normal"], workers: int, out: Path | None
+    files: list[Path],
+    effort: Literal["fast", "normal"],
+    method: Literal["bending", "flow"],
+    workers: int,
+    out: Path | None,
 ) -> None:
     print(
         "solid       group      score overlap shadows kept smooth bent  missed  leaves  found  seconds"
@@ -93,7 +98,7 @@ def _searches(
     best = list[EscherSolid]()
     for file in files:
         begin = time.perf_counter()
-        settings = FillSettings(effort=effort, workers=workers, up="y")
+        settings = FillSettings(effort=effort, method=method, workers=workers, up=usual_up(file))
         found = fill(read_mesh(file).mesh, settings, name=file.stem)
         seconds = time.perf_counter() - begin
         if not found:
@@ -110,7 +115,7 @@ def _searches(
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         for solid in best:
-            solid_sheet(solid, upright=solid.upright).save(out / f"{solid.name}.png")
+            solid_sheet(solid).save(out / f"{solid.name}.png")
         solids_picture(best).save(out / "solids.png")
 
 

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import Manifold
 
+from orbiflow.solids.bodies import as_mesh
 from orbiflow.solids.mesh import Mesh
-
-
-def as_mesh(body: Manifold) -> Mesh:
-    """Return the mesh of a body."""
-    found = body.to_mesh64()
-    return Mesh(found.vert_properties[:, :3], found.tri_verts.astype(np.int64))
 
 
 def of_volume_one(mesh: Mesh) -> Mesh:

@@ -24,7 +24,12 @@ from solids_read import read_3mf, read_stl
 
 def space_tile(tile: Mesh, group: CrystallographicGroup | None = None) -> Any:
     return SimpleNamespace(
-        group=group or cubic_group(), tile=tile, target=tile, bent=tile, millimetres=30.0
+        group=group or cubic_group(),
+        tile=tile,
+        target=tile,
+        bent=tile,
+        millimetres=30.0,
+        upright=np.eye(3),
     )
 
 
@@ -84,7 +89,7 @@ def test_a_stack_repeats_no_mesh() -> None:
     mirror = Isometry(np.diag([-1.0, 1.0, 1.0]), np.zeros(3))
     group = CrystallographicGroup.generate(np.diag([2.0, 1.0, 1.0]), [mirror], name="Pm")
     for own in (BUMPY, space_tile(box(), group)):
-        made = make_stack(own, copies=8, clearance=0.3, upright=np.eye(3))
+        made = make_stack(own, copies=8, clearance=0.3)
         bodies = list(made.bodies().values())
         assert len(bodies) == 8
         assert made.parts.keys() == made.places.keys() == made.colours.keys()

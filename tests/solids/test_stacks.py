@@ -31,7 +31,12 @@ def space_tile(tile: Mesh | None = None, group: CrystallographicGroup | None = N
     tile = tile or bumpy_cell(steps=8)
     figure = ball(0.6, (0.5, 0.5, 0.5))
     return SimpleNamespace(
-        group=group or cubic_group(), tile=tile, target=figure, bent=figure, millimetres=30.0
+        group=group or cubic_group(),
+        tile=tile,
+        target=figure,
+        bent=figure,
+        millimetres=30.0,
+        upright=np.eye(3),
     )
 
 

@@ -187,6 +187,14 @@ def done(client: Client, answer: Any) -> dict[str, Any]:
     return next(task for task in project["tasks"] if task["id"] == number)
 
 
+def worked(client: Client, own: str, operation: str, **settings: Any) -> dict[str, Any]:
+    """A task that has ended."""
+    body = {"operation": operation, "settings": settings}
+    answer = client.post(f"{own}/tasks", json=body)
+    assert answer.status_code == 200, answer.text
+    return done(client, answer)
+
+
 def new_project(client: Client) -> str:
     """Return the address of a new project."""
     return f"/api/projects/{client.post('/api/projects', json={}).json()['id']}"

@@ -22,7 +22,7 @@ from orbiflow.density.tables import Table, seen_column
 from orbiflow.studio import density_tasks
 from orbiflow.studio.density_routes import EXAMPLES, TABLES
 from orbiflow.studio.density_tasks import table_view
-from studio.served import Client, done, new_project, studio
+from studio.served import Client, done, new_project, studio, worked
 
 ROWS = 40
 ANGLES = "".join(f"{v:.2f},{40 * np.sin(v):.2f}\n" for v in np.linspace(-170, 170, ROWS))
@@ -43,14 +43,6 @@ def uploaded(client: Client, data: bytes, name: str) -> tuple[str, dict[str, Any
     answer = client.put(f"{own}/density/table", params={"name": name}, content=data)
     assert answer.status_code == 200, answer.text
     return own, done(client, answer)
-
-
-def worked(client: Client, own: str, operation: str, **settings: Any) -> dict[str, Any]:
-    """A task that has ended."""
-    body = {"operation": operation, "settings": settings}
-    answer = client.post(f"{own}/tasks", json=body)
-    assert answer.status_code == 200, answer.text
-    return done(client, answer)
 
 
 @pytest.fixture(scope="module", name="client")

@@ -18,11 +18,12 @@ from PIL import Image
 import orbiflow.solids
 from orbiflow.solids import EscherSolid, FillSettings, SolidLikeness, read_solid
 from orbiflow.solids.mesh import Mesh
+from orbiflow.solids.reading import READERS
 from orbiflow.studio.settings import Job
 from orbiflow.studio.solid_routes import FILES
-from orbiflow.studio.solid_tasks import put_solid
+from orbiflow.studio.solid_tasks import ENDINGS, put_solid
 from solids.mesh_files import ball, box, bumpy_cell, cubic_group, inside_out, obj, stl, three_mf
-from studio.served import Client, done, new_project, studio
+from studio.served import Client, done, new_project, studio, worked
 
 BUMPY = bumpy_cell(steps=8)
 UPLOAD = 60_000
@@ -66,12 +67,8 @@ def uploaded(client: Client, data: bytes, name: str) -> tuple[str, dict[str, Any
     return own, done(client, answer)
 
 
-def worked(client: Client, own: str, operation: str, **settings: Any) -> dict[str, Any]:
-    """A task that has ended."""
-    body = {"operation": operation, "settings": settings}
-    answer = client.post(f"{own}/tasks", json=body)
-    assert answer.status_code == 200, answer.text
-    return done(client, answer)
+def test_what_is_uploaded_is_what_is_read() -> None:
+    assert tuple(READERS) == ENDINGS
 
 
 def home(client: Client, own: str) -> Path:

@@ -3,11 +3,11 @@ from .certificate import certify_solid as certify_solid
 from .families import GroupFamily as GroupFamily
 from .likeness import SolidLikeness as SolidLikeness
 from .mesh import Mesh as Mesh
-from .operations import Y_UP as Y_UP
 from .pictures import solid_gif as solid_gif
 from .pictures import solid_sheet as solid_sheet
 from .reading import ReadMesh as ReadMesh
 from .reading import read_mesh as read_mesh
+from .reading import usual_up as usual_up
 from .run_folder import SOLIDS as SOLIDS
 from .run_folder import as_solid as as_solid
 from .run_folder import read_run as read_run

@@ -86,7 +86,7 @@ class BentBody:
             ]
             cells = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
             linear = lattice @ turn @ inverse
-            boxes = (corners @ linear.T) @ np.eye(3)
+            boxes = corners @ linear.T
             moves = (shift + cells) @ lattice.T
             near = ((boxes.min(0) + moves < high) & (boxes.max(0) + moves > low)).all(axis=1)
             if k == 0:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from manifold3d import Manifold
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from orbiflow.arrays import Array, Integers
+from orbiflow.errors import OrbiflowError
+from orbiflow.solids.bodies import as_body, common_volume, moved_body
 from orbiflow.solids.crossings import crossing_pairs
 from orbiflow.solids.mesh import Mesh
 from orbiflow.symmetry import CrystallographicGroup, Isometry
@@ -134,10 +136,7 @@ def _shape_reasons(mesh: Mesh) -> list[str]:
     reasons: list[str] = []
     if not mesh.is_closed:
         reasons.append("it is not closed: an edge is not of two faces that run along it oppositely")
-    edges = mesh.corners - np.roll(mesh.corners, 1, axis=1)
-    longest = np.einsum("nij,nij->ni", edges, edges).max(axis=1)
-    flat = int(np.sum(np.linalg.norm(mesh.face_vectors, axis=1) <= SMALLEST_SINE * longest))
-    if flat:
+    if flat := len(mesh.thin_faces(SMALLEST_SINE)):
         reasons.append(f"{flat} triangles have no area")
     pieces = int(mesh.piece_of_faces.max()) + 1
     if pieces > 1:
@@ -217,17 +216,14 @@ def boolean_errors(group: CrystallographicGroup, mesh: Mesh) -> tuple[float, flo
     asked, as both share as much. What is uncovered is a box's volume less that of the copies' parts in
     it. The box is a little larger than the solid's, so that it shows gaps behind all faces.
     """
-    import manifold3d
-
     volume = mesh.volume
     center = (mesh.points.min(axis=0) + mesh.points.max(axis=0)) / 2
     half = np.ptp(mesh.points, axis=0) / 2 * (1 + 1e-3 * np.sqrt([2, 3, 5]))
-    solid = manifold3d.Manifold(
-        manifold3d.Mesh64(mesh.points - center, mesh.faces.astype(np.uint64))
-    )
-    if solid.status() != manifold3d.Error.NoError:
+    try:
+        solid = as_body(Mesh(mesh.points - center, mesh.faces))
+    except OrbiflowError:
         return 1.0, 1.0, 0
-    box = manifold3d.Manifold.cube((2 * half).tolist(), True)
+    box = Manifold.cube((2 * half).tolist(), True)
     radius = float(np.linalg.norm(mesh.points - center, axis=1).max())
     reach = radius + float(np.linalg.norm(half))
     rest, overlap, near = 8 * float(np.prod(half)), 0.0, 0
@@ -237,7 +233,7 @@ def boolean_errors(group: CrystallographicGroup, mesh: Mesh) -> tuple[float, flo
         middle = mesh.points @ element.linear.T + (element.translation - center)
         if np.any(middle.min(axis=0) > half) or np.any(middle.max(axis=0) < -half):
             continue
-        copy = solid.transform(np.column_stack([element.linear, shift]))
+        copy = moved_body(solid, element.linear, shift)
         rest -= (copy ^ box).volume()
         if np.allclose(element.linear, np.eye(3)) and np.allclose(element.translation, 0):
             continue
@@ -248,19 +244,18 @@ def boolean_errors(group: CrystallographicGroup, mesh: Mesh) -> tuple[float, flo
     return overlap / volume, rest / volume, near
 
 
-def _shared_volume(first: Any, second: Any, volume: float) -> float:
+def _shared_volume(first: Manifold, second: Manifold, volume: float) -> float:
     """Return the volume that two of manifold3d's solids share.
 
     Where faces coincide, rounding can spoil it by a triangle's thickness; in another frame it is
     rounded otherwise, so the least of three counts.
     """
-    least = (first ^ second).volume()
+    least = common_volume(first, second)
     for angle in (1.0, 2.0):
         if least <= BOOLEAN_TOLERANCE / 4 * volume:
             break
         turn = Rotation.from_rotvec(np.array([0.3, 0.5, 0.8]) * angle).as_matrix()
-        frame = np.column_stack([turn, np.zeros(3)])
-        least = min(least, (first.transform(frame) ^ second.transform(frame)).volume())
+        least = min(least, common_volume(moved_body(first, turn), moved_body(second, turn)))
     return least
 
 

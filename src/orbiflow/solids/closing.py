@@ -92,13 +92,10 @@ def _closed_in(function: Function, lower: Array, upper: Array, complex: Complex)
     """Return a ball of cells in a box, as `close_tile` does."""
     box, values = _evaluated(function, lower, upper, complex)
     orbits = np.where(np.isfinite(values), complex.orbit_of(box.cells(np.arange(len(values)))), -1)
-    best, _ = _largest(values, orbits, complex.cells_per_tile)
-    piece = _pieces(box, best)
-    main = piece == np.bincount(piece).argmax()
     unit = _slope(values, orbits, box) * complex.spacing
-    rough = _grown(box, orbits, values)
+    rough, best, pieces = _grown(box, orbits, values)
     wanted = _settled(box, orbits, values / unit, rough.members())
-    ball, largest = _grown(box, orbits, wanted), _largest(wanted, orbits, complex.cells_per_tile)[0]
+    ball, largest, _ = _grown(box, orbits, wanted)
     size = SURFACE_WEIGHT * FAITH
     for _ in range(FREEING_PASSES):
         if ball.is_complete:
@@ -112,29 +109,31 @@ def _closed_in(function: Function, lower: Array, upper: Array, complex: Complex)
     members = ball.members()
     own = ball.orbit_of[members]
     lost = values[best[own]] - values[members]
-    slope = unit / complex.spacing
     return CellTile(
         complex,
         box.cells(members),
         missing=complex.cells_per_tile - len(members),
         moved=int(np.sum(best[own] != members)),
-        loss=float(lost.mean()) / (slope * complex.spacing),
-        raw_pieces=int(piece.max()) + 1,
-        raw_strays=int(np.sum(~main)),
+        loss=float(lost.mean()) / unit,
+        raw_pieces=len(pieces),
+        raw_strays=int(pieces.sum() - pieces.max()),
     )
 
 
-def _grown(box: CellBox, orbits: Integers, values: Array) -> BallOfCells:
-    """Return a ball that grows by the cells of largest values, first where a cell would lose most."""
+def _grown(box: CellBox, orbits: Integers, values: Array) -> tuple[BallOfCells, Integers, Integers]:
+    """Return a ball that grows by the cells of largest values, first where a cell would lose most.
+
+    Returns as well these cells, one for each orbit, and how many are in each of their pieces.
+    """
     number = box.complex.cells_per_tile
     best, margins = _largest(values, orbits, number)
     piece = _pieces(box, best)
-    main = piece == np.bincount(piece).argmax()
+    sizes = np.bincount(piece)
     ball = BallOfCells(box, orbits, number)
-    ball.attach(int(best[np.where(main, margins, -np.inf).argmax()]))
+    ball.attach(int(best[np.where(piece == sizes.argmax(), margins, -np.inf).argmax()]))
     ball.grow(best[np.argsort(-margins, kind="stable")])
     _grow_the_rest(ball, values, values[best])
-    return ball
+    return ball, best, sizes
 
 
 def _settled(box: CellBox, orbits: Integers, values: Array, members: Integers) -> Array:

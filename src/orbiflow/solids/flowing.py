@@ -206,7 +206,7 @@ def areas_and_pull(mesh: Mesh, tension: Array) -> tuple[Array, Array]:
     opposite = np.roll(mesh.corners, -1, axis=1) - np.roll(mesh.corners, -2, axis=1)
     pulls = np.cross(flat[:, None], opposite).reshape(-1, 3) / 2
     areas = np.bincount(where, np.repeat(sizes / 6, 3), n)
-    return areas, np.stack([np.bincount(where, own, n) for own in pulls.T], axis=1)
+    return areas, mesh.sums_at_points(pulls)
 
 
 def thickness(mesh: Mesh) -> Array:

@@ -18,11 +18,10 @@ from orbiflow.solids.assembly import Assembly, Leaving, Pieces
 from orbiflow.solids.bodies import moved_body, united
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.offsets import offset_body
-from orbiflow.solids.pictures import figure_axes
 from orbiflow.solids.print_advice import lying, print_advice
 from orbiflow.solids.settings import BuildSettings
 from orbiflow.solids.solid import EscherSolid
-from orbiflow.solids.stacks import STACK_PALETTE, SpaceTile, StackedCopy, colour_number, stack_of
+from orbiflow.solids.stacks import STACK_PALETTE, StackedCopy, colour_number, stack_of
 from orbiflow.solids.sweeping import lifted
 
 CLEARANCE, WALL, FLOOR = 0.25, 3.0, 2.0
@@ -79,7 +78,7 @@ def make(own: EscherSolid, settings: BuildSettings) -> Made:
         case "tile":
             return make_tile(own, clearance=gap, nozzle=settings.nozzle)
         case "stack":
-            return make_stack(own, copies=settings.copies, clearance=gap, upright=own.upright)
+            return make_stack(own, copies=settings.copies, clearance=gap)
         case "block":
             return make_block(own, clearance=gap, wall=wall, floor=floor)
         case "puzzle":
@@ -93,7 +92,7 @@ def make(own: EscherSolid, settings: BuildSettings) -> Made:
             )
 
 
-def make_tile(own: SpaceTile, *, clearance: float = CLEARANCE, nozzle: float = 0.4) -> Made:
+def make_tile(own: EscherSolid, *, clearance: float = CLEARANCE, nozzle: float = 0.4) -> Made:
     """Return one tile, smaller all around by half of the clearance, as it is best printed.
 
     Args:
@@ -110,18 +109,15 @@ def make_tile(own: SpaceTile, *, clearance: float = CLEARANCE, nozzle: float = 0
     return Made({"tile": body}, {"tile": STACK_PALETTE.fill(0)}, notes=advice.sentences)
 
 
-def make_stack(
-    own: SpaceTile, *, copies: int = 8, clearance: float = CLEARANCE, upright: Array | None = None
-) -> Made:
+def make_stack(own: EscherSolid, *, copies: int = 8, clearance: float = CLEARANCE) -> Made:
     """Return a stack of copies as they fill space, a part for each colour, standing like the figure.
 
     Args:
         own: A tile that fills space.
         copies: How many copies.
         clearance: The gap in mm between them.
-        upright: As for `solid_sheet`.
     """
-    axes = figure_axes(own.target) if upright is None else np.asarray(upright, float)
+    axes = own.upright
     stack = stack_of(own.group, own.tile, copies)
     body = offset_body(_in_mm(own.tile, own), -clearance / 2)
     placed = _placed(body, stack, own, axes.T)
@@ -141,7 +137,7 @@ def make_stack(
 
 
 def make_block(
-    own: SpaceTile,
+    own: EscherSolid,
     *,
     clearance: float = CLEARANCE,
     wall: float = WALL,
@@ -188,7 +184,7 @@ def make_block(
     return Made(parts, {"starting block": "#d9d3c7", "tile": STACK_PALETTE.fill(0)}, notes=notes)
 
 
-def _copies_above(own: SpaceTile, body: Manifold, turn: Array, block: Manifold) -> list[Manifold]:
+def _copies_above(own: EscherSolid, body: Manifold, turn: Array, block: Manifold) -> list[Manifold]:
     """Return the copies of a body, itself too, that meet a block and are not below the tile."""
     center, up = own.tile.centroid, turn[2]
     box = np.reshape(block.bounding_box(), (2, 3)) / own.millimetres
@@ -203,7 +199,7 @@ def _copies_above(own: SpaceTile, body: Manifold, turn: Array, block: Manifold) 
 
 
 def make_puzzle(
-    own: SpaceTile,
+    own: EscherSolid,
     *,
     copies: int = 8,
     clearance: float = CLEARANCE,
@@ -263,12 +259,12 @@ def _box_direction(
     return leaving, ["In the box not all of them go in straight from above."]
 
 
-def _in_mm(mesh: Mesh, own: SpaceTile) -> Mesh:
+def _in_mm(mesh: Mesh, own: EscherSolid) -> Mesh:
     return Mesh(own.millimetres * mesh.points, mesh.faces)
 
 
 def _placed(
-    body: Manifold, stack: Sequence[StackedCopy], own: SpaceTile, turn: Array
+    body: Manifold, stack: Sequence[StackedCopy], own: EscherSolid, turn: Array
 ) -> list[Manifold]:
     """Return the copies of a body in mm, turned."""
     return [

@@ -46,6 +46,11 @@ class Mesh:
         object.__setattr__(self, "faces", faces)
 
     @property
+    def bounds(self) -> Array:
+        """The least and greatest coordinates (2, 3)."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+    @property
     def corners(self) -> Array:
         """The corners of all triangles (M, 3, 3)."""
         return self.points[self.faces]
@@ -70,10 +75,16 @@ class Mesh:
         a, b, c = np.moveaxis(self.corners, 1, 0)
         return np.cross(b - a, c - a)
 
+    def thin_faces(self, sine: float) -> Integers:
+        """Return the triangles whose height is at most `sine` times their longest edge."""
+        edges = self.corners - np.roll(self.corners, 1, axis=1)
+        longest = np.einsum("nij,nij->ni", edges, edges).max(axis=1)
+        return np.flatnonzero(np.linalg.norm(self.face_vectors, axis=1) <= sine * longest)
+
     @cached_property
     def normals(self) -> Array:
         """The outer unit normals at the points (N, 3), means of the faces' by their areas."""
-        found = self._sums(np.repeat(self.face_vectors, 3, axis=0))
+        found = self.sums_at_points(np.repeat(self.face_vectors, 3, axis=0))
         return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300)
 
     @property
@@ -128,7 +139,7 @@ class Mesh:
         faces = self.faces if np.linalg.det(matrix) > 0 else self.faces[:, ::-1]
         return Mesh(self.points @ matrix.T + np.asarray(shift, float), faces)
 
-    def _sums(self, values: Array) -> Array:
+    def sums_at_points(self, values: Array) -> Array:
         """Return for each point the sum (N, 3) of values (3 M, 3) at the faces' corners."""
         where = self.faces.ravel()
         return np.stack([np.bincount(where, v, len(self.points)) for v in values.T], axis=1)

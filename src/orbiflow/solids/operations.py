@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +16,7 @@ from orbiflow.runtime import (
     Written,
     check_output_file,
     check_output_folder,
+    cores,
     ignore,
     operation,
     write_atomic,
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from orbiflow.solids.solid import EscherSolid
 else:  # what annotations mean when they are read, without heavy imports
     SolidSource = Annotated[Any, InMemory("the folder of a run, or the folder of a solid in it")]
-
-Y_UP = (".obj", ".gltf", ".glb")
-"""Endings of files whose y axis usually points up."""
 
 
 @operation("fill", starts_processes=True)
@@ -53,7 +50,7 @@ def fill(
         out: Folder for the results, made if need be.
     """
     from orbiflow.solids import run_folder, search
-    from orbiflow.solids.reading import read_mesh
+    from orbiflow.solids.reading import read_mesh, usual_up
 
     begin = time.perf_counter()
     check_output_folder(out, mesh)
@@ -66,16 +63,14 @@ def fill(
         on_event(
             Note(f"the file's size is no size to print: the longest side is made {goal_size:g} mm")
         )
-    up = settings.up or ("y" if mesh.suffix.lower() in Y_UP else "z")
-    found = search.fill(
-        read.mesh, settings.replace(up=up), name=mesh.stem, on_event=on_event, cancel=cancel
-    )
+    settings = settings.replace(up=settings.up or usual_up(mesh))
+    found = search.fill(read.mesh, settings, name=mesh.stem, on_event=on_event, cancel=cancel)
     seconds = time.perf_counter() - begin
     summary = {"mesh": str(mesh), "seconds": seconds}
     if not found:
         on_event(Note("no solid was found that is one piece and fills space", warning=True))
         return Outcome({**summary, "solids": []}, "nothing found")
-    workers = settings.workers or os.cpu_count() or 1
+    workers = settings.workers or cores()
     run_folder.write_run(
         found, out, workers=workers, summary=summary, on_event=on_event, cancel=cancel
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -11,9 +11,9 @@ from PIL import Image, ImageDraw
 from orbiflow.arrays import Array
 from orbiflow.drawing import ShadedPart, View, draw_solids, font
 from orbiflow.solids.mesh import Mesh
+from orbiflow.solids.solid import EscherSolid
 from orbiflow.solids.stacks import (
     STACK_PALETTE,
-    SpaceTile,
     StackedCopy,
     copy_centers,
     copy_colour,
@@ -35,19 +35,14 @@ OPENED = 0.75
 """How far the copies of an open stack are moved apart, as a share of their distances."""
 
 
-def solid_sheet(
-    own: SpaceTile, *, width: int = 1600, copies: int = 18, upright: Array | None = None
-) -> Image.Image:
+def solid_sheet(own: EscherSolid, *, width: int = 1600, copies: int = 18) -> Image.Image:
     """Return a sheet on white: the figure, its bent body, the tile from three sides, and stacks.
 
     Args:
         own: A tile that fills space.
         width: The width in pixels; the height is 7/16 of it.
         copies: How many copies are stacked; colours tell the cosets, and copies side by side, apart.
-        upright: The directions (3, 3), as columns, that are right, backwards and up for the figure.
-            Default: `figure_axes` of the target.
     """
-    axes = figure_axes(own.target) if upright is None else np.asarray(upright, float)
     side, height = round(0.1875 * width), round(0.4375 * width)
     large, row = width - 3 * side, height // 2
     bodies = [(own.target, TARGET_COLOUR), (own.bent, BENT_COLOUR), (own.tile, TILE_COLOUR)]
@@ -66,25 +61,24 @@ def solid_sheet(
     letters = font(max(9, round(width / 110)))
     for parts, direction, size, place, words in panels:
         line = round(0.022 * width)
-        drawn = draw_solids(parts, (size[0], size[1] - line), _view(axes, direction))
+        drawn = draw_solids(parts, (size[0], size[1] - line), _view(own.upright, direction))
         sheet.paste(drawn, place)
         bottom = place[0] + size[0] / 2, place[1] + size[1] - line
         ImageDraw.Draw(sheet).text(bottom, words, fill="#555555", font=letters, anchor="ma")
     return sheet
 
 
-def _stack_words(own: SpaceTile, copies: int) -> str:
+def _stack_words(own: EscherSolid, copies: int) -> str:
     return f"{copies} copies, {own.group.name}" if own.group.name else f"{copies} copies"
 
 
 def solid_gif(
-    own: SpaceTile,
+    own: EscherSolid,
     *,
     size: int = 480,
     frames: int = 48,
     copies: int = 12,
     seconds: float = 6.0,
-    upright: Array | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> bytes:
     """Return a GIF without end in which a stack turns once round, opens and closes.
@@ -93,20 +87,20 @@ def solid_gif(
         own: A tile that fills space.
         size: Width and height in pixels.
         frames, seconds: How many pictures, and how long one turn takes.
-        copies, upright: As for `solid_sheet`.
+        copies: How many copies are stacked.
         progress: Told after each picture what share is done, 0 to 1.
     """
-    axes = figure_axes(own.target) if upright is None else np.asarray(upright, float)
     stack, drawn = Stack(own, copies, FILM_FACES), list[Image.Image]()
     for k in range(frames):
         turn = 2 * np.pi * k / frames
         apart = OPENED * (0.5 - 0.5 * np.cos(turn)) ** 1.5
         cos, sin = np.cos(turn), np.sin(turn)
         x, y, z = STACK_SIDE
-        view = _view(axes, (cos * x - sin * y, sin * x + cos * y, z))
-        middle, radius = stack.ball(apart)
+        view = _view(own.upright, (cos * x - sin * y, sin * x + cos * y, z))
+        parts = stack.parts(apart)
+        middle, radius = stack.ball(parts)
         view = View(view.direction, view.up, middle, radius)
-        drawn.append(draw_solids(stack.parts(apart), (size, size), view))
+        drawn.append(draw_solids(parts, (size, size), view))
         if progress:
             progress((k + 1) / frames)
     few = drawn[:: max(1, frames // 6)]
@@ -131,7 +125,7 @@ class Stack:
         most_faces: The most triangles that a copy has.
     """
 
-    def __init__(self, own: SpaceTile, copies: int, most_faces: int) -> None:
+    def __init__(self, own: EscherSolid, copies: int, most_faces: int) -> None:
         mesh = lighter(own.tile, most_faces)
         self.copies: list[StackedCopy] = stack_of(own.group, own.tile, copies)
         self._centers = copy_centers(own.tile, self.copies)
@@ -146,9 +140,9 @@ class Stack:
             for copy, shift, colour in zip(self.copies, shifts, self._colours, strict=True)
         ]
 
-    def ball(self, apart: float) -> tuple[tuple[float, float, float], float]:
-        """Return the middle of the stack, and how far it reaches from there."""
-        places = np.concatenate([own.corners.reshape(-1, 3) for own in self.parts(apart)])
+    def ball(self, parts: Sequence[ShadedPart]) -> tuple[tuple[float, float, float], float]:
+        """Return the middle of the stack, and how far its parts reach from there."""
+        places = np.concatenate([own.corners.reshape(-1, 3) for own in parts])
         x, y, z = self._centers.mean(axis=0).tolist()
         return (x, y, z), float(np.linalg.norm(places - (x, y, z), axis=1).max())
 

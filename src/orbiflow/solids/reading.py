@@ -12,7 +12,7 @@ import io
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,15 @@ class ReadMesh(NamedTuple):
 
     mesh: Mesh
     notes: list[str]
+
+
+def usual_up(path: Path) -> Literal["y", "z"]:
+    """Return the axis that usually points up in such a file: y in an OBJ or glTF.
+
+    >>> usual_up(Path("a.GLB")), usual_up(Path("a.stl"))
+    ('y', 'z')
+    """
+    return "y" if path.suffix.lower() in (".obj", ".gltf", ".glb") else "z"
 
 
 def read_mesh(path: str | Path) -> ReadMesh:

@@ -144,9 +144,9 @@ def solid_files(solid: EscherSolid) -> dict[str, bytes]:
     return {
         SOLID: solid.to_bytes(),
         "tile.stl": write_stl({"tile": as_body(scaled)}, f"{title}, in mm"),
-        "sheet.png": png_bytes(solid_sheet(solid, width=SHEET_WIDTH, upright=solid.upright)),
-        "stack.gif": solid_gif(solid, size=400, frames=FRAMES, upright=solid.upright),
-        "page.html": stack_page(solid, title=title, upright=solid.upright).encode(),
+        "sheet.png": png_bytes(solid_sheet(solid, width=SHEET_WIDTH)),
+        "stack.gif": solid_gif(solid, size=400, frames=FRAMES),
+        "page.html": stack_page(solid, title=title).encode(),
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from scipy.spatial import cKDTree
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import naming_extras
-from orbiflow.runtime import NEVER, Cancel, Sink, Team, ignore
+from orbiflow.runtime import NEVER, Cancel, Sink, Team, cores, ignore
 from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
 from orbiflow.solids.body import Body
 from orbiflow.solids.closing import Function, close_tile
@@ -115,11 +114,6 @@ class Goal:
         weight = partial(_emphasis, settings, center, side) if settings.emphasis else None
         return cls(name, unit, weight, millimetres, np.array(AXES[settings.up or "z"]).T)
 
-    @property
-    def bounds(self) -> Array:
-        """The least and greatest coordinates (2, 3)."""
-        return np.stack([self.mesh.points.min(axis=0), self.mesh.points.max(axis=0)])
-
     @cached_property
     def inner_points(self) -> Array:
         """Points (n, 3) evenly inside."""
@@ -128,7 +122,7 @@ class Goal:
     def body(self, spacing: float) -> Body:
         """Return the body that bends, with nodes so far from each other."""
         distance = SignedDistance.of_mesh(self.mesh, FINE)
-        return Body.of(distance, self.bounds, spacing, self.weight)
+        return Body.of(distance, self.mesh.bounds, spacing, self.weight)
 
 
 def usual_size(mesh: Mesh) -> float | None:
@@ -173,7 +167,7 @@ def fill(
     effort, goal = EFFORTS[settings.effort], Goal.of(mesh, settings, name)
     names = settings.groups or USUAL_GROUPS[: effort.groups]
     families = [GroupFamily.named(own) for own in names]
-    team = Team(__name__, settings.workers or os.cpu_count() or 1, on_event, cancel)
+    team = Team(__name__, settings.workers or cores(), on_event, cancel)
     seeds = np.random.SeedSequence(settings.seed).spawn(len(families))
     jobs = list(zip(families, seeds, strict=True))
     placed = team.each(partial(starting_poses, effort, goal.inner_points), jobs, "placing", 0.1)
@@ -226,7 +220,7 @@ def quick_bend(body: Body, pose: Pose) -> tuple[float, Pose]:
 
 def coverage(found: BentBody) -> tuple[float, float]:
     """Return the share of space that copies of a bent body leave uncovered, and cover twice or more."""
-    low, high = found.surface.points.min(axis=0), found.surface.points.max(axis=0)
+    low, high = found.surface.bounds
     lattice, counts = found.lattice, np.zeros(PROBES, dtype=int)
     corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
     box = np.linalg.solve(lattice, corners.T).T
@@ -245,7 +239,8 @@ def coverage(found: BentBody) -> tuple[float, float]:
 
 
 def _box(mesh: Mesh) -> tuple[Array, Array]:
-    return mesh.points.min(axis=0) - MARGIN, mesh.points.max(axis=0) + MARGIN
+    low, high = mesh.bounds
+    return low - MARGIN, high + MARGIN
 
 
 def _solid(

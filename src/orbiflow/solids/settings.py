@@ -71,7 +71,7 @@ def sphere(text: str) -> Sphere:
 
 
 def group_names(text: str) -> tuple[str, ...]:
-    """Return the space groups that a text names, between commas, or "all".
+    """Return the space groups that a text names, between commas.
 
     >>> group_names("P-1, P 21 21 21,19")
     ('P-1', 'P 21 21 21', '19')

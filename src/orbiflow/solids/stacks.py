@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,27 +27,6 @@ STACK_PALETTE = Palette(
 
 FEW_COSETS = {1: 4, 2: 2}
 """For groups with so few cosets: the number of colours that copies of each coset share."""
-
-
-class SpaceTile(Protocol):
-    """A solid whose copies under a group fill space, and what it was made of.
-
-    - `group`: The group.
-    - `tile`: The solid, of a volume of about 1.
-    - `target`, `bent`: The figure in its place over the tile, and bent to fill space.
-    - `millimetres`: The length of a unit in mm.
-    """
-
-    @property
-    def group(self) -> CrystallographicGroup: ...
-    @property
-    def tile(self) -> Mesh: ...
-    @property
-    def target(self) -> Mesh: ...
-    @property
-    def bent(self) -> Mesh: ...
-    @property
-    def millimetres(self) -> float: ...
 
 
 class StackedCopy(NamedTuple):

@@ -243,7 +243,9 @@ def _without_crossings(
     for repair in range(REPAIRS):
         places = orbits.start + share[:, None] * (moved - orbits.start)
         points = _with_middles(orbits.places(places), middles)
-        bad = np.union1d(crossing_pairs(points, faces, changed), _thin_triangles(points, faces))
+        bad = np.union1d(
+            crossing_pairs(points, faces, changed), Mesh(points, faces).thin_faces(SMALLEST_SINE)
+        )
         hit = np.isin(np.arange(len(moved)), of_points[faces[bad]])
         if not np.any(share[hit] > 0):
             break
@@ -258,14 +260,6 @@ def _without_crossings(
     places = orbits.start + share[:, None] * (moved - orbits.start)
     crossing = np.isin(np.arange(len(orbits.number)), faces[bad])
     return places, float(np.mean(share < 1)), crossing
-
-
-def _thin_triangles(points: Array, faces: Integers) -> Integers:
-    corners = points[faces]
-    edges = corners - np.roll(corners, 1, axis=1)
-    longest = np.einsum("nij,nij->ni", edges, edges).max(axis=1)
-    areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    return np.flatnonzero(areas < SMALLEST_SINE * longest)
 
 
 def _partner_triangles(

@@ -11,9 +11,9 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import ShadedPart, rendered, rgb
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.pictures import BENT_COLOUR, TARGET_COLOUR, TILE_COLOUR, figure_axes
+from orbiflow.solids.solid import EscherSolid
 from orbiflow.solids.stacks import (
     STACK_PALETTE,
-    SpaceTile,
     colour_number,
     copy_centers,
     copy_colour,
@@ -31,13 +31,12 @@ KINDS = {"target": "the figure", "bent": "bent", "tile": "the tile", "stack": "t
 
 
 def stack_page(
-    own: SpaceTile,
+    own: EscherSolid,
     *,
     title: str = "A solid that fills space",
     caption: str = "",
     copies: int = 24,
     apart: float = 1.2,
-    upright: Array | None = None,
 ) -> str:
     """Return a self-contained HTML page with the figure, its bent body, the tile and a stack to open.
 
@@ -50,20 +49,16 @@ def stack_page(
         caption: A sentence or two below it. Default: how many copies there are, and the group.
         copies: How many copies are stacked, a colour for each coset.
         apart: How far the slider takes copies from the middle, as a share of their distances.
-        upright: As for `solid_sheet`.
     """
-    data = stack_data(own, copies=copies, apart=apart, upright=upright)
+    data = stack_data(own, copies=copies, apart=apart)
     group = f" of {own.group.name}" if own.group.name else ""
     caption = caption or f"{copies} copies of one solid{group}: they fill space without gaps."
     values = {"title": title, "caption": caption, "kinds": KINDS, "legend": _legend(own, copies)}
     return rendered("orbiflow.solids", "stack.html", **values, data=data)
 
 
-def stack_data(
-    own: SpaceTile, *, copies: int = 24, apart: float = 1.2, upright: Array | None = None
-) -> dict[str, Any]:
+def stack_data(own: EscherSolid, *, copies: int = 24, apart: float = 1.2) -> dict[str, Any]:
     """Return what `stack.js` draws, as JSON has it: see `stack_page`."""
-    axes = figure_axes(own.target) if upright is None else np.asarray(upright, float)
     meshes = {"target": own.target, "bent": own.bent, "tile": own.tile}
     stack = stack_of(own.group, own.tile, copies)
     centers = copy_centers(own.tile, stack)
@@ -78,7 +73,7 @@ def stack_data(
     balls["stack"] = {"center": centers.mean(axis=0).tolist(), "radius": closed, "opened": opened}
     return {
         "start": START,
-        "axes": axes.T.tolist(),
+        "axes": own.upright.T.tolist(),
         "meshes": {name: _packed_mesh(mesh) for name, mesh in meshes.items()},
         "colours": {name: _shares(colour) for name, colour in colours.items()},
         "balls": balls,
@@ -94,13 +89,12 @@ def stack_data(
     }
 
 
-def figure_data(figure: Mesh, upright: Array | None = None) -> dict[str, Any]:
+def figure_data(figure: Mesh) -> dict[str, Any]:
     """Return what `stack.js` draws of a figure alone, as JSON has it: see `stack_page`."""
-    axes = figure_axes(figure) if upright is None else np.asarray(upright, float)
     ball = _ball(figure)
     return {
         "start": START,
-        "axes": axes.T.tolist(),
+        "axes": figure_axes(figure).T.tolist(),
         "meshes": {"target": _packed_mesh(figure)},
         "colours": {"target": _shares(TARGET_COLOUR)},
         "balls": {"target": ball, "stack": ball},
@@ -108,7 +102,7 @@ def figure_data(figure: Mesh, upright: Array | None = None) -> dict[str, Any]:
     }
 
 
-def _legend(own: SpaceTile, copies: int) -> dict[str, str]:
+def _legend(own: EscherSolid, copies: int) -> dict[str, str]:
     """Return what each colour stands for."""
     group, stack = own.group, stack_of(own.group, own.tile, copies)
     numbers = sorted({colour_number(group, copy) for copy in stack})

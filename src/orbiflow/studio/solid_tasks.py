@@ -26,7 +26,7 @@ from orbiflow.runtime import (
     write_atomic,
     write_json,
 )
-from orbiflow.solids import Y_UP, FillSettings
+from orbiflow.solids import FillSettings
 from orbiflow.studio.settings import Job
 from orbiflow.studio.tasks import export_folder, files_of
 from orbiflow.studio.tile_files import (
@@ -65,7 +65,7 @@ def mesh(
         called: What messages call its file.
     """
     from orbiflow.drawing import png_bytes, solid_picture
-    from orbiflow.solids import figure_data, read_mesh, usual_size
+    from orbiflow.solids import figure_data, read_mesh, usual_size, usual_up
 
     file = mesh_file(job.project)
     on_event(Progress(0.1, "reading the mesh"))
@@ -78,7 +78,7 @@ def mesh(
         raise OrbiflowError(text) from error
     cancel.check()
     on_event(Progress(0.7, "drawing it"))
-    up = "y" if file.suffix in Y_UP else "z"
+    up = usual_up(file)
     corners = found.corners[..., [0, 2, 1]] * (1, -1, 1) if up == "y" else found.corners
     write_atomic(job.project / BACKDROP, png_bytes(solid_picture([corners], (600, 450))))
     write_json(job.project / FIGURE, figure_data(found))
@@ -164,16 +164,16 @@ def _write_solid(solid: EscherSolid, card: dict[str, Any], stage: Path) -> None:
     from orbiflow.solids import solid_sheet, stack_data, stack_page
 
     folder, title = make_folder(stage / SAVED), f"{solid.name}, {solid.group_name}"
-    sheet = solid_sheet(solid, upright=solid.upright)
+    sheet = solid_sheet(solid)
     (width, height), words = sheet.size, sheet.width // 40
     # the stack is the square at the right, above its words
     stack = sheet.crop((width - height + words, 0, width, height - words))
     write_atomic(folder / SOLID, solid.to_bytes())
     write_atomic(folder / SHEET, png_bytes(sheet))
     write_atomic(folder / THUMB, png_bytes(stack.resize((450, 450))))
-    page = stack_page(solid, title=title, upright=solid.upright)
+    page = stack_page(solid, title=title)
     write_atomic(folder / PAGE, page.encode())
-    write_json(stage / VIEW, stack_data(solid, upright=solid.upright))
+    write_json(stage / VIEW, stack_data(solid))
     write_json(stage / CARD, card)
 
 
@@ -195,7 +195,7 @@ def film(
 
     folder, solid = export_folder(job.project, job.task), read_solid(tile_folder(job.project, tile))
     told(0.0)
-    content = solid_gif(solid, upright=solid.upright, progress=told)
+    content = solid_gif(solid, progress=told)
     write_atomic(make_folder(folder) / f"{plain_letters(called, 'solid')}-stack.gif", content)
     made = {"takeaway": job.task, "files": files_of(folder), "made": time.time()}
     return Outcome({**made, "preview": False})
