@@ -165,7 +165,7 @@ def test_mistakes_are_named(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(OutputError, match=r"mine\.txt"):
         write_run(found(), tmp_path)
-    with pytest.raises(InputFileError):
+    with pytest.raises(InputFileError, match=r"holds no solids\.json; give the folder"):
         read_run(tmp_path)
 
 

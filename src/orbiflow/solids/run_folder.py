@@ -157,6 +157,8 @@ def read_run(path: str | Path) -> list[EscherSolid]:
     """
     path = Path(path)
     file = path / SOLIDS if path.is_dir() else path
+    if path.is_dir() and not file.is_file():
+        raise InputFileError(f"{path} holds no {SOLIDS}; give the folder that orbiflow fill wrote")
     document = read_json(file, "a run of orbiflow fill")
     try:
         names = [str(entry["folder"]) for entry in document["solids"]]

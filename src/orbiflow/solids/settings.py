@@ -149,7 +149,7 @@ class BuildSettings(FileSettings, group="Pieces"):
     """One solid; a stack of copies in colours; a block with a flat bottom to start a stack on; a puzzle
     of copies in an open box."""
 
-    format: Annotated[Literal["3mf", "stl"] | None, DefaultText("3mf")] = None
+    format: Annotated[Literal["stl", "3mf"] | None, DefaultText("3mf")] = None
     """Format of the file. A 3MF has colours, and each part is an object of its own."""
 
     size: Annotated[Length | None, DefaultText("as the search made it")] = None
