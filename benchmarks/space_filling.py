@@ -34,7 +34,7 @@ from orbiflow.solids.distance import points_inside
 from orbiflow.solids.pictures import solid_sheet
 from orbiflow.solids.search import EFFORTS, Goal, quick_bend, starting_poses
 
-MOST_COSETS = 4  # of groups in the table: solids of larger ones have little room for limbs
+MOST_COSETS = 8  # of groups in the table: solids of larger ones have little room for limbs
 
 
 def main() -> None:

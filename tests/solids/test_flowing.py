@@ -106,16 +106,3 @@ def test_what_no_ball_is_like_starts_as_a_dirichlet_cell(monkeypatch):
     assert certify_solid(group, tile).is_ball
     start = dirichlet_cell(group, best_site(body, group)).mesh
     assert mean_overlap(tile, body) > mean_overlap(start, body) + 0.02
-
-
-def test_time_and_checks_end_the_fit(monkeypatch):
-    monkeypatch.setattr("orbiflow.solids.flowing.START_CELLS", (200,))
-    group = group_named("P 1")
-    body = ellipsoid(DirichletDomain(group).site)
-    distance = SignedDistance.of_mesh(body, 0.05)
-    calls = list[int]()
-    tile = flowed_tile(
-        lambda points: -distance(points), body, group, seconds=0.0, check=lambda: calls.append(1)
-    )
-    assert len(calls) == 1
-    assert certify_solid(group, tile).is_ball

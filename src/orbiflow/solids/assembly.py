@@ -263,7 +263,7 @@ class Pieces:
         the others, exactly: a piece is drawn out freely if it is behind on none. Once the share is
         above `most` no more pieces are asked.
         """
-        axes = _axes(direction)
+        axes = axes_along(direction)
         seen = piece.corners @ axes
         low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
         scale = LINES / float((high - low)[:2].max())
@@ -336,7 +336,7 @@ def _directions(cone: FreeCone) -> Array:
     return np.stack([own / np.linalg.norm(own) for own in tried])
 
 
-def _axes(direction: Array) -> Array:
+def axes_along(direction: Array) -> Array:
     """Return three unit vectors as columns (3, 3), the last of them the direction."""
     unit = direction / np.linalg.norm(direction)
     aside = np.cross(unit, np.eye(3)[np.abs(unit).argmin()])

@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.solids.complexes import Complex
+from orbiflow.solids.complexes import Complex, cell_complex
 from orbiflow.solids.growth import BallOfCells, CellBox
+from orbiflow.solids.mesh import Mesh
+from orbiflow.symmetry import CrystallographicGroup
 
 Function = Callable[[Array], Array]
 """Takes points (n, 3) to values (n,); the larger, the more a point is inside."""
@@ -28,6 +30,8 @@ and up to how many."""
 
 POLISHING_PASSES, FREEING_PASSES, WIDENINGS, CARVINGS = 6, 1, 1, 8
 POINTS_AT_ONCE = 400_000
+MARGIN = 0.15  # how far from a body its tile may reach
+FINENESS = (1.0, 0.8)  # cells over those wanted: another grid may close where one does not
 FEW_MISSING = 50  # orbits that a larger box would not let in
 
 
@@ -59,6 +63,12 @@ class CellTile:
         return self.missing == 0
 
 
+def box_around(body: Mesh) -> tuple[Array, Array]:
+    """Return the corners (3,) of the box in which the tile of a body of volume 1 is looked for."""
+    low, high = body.bounds
+    return low - MARGIN, high + MARGIN
+
+
 def close_tile(
     function: Function, lower: ArrayLike, upper: ArrayLike, complex: Complex
 ) -> CellTile:
@@ -86,6 +96,17 @@ def close_tile(
         low, high = low - reach, high + reach
         found = min(found, _closed_in(function, low, high, complex), key=lambda own: own.missing)
     return found
+
+
+def ball_of_cells(
+    function: Function, bounds: tuple[Array, Array], group: CrystallographicGroup, detail: int
+) -> CellTile | None:
+    """Return a tile of about so many cells, or None if it is no ball on any of some grids."""
+    closed = (
+        close_tile(function, *bounds, cell_complex(group, round(share * detail)))
+        for share in FINENESS
+    )
+    return next((own for own in closed if own.is_ball), None)
 
 
 def _closed_in(function: Function, lower: Array, upper: Array, complex: Complex) -> CellTile:

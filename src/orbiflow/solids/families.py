@@ -13,7 +13,7 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.errors import GroupError
 from orbiflow.symmetry import CrystallographicGroup, space_group
 
-# Of those that were tried on several animals, the groups whose tiles looked best: see docs/solids.md.
+# groups whose tiles looked best; benchmarks/space_filling.py --groups finds that most are as good
 USUAL_GROUPS = (
     "P 1",
     "P -1",

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.runtime import one_thread
-from orbiflow.solids.closing import CellTile, Function, close_tile
+from orbiflow.solids.closing import CellTile, Function, box_around, close_tile
 from orbiflow.solids.complexes import cell_complex
 from orbiflow.solids.crossings import crossing_pairs
 from orbiflow.solids.matched import MatchedSurface
@@ -27,7 +26,6 @@ from orbiflow.symmetry import CrystallographicGroup
 START_CELLS = (4_000, 1_500, 600)
 """Cells of the ball that is moved: fewer where more are none."""
 
-MARGIN = 0.15  # how far from the body its tile may reach
 DIRICHLET_CELLS, SITES, NEAR = 1_000, 300, 40
 REACH = 0.12  # the farthest that a point is asked to go in one step
 STEEPEST = 0.4  # an edge changes in one step by less than this share of its length
@@ -61,8 +59,6 @@ def flowed_tile(
     group: CrystallographicGroup,
     *,
     stages: Sequence[Stage] = STAGES,
-    seconds: float | None = None,
-    check: Callable[[], object] = lambda: None,
 ) -> Mesh:
     """Return a solid that fits a body and fills space, as a symmetric flow makes it; always one piece.
 
@@ -77,18 +73,13 @@ def flowed_tile(
         body: The body in its place.
         group: A space group without mirrors, whose tiles have the volume 1.
         stages: Fields and steps, the coarse ones first.
-        seconds: Maximum processor time. Default: no limit.
-        check: Called before each step; may raise.
     """
-    begin, own = time.process_time(), starting_surface(function, body, group)
+    own = starting_surface(function, body, group)
     smoother = Smoother(group, own)
     for stage in stages:
         waves = max(1, round(group.cell_volume ** (1 / 3) / stage.wavelength))
         field = FourierField(group, waves, smoothness=SMOOTHNESS)
         for step in range(stage.steps):
-            check()
-            if seconds is not None and time.process_time() - begin > seconds:
-                return own.mesh
             fine = divided_to(own, stage.edge)
             if step == 0 or fine is not own:
                 smoother = Smoother(group, fine)
@@ -103,9 +94,9 @@ def starting_surface(
     function: Function, body: Mesh, group: CrystallographicGroup
 ) -> MatchedSurface:
     """Return the surface of a ball of few cells that is like the body, or of a Dirichlet cell."""
-    low, high = body.points.min(axis=0) - MARGIN, body.points.max(axis=0) + MARGIN
+    box = box_around(body)
     for cells in START_CELLS:
-        tile = close_tile(function, low, high, cell_complex(group, cells))
+        tile = close_tile(function, *box, cell_complex(group, cells))
         if tile.is_ball:
             found = _surface(tile, function)
             if not len(crossing_pairs(found.mesh.points, found.mesh.faces)):

@@ -17,13 +17,13 @@ from orbiflow.extras import naming_extras
 from orbiflow.runtime import NEVER, Cancel, Sink, Team, cores, ignore
 from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
 from orbiflow.solids.body import Body
-from orbiflow.solids.closing import Function, close_tile
-from orbiflow.solids.complexes import cell_complex
+from orbiflow.solids.closing import Function, ball_of_cells, box_around
 from orbiflow.solids.distance import SignedDistance, points_inside, surface_points
 from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
 from orbiflow.solids.likeness import measured, rigid_motion
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.poses import Pose, best_poses
+from orbiflow.solids.separable import SEPARABLE_GROUPS, check_separable, separable_tile
 from orbiflow.solids.settings import FillSettings
 from orbiflow.solids.solid import EscherSolid
 from orbiflow.solids.surfaces import tile_surface
@@ -31,8 +31,6 @@ from orbiflow.symmetry import CrystallographicGroup
 
 GRAIN = 0.058  # of the points inside a body by which poses are compared
 FINE = 0.03  # of the points on its surface
-FINENESS = (1.0, 0.8)  # cells over those wanted: another grid may close where one does not
-MARGIN = 0.15  # how far from the bent body its tile may reach
 PROBES = 5_000  # points of space that are asked how many copies hold them
 SMALLEST, LARGEST, USUAL_SIZE = 15.0, 400.0, 60.0  # longest sides in mm that are printed
 MOST_STRAIN = 0.5  # of a body that did not come apart while it bent
@@ -158,15 +156,20 @@ def fill(
         cancel: Checked before each step.
 
     Raises:
-        GroupError: For a group that is unknown, or has mirrors.
+        GroupError: For a group that is unknown, or has mirrors, or where none comes apart as asked for.
         OrbiflowError: If the mesh is not closed, or too thin to be followed.
         Cancelled: If the token was cancelled.
     """
     settings = settings or FillSettings()
     make = _tile_maker(settings)
     effort, goal = EFFORTS[settings.effort], Goal.of(mesh, settings, name)
-    names = settings.groups or USUAL_GROUPS[: effort.groups]
-    families = [GroupFamily.named(own) for own in names]
+    usual = SEPARABLE_GROUPS if settings.separable else USUAL_GROUPS[: effort.groups]
+    families = [GroupFamily.named(own) for own in settings.groups or usual]
+    if settings.separable:
+        # of few groups more poses, of which fewer give solids
+        effort = effort._replace(per_group=effort.quick, full=2 * effort.full)
+        for family in families:
+            check_separable(family.base)
     team = Team(__name__, settings.workers or cores(), on_event, cancel)
     seeds = np.random.SeedSequence(settings.seed).spawn(len(families))
     jobs = list(zip(families, seeds, strict=True))
@@ -238,11 +241,6 @@ def coverage(found: BentBody) -> tuple[float, float]:
     return float((counts == 0).mean()), float(np.maximum(counts - 1, 0).mean())
 
 
-def _box(mesh: Mesh) -> tuple[Array, Array]:
-    low, high = mesh.bounds
-    return low - MARGIN, high + MARGIN
-
-
 def _solid(
     goal: Goal, body: Body, make: TileMaker, effort: Effort, pose: Pose
 ) -> EscherSolid | None:
@@ -281,6 +279,8 @@ TileMaker = Callable[[Function, Mesh, CrystallographicGroup], Mesh | None]
 
 
 def _tile_maker(settings: FillSettings) -> TileMaker:
+    if settings.separable:
+        return partial(separable_tile, settings.detail)
     if settings.method == "bending":
         return partial(_closed_tile, settings.detail)
     with naming_extras("method 'flow'"):
@@ -291,9 +291,7 @@ def _tile_maker(settings: FillSettings) -> TileMaker:
 def _closed_tile(
     detail: int, depth: Function, fine: Mesh, group: CrystallographicGroup
 ) -> Mesh | None:
-    grids = (cell_complex(group, round(share * detail)) for share in FINENESS)
-    closed = (close_tile(depth, *_box(fine), grid) for grid in grids)
-    ball = next((own for own in closed if own.is_ball), None)
+    ball = ball_of_cells(depth, box_around(fine), group, detail)
     return None if ball is None else tile_surface(ball, depth).mesh
 
 

@@ -101,6 +101,10 @@ class FillSettings(Settings, group="Search"):
     """How what is left between bent copies is divided: cell by cell, or by a symmetric flow of a simple
     solid, which is always one piece (needs torch)."""
 
+    separable: bool = False
+    """Look only for solids that come apart: each can be drawn out of a stack by a straight move. In P 1
+    and P -1."""
+
     size: Annotated[Length | None, DefaultText("that of the file, in mm")] = None
     """Longest side of the target's box."""
 
@@ -132,6 +136,8 @@ class FillSettings(Settings, group="Search"):
 
     def check(self) -> None:
         super().check()
+        if self.separable and self.method == "flow":
+            raise SettingError("{separable} solids are made by {method} 'bending' only")
         try:
             _ = self.spheres
         except OrbiflowError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +62,13 @@ class Patches:
     partner_corners: Integers
 
 
-def tile_surface(tile: CellTile, function: Function | None = None) -> TileSurface:
+Move = Callable[[PointOrbits, Array, Patches], Array]
+"""Takes the orbits' places (n, 3) to other places, given the tile's patches."""
+
+
+def tile_surface(
+    tile: CellTile, function: Function | None = None, *, move: Move | None = None
+) -> TileSurface:
     """Return the surface of a tile of cells, smooth, with faces in pairs under the group.
 
     Points move by orbits of the group, and those that an element fixes stay fixed: so faces match
@@ -72,12 +79,15 @@ def tile_surface(tile: CellTile, function: Function | None = None) -> TileSurfac
     Args:
         tile: A tile that is a ball.
         function: The function of `close_tile`. Default: the surface is only smoothed.
+        move: Moves the places once more.
     """
     patches = boundary_patches(tile)
     orbits = PointOrbits(tile.complex, patches.points, patches.corners)
     moved = relax(orbits, orbits.start)
     if function is not None:
         moved = place_between_copies(orbits, moved, function, patches)
+    if move is not None:
+        moved = move(orbits, moved, patches)
     cells, kept_apart = patches, np.zeros(len(patches.points), bool)
     for attempt in range(ATTEMPTS):
         patches = _with_quads_at_seams(cells, orbits.seams, kept_apart)
