@@ -1,10 +1,11 @@
 """What space groups are worth for solids that fill space, and what whole searches find.
 
-    python benchmarks/space_filling.py [--effort fast|normal] [--method flow] [--out FOLDER] MESH ...
+    python benchmarks/space_filling.py [--effort fast] [--method flow] [--separable] [--out FOLDER] MESH ...
     python benchmarks/space_filling.py --groups all MESH ...      # what groups are worth
 
 A row of a search is of the first solid: how much it looks like the figure, how many of a million points
-of a grid are in no copy or in several, and whether a copy leaves a stack by a straight move. With --out
+of a grid are in no copy or in several, and whether a copy with the gap of a print
+leaves a stack by a straight move. With --out
 the sheet of each first solid is written into a folder, and solids.png, the solids alone, for people to
 name.
 
@@ -19,7 +20,6 @@ import random
 import time
 from functools import partial
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -33,6 +33,7 @@ from orbiflow.solids.body import Body
 from orbiflow.solids.distance import points_inside
 from orbiflow.solids.pictures import solid_sheet
 from orbiflow.solids.search import EFFORTS, Goal, quick_bend, starting_poses
+from orbiflow.solids.separable import GAP
 
 MOST_COSETS = 8  # of groups in the table: solids of larger ones have little room for limbs
 
@@ -43,6 +44,7 @@ def main() -> None:
     parser.add_argument("--groups", help="names between commas, or all: print the table of groups")
     parser.add_argument("--effort", choices=("fast", "normal"), default="normal")
     parser.add_argument("--method", choices=("bending", "flow"), default="bending")
+    parser.add_argument("--separable", action="store_true", help="only solids that come apart")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path)
     parser.add_argument("files", nargs="+", type=Path)
@@ -50,7 +52,13 @@ def main() -> None:
     if options.groups:
         _groups(options.files, options.groups, options.workers)
     else:
-        _searches(options.files, options.effort, options.method, options.workers, options.out)
+        settings = FillSettings(
+            effort=options.effort,
+            method=options.method,
+            separable=options.separable,
+            workers=options.workers,
+        )
+        _searches(options.files, settings, options.out)
 
 
 def _groups(files: list[Path], names: str, workers: int) -> None:
@@ -85,21 +93,14 @@ def _cost(goal: Goal, body: Body, family: GroupFamily) -> float:
     return min(quick_bend(body, pose)[0] for pose in poses[: effort.per_group])
 
 
-def _searches(
-    files: list[Path],
-    effort: Literal["fast", "normal"],
-    method: Literal["bending", "flow"],
-    workers: int,
-    out: Path | None,
-) -> None:
+def _searches(files: list[Path], settings: FillSettings, out: Path | None) -> None:
     print(
         "solid       group      score overlap shadows kept smooth bent  missed  leaves  found  seconds"
     )
     best = list[EscherSolid]()
     for file in files:
         begin = time.perf_counter()
-        settings = FillSettings(effort=effort, method=method, workers=workers, up=usual_up(file))
-        found = fill(read_mesh(file).mesh, settings, name=file.stem)
+        found = fill(read_mesh(file).mesh, settings.replace(up=usual_up(file)), name=file.stem)
         seconds = time.perf_counter() - begin
         if not found:
             print(f"{file.stem[:11]:11} nothing found {seconds:60.0f}", flush=True)
@@ -107,7 +108,8 @@ def _searches(
         own = found[0].likeness
         row = f"{file.stem[:11]:11} {found[0].group_name:10} {own.score:5.3f} {own.overlap:7.3f}"
         row += f" {own.shadows:7.3f} {own.kept:4.2f} {own.smooth:6.2f} {own.strain:4.2f}"
-        leaves = Pieces(found[0].group, found[0].tile).leaving_stack()
+        size = float(np.ptp(found[0].tile.points, axis=0).max())
+        leaves = Pieces(found[0].group, found[0].tile, GAP * size).leaving_stack()
         free = "yes" if leaves.is_free else f"{100 * leaves.blocked:.1f} %"
         row += f"  {missed(found[0]):6} {free:>7} {len(found):6} {seconds:8.0f}"
         print(row, flush=True)

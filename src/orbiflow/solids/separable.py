@@ -29,10 +29,10 @@ SEPARABLE_GROUPS = ("P 1", "P -1")
 """Groups that keep each direction up to its sign, so that any may be the one."""
 
 DIRECTIONS, ROUGH, FINE = 40, 0.1, 0.04  # tried, all around; distances of lines and places on them
-BLUR = 1.0  # of the sorted tile, in steps
+BLUR = 1.6  # of the sorted tile, in steps
 FAITH, DEEPEST = 0.1, 0.1  # of the function beside it, and its most
 DRAFT = np.sin(np.deg2rad(2.0))  # slope that walls get, so that they do not rub
-DRAFT_ROUNDS, DRAFTS, OVERSHOOT = 120, 3, 1.3
+DRAFT_ROUNDS, SMOOTHED, DRAFTS, OVERSHOOT = 120, 4, 3, 1.3
 GAP = 0.004  # between copies that come apart, in longest sides: a quarter of a millimetre of 60
 STILL = 0.15  # how much less a face that may stay counts at a point than one that turns
 
@@ -116,12 +116,14 @@ class _Lines:
     def kept(self, direction: Array, step: float) -> float:
         """Return the volume that the exact tile and the sorted one share."""
         values, own, _, _ = self._values(direction, step)
-        return float(((values.argmax(axis=0) == own) & (_sorted(values) == own)).sum() * step**3)
+        return float(
+            ((values.argmax(axis=0) == own) & (sorted_labels(values) == own)).sum() * step**3
+        )
 
     def sorted_function(self, direction: Array, step: float) -> Function:
         """Return a function that is above 0 in the sorted tile, and a little deeper as `depth` is."""
         values, own, axes, start = self._values(direction, step)
-        inside = np.where(_sorted(values) == own, 0.5, -0.5)
+        inside = np.where(sorted_labels(values) == own, 0.5, -0.5)
         soft = scipy.ndimage.gaussian_filter(inside, BLUR)
 
         def wanted(points: Array) -> Array:
@@ -157,10 +159,10 @@ class _Lines:
         return found - np.linalg.norm(points - inside, axis=-1)
 
 
-def _sorted(values: Array) -> Array:
+def sorted_labels(values: Array) -> Array:
     """Return labels (U, V, n), never less along a line, whose values (K, U, V, n) have the largest sum.
 
-    >>> _sorted(np.array([[[[0.0, 2.0, 1.0]]], [[[1.0, 0.0, 2.0]]]])).tolist()
+    >>> sorted_labels(np.array([[[[0.0, 2.0, 1.0]]], [[[1.0, 0.0, 2.0]]]])).tolist()
     [[[0, 0, 1]]]
     """
     number = np.arange(len(values))[:, None, None]
@@ -198,7 +200,9 @@ def _drafted(
     corners = patches.corners
     real = np.ones(corners.shape, bool)
     real[:, 3] = corners[:, 2] != corners[:, 3]
-    for _ in range(DRAFT_ROUNDS):
+    for turn in range(DRAFT_ROUNDS):
+        if turn % SMOOTHED == 0 and turn < DRAFT_ROUNDS / 2:  # else walls keep the steps of cells
+            places = orbits.near(places + 0.5 * orbits.pull(places), orbits.start)
         points = orbits.places(places)
         p = points[corners]
         flat = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
