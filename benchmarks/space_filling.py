@@ -1,6 +1,6 @@
 """What space groups are worth for solids that fill space, and what whole searches find.
 
-    python benchmarks/space_filling.py [--effort fast] [--method flow] [--separable] [--out FOLDER] MESH ...
+    python benchmarks/space_filling.py [--effort fast] [--separable] [--out FOLDER] MESH ...
     python benchmarks/space_filling.py --groups all MESH ...      # what groups are worth
 
 A row of a search is of the first solid: how much it looks like the figure, how many of a million points

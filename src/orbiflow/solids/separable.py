@@ -28,8 +28,8 @@ from orbiflow.symmetry import CrystallographicGroup
 SEPARABLE_GROUPS = ("P 1", "P -1")
 """Groups that keep each direction up to its sign, so that any may be the one."""
 
-DIRECTIONS, ROUGH, FINE = 40, 0.1, 0.04  # tried, all around; distances of lines and places on them
-BLUR = 1.6  # of the sorted tile, in steps
+DIRECTIONS, ROUGH, FINE = 40, 0.1, 0.03  # tried, all around; distances of lines and places on them
+BLUR = 1.2  # of the sorted tile, in steps
 FAITH, DEEPEST = 0.1, 0.1  # of the function beside it, and its most
 DRAFT = np.sin(np.deg2rad(2.0))  # slope that walls get, so that they do not rub
 DRAFT_ROUNDS, SMOOTHED, DRAFTS, OVERSHOOT = 120, 4, 3, 1.3
@@ -69,7 +69,9 @@ def separable_tile(
     half = [d for d in sphere(DIRECTIONS) if d @ (0.3, 0.5, 1) > 0]
     direction = max(half, key=lambda d: lines.kept(d, ROUGH))
     ball = ball_of_cells(lines.sorted_function(direction, FINE), bounds, group, detail)
-    for _ in range(DRAFTS if ball else 0):
+    if ball is None:
+        return None
+    for _ in range(DRAFTS):
         tile = tile_surface(ball, move=partial(_drafted, group, direction)).mesh
         gap = GAP * float(np.ptp(tile.points, axis=0).max())
         leaving = Pieces(group, tile, gap).leaving_stack()
@@ -146,8 +148,8 @@ class _Lines:
         points = (start + step * places) @ axes.T
         order = np.argsort(self.offsets @ direction, kind="stable")
         found = np.empty((len(order), *counts), np.float32)
-        for row, k in zip(found, order, strict=True):
-            row[:] = self._depths((points - self.shifts[k]) @ self.turns[k])
+        for place, k in enumerate(order):
+            found[place] = self._depths((points - self.shifts[k]) @ self.turns[k])
         return found, int(np.flatnonzero(order == 0)[0]), axes, start
 
     def _depths(self, points: Array) -> Array:
