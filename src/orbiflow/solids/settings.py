@@ -178,3 +178,8 @@ class BuildSettings(FileSettings, group="Pieces"):
 
     assembled: Annotated[bool, OnlyWith(kind="puzzle")] = False
     """Leave the pieces in the box, to look at; else they lie beside it, to print."""
+
+    @property
+    def usual_format(self) -> str:
+        """3MF: it has colours."""
+        return "3mf"
