@@ -28,12 +28,11 @@ from orbiflow.drawing import ShadedPart, View, draw_solids, font
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Team, ignore
 from orbiflow.solids import EscherSolid, FillSettings, GroupFamily, fill, read_mesh, usual_up
-from orbiflow.solids.assembly import Pieces
 from orbiflow.solids.body import Body
 from orbiflow.solids.distance import points_inside
 from orbiflow.solids.pictures import solid_sheet
 from orbiflow.solids.search import EFFORTS, Goal, quick_bend, starting_poses
-from orbiflow.solids.separable import GAP
+from orbiflow.solids.separable import pieces_with_gap
 
 MOST_COSETS = 8  # of groups in the table: solids of larger ones have little room for limbs
 
@@ -108,8 +107,7 @@ def _searches(files: list[Path], settings: FillSettings, out: Path | None) -> No
         own = found[0].likeness
         row = f"{file.stem[:11]:11} {found[0].group_name:10} {own.score:5.3f} {own.overlap:7.3f}"
         row += f" {own.shadows:7.3f} {own.kept:4.2f} {own.smooth:6.2f} {own.strain:4.2f}"
-        size = float(np.ptp(found[0].tile.points, axis=0).max())
-        leaves = Pieces(found[0].group, found[0].tile, GAP * size).leaving_stack()
+        leaves = pieces_with_gap(found[0].group, found[0].tile).leaving_stack()
         free = "yes" if leaves.is_free else f"{100 * leaves.blocked:.1f} %"
         row += f"  {missed(found[0]):6} {free:>7} {len(found):6} {seconds:8.0f}"
         print(row, flush=True)

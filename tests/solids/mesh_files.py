@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from manifold3d import Manifold
@@ -113,3 +115,17 @@ def dirichlet_cell(group: CrystallographicGroup, place: Array) -> Mesh:
     offsets = -np.einsum("ij,ij->i", normals, (images + place) / 2)
     corners = HalfspaceIntersection(np.column_stack([normals, offsets]), place).intersections
     return as_mesh(Manifold.hull_points(np.unique(corners.round(9), axis=0)))
+
+
+def space_tile(
+    tile: Mesh, group: CrystallographicGroup | None = None, figure: Mesh | None = None
+) -> Any:
+    """What is known of a solid, by default of the cubic group, whose figure is by default itself."""
+    return SimpleNamespace(
+        group=group or cubic_group(),
+        tile=tile,
+        target=figure or tile,
+        bent=figure or tile,
+        millimetres=30.0,
+        upright=np.eye(3),
+    )

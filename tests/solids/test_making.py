@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,20 +17,8 @@ from orbiflow.solids.print_advice import lying, overhang_share, print_advice
 from orbiflow.solids.sweeping import lifted
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from solids.hooked_tiles import hooked_tile
-from solids.mesh_files import ball, box, bumpy_cell, cubic_group
+from solids.mesh_files import ball, box, bumpy_cell, space_tile
 from solids_read import read_3mf, read_stl
-
-
-def space_tile(tile: Mesh, group: CrystallographicGroup | None = None) -> Any:
-    return SimpleNamespace(
-        group=group or cubic_group(),
-        tile=tile,
-        target=tile,
-        bent=tile,
-        millimetres=30.0,
-        upright=np.eye(3),
-    )
-
 
 BUMPY = space_tile(bumpy_cell(steps=12))
 HOOKED = space_tile(hooked_tile(0))

@@ -12,11 +12,16 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError, SettingError
 from orbiflow.solids import FillSettings, fill
-from orbiflow.solids.assembly import Pieces, greatest_overlap
+from orbiflow.solids.assembly import greatest_overlap
 from orbiflow.solids.bodies import as_body, united
 from orbiflow.solids.certificate import certify_solid
 from orbiflow.solids.distance import SignedDistance
-from orbiflow.solids.separable import GAP, check_separable, separable_tile, sorted_labels
+from orbiflow.solids.separable import (
+    check_separable,
+    pieces_with_gap,
+    separable_tile,
+    sorted_labels,
+)
 from orbiflow.solids.stacks import stack_of
 from orbiflow.symmetry import space_group
 from solids.known_bodies import ball, creature
@@ -47,7 +52,7 @@ def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted() -> Non
     assert tile is not None
     assert certify_solid(group, tile).valid
     size = float(np.ptp(tile.points, axis=0).max())
-    pieces = Pieces(group, tile, GAP * size)
+    pieces = pieces_with_gap(group, tile)
     leaving = pieces.leaving_stack()
     assert leaving.is_free
     # what lines say is checked by moving the body out of copies that are lower

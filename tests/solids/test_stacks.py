@@ -8,7 +8,6 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,22 +21,13 @@ from orbiflow.solids.pictures import figure_axes, solid_gif, solid_sheet
 from orbiflow.solids.stacks import copy_colour, lighter, stack_of
 from orbiflow.solids.web_page import KINDS, stack_data, stack_page
 from orbiflow.symmetry import CrystallographicGroup, Isometry
-from solids.mesh_files import ball, box, bumpy_cell, cubic_group
+from solids.mesh_files import ball, box, bumpy_cell, cubic_group, space_tile
 from studio.browser import chromium
 
 
-def space_tile(tile: Mesh | None = None, group: CrystallographicGroup | None = None) -> Any:
+def with_a_ball(tile: Mesh | None = None) -> Any:
     """A tile that fills space, with a ball as its figure."""
-    tile = tile or bumpy_cell(steps=8)
-    figure = ball(0.6, (0.5, 0.5, 0.5))
-    return SimpleNamespace(
-        group=group or cubic_group(),
-        tile=tile,
-        target=figure,
-        bent=figure,
-        millimetres=30.0,
-        upright=np.eye(3),
-    )
+    return space_tile(tile or bumpy_cell(steps=8), figure=ball(0.6, (0.5, 0.5, 0.5)))
 
 
 def mirrored_cells() -> CrystallographicGroup:
@@ -83,7 +73,7 @@ def test_a_figure_is_seen_from_its_broad_side() -> None:
 
 
 def test_a_sheet_shows_figure_tile_and_stack() -> None:
-    sheet = solid_sheet(space_tile(), width=400, copies=8)
+    sheet = solid_sheet(with_a_ball(), width=400, copies=8)
     assert sheet.size == (400, 175)
     pixels = np.asarray(sheet, float)
     left, right = pixels[:, :225], pixels[:, 225:]
@@ -93,13 +83,13 @@ def test_a_sheet_shows_figure_tile_and_stack() -> None:
         for p in right[20:150:9, 20:150:9].reshape(-1, 3)
     }
     assert len(hues) >= 4  # white, and the colours of four kinds of copies
-    again = np.asarray(solid_sheet(space_tile(), width=400, copies=8), float)
+    again = np.asarray(solid_sheet(with_a_ball(), width=400, copies=8), float)
     assert np.array_equal(again, pixels)
 
 
 def test_a_film_opens_the_stack_and_closes_it() -> None:
     told = list[float]()
-    content = solid_gif(space_tile(), size=80, frames=6, copies=8, progress=told.append)
+    content = solid_gif(with_a_ball(), size=80, frames=6, copies=8, progress=told.append)
     film: Any = Image.open(io.BytesIO(content))
     assert film.n_frames == 6
     assert film.info["loop"] == 0
@@ -116,7 +106,7 @@ def unpacked(text: str, kind: str) -> Any:
 
 
 def test_what_a_page_draws() -> None:
-    own = space_tile()
+    own = with_a_ball()
     data = stack_data(own, copies=8)
     assert len(data["copies"]) == 8
     mesh = data["meshes"]["tile"]
@@ -144,7 +134,7 @@ def page_fixture(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     file = tmp_path_factory.mktemp("page") / "stack.html"
-    file.write_text(stack_page(space_tile(), copies=8), "utf-8")
+    file.write_text(stack_page(with_a_ball(), copies=8), "utf-8")
     arguments = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=arguments)
@@ -211,6 +201,6 @@ def test_a_page_has_no_barriers(page: Any) -> None:
 
 
 def test_pages_are_small(tmp_path: Path) -> None:
-    page = stack_page(space_tile(bumpy_cell(steps=40)))
+    page = stack_page(with_a_ball(bumpy_cell(steps=40)))
     (tmp_path / "page.html").write_text(page)
     assert (tmp_path / "page.html").stat().st_size < 2_500_000

@@ -21,7 +21,7 @@ from orbiflow.errors import GroupError
 from orbiflow.solids.assembly import Pieces, axes_along, sphere
 from orbiflow.solids.closing import Function, ball_of_cells, box_around
 from orbiflow.solids.mesh import Mesh
-from orbiflow.solids.smoothing import PointOrbits
+from orbiflow.solids.smoothing import PointOrbits, patch_vectors
 from orbiflow.solids.surfaces import Patches, tile_surface
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -45,6 +45,11 @@ def check_separable(group: CrystallographicGroup) -> None:
             f"solids that come apart are looked for in {' and '.join(SEPARABLE_GROUPS)}, "
             f"not in {group.name}"
         )
+
+
+def pieces_with_gap(group: CrystallographicGroup, tile: Mesh) -> Pieces:
+    """Return a tile and its neighbours with the gap that copies which come apart may have."""
+    return Pieces(group, tile, GAP * float(np.ptp(tile.points, axis=0).max()))
 
 
 def separable_tile(
@@ -73,8 +78,7 @@ def separable_tile(
         return None
     for _ in range(DRAFTS):
         tile = tile_surface(ball, move=partial(_drafted, group, direction)).mesh
-        gap = GAP * float(np.ptp(tile.points, axis=0).max())
-        leaving = Pieces(group, tile, gap).leaving_stack()
+        leaving = pieces_with_gap(group, tile).leaving_stack()
         if leaving.is_free:
             return tile
         direction = leaving.direction
@@ -207,8 +211,7 @@ def _drafted(
             places = orbits.near(places + 0.5 * orbits.pull(places), orbits.start)
         points = orbits.places(places)
         p = points[corners]
-        flat = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-        flat[~real[:, 3]] = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[~real[:, 3]]
+        flat = patch_vectors(p, ~real[:, 3])
         flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
         up = side * (flat @ direction)
         bad = up < DRAFT

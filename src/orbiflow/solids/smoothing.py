@@ -161,12 +161,20 @@ def _steps_between_copies(
     return np.linalg.solve(matrix, vector[..., None])[..., 0]
 
 
+def patch_vectors(corners: Array, three: Array) -> Array:
+    """Return the outer normals (n, 3), twice as long as the areas, of patches with corners (n, 4, 3).
+
+    The last corner of those with `three` (n,) corners is a repeated one.
+    """
+    found = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    a, b, c = np.moveaxis(corners[three, :3], 1, 0)
+    found[three] = np.cross(b - a, c - a)
+    return found
+
+
 def _orbit_normals(orbits: PointOrbits, points: Array, patches: Integers) -> Array:
     """Return a unit normal (n, 3) of the surface at each orbit, seen from one of its sides."""
-    p = points[patches]
-    vectors = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    thin = patches[:, 2] == patches[:, 3]
-    vectors[thin] = np.cross(p[thin, 1] - p[thin, 0], p[thin, 2] - p[thin, 0])
+    vectors = patch_vectors(points[patches], patches[:, 2] == patches[:, 3])
     normals = np.zeros_like(points)
     for k in range(4):
         np.add.at(normals, patches[:, k], vectors)

@@ -57,7 +57,7 @@ class FitChoice(Settings, group="Density"):
     columns: tuple[str, ...]
     """Columns of the table."""
 
-    unit: Literal["degrees", "radians", "turns"] | None = None
+    unit: Literal["radians", "degrees", "turns"] | None = None
     """Unit of angles."""
 
     def check(self) -> None:
