@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -141,11 +140,7 @@ def contacts(bent: BentBody) -> Contacts:
     return Contacts(copies, np.maximum(gaps, -REACH), copy, point)
 
 
-def bent(
-    start: BentBody,
-    stages: tuple[tuple[float, int], ...] = STAGES,
-    check: Callable[[], object] = lambda: None,
-) -> BentBody:
+def bent(start: BentBody, stages: tuple[tuple[float, int], ...] = STAGES) -> BentBody:
     """Return a body bent until its copies meet.
 
     Each point of the surface is pulled over a share of the gap or overlap: who matters more yields
@@ -154,14 +149,12 @@ def bent(
     Args:
         start: The body in its place.
         stages: How strongly it is pulled, and for how many steps.
-        check: Called before each step; may raise.
     """
     found, importance = start, start.body.importance
     size = start.body.size
     for strength, steps in stages:
         pulled = start.body.pulled(strength)
         for step in range(steps):
-            check()
             near = contacts(found)
             if step % 2 == 0:
                 found = refitted(found, near)

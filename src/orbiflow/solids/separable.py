@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 import scipy.ndimage
 
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import GroupError
 from orbiflow.solids.assembly import Pieces, axes_along, sphere
 from orbiflow.solids.closing import Function, ball_of_cells, box_around
@@ -203,25 +203,31 @@ def _drafted(
     behind = group.linear_parts[patches.cosets] @ center + group.translations[patches.cosets]
     behind = behind + patches.shifts @ group.lattice.T
     side = np.sign((behind - center) @ direction)
-    corners = patches.corners
-    real = np.ones(corners.shape, bool)
-    real[:, 3] = corners[:, 2] != corners[:, 3]
     for turn in range(DRAFT_ROUNDS):
         if turn % SMOOTHED == 0 and turn < DRAFT_ROUNDS / 2:  # else walls keep the steps of cells
             places = orbits.near(places + 0.5 * orbits.pull(places), orbits.start)
-        points = orbits.places(places)
-        p = points[corners]
-        flat = patch_vectors(p, ~real[:, 3])
-        flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
-        up = side * (flat @ direction)
-        bad = up < DRAFT
-        turned = flat + np.where(bad, side * (2 * DRAFT - up), 0.0)[:, None] * direction
-        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-        middle = (p * real[..., None]).sum(axis=1) / real.sum(axis=1, keepdims=True)
-        off = np.einsum("fkj,fj->fk", p - middle[:, None], turned) * bad[:, None]
-        moves, weight = np.zeros_like(points), np.zeros(len(points))
-        np.add.at(moves, corners[real], (-off[..., None] * turned[:, None])[real])
-        np.add.at(weight, corners[real], np.where(bad, 1.0, STILL)[:, None].repeat(4, 1)[real])
-        steps = orbits.mean_moves(moves / np.maximum(weight, 1e-300)[:, None])
-        places = orbits.near(places + OVERSHOOT * steps, orbits.start)
+        moves = _moves_of_draft(orbits.places(places), patches.corners, side, direction)
+        places = orbits.near(places + OVERSHOOT * orbits.mean_moves(moves), orbits.start)
     return places
+
+
+def _moves_of_draft(points: Array, corners: Integers, side: Array, direction: Array) -> Array:
+    """Return the moves (N, 3) of points that turn undercut patches (F, 4) about their centres.
+
+    `side` (F,) is 1 for patches that must look along the direction, -1 for those that must look back.
+    """
+    real = np.ones(corners.shape, bool)
+    real[:, 3] = corners[:, 2] != corners[:, 3]
+    p = points[corners]
+    flat = patch_vectors(p, ~real[:, 3])
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    up = side * (flat @ direction)
+    bad = up < DRAFT
+    turned = flat + np.where(bad, side * (2 * DRAFT - up), 0.0)[:, None] * direction
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    middle = (p * real[..., None]).sum(axis=1) / real.sum(axis=1, keepdims=True)
+    off = np.einsum("fkj,fj->fk", p - middle[:, None], turned) * bad[:, None]
+    moves, weight = np.zeros_like(points), np.zeros(len(points))
+    np.add.at(moves, corners[real], (-off[..., None] * turned[:, None])[real])
+    np.add.at(weight, corners[real], np.where(bad, 1.0, STILL)[:, None].repeat(4, 1)[real])
+    return moves / np.maximum(weight, 1e-300)[:, None]
