@@ -107,7 +107,8 @@ def _searches(files: list[Path], settings: FillSettings, out: Path | None) -> No
         own = found[0].likeness
         row = f"{file.stem[:11]:11} {found[0].group_name:10} {own.score:5.3f} {own.overlap:7.3f}"
         row += f" {own.shadows:7.3f} {own.kept:4.2f} {own.smooth:6.2f} {own.strain:4.2f}"
-        leaves = pieces_with_gap(found[0].group, found[0].tile).leaving_stack()
+        pieces = pieces_with_gap(found[0].group, found[0].tile)
+        leaves = pieces.leaving_stack(found[0].group.linear_parts if settings.separable else None)
         free = "yes" if leaves.is_free else f"{100 * leaves.blocked:.1f} %"
         row += f"  {missed(found[0]):6} {free:>7} {len(found):6} {seconds:8.0f}"
         print(row, flush=True)

@@ -121,26 +121,42 @@ class Pieces:
         """Return how the tile is best drawn away from a neighbour; None if it is locked to it."""
         element, cone = self.contacts[number].element, self.cones[number]
         other = self.piece.moved(element.linear, element.translation)
-        return self._best(_directions(cone), lambda _: [other])
+        return _best(
+            _directions(cone), lambda own, most: self.blocked(self.piece, [other], own, most)
+        )
 
-    def leaving_stack(self) -> Leaving:
+    def leaving_stack(self, turns: Array | None = None) -> Leaving:
         """Return how the tile is best drawn out of a stack that fills all space on one side of it.
 
         For a direction d, copies are there whose centres are at most as far along d as the tile's.
         The tile's free directions and `SPREAD` others are tried.
+
+        Args:
+            turns: Linear parts (n, 3, 3) of elements whose copies leave by the same move, of which the
+                one that is blocked most counts. Default: the tile alone.
         """
+        turns = np.eye(3)[None] if turns is None else turns
         center = self.tile.centroid
         radius = float(np.linalg.norm(self.tile.points - center, axis=1).max())
         near = self.group.elements_near(center, 2 * radius, source=center)[1:]
         meshes = [self.piece.moved(own.linear, own.translation) for own in near]
         shifts = np.array([own.linear @ center + own.translation - center for own in near])
         rays = [ray for cone in self.cones for ray in cone.rays]
-        tried = least_pushed(lambda d: self._pushed(d, 1e-6 * radius), np.reshape(rays, (-1, 3)))
+        close = 1e-6 * radius
 
-        def before(direction: Array) -> list[Mesh]:
-            return [m for m, s in zip(meshes, shifts, strict=True) if s @ direction < 1e-6 * radius]
+        def pushed(directions: Array) -> Array:
+            return np.sum([self._pushed(directions @ turn, close) for turn in turns], axis=0)
 
-        found = self._best(tried, before)
+        def blocked(direction: Array, most: float) -> float:
+            worst = 0.0
+            for own in direction @ turns:  # how the move looks to the tile itself
+                before = [m for m, s in zip(meshes, shifts, strict=True) if s @ own < close]
+                worst = max(worst, self.blocked(self.piece, before, own, most))
+                if worst > most:
+                    break
+            return worst
+
+        found = _best(least_pushed(pushed, np.reshape(rays, (-1, 3))), blocked)
         assert found is not None
         return found
 
@@ -158,8 +174,13 @@ class Pieces:
         """Return an order in which some copies are put together, each by a straight move.
 
         They are taken apart one by one, and put together the other way round. That finds an order if
-        there is one: a piece that can leave some others can leave fewer, too.
+        there is one: a piece that can leave some others can leave fewer, too. Where all copies leave a
+        stack by one move, they go in by that.
         """
+        if keeps_directions(self.group):
+            leaving = self.leaving_stack(self.group.linear_parts)
+            if leaving.is_free and (order := self.order_along(copies, leaving.direction)):
+                return Assembly(tuple(Step(k, -leaving.direction) for k in order[::-1]), ())
         meshes = [self.piece.moved(own.linear, own.shift) for own in copies]
         touching = self._touching(copies)
         left, taken = list(range(len(copies))), list[Step]()
@@ -242,18 +263,6 @@ class Pieces:
                 return Leaving(direction, 0.0)
         return None
 
-    def _best(self, directions: Array, others: Callable[[Array], Sequence[Mesh]]) -> Leaving | None:
-        """Return how the tile leaves others, which depend on the direction, with least in its way."""
-        best = None
-        for direction in directions:
-            most = 1.0 if best is None else best.blocked
-            share = self.blocked(self.piece, others(direction), direction, most)
-            if best is None or share < best.blocked:
-                best = Leaving(direction, share)
-            if best.is_free:
-                break
-        return best
-
     def blocked(
         self, piece: Mesh, others: Sequence[Mesh], direction: Array, most: float = 1.0
     ) -> float:
@@ -282,6 +291,24 @@ class Pieces:
             if hit.sum() > most * count:
                 break
         return float(hit.sum() / count)
+
+
+def keeps_directions(group: CrystallographicGroup) -> bool:
+    """Return whether all elements keep each direction up to its sign, as in P 1 and P -1."""
+    turns = group.linear_parts
+    return all(np.allclose(turn, turn[0, 0] * np.eye(3)) for turn in turns)
+
+
+def _best(directions: Array, blocked: Callable[[Array, float], float]) -> Leaving | None:
+    """Return the direction in which least is in the way; what is above the least need not be exact."""
+    best = None
+    for direction in directions:
+        share = blocked(direction, 1.0 if best is None else best.blocked)
+        if best is None or share < best.blocked:
+            best = Leaving(direction, share)
+        if best.is_free:
+            break
+    return best
 
 
 def greatest_overlap(

@@ -18,7 +18,7 @@ import scipy.ndimage
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import GroupError
-from orbiflow.solids.assembly import Pieces, axes_along, sphere
+from orbiflow.solids.assembly import Pieces, axes_along, keeps_directions, sphere
 from orbiflow.solids.closing import Function, ball_of_cells, box_around
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.smoothing import PointOrbits, patch_vectors
@@ -39,8 +39,7 @@ STILL = 0.15  # how much less a face that may stay counts at a point than one th
 
 def check_separable(group: CrystallographicGroup) -> None:
     """Raise `GroupError` for groups in which tiles that come apart are not looked for."""
-    turns = group.linear_parts
-    if not all(np.allclose(turn, turn[0, 0] * np.eye(3)) for turn in turns):
+    if not keeps_directions(group):
         raise GroupError(
             f"solids that come apart are looked for in {' and '.join(SEPARABLE_GROUPS)}, "
             f"not in {group.name}"
@@ -78,7 +77,7 @@ def separable_tile(
         return None
     for _ in range(DRAFTS):
         tile = tile_surface(ball, move=partial(_drafted, group, direction)).mesh
-        leaving = pieces_with_gap(group, tile).leaving_stack()
+        leaving = pieces_with_gap(group, tile).leaving_stack(group.linear_parts)
         if leaving.is_free:
             return tile
         direction = leaving.direction
