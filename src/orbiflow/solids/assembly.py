@@ -133,9 +133,13 @@ class Pieces:
 
         Args:
             turns: Linear parts (n, 3, 3) of elements whose copies leave by the same move, of which the
-                one that is blocked most counts. Default: the tile alone.
+                one that is blocked most counts. Default: all, where they do leave, else the tile alone.
         """
-        turns = np.eye(3)[None] if turns is None else turns
+        if turns is None:
+            found = self._all_leave
+            if found and (found.is_free or self.group.order == 1):
+                return found
+            turns = np.eye(3)[None]
         center = self.tile.centroid
         radius = float(np.linalg.norm(self.tile.points - center, axis=1).max())
         near = self.group.elements_near(center, 2 * radius, source=center)[1:]
@@ -160,6 +164,12 @@ class Pieces:
         assert found is not None
         return found
 
+    @cached_property
+    def _all_leave(self) -> Leaving | None:
+        """Return how all copies leave by one move, in groups that keep directions."""
+        group = self.group
+        return self.leaving_stack(group.linear_parts) if keeps_directions(group) else None
+
     def _pushed(self, directions: Array, near: float) -> Array:
         """Return how hard (n,) a tile is pushed into neighbours that are not ahead along directions."""
         center = self.tile.centroid
@@ -177,10 +187,9 @@ class Pieces:
         there is one: a piece that can leave some others can leave fewer, too. Where all copies leave a
         stack by one move, they go in by that.
         """
-        if keeps_directions(self.group):
-            leaving = self.leaving_stack(self.group.linear_parts)
-            if leaving.is_free and (order := self.order_along(copies, leaving.direction)):
-                return Assembly(tuple(Step(k, -leaving.direction) for k in order[::-1]), ())
+        leaving = self._all_leave
+        if leaving and leaving.is_free and (order := self.order_along(copies, leaving.direction)):
+            return Assembly(tuple(Step(k, -leaving.direction) for k in order[::-1]), ())
         meshes = [self.piece.moved(own.linear, own.shift) for own in copies]
         touching = self._touching(copies)
         left, taken = list(range(len(copies))), list[Step]()
