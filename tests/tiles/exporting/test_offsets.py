@@ -75,8 +75,10 @@ def test_pieces_in_the_file(name: str, offset: float) -> None:
     lines = svg_lines(text)
     cuts = polygons([line for line in lines if line.layer == "cut"])
     tile = shapely.Polygon(scene.prototiles[0])
-    for cut, placed in zip(cuts, scene.tiles, strict=True):
+    assert len(cuts) == len(scene.tiles)
+    for placed in scene.tiles:
         own = shapely.affinity.affine_transform(tile, [*placed.linear.ravel(), *placed.offset])
+        cut = max(cuts, key=lambda cut: cut.intersection(own).area)
         left = cut.buffer(-0.1)  # what the beam leaves
         assert (
             left.symmetric_difference(own.buffer(offset)).area < 2 * chosen.deviation * own.length
@@ -84,6 +86,6 @@ def test_pieces_in_the_file(name: str, offset: float) -> None:
     seams = [line for line in lines if line.layer == "seam"]
     # the line to sew along lies where the tile is; a cut inside needs none
     assert len(seams) == (2 if offset > 0 else 0)
-    for seam, cut in zip(polygons(seams), cuts, strict=False):
+    for seam in polygons(seams):
         assert seam.area == pytest.approx(tile.area, rel=1e-2)
-        assert cut.contains(seam)
+        assert any(cut.contains(seam) for cut in cuts)

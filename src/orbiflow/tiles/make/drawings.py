@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.make.layout import BLACK, BLUE, Layout, line_style
 from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
 from orbiflow.tiles.page import (
@@ -136,13 +137,13 @@ def burnt(
     dark, lines = dark_parts(motif)
     inner = tile.buffer(-edge)
     if styles["engrave"].fill:
-        regions = boundary(dark & tile)
+        regions = [boundary(region) for region in polygons_in(dark & tile)]
     else:
-        regions = polylines((dark & tile).boundary & inner)
+        regions = [polylines((dark & tile).boundary & inner)]
     kept = (curve for line in lines for curve in polylines(line & inner))
     scored = tuple(c for c in kept if c.closed or np.ptp(c.bounds(), axis=0).max() > edge)
     pictures = cut_off(Motif(rasters=motif.rasters), tile).rasters
-    engraved = (Part(regions, styles["engrave"]),) if regions else ()
+    engraved = tuple(Part(region, styles["engrave"]) for region in regions if region)
     return {
         "engrave": Motif(engraved, pictures),
         "score": Motif((Part(scored, styles["score"]),) if scored else ()),

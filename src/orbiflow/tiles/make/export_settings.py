@@ -90,7 +90,8 @@ class ExportSettings(PageSettings, MotifSettings, group="Page and file"):
         PageSize | None,
         OnlyWith(cut=("none", "skeleton", "pieces"), because="others are one sheet"),
     ] = None
-    """Size of the machine's bed, or a page's name; a larger page becomes several files."""
+    """Size of the machine's bed, or a page's name; a larger page becomes several files, of whole
+    tiles if they are cut out, else of parts to put together."""
 
     calibrate: bool = False
     """Add a mark of 100 mm on a layer of its own."""
@@ -194,11 +195,16 @@ class ExportSettings(PageSettings, MotifSettings, group="Page and file"):
 
     @property
     def page(self) -> tuple[float, float]:
-        """Width and height in mm of what is drawn on; for pieces no larger than the bed."""
-        if self.cut != "pieces" or self.bed is None:
+        """Width and height in mm of what is drawn on; with whole tiles no larger than the bed."""
+        if self.bed is None or not self.whole_sheets:
             return super().page
-        area = self.area or self.bed
+        area = self.area or (self.bed if self.cut == "pieces" else super().page)
         return min(area[0], self.bed[0]), min(area[1], self.bed[1])
+
+    @property
+    def whole_sheets(self) -> bool:
+        """Whether each of several sheets holds whole tiles; else they are cut where sheets meet."""
+        return self.cut == "pieces" or (self.cut == "skeleton" and not self.clip)
 
     @property
     def deviation(self) -> float:

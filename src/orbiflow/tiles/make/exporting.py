@@ -12,6 +12,7 @@ from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Outcome
 from orbiflow.tiles.likeness import narrowest_neck
+from orbiflow.tiles.make.cut_order import in_cutting_order
 from orbiflow.tiles.make.drawings import drawn_on, with_drawing
 from orbiflow.tiles.make.export_settings import ExportSettings
 from orbiflow.tiles.make.jigsaws import jigsaw_scenes
@@ -19,7 +20,7 @@ from orbiflow.tiles.make.layout import Layout, layout, tiling_scene
 from orbiflow.tiles.make.offsets import place_on
 from orbiflow.tiles.make.pieces import pieces_scenes
 from orbiflow.tiles.make.sheets import calibrated, registered, split
-from orbiflow.tiles.make.skeletons import skeleton_scene
+from orbiflow.tiles.make.skeletons import skeleton_scenes
 from orbiflow.tiles.make.templates import template_scene
 from orbiflow.tiles.motifs import Over, read_overs, require_figures, with_map
 from orbiflow.tiles.page import Scene, flattened, shades
@@ -39,12 +40,12 @@ class Maker(NamedTuple):
     scenes: Callable[[Layout], list[Scene]]
     called: str  # what is counted on its sheets
     calibrated: slice = LAST  # the sheets that have a strip for the calibration mark
-    splits: bool = False  # whether a page larger than the bed is split, cutting tiles
+    splits: bool = False  # whether what is larger than the bed is split, cutting tiles
 
 
 MAKERS = {
     "none": Maker(lambda layout: [tiling_scene(layout)], "tiles", splits=True),
-    "skeleton": Maker(lambda layout: [skeleton_scene(layout)], "tiles in outline", splits=True),
+    "skeleton": Maker(skeleton_scenes, "tiles in outline", splits=True),
     "pieces": Maker(pieces_scenes, "pieces", EVERY),
     "jigsaw": Maker(jigsaw_scenes, "pieces of a jigsaw", FIRST),
     "template": Maker(lambda layout: [template_scene(layout)], "template"),
@@ -131,10 +132,11 @@ def _made(placed: Layout, maker: Maker) -> list[Scene]:
     settings, fine = placed.settings, placed.fine
     made = [with_drawing(scene, placed) for scene in maker.scenes(placed)]
     if maker.splits and settings.bed is not None:
-        made = split(made[0], settings.bed, fine)
+        made = [sheet for scene in made for sheet in split(scene, settings.bed, fine)]
     # a machine need not know copies
     painted = settings.cut == "none" and settings.filled
-    return made if painted else [flattened(scene, fine) for scene in made]
+    made = made if painted else [flattened(scene, fine) for scene in made]
+    return made if settings.coloured else [in_cutting_order(scene) for scene in made]
 
 
 def laid_out(

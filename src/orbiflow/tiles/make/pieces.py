@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -15,6 +14,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make.layout import BLUE, Layout, line_style
 from orbiflow.tiles.make.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.make.offsets import cut_ring
+from orbiflow.tiles.make.sheets import counts_by_sheet
 from orbiflow.tiles.page import (
     USUAL_WIDTH,
     Box,
@@ -71,15 +71,14 @@ def _scenes_of(layout: Layout, kind: int) -> list[Scene]:
 def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
     settings, fit = layout.settings, len(placed)
     wanted = settings.copies or fit
-    sheets = math.ceil(wanted / fit)
-    if sheets > 1 and settings.bed is None:
+    counts = counts_by_sheet(wanted, fit)
+    if len(counts) > 1 and settings.bed is None:
         plural = "s" if fit > 1 else ""
         raise OrbiflowError(
             f"{wanted} pieces do not fit on the page of {box.width:g} x {box.height:g} mm: it holds "
-            f"{fit} piece{plural}, so that {sheets} sheets are needed; choose a larger area, or give "
-            f"the bed to have {sheets} files"
+            f"{fit} piece{plural}, so that {len(counts)} sheets are needed; choose a larger area, or "
+            f"give the bed to have {len(counts)} files"
         )
-    counts = [min(fit, wanted - k * fit) for k in range(sheets)]
     return [placed.select(slice(n)) for n in counts]
 
 

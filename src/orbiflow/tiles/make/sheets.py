@@ -41,17 +41,33 @@ def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scen
     if scene.width <= bed[0] and scene.height <= bed[1]:
         return [scene]
     columns, rows = _parts(scene.width, bed[0]), _parts(scene.height, bed[1])
-    if len(columns) * len(rows) > MOST_SHEETS:
-        raise OrbiflowError(
-            f"the page of {scene.width:g} x {scene.height:g} mm needs {len(columns) * len(rows)} "
-            f"sheets of {bed[0]:g} x {bed[1]:g} mm; the most is {MOST_SHEETS}"
-        )
+    _require_few(len(columns) * len(rows))
     crosses = _crosses(columns, rows)
     pages = [Box(left, top, right, bottom) for top, bottom in rows for left, right in columns]
     return [
         _sheet(scene, page, crosses, tolerance, f"{k} of {len(pages)}")
         for k, page in enumerate(pages, 1)
     ]
+
+
+def _require_few(sheets: int) -> None:
+    if sheets > MOST_SHEETS:
+        raise OrbiflowError(
+            f"the page needs {sheets} sheets of the bed's size; the most is {MOST_SHEETS}"
+        )
+
+
+def counts_by_sheet(wanted: int, fit: int) -> list[int]:
+    """Return how many things lie on each sheet, if a sheet holds `fit` of those that are wanted.
+
+    >>> counts_by_sheet(7, 3)
+    [3, 3, 1]
+    """
+    if not fit:
+        raise OrbiflowError("the bed holds no whole tile; choose a smaller tile size")
+    sheets = math.ceil(wanted / fit)
+    _require_few(sheets)
+    return [min(fit, wanted - k * fit) for k in range(sheets)]
 
 
 def _parts(length: float, bed: float) -> list[tuple[float, float]]:

@@ -1,18 +1,19 @@
-"""The lines that tiles share, each cut or drawn once, joined into few long ones in a short order."""
+"""The lines that tiles share, each cut or drawn once, joined into few long ones."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.make.layout import Layout, line_style
+from orbiflow.tiles.make.layout import Layout, layout, line_style
+from orbiflow.tiles.make.sheets import counts_by_sheet
 from orbiflow.tiles.page import Curve, Layer, Scene, clipped, rectangle
 from orbiflow.tiles.tilings import skeleton
 
@@ -34,18 +35,28 @@ def shared_edges(layout: Layout) -> Iterator[tuple[Curve, tuple[int, int]]]:
         yield curve.moved(linear[copies.cosets[copy]], translations[copy]), (start, end)
 
 
-def skeleton_scene(layout: Layout) -> Scene:
+def skeleton_scenes(placed: Layout) -> list[Scene]:
+    """Return a scene; of whole tiles one for each bed that all tiles of the page need."""
+    settings, page = placed.settings, placed.page
+    if settings.bed is None or not settings.whole_sheets:
+        return [_skeleton_scene(placed)]
+    wanted = len(layout(placed.tile, settings.replace(bed=None)).page.copies)
+    counts = counts_by_sheet(wanted, len(page.copies))
+    return [_skeleton_scene(replace(placed, page=replace(page, most=n))) for n in counts]
+
+
+def _skeleton_scene(placed: Layout) -> Scene:
     """Return a scene with each edge that tiles share once, in few long lines."""
-    settings, box = layout.settings, layout.page.box
+    settings, box = placed.settings, placed.page.box
     arcs: list[Curve] = []
     ends: list[tuple[int, int]] = []
     free = -1
-    for curve, vertices in shared_edges(layout):
+    for curve, vertices in shared_edges(placed):
         if not settings.clip:
             arcs.append(curve)
             ends.append(vertices)
             continue
-        for part in clipped(curve, box, layout.fine, filled=False):
+        for part in clipped(curve, box, placed.fine, filled=False):
             # a cut end is a vertex of its own
             start, end = vertices
             if not np.allclose(part.start, curve.start, 0, 1e-9):
@@ -54,22 +65,22 @@ def skeleton_scene(layout: Layout) -> Scene:
                 end = free = free - 1
             arcs.append(part)
             ends.append((start, end))
-    style = line_style(layout)
+    style = line_style(placed)
     layers = [Layer("cut", "cut", style, tuple(joined(arcs, ends)))]
     if settings.border:
         layers.append(Layer("border", "cut", style, (rectangle(box),)))
-    return layout.scene(layers, layout.placed_tiles)
+    return placed.scene(layers, placed.placed_tiles)
 
 
 def joined(arcs: list[Curve], ends: list[tuple[int, int]]) -> list[Curve]:
-    """Join arcs that lead from vertex to vertex into few long curves, in a short order."""
+    """Join arcs that lead from vertex to vertex into few long curves."""
     long = []
     for trail in trails(np.array(ends)) if arcs else ():
         parts = [arcs[number] if forward else arcs[number].reversed() for number, forward in trail]
         (first, along), (last, forward) = trail[0], trail[-1]
         start, end = ends[first][0 if along else 1], ends[last][1 if forward else 0]
         long.append(Curve.joined(parts, closed=start == end))
-    return in_short_order(long)
+    return long
 
 
 Trail = list[tuple[int, bool]]
@@ -148,27 +159,3 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
         else:
             parts[-1].append((arc, forward))
     return [part for part in parts if part]
-
-
-def in_short_order(curves: list[Curve]) -> list[Curve]:
-    """Return curves in the order and direction of a way from each to the nearest end that is left."""
-    ends = np.array([[curve.start, curve.end] for curve in curves])
-    left, taken = np.ones(len(ends), dtype=bool), 0
-    place, ordered, numbers, tree = np.zeros(2), [], np.zeros(0, dtype=np.int64), None
-    for _ in curves:
-        if tree is None or 2 * taken > len(
-            numbers
-        ):  # most of the tree's curves are taken: a new one
-            numbers, taken = np.flatnonzero(left), 0
-            tree = KDTree(ends[numbers].reshape(-1, 2))
-        number, side, count = -1, 0, min(8, 2 * len(numbers))
-        while number < 0:
-            for hit in np.atleast_1d(tree.query(place, k=count)[1]).tolist():
-                if left[numbers[hit // 2]]:
-                    number, side = int(numbers[hit // 2]), hit % 2
-                    break
-            count = min(4 * count, 2 * len(numbers))
-        left[number], taken = False, taken + 1
-        ordered.append(curves[number].reversed() if side else curves[number])
-        place = ends[number, 1 - side]
-    return ordered

@@ -66,6 +66,7 @@ class Page:
     - `colour`: Which tiles have the same colour.
     - `known`: A colouring of the tiling in its own units. Default: the one with fewest colours.
     - `stretch`: A linear map of all copies, near the identity, for cells that repeat.
+    - `most`: The largest number of whole tiles. Default: all that the box holds.
     """
 
     size: tuple[float, float]
@@ -76,6 +77,7 @@ class Page:
     colour: ColourRule = "neighbour"
     known: Colouring | None = None
     stretch: Array = field(default_factory=lambda: np.eye(2))
+    most: int | None = None
 
     @classmethod
     def placed(
@@ -144,7 +146,8 @@ class Page:
     def copies(self) -> Copies:
         """The copies that the page shows."""
         if self.whole is not None:
-            return copies_inside(self.tiling, inset(self.box, self.whole))
+            found = copies_inside(self.tiling, inset(self.box, self.whole))
+            return found.select(np.arange(len(found))[: self.most])
         left, top, right, bottom = self.box
         corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
         own = corners @ np.linalg.inv(self.stretch).T

@@ -1,0 +1,152 @@
+"""Lines are followed from the inside out, and otherwise from the nearest to the nearest."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from artworks import EYE, squirrel
+from exported import tile_of
+from orbiflow.tiles import Curve, ExportSettings, Scene, scenes
+from orbiflow.tiles.make import exporting
+from orbiflow.tiles.make.cut_order import in_cutting_order, ordered_lines
+from orbiflow.tiles.page import Layer, Part, Style
+
+rows = st.lists(st.tuples(*[st.floats(0, 100)] * 4), min_size=1, max_size=60)
+
+
+@settings(max_examples=30)
+@given(rows)
+def test_open_lines_are_kept_and_go_to_the_nearest(ends: list) -> None:
+    curves = [Curve.polyline([[a, b], [c, d]]) for a, b, c, d in ends]
+    ordered, place = ordered_lines(curves, np.zeros(2))
+    assert Counter(map(key, ordered)) == Counter(map(key, curves))
+    left = [np.array([c.start, c.end]) for c in ordered if isinstance(c, Curve)]
+    assert np.array_equal(place, left[-1][1])
+    place = np.zeros(2)
+    for k, own in enumerate(left):
+        nearest = min(float(np.linalg.norm(ends - place, axis=1).min()) for ends in left[k:])
+        assert np.isclose(np.linalg.norm(own[0] - place), nearest)
+        place = own[1]
+
+
+def key(line: Curve | Part) -> tuple:
+    """What stays of a line however it is turned."""
+    curve = line if isinstance(line, Curve) else line.curves[0]
+    corners = curve.pieces[:, 0] if curve.closed else np.stack([curve.start, curve.end])
+    return tuple(sorted(map(tuple, corners.tolist())))
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(st.floats(10, 90), st.floats(10, 90), st.floats(1, 40)), max_size=25))
+def test_what_lies_inside_comes_first(discs: list) -> None:
+    turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    curves = [Curve.polyline(ring * r + (x, y), closed=True) for x, y, r in discs]
+    ordered, _ = ordered_lines(curves, np.zeros(2))
+    assert Counter(map(key, ordered)) == Counter(map(key, curves))
+    assert_inside_out([own for own in ordered if isinstance(own, Curve)])
+
+
+def assert_inside_out(curves: list[Curve]) -> None:
+    regions = [shapely.Polygon(c.flattened(0.01)) if c.closed else None for c in curves]
+    for k, outer in enumerate(regions):
+        if outer is None or not outer.is_valid:
+            continue
+        for curve in curves[k + 1 :]:
+            inner = shapely.LineString(curve.flattened(0.01))
+            assert not outer.contains_properly(inner)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"cut": "skeleton"},
+        {"cut": "skeleton", "clip": True, "border": True},
+        {"cut": "skeleton", "bed": (70.0, 70.0)},
+        {"cut": "pieces", "kerf": 0.2, "strokes": "hatch"},
+        {"cut": "jigsaw", "margin": 5.0, "tray": 12.0},
+        {"purpose": "plotter", "strokes": "echoes"},
+        {"cut": "template"},
+    ],
+)
+def test_every_cut_goes_inside_out_and_loses_no_line(
+    given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen = ExportSettings(
+        **{"purpose": "laser", "area": (150.0, 130.0), "tile_size": 40.0, "eyes": (EYE,), **given}
+    )
+    tile = squirrel("IH4")
+    written, _ = scenes(tile, chosen)
+    monkeypatch.setattr(exporting, "in_cutting_order", lambda scene: scene)
+    made, _ = scenes(tile, chosen)
+    for before, after in zip(made, written, strict=True):
+        for old, new in zip(before.layers, after.layers, strict=True):
+            lines = list(after.curves(new))
+            assert Counter(map(key, before.curves(old))) == Counter(map(key, lines))
+            assert_inside_out(lines)
+        assert travel(after) <= travel(before) + 1e-9
+
+
+def travel(scene: Scene) -> float:
+    """How far in mm the head goes between the lines of all layers."""
+    found, place = 0.0, np.zeros(2)
+    for layer in scene.layers:
+        for curve in scene.curves(layer):
+            found += float(np.hypot(*(curve.start - place)))
+            place = curve.end
+    return found
+
+
+def test_a_filled_part_keeps_its_holes() -> None:
+    rings = [
+        Curve.polyline(
+            np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * side + 5 - side / 2, closed=True
+        )
+        for side in (8.0, 4.0)
+    ]
+    hole = rings[1].reversed()
+    part = Part((rings[0], hole), Style("#000000"))
+    lone = Part(
+        (Curve.polyline([[0.6, 0], [0.7, 0]]), Curve.polyline([[0, 0], [0.5, 0]])),
+        Style(None, "#0000ff", 0.1),
+    )
+    layer = Layer("engrave", "drawing", Style(None, "#0000ff", 0.1), (part, lone))
+    (done,) = in_cutting_order(Scene(10.0, 10.0, (layer,))).layers
+    kinds = [type(item) for item in done.items]
+    assert kinds == [Curve, Curve, Part]
+    assert np.array_equal(done.items[0].start, [0, 0])  # type: ignore[union-attr]
+    assert len(done.items[2].curves) == 2  # type: ignore[union-attr]
+
+
+def test_whole_tiles_on_every_sheet() -> None:
+    tile = tile_of("IH7")
+    page = ExportSettings(purpose="laser", area=(300.0, 200.0), tile_size=40.0)
+    (whole,), _ = scenes(tile, page)
+    sheets, _ = scenes(tile, page.replace(bed=(100.0, 100.0)))
+    assert len(sheets) > 1
+    assert sum(len(sheet.tiles) for sheet in sheets) == len(whole.tiles)
+    counts = [len(sheet.tiles) for sheet in sheets]
+    assert len(set(counts[:-1])) == 1
+    for sheet in sheets:
+        assert (sheet.width, sheet.height) == (100.0, 100.0)
+        assert all(own.whole for own in sheet.tiles)
+        lines = shapely.union_all(
+            [
+                shapely.LineString(curve.flattened(0.01))
+                if not curve.closed
+                else shapely.LinearRing(curve.flattened(0.01))
+                for curve in sheet.curves(sheet.layers[0])
+            ]
+        )
+        # all tiles drop out, and nothing else
+        faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines, grid_size=1e-4)]))
+        areas = shapely.area(faces)
+        (ring,) = {id(own): own for own in sheet.prototiles}.values()
+        assert np.isclose(areas, shapely.Polygon(ring).area, rtol=0.02).sum() == len(sheet.tiles)
