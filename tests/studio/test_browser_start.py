@@ -92,6 +92,26 @@ def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
     studio.until(lambda: studio.project(own)["reading"]["invert"] is True)
 
 
+def test_smoothing_joins_parts_as_before_once_something_is_painted(
+    page, studio: RunningStudio, tmp_path
+) -> None:
+    picture = Image.new("L", (300, 200), 255)
+    picture.paste(0, (20, 60, 150, 140))
+    picture.paste(0, (152, 60, 250, 140))  # a gap of less than two per cent of the length
+    picture.save(tmp_path / "halves.png")
+    own = begun(page, tmp_path / "halves.png")
+    whole = area_of(studio.project(own))
+    page.get_by_role("radio", name="Add").check()
+    stroke(page, "canvas.reading", (0.2, 0.28), (0.3, 0.28))
+    studio.until(lambda: area_of(studio.project(own)) > 1.01 * whole)
+    assert "1 part is left out" in page.locator(".said").inner_text()
+    page.get_by_label("Smoothing").focus()
+    for _ in range(15):
+        page.keyboard.press("ArrowRight")
+    studio.until(lambda: area_of(studio.project(own)) > 1.5 * whole)
+    page.get_by_text("left out").wait_for(state="detached")
+
+
 def test_painting_mends_the_shape_and_can_be_undone(page, drawing, studio: RunningStudio) -> None:
     own = begun(page, drawing)
     before = area_of(studio.project(own))

@@ -68,6 +68,21 @@ def test_an_upload_becomes_a_silhouette(client: Client, project: str) -> None:
     assert summary["thumb"].endswith("backdrop.png")
 
 
+def test_a_polygon_stays_in_its_picture_when_it_is_mended(client: Client) -> None:
+    address = new_project(client)
+    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
+    before = client.get(address).json()["silhouette"]
+    size = before["width"], before["height"]
+    brush = Image.new("RGBA", size)
+    ImageDraw.Draw(brush).rectangle((0, 0, size[0] // 2, size[1]), fill=(0, 0, 0, 255))
+    done(client, client.put(f"{address}/mend", content=painted(brush)))
+    found = client.get(address).json()["silhouette"]
+    low, high = np.min(found["outline"], axis=0), np.max(found["outline"], axis=0)
+    assert (found["width"], found["height"]) == size
+    assert low == pytest.approx([size[0] / 2, 0], abs=3)
+    assert high == pytest.approx(size, abs=3)
+
+
 def painted(shape: Any) -> bytes:
     data = io.BytesIO()
     shape.save(data, "png")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from PIL import Image, ImageDraw
 
 from orbiflow.drawing import png_bytes
@@ -26,6 +27,7 @@ from orbiflow.tiles import (
 
 BACKDROP_SIDE_PIXELS = 1200  # pixels of the backdrop's longer side
 SUPERSAMPLING = 3  # along each side of a pixel of what is drawn
+ABOUT_PARTS = ("kept the largest", "filled ")  # how notes on parts and holes begin
 PAPER, INK = (255, 255, 255), (70, 78, 92)
 
 
@@ -50,8 +52,8 @@ def silhouette_file(home: Path, number: int = 0) -> Path:
 def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 0) -> Target:
     """Read one of a project's pictures and write its backdrop and its silhouette."""
     content = FileContent(input_file(home, number).read_bytes(), called)
-    target = Target.from_bytes(
-        content.data, called, threshold=reading.threshold, invert=reading.invert
+    target = _framed(
+        Target.from_bytes(content.data, called, threshold=reading.threshold, invert=reading.invert)
     )
     picture = _picture(target, content)
     end = OF_PICTURE[number]
@@ -60,6 +62,15 @@ def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 
     document = {"shown": _shown(mended, picture.size), "target": _stored(mended)}
     write_json(silhouette_file(home, number), document)
     return mended
+
+
+def _framed(target: Target) -> Target:
+    """Return a polygon with a page of its own size, which stays when it is mended."""
+    if target.size is not None:
+        return target
+    low, high = target.covered.low, target.covered.high
+    (width, height), corner = (high - low).tolist(), low.tolist()
+    return replace(target, size=(width, height), corner=tuple(corner))
 
 
 def load_target(home: Path, number: int = 0) -> Target:
@@ -124,9 +135,14 @@ def _mended(target: Target, file: Path, size: tuple[int, int]) -> Target:
     if not mask.any():
         raise InputFileError("nothing of the picture is left; paint some of it back")
     found = Target.from_mask(mask, source=target.source)
-    outline = target.covered.at((found.outline - 1) / size)
-    notes = tuple(note for note in target.notes if not note.startswith("kept the largest"))
-    return replace(target, outline=outline, notes=notes, seen=None)
+
+    def placed(points: Any) -> Any:
+        return target.covered.at((np.asarray(points) - 1) / size)
+
+    kept = [note for note in target.notes if not note.startswith(ABOUT_PARTS)]
+    notes = (*kept, *(note for note in found.notes if note.startswith(ABOUT_PARTS)))
+    seen = None if found.seen is None else shapely.transform(found.seen, placed)
+    return replace(target, outline=placed(found.outline), notes=notes, seen=seen)
 
 
 def _shown(target: Target, size: tuple[int, int]) -> dict[str, Any]:

@@ -95,6 +95,18 @@ def test_growing_is_said_and_comes_before_smoothing() -> None:
         ReadingSettings(thicken=0.3)
 
 
+def test_what_has_grown_in_a_picture_outlasts_smoothing() -> None:
+    mask = np.zeros((300, 400), dtype=bool)
+    mask[90:210, 40:200] = True
+    mask[145:149, 200:360] = True  # a leg
+    mask[20:60, 20:60] = True  # apart from the rest
+    target = Target.from_mask(mask)
+    assert target.seen is not None
+    grown = ReadingSettings(thicken=0.06, smooth=0.03).shaped(target)
+    assert grown.outline.max(axis=0)[0] > 350
+    assert ReadingSettings(smooth=0.03).shaped(target).outline.max(axis=0)[0] < 250
+
+
 def test_legs_that_are_too_thin_are_said_before_a_search() -> None:
     (said,) = doubts(spider(4))
     assert "let them grow (--thicken) by 0.04" in said.named(lambda name: f"--{name}")

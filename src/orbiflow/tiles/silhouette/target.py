@@ -351,7 +351,8 @@ class Target(Reading):
         shape = thickened(own, share * float(np.ptp(self.outline, axis=0).max()))
         more = percent(shape.area / own.area - 1)
         note = f"grew parts thinner than {percent(share)} of the length, by {more} of the area"
-        return replace(self, outline=outer_ring(shape), notes=(*self.notes, note))
+        seen = None if self.seen is None else self.seen.buffer(0).union(shape.difference(own))
+        return replace(self, outline=outer_ring(shape), notes=(*self.notes, note), seen=seen)
 
     @property
     def area(self) -> float:
