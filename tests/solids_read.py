@@ -35,7 +35,9 @@ def read_3mf(content: bytes) -> list[Object]:
         root = ElementTree.fromstring(archive.read("3D/3dmodel.model"))
     assert root.get("unit") == "millimeter"
     objects = {own.get("id"): own for own in root.iter(f"{CORE}object")}
-    return [_object(objects[item.get("objectid")]) for item in root.iter(f"{CORE}item")]
+    built = [objects[item.get("objectid")] for item in root.iter(f"{CORE}item")]
+    own = [[p.get("objectid") for p in o.iter(f"{CORE}component")] or [o.get("id")] for o in built]
+    return [_object(objects[part]) for parts in own for part in parts]
 
 
 def _object(own: ElementTree.Element) -> Object:

@@ -43,6 +43,7 @@ def write_3mf(
     *,
     colours: Mapping[str, str] | None = None,
     places: Mapping[str, Sequence[Array]] | None = None,
+    groups: Mapping[str, Sequence[str]] | None = None,
 ) -> bytes:
     """Return a 3MF file with each part as an object of its own, in millimetres.
 
@@ -52,13 +53,26 @@ def write_3mf(
         colours: The colour of each part that has one, as #rrggbb.
         places: Of a part that is there several times, the matrices (3, 4) of its copies: linear part
             and shift, as `Manifold.transform` takes them. A part that is not named is there once.
+        groups: Of a part that is one object with others, such as what fills a drawing in it, the
+            names of all, itself the first.
 
     Raises `OrbiflowError` for a place that is a reflection, which printers' programs read differently:
     mirror the part.
     """
     meshes = {name: body.to_mesh64() for name, body in parts.items()}
     texts = {name: list(map(_transform, own)) for name, own in (places or {}).items()}
-    values = {"meshes": meshes, "title": title, "colours": colours or {}, "places": texts}
+    together = {part for own in (groups or {}).values() for part in own[1:]}
+    numbers: dict[Any, int] = {name: number for number, name in enumerate(meshes, 1)}
+    numbers |= {(name, "all"): len(meshes) + 1 + k for k, name in enumerate(groups or {}, 1)}
+    values = {
+        "meshes": meshes,
+        "title": title,
+        "colours": colours or {},
+        "places": texts,
+        "groups": groups or {},
+        "numbers": numbers,
+        "built": [name for name in meshes if name not in together],
+    }
     files = {
         "[Content_Types].xml": "solid_content_types.xml",
         "_rels/.rels": "solid_relationships.xml",
@@ -87,8 +101,12 @@ def read_triangles(path: Path) -> list[Array]:
         return [np.frombuffer(path.read_bytes()[84:], STL_TRIANGLE)["corners"].astype(float)]
     with zipfile.ZipFile(path) as archive:
         model = ElementTree.fromstring(archive.read("3D/3dmodel.model"))
-    found = dict[str, Array]()
+    found, groups = dict[str, Array](), dict[str, list[str]]()
     for own in model.iter(f"{CORE}object"):
+        parts = [part.get("objectid", "") for part in own.iter(f"{CORE}component")]
+        if parts:
+            groups[own.get("id", "")] = parts
+            continue
         points, corners = (
             [list(row.attrib.values()) for row in own.iter(CORE + tag)]
             for tag in ("vertex", "triangle")
@@ -96,9 +114,11 @@ def read_triangles(path: Path) -> list[Array]:
         found[own.get("id", "")] = np.array(points, float)[np.array([c[:3] for c in corners], int)]
     placed = list[Array]()
     for item in model.iter(f"{CORE}item"):
-        corners = found[item.get("objectid", "")]
-        if text := item.get("transform"):
-            rows = np.array(text.split(), float).reshape(4, 3)
-            corners = corners @ rows[:3] + rows[3]
-        placed.append(corners)
+        name = item.get("objectid", "")
+        for part in groups.get(name, [name]):
+            corners = found[part]
+            if text := item.get("transform"):
+                rows = np.array(text.split(), float).reshape(4, 3)
+                corners = corners @ rows[:3] + rows[3]
+            placed.append(corners)
     return placed

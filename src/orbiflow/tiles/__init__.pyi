@@ -137,7 +137,7 @@ from .silhouette.target import Frame as Frame
 from .silhouette.target import Target as Target
 from .solids.making import Solid as Solid
 from .solids.making import make_solid as make_solid
-from .solids.making import solid_file as solid_file
+from .solids.making import solid_files as solid_files
 from .solids.settings import SolidSettings as SolidSettings
 from .tile import EscherTile as EscherTile
 from .tile import SearchFacts as SearchFacts

@@ -358,29 +358,35 @@ def solid(
 
     Args:
         result: A search's folder, its result.json, or the folder of a tile in it.
-        out: The file, .stl or .3mf.
+        out: The file, .stl or .3mf; several plates are numbered.
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
-        picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
+        picture: An SVG drawing over the silhouette, in the same frame; a 3MF has it in a second colour.
         second_picture: One over the second silhouette, of a tile of two figures.
 
     Raises:
         InputFileError: If the drawing cannot be read, or is a picture of pixels.
         OrbiflowError: As `make_solid` and `export` raise it.
     """
-    settings = settings.for_file(out)
     settings.check_picture(picture or second_picture)
+    if settings.kind == "tile" and (picture or second_picture) and not (settings.format or out):
+        settings = settings.replace(format="3mf")  # with a second colour
+    settings = settings.for_file(out)
 
-    from orbiflow.tiles.solids import make_solid, solid_file
+    from orbiflow.tiles.make import sheet_names
+    from orbiflow.tiles.solids import make_solid, solid_files
 
     pictures = picture, second_picture
     given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", *pictures)
     own = {"picture": picture, "second_picture": second_picture}
     made = make_solid(given, settings, **own, force=force)
     cancel.check()
-    write_atomic(out, solid_file(made, settings.file_format))
-    done = made.written(out)
-    _tell(on_event, (*made.notes, done.words), out)
+    contents = solid_files(made, settings.file_format)
+    cancel.check()
+    names = sheet_names(out, len(contents))
+    files = [write_atomic(name, text) for name, text in zip(names, contents, strict=True)]
+    done = made.written(files)
+    _tell(on_event, (*made.notes, done.words), *files)
     return done
 
 

@@ -143,3 +143,26 @@ def test_files_of_all_formats_have_the_same_pieces() -> None:
         found.append(scenes(tile_of("IH4"), own)[0][0])
     one, other = ([tile.offset for tile in scene.tiles] for scene in found)
     np.testing.assert_array_equal(one, other)
+
+
+def test_a_fit_test_cuts_two_neighbours_five_times() -> None:
+    tile = tile_of("IH5")
+    chosen = ExportSettings(cut="pieces", tile_size=50, kerf=0.2, clearance=0.2, fit_test=True)
+    ((scene,), notes) = scenes(tile, chosen)
+    assert any("clearances of 0.1, 0.15, 0.2, 0.3 and 0.4 mm" in note for note in notes)
+    text = sheet_content(scene, chosen)
+    assert isinstance(text, str)
+    lines = svg_lines(text)
+    pieces = polygons([line for line in lines if line.layer == "cut"])
+    dots = polygons([line for line in lines if line.layer == "score"])
+    assert len(pieces) == 10
+    assert min(a.distance(b) for k, a in enumerate(pieces) for b in pieces[:k]) > 0.99
+    area = shapely.Polygon(layout(as_tile(tile), chosen).page.ring)
+    found = sorted((sum(piece.contains(dot) for dot in dots), piece.area) for piece in pieces)
+    for (count, left), step in zip(found, np.repeat([0.1, 0.15, 0.2, 0.3, 0.4], 2), strict=True):
+        assert 0.1 * [0, 1, 1.5, 2, 3, 4][count] == pytest.approx(step)
+        # half the kerf outside, half of the clearance inside
+        wanted = area.area + area.length * (0.2 - step) / 2
+        assert left == pytest.approx(wanted, abs=chosen.deviation * area.length)
+    with pytest.raises(OrbiflowError, match="does not hold the ten pieces of a test of fits"):
+        scenes(tile, chosen.replace(area=(120.0, 80.0)))

@@ -17,10 +17,12 @@ from exported import tile_of, tiles
 from orbiflow.drawing import read_triangles, write_3mf, write_stl
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, SettingError
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import SolidSettings, Tile, as_tile, make_solid, polygons_in, solid_file
+from orbiflow.tiles import SolidSettings, Tile, as_tile, make_solid, polygons_in, solid_files
 from orbiflow.tiles.make import ExportSettings, dark_parts, laid_out
 from orbiflow.tiles.page import Curve, Motif, Part, Style, longer_side
-from orbiflow.tiles.solids.making import Level, Plan, shape, stacked
+from orbiflow.tiles.solids.plates import plates_of
+from orbiflow.tiles.solids.sections import Level, stacked
+from orbiflow.tiles.solids.shapes import Plan
 from solids_read import read_3mf, read_stl, section
 
 Kind: TypeAlias = Literal["tile", "cutter", "stamp", "mould", "puzzle"]
@@ -148,7 +150,7 @@ def test_a_drawing_stands_on_the_mould_s_floor(relief: float) -> None:
     page = ExportSettings(cut="pieces", tile_size=own.tile_size)
     placed, _ = laid_out(as_tile(tile_of("IH5")), page)
     disc = shapely.Point(placed.page.tiling.center).buffer(4)
-    body = shape([Plan(own, placed, disc)])["mould"]
+    body = plates_of([Plan(own, placed, disc)])[0]["mould"].solid
     (island,) = (p for p in polygons_in(section(body, 2 + relief / 2)) if not p.interiors)
     assert island.area == pytest.approx(disc.area)
     assert len(polygons_in(section(body, 2 + relief + 1e-3))) == (1 if relief < 6 else 0)
@@ -178,11 +180,24 @@ def test_a_puzzle_s_pieces_lie_in_the_tray(
 
 
 def test_a_puzzle_s_pieces_lie_apart_on_the_bed() -> None:
-    made = make_solid(tile_of("IH5"), SolidSettings(kind="puzzle", copies=5))
-    plans = [shapely.box(*np.array(b.bounding_box())[[0, 1, 3, 4]]) for b in made.parts.values()]
-    assert min(a.distance(b) for k, a in enumerate(plans) for b in plans[:k]) > 2.9
-    assert {body.bounding_box()[2] for body in made.parts.values()} == {0.0}
-    laid = make_solid(tile_of("IH5"), SolidSettings(kind="puzzle", copies=5, assembled=True))
+    made = make_solid(tile_of("IH5"), SolidSettings(kind="puzzle", copies=5, area=(110, 110)))
+    tray, *others = made.plates
+    assert list(tray) == ["tray"]
+    assert [name for plate in others for name in plate] == [f"piece {k}" for k in range(1, 6)]
+    for plate in made.plates:
+        boxes = np.array([own.solid.bounding_box() for own in plate.values()])
+        assert (boxes[:, 3:5].max(axis=0) <= 110).all()
+        assert boxes[:, :3].min(axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
+        plans = [shapely.box(*box[[0, 1, 3, 4]]) for box in boxes]
+        gaps = [a.distance(b) for k, a in enumerate(plans) for b in plans[:k]]
+        assert min(gaps, default=3) > 2.9
+        assert set(boxes[:, 2]) == {0.0}
+    assert [len(read_3mf(content)) for content in solid_files(made, "3mf")] == [
+        len(plate) for plate in made.plates
+    ]
+    own = SolidSettings(kind="puzzle", copies=5, area=(110, 110), assembled=True)
+    laid = make_solid(tile_of("IH5"), own)
+    assert len(laid.plates) == 1
     assert made.volume == pytest.approx(laid.volume)
 
 
@@ -260,7 +275,7 @@ def test_notes_say_where_it_is_too_thin() -> None:
         ({"kind": "cutter"}, 5.0),
         ({"kind": "stamp"}, 0.4),
         ({"kind": "mould"}, 2.0),
-        ({"kind": "mould", "height": 20}, 40 * np.tan(np.radians(5)) + 0.2),
+        ({"kind": "mould", "height": 20}, 40 * np.tan(np.radians(5))),
         ({"kind": "puzzle", "clearance": 0.4}, 1.4),
         ({"kind": "cutter", "warn_neck": "3mm"}, 3.0),
     ],
@@ -278,7 +293,9 @@ def test_how_thin_a_solid_may_be(given: dict[str, Any], least: float) -> None:
         ({"kind": "cutter", "blade": 2}, "blade must be at most wall, and wall at most foot"),
         ({"kind": "cutter", "chamfer": 1}, "chamfer applies only to kind"),
         ({"blade": 1}, "blade applies only to kind cutter"),
-        ({"engrave": True}, "engrave applies only to kind stamp or mould"),
+        ({"kind": "cutter", "engrave": True}, "engrave has no place on a cutter"),
+        ({"relief": 5}, "relief must be at most height"),
+        ({"fit_test": True}, "fit_test applies only to kind puzzle"),
         ({"kind": "vase"}, "kind must be"),
     ],
 )
@@ -310,14 +327,66 @@ def test_a_stamp_wants_lines(tmp_path: Path) -> None:
         make_solid(tile, SolidSettings(kind="cutter"), picture=picture)
 
 
+@pytest.mark.parametrize("kind", ["tile", "puzzle"])
+def test_a_drawing_is_sunk_and_filled_in_a_second_colour(kind: Literal["tile", "puzzle"]) -> None:
+    given: dict[str, Any] = {"kind": kind, "tile_size": 60, "relief": 0.8, "clearance": 0.1}
+    plain = make_solid(squirrel("IH4"), SolidSettings(**given))
+    made = make_solid(squirrel("IH4"), SolidSettings(**given, eyes=((*EYE, 12.0),)))
+    bodies = {name: own for plate in made.plates for name, own in plate.items()}
+    for name, own in bodies.items():
+        if name == "tray":
+            assert own.inlay is None
+            continue
+        assert own.inlay is not None
+        both = own.solid + own.inlay
+        assert both.volume() == pytest.approx(plain.parts[name].volume(), rel=1e-6)
+        assert (own.solid ^ own.inlay).volume() == pytest.approx(0, abs=1e-6)
+        box = own.inlay.bounding_box()
+        assert (box[2], box[5]) == pytest.approx((3.2, 4.0))
+        assert section(own.inlay, 3.6).area > 1
+    for plate, content in zip(made.plates, solid_files(made, "3mf"), strict=True):
+        objects = read_3mf(content)
+        assert all(own.mesh.is_volume for own in objects)
+        assert len(objects) == sum(1 + (own.inlay is not None) for own in plate.values())
+    # without a second colour it is sunk
+    first = make_solid(squirrel("IH4"), SolidSettings(kind="tile", eyes=((*EYE, 12.0),)))
+    whole = read_stl(solid_files(first, "stl")[0])
+    assert whole.is_volume
+    assert whole.volume == pytest.approx(first.volume, rel=1e-5)
+
+
+def test_a_fit_test_has_two_neighbours_at_five_clearances() -> None:
+    own = SolidSettings(kind="puzzle", clearance=0.2, tile_size=50, fit_test=True)
+    made = make_solid(tile_of("IH5"), own)
+    assert len(made.parts) == 10
+    assert any("clearances of 0.1, 0.15, 0.2, 0.3 and 0.4 mm" in note for note in made.notes)
+    for number, clearance in enumerate((0.1, 0.15, 0.2, 0.3, 0.4), 1):
+        pair = [body for name, body in made.parts.items() if name.startswith(f"pair {number}")]
+        alone = make_solid(tile_of("IH5"), SolidSettings(tile_size=50, clearance=clearance))
+        for body in pair:
+            low = section(body, 1.0)
+            assert low.area == pytest.approx(section(alone.parts["tile"], 1.0).area, rel=1e-4)
+            top = section(body, 3.7)
+            assert len(top.interiors) == number
+
+
+def test_a_mould_s_mouth_is_the_tile() -> None:
+    tile = tile_of("IH4")
+    made = make_solid(tile, SolidSettings(kind="mould", tile_size=70))
+    face = section(made.parts["mould"], made.size[2] - 1e-4)
+    mouth = shapely.Polygon(face.interiors[0])
+    assert apart(at_zero(mouth), in_mm(tile, 70, mirrored=True)) < NEAR
+
+
 @pytest.mark.parametrize(("kind", "name"), [("tile", "a.stl"), ("puzzle", "a.3mf")])
 def test_files_are_read_again_to_be_drawn(kind: Kind, name: str, tmp_path: Path) -> None:
     own: dict[str, Any] = {"area": (90, 90)} if kind == "puzzle" else {}
     made = make_solid(tile_of("IH4"), SolidSettings(kind=kind, **own))
-    (tmp_path / name).write_bytes(solid_file(made, name[2:]))
+    (tmp_path / name).write_bytes(solid_files(made, name[2:])[0])
     parts = read_triangles(tmp_path / name)
-    assert len(parts) == len(made.parts)
-    for part, body in zip(parts, made.parts.values(), strict=True):
+    bodies = [own.solid for own in made.plates[0].values()]
+    assert len(parts) == len(bodies)
+    for part, body in zip(parts, bodies, strict=True):
         first, second, third = part.transpose(1, 0, 2)
         volume = np.einsum("ij,ij->i", first, np.cross(second, third)).sum() / 6
         assert volume == pytest.approx(body.volume(), rel=1e-4)
@@ -326,8 +395,8 @@ def test_files_are_read_again_to_be_drawn(kind: Kind, name: str, tmp_path: Path)
 def test_files_are_the_same_every_time() -> None:
     tile = as_tile(tile_of("IH4"))
     for form in ("stl", "3mf"):
-        once = solid_file(make_solid(tile), form)
-        assert solid_file(make_solid(tile), form) == once
+        (once,) = solid_files(make_solid(tile), form)
+        assert solid_files(make_solid(tile), form) == [once]
         assert not once.startswith(b"solid")
     with pytest.raises(SettingError, match="stl or 3mf"):
-        solid_file(make_solid(tile), "obj")
+        solid_files(make_solid(tile), "obj")

@@ -12,6 +12,10 @@ from .exporting import laid_out as laid_out
 from .exporting import scenes as scenes
 from .exporting import sheet_content as sheet_content
 from .exporting import sheet_names as sheet_names
+from .fit_tests import dice as dice
+from .fit_tests import fit_clearances as fit_clearances
+from .fit_tests import fit_words as fit_words
+from .fit_tests import two_neighbours as two_neighbours
 from .layout import Layout as Layout
 from .offsets import cut_ring as cut_ring
 from .offsets import place_on as place_on

@@ -131,6 +131,9 @@ class ExportSettings(PageSettings, MotifSettings, group="Page and file"):
     ] = None
     """Number of pieces."""
 
+    fit_test: Annotated[bool, OnlyWith(cut="pieces"), PIECES] = False
+    """Instead two neighbours at five clearances, from half to twice what is asked for, or 0.1 mm."""
+
     marks: Annotated[bool, Option("--marks", off="--no-marks"), OnlyWith(cut="pieces"), PIECES] = (
         False
     )

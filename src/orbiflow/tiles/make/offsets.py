@@ -12,7 +12,9 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.likeness import narrowest_neck, narrowest_slit
+from orbiflow.tiles.page import Curve, fitted, turning
 
+LEAST_GAP = 0.01  # the least distance in mm between cuts: pieces never touch
 MITRE = 4.0  # the greatest reach of a sharp corner of a cut, in offsets
 
 
@@ -98,6 +100,18 @@ def _farthest(part: shapely.Polygon, other: shapely.Polygon) -> tuple[float, Arr
     points = shapely.get_coordinates(part)
     distance = np.asarray(shapely.distance(shapely.points(points), other.boundary))
     return float(distance.max()), points[distance.argmax()]
+
+
+def closed_fit(ring: Array, tolerance: float) -> Curve:
+    """Fit a smooth curve to a closed polygon; take the polygon where the curve would cross itself."""
+    closed = np.concatenate([ring[-1:], ring, ring[:1]])
+    first = int(np.argmax(np.abs(turning(closed))))  # a corner, where there is one
+    turned = np.roll(ring, -first, axis=0)
+    curve = fitted(np.concatenate([turned, turned[:1]]), tolerance)
+    curve = Curve(curve.pieces, curve.straight, closed=True)
+    if shapely.Polygon(curve.flattened(tolerance / 4)).is_valid:
+        return curve
+    return Curve.polyline(ring, closed=True)
 
 
 def place_on(ring: Array, place: Array) -> str:

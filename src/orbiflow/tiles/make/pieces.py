@@ -11,9 +11,10 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.make.fit_tests import fit_test_scene
 from orbiflow.tiles.make.layout import BLUE, Layout, line_style
 from orbiflow.tiles.make.nesting import dense_arrangements, on_sheet
-from orbiflow.tiles.make.offsets import cut_ring
+from orbiflow.tiles.make.offsets import LEAST_GAP, closed_fit, cut_ring
 from orbiflow.tiles.make.sheets import counts_by_sheet
 from orbiflow.tiles.page import (
     USUAL_WIDTH,
@@ -24,19 +25,18 @@ from orbiflow.tiles.page import (
     Scene,
     Style,
     Uses,
-    fitted,
     mark_corners,
     rectangle_sides,
-    turning,
 )
 
 STICKER_COLOURS = 3
-LEAST_GAP = 0.01  # the least distance in mm between cuts: pieces never touch
 LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
 
 def pieces_scenes(layout: Layout) -> list[Scene]:
     """Return a scene for each sheet, several where a bed does not hold all, and for each figure."""
+    if layout.settings.fit_test:
+        return [fit_test_scene(layout)]
     kinds = range(len(layout.pieces))
     return [scene for kind in kinds for scene in _scenes_of(layout, kind)]
 
@@ -45,7 +45,7 @@ def _scenes_of(layout: Layout, kind: int) -> list[Scene]:
     """Return the sheets of one prototile's pieces."""
     settings, box, flat = layout.settings, layout.page.box, layout.fine
     ring = cut_ring(layout.pieces[kind][0], settings.kerf, settings.clearance)
-    curve = _closed_fit(ring, flat)
+    curve = closed_fit(ring, flat)
     line = curve.flattened(flat / 4)
     gap = max(settings.spacing, LEAST_GAP)
     if settings.coloured:  # colours that reach beyond the cut do not meet
@@ -109,18 +109,6 @@ def _coloured(layout: Layout, pieces: list[PlacedTile]) -> Iterator[Layer]:
 
 def _moved(curve: Curve, pieces: list[PlacedTile]) -> tuple[Curve, ...]:
     return tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
-
-
-def _closed_fit(ring: Array, tolerance: float) -> Curve:
-    """Fit a smooth curve to a closed polygon; take the polygon where the curve would cross itself."""
-    closed = np.concatenate([ring[-1:], ring, ring[:1]])
-    first = int(np.argmax(np.abs(turning(closed))))  # a corner, where there is one
-    turned = np.roll(ring, -first, axis=0)
-    curve = fitted(np.concatenate([turned, turned[:1]]), tolerance)
-    curve = Curve(curve.pieces, curve.straight, closed=True)
-    if shapely.Polygon(curve.flattened(tolerance / 4)).is_valid:
-        return curve
-    return Curve.polyline(ring, closed=True)
 
 
 def _require_clear(rings: Array, box: Box, gap: float) -> None:

@@ -1,4 +1,4 @@
 from .making import Solid as Solid
 from .making import make_solid as make_solid
-from .making import solid_file as solid_file
+from .making import solid_files as solid_files
 from .settings import SolidSettings as SolidSettings

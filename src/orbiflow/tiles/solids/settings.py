@@ -10,7 +10,7 @@ from orbiflow.settings import DefaultText, FileSettings, OnlyWith, Range, Settin
 from orbiflow.tiles.motifs import MotifSettings
 from orbiflow.units import LONGEST_SIDE, Length, LengthOrZero, PageSize
 
-WITH_DRAWING = ("stamp", "mould")
+WITH_DRAWING = ("tile", "stamp", "mould", "puzzle")
 FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break
 _CUTTER, _MOULD, _PUZZLE = (OnlyWith(kind=name) for name in ("cutter", "mould", "puzzle"))
 
@@ -36,8 +36,10 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     height: Annotated[Length, DefaultText("4 mm; cutter 13, stamp 3, mould 8 mm")] = 4.0
     """Height of a tile or piece; of a cutter above its rim; of a stamp's base; depth of a mould."""
 
-    clearance: Annotated[LengthOrZero, OnlyWith(kind=("tile", "mould", "puzzle"))] = 0.2
-    """Gap between tiles put together."""
+    clearance: Annotated[
+        LengthOrZero, OnlyWith(kind=("tile", "mould", "puzzle")), DefaultText("0.2 mm; mould 0 mm")
+    ] = 0.2
+    """Gap between tiles put together; with 0 a mould's mouth is the tile."""
 
     chamfer: Annotated[LengthOrZero, OnlyWith(kind=("tile", "puzzle"))] = 0.5
     """Bevel of the upper edge."""
@@ -54,8 +56,10 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     floor: Annotated[Length, OnlyWith(kind=("cutter", "mould", "puzzle"))] = 2.0
     """Thickness of the floor of a mould or tray, and of a cutter's rim."""
 
-    relief: Annotated[Length, OnlyWith(kind=WITH_DRAWING)] = 1.2
-    """How far lines stand out of a stamp, or out of a mould's floor."""
+    relief: Annotated[
+        Length, OnlyWith(kind=WITH_DRAWING), DefaultText("0.6 mm; stamp, mould 1.2 mm")
+    ] = 0.6
+    """How far lines stand out of a stamp or of a mould's floor, or are sunk in a tile or a piece."""
 
     draft: Annotated[float, Range(0, 45), Unit("degrees"), _MOULD] = 5.0
     """Slope of a mould's walls, so that casts come out."""
@@ -70,7 +74,7 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     which dough tears or a cast breaks. 0 says nothing."""
 
     area: Annotated[PageSize, _PUZZLE, DefaultText("180x180mm")] = (180.0, 180.0)
-    """Largest width and depth of the tray, such as those of the printer's bed."""
+    """Largest width and depth of the tray and of each plate, such as those of the printer's bed."""
 
     copies: Annotated[int | None, Range(1), _PUZZLE, DefaultText("what the area holds")] = None
     """Number of pieces; those in the middle are taken."""
@@ -79,7 +83,10 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     """With straight, the tray is a rectangle; with following, it follows the pieces."""
 
     assembled: Annotated[bool, _PUZZLE] = False
-    """Leave the pieces in the tray, to look at; else they lie beside it, to print."""
+    """Leave the pieces in the tray, to look at; else they lie on plates as large as the area."""
+
+    fit_test: Annotated[bool, _PUZZLE] = False
+    """Instead two neighbours at five clearances, from half to twice what is asked for."""
 
     def defaults(self) -> Mapping[str, Any]:
         values = {**super().defaults(), **KINDS[self.kind]}
@@ -91,8 +98,9 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
 
     @property
     def usual_format(self) -> str:
-        """3MF for a puzzle, else STL."""
-        return "3mf" if self.kind == "puzzle" else "stl"
+        """3MF for a puzzle and for a tile with a drawing, else STL."""
+        drawn = self.kind == "tile" and (self.strokes or self.eyes or self.second_eyes)
+        return "3mf" if self.kind == "puzzle" or drawn else "stl"
 
     @property
     def slope(self) -> float:
@@ -103,10 +111,11 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
         super().check()
         for name in ("engrave", "strokes", "eyes"):
             if getattr(self, name) and self.kind not in WITH_DRAWING:
-                raise SettingError(f"{{{name}}} applies only to {{kind}} stamp or mould")
-        part = {"tile": "chamfer", "puzzle": "chamfer", "mould": "relief"}.get(self.kind)
-        if part is not None and getattr(self, part) > self.height:
-            raise SettingError(f"{{{part}}} must be at most {{height}}, {self.height:g} mm")
+                raise SettingError(f"{{{name}}} has no place on a cutter")
+        inside = {"tile": ("chamfer", "relief"), "mould": ("relief",)}
+        for part in inside.get("tile" if self.kind == "puzzle" else self.kind, ()):
+            if getattr(self, part) > self.height:
+                raise SettingError(f"{{{part}}} must be at most {{height}}, {self.height:g} mm")
         if self.kind == "cutter" and not self.blade <= self.wall <= self.foot:
             raise SettingError("{blade} must be at most {wall}, and {wall} at most {foot}")
         if self.kind == "puzzle" and not self.clearance:
@@ -116,14 +125,14 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
         """Check that a picture, if there is one, has a place on the solid."""
         if picture is not None and self.kind not in WITH_DRAWING:
             what = f"a {self.kind} takes no {{picture}}"
-            raise SettingError(f"{what}; leave it out, or make a stamp or mould")
+            raise SettingError(f"{what}; leave it out, or make a tile, stamp, mould or puzzle")
 
 
 KINDS: Mapping[str, Mapping[str, Any]] = {
     "tile": {},
     "cutter": {"tile_size": 80.0, "height": 13.0, "wall": 1.2},
-    "stamp": {"height": 3.0, "wall": 1.0},
-    "mould": {"height": 8.0},
+    "stamp": {"height": 3.0, "wall": 1.0, "relief": 1.2},
+    "mould": {"height": 8.0, "relief": 1.2, "clearance": 0.0},
     "puzzle": {"tile_size": 40.0},
 }
 """What each kind is usually made with; settings that are given go before."""

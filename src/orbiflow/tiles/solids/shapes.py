@@ -1,0 +1,124 @@
+"""The solids of one figure: a tile, a cutter, a stamp, a mould. On a page y is down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import shapely
+from manifold3d import Manifold
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.make import Layout, cut_ring
+from orbiflow.tiles.solids.sections import Level, stacked
+from orbiflow.tiles.solids.settings import SolidSettings
+
+FLATNESS = 0.01  # how far in mm straight sides may be from the tile's curves: no printer shows it
+
+
+class Body(NamedTuple):
+    """A closed body, and what fills the drawing that is sunk in it, in another colour."""
+
+    solid: Manifold
+    inlay: Manifold | None = None
+
+    def changed(self, change: Callable[[Manifold], Manifold]) -> Body:
+        """Return both after a change of their places."""
+        return Body(change(self.solid), self.inlay and change(self.inlay))
+
+
+class Plan(NamedTuple):
+    """What solids are made from: the tile in its place, and what is drawn on it, in mm."""
+
+    settings: SolidSettings
+    layout: Layout
+    drawing: BaseGeometry
+    number: int = 0  # which of the tile's figures it is made of
+
+    @property
+    def ring(self) -> Array:
+        """The figure's outline (N, 2)."""
+        curve = self.layout.outline.closed[self.number]
+        rings = [curve.flattened(flatness) for flatness in (FLATNESS, FLATNESS / 16)]
+        # hair-thin parts cross where a line is taken for their curves
+        return next((ring for ring in rings if shapely.Polygon(ring).is_valid), rings[0])
+
+    @property
+    def piece(self) -> shapely.Polygon:
+        """The tile, smaller by half of the clearance all around."""
+        return shapely.Polygon(cut_ring(self.ring, 0.0, self.settings.clearance))
+
+
+def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
+    """Return a region grown by a distance, or shrunk, unless nothing is left."""
+    found = region.buffer(distance, quad_segs=12) if distance else region
+    if found.is_empty:
+        raise OrbiflowError(
+            f"nothing is left of the tile {-distance:.3g} mm inside its edge; choose a larger tile size"
+        )
+    return found
+
+
+def tile_body(plan: Plan) -> Body:
+    """Return a tile with a bevelled upper edge, in which what is drawn is sunk."""
+    settings, piece = plan.settings, plan.piece
+    face, top = _grown(piece, -settings.chamfer), settings.height
+    body = stacked(Level(0.0, piece), Level(top - settings.chamfer, piece), Level(top, face))
+    drawing = plan.drawing.intersection(face.buffer(-settings.nozzle))
+    if drawing.is_empty or not drawing.area:
+        return Body(body)
+    inlay = stacked(Level(top - settings.relief, drawing), Level(top, drawing))
+    return Body(body - inlay, inlay)
+
+
+def _cutter(plan: Plan) -> Body:
+    """Return a cutter that stands on its rim, blade up; its walls stand outside of the tile."""
+    settings, tile = plan.settings, shapely.Polygon(plan.ring)
+    widths = (settings.foot, settings.wall, settings.blade)
+    foot, wall, blade = (_grown(tile, width).difference(tile) for width in widths)
+    rim, top = settings.floor, settings.floor + settings.height
+    thins = Level(top - settings.height / 3, wall)
+    return Body(
+        stacked(Level(0.0, foot), Level(rim, foot), Level(rim, wall), thins, Level(top, blade))
+    )
+
+
+def _stamp(plan: Plan) -> Body:
+    """Return a stamp, face up: the tile's border and the drawing inside it are raised."""
+    settings, tile = plan.settings, shapely.Polygon(plan.ring)
+    low = tile.buffer(-settings.wall).difference(plan.drawing)
+    raised = tile.difference(low)
+    base, top = settings.height, settings.height + settings.relief
+    return Body(
+        stacked(Level(0.0, tile), Level(base, tile), Level(base, raised), Level(top, raised))
+    )
+
+
+def _mould(plan: Plan) -> Body:
+    """Return a block with a cavity that is the tile at its mouth, with the drawing on its floor."""
+    settings, mouth = plan.settings, plan.piece
+    block = shapely.box(*mouth.bounds).buffer(settings.wall)
+    bottom = _grown(mouth, -settings.slope * settings.height)
+    middle = _grown(mouth, -settings.slope * (settings.height - settings.relief))
+    drawing = plan.drawing.intersection(bottom.buffer(-settings.nozzle))
+    floor, relief = settings.floor, settings.floor + settings.relief
+    levels = (
+        Level(0.0, block),
+        Level(floor, block),
+        Level(floor, block.difference(bottom).union(drawing)),
+        Level(relief, block.difference(middle).union(drawing)),
+        Level(relief, block.difference(middle)),
+        Level(floor + settings.height, block.difference(mouth)),
+    )
+    return Body(stacked(*levels))
+
+
+SHAPES: Mapping[str, Callable[[Plan], Body]] = {
+    "tile": tile_body,
+    "cutter": _cutter,
+    "stamp": _stamp,
+    "mould": _mould,
+}
+"""How each kind is made of one figure."""
