@@ -103,7 +103,8 @@ def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
         path = "L".join(f"{x:.6g} {y:.6g}" for x, y in ends)
         parts.append(
             f'<path d="M{path}" fill="none" stroke="{stroke.colour}" '
-            f'stroke-width="{stroke.width:.6g}" stroke-linecap="round" stroke-linejoin="round"/>'
+            f'stroke-width="{stroke.width:.6g}" stroke-linecap="round" stroke-linejoin="round" '
+            'vector-effect="non-scaling-stroke"/>'
         )
     return "\n".join([*parts, "</svg>\n"])
 

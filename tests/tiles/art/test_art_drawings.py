@@ -155,7 +155,7 @@ def test_the_drawing_is_there_once(tmp_path: Path) -> None:
     shown = len(re.findall('href="#motif"', text))
     assert shown == len(art.page.copies) == len(re.findall('href="#tile" ', text)) / 2
     assert 'opacity="0.5"' in text
-    assert 'stroke="#ff0000"' in text
+    assert 'fill="#ff0000"' in text  # a wide stroke is an area that bends with the tile
     width = 300 * 25.4 / 300
     assert f'width="{width:g}mm"' in text
 
@@ -204,6 +204,7 @@ def test_lines_that_no_clip_cuts_stay_lines(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "body",
     [
+        '<path {0} stroke-width="20"/>',  # wide ones bend with the tile
         '<path {0} stroke-width="20" stroke-dasharray="60 30"/>',
         '<g transform="translate(0 200) scale(1 .3)"><path {0} stroke-width="40"/></g>',
         '<clipPath id="c"><circle cx="500" cy="300" r="90"/></clipPath>'
@@ -313,3 +314,34 @@ def test_current_colour_is_ink(tmp_path: Path) -> None:
     chosen = palette(art.settings.palette)
     inks = {layer.ink for layer in art_scene(art).layers} - {None}
     assert inks == {chosen.outline, chosen.paper}
+
+
+def test_a_machine_follows_strokes_that_a_picture_has_as_areas(tmp_path: Path) -> None:
+    tile = squirrel("IH4")
+    size = float(np.sqrt(abs(tile.tile.signed_area)))
+    line = f'<path d="M350 250L620 380" fill="none" stroke="#000000" stroke-width="{size / 100}"/>'
+    path = svg_of("IH4", line, tmp_path)
+    for followed in (False, True):
+        over = read_over(path, tile, followed=followed)
+        assert over.drawing is not None
+        (part,) = over.drawing.parts
+        assert (part.style.stroke is not None) == followed
+    steady = line.replace("/>", ' vector-effect="non-scaling-stroke"/>')
+    over = read_over(svg_of("IH4", steady, tmp_path), tile)
+    assert over.drawing is not None
+    assert over.drawing.parts[0].style.width == pytest.approx(size / 100)
+
+
+def test_wide_strokes_leave_no_gap_where_the_tile_stretches(tmp_path: Path) -> None:
+    """Strokes side by side fill what a rectangle fills."""
+    wide = "".join(
+        f'<path d="M{x} 150V520" fill="none" stroke="#000000" stroke-width="40"/>'
+        for x in range(340, 640, 40)
+    )
+    block = '<rect x="320" y="150" width="320" height="370" fill="#000000"/>'
+    regions = []
+    for body in (wide, block):
+        over = read_over(svg_of("IH4", body, tmp_path), squirrel("IH4"))
+        assert over.drawing is not None
+        regions.append(shapely.union_all([region(part) for part in over.drawing.parts]))
+    assert regions[1].difference(regions[0]).area < 2e-3 * regions[1].area

@@ -147,7 +147,7 @@ def laid_out(
     require_figures(given, settings, 1 + any(pictures[1:]))
     if settings.strokes or settings.eyes or settings.second_eyes or any(pictures):
         given = with_map(given)
-        overs = read_overs(pictures, given)
+        overs = read_overs(pictures, given, followed=not settings.coloured)
     if any(over.picture for over in overs) and settings.file_format in LINES_ALONE:
         raise OrbiflowError(
             f"{next(filter(None, pictures))}: DXF and JSON hold lines, and the picture is made of "

@@ -207,14 +207,23 @@ def _places(tile: EscherTile, grid: Grid) -> Array:
 FLATNESS = 1 / 4000
 # Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile
 LONGEST = 1 / 150
+# Widest strokes that stay lines, in sizes of the silhouette: a wider one is an area, which bends with
+# the tile and fills it as the drawing did. A machine is to follow a line where a picture has an area
+WIDEST_LINE, WIDEST_FOLLOWED = 1 / 150, 1 / 40
 MOST_CARRIED = 400_000  # greatest number of points that are carried in all
 FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 
 
-def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
-    """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes."""
+def read_drawing(
+    path: Path, tile: EscherTile, widest: float = WIDEST_LINE
+) -> tuple[Motif, tuple[str, ...]]:
+    """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes.
+
+    Strokes wider than `widest`, in sizes of the silhouette, are carried as areas, unless their
+    vector-effect is non-scaling-stroke.
+    """
     drawing = Drawing(path)
-    carry = _Carry(path, drawing, tile)
+    carry = _Carry(path, drawing, tile, widest)
     regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
     parts: list[Part] = []
     for shape in drawing.shapes:
@@ -232,7 +241,7 @@ def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
 class _Carry:
     """The map from a drawing to the tile, point by point."""
 
-    def __init__(self, path: Path, drawing: Drawing, tile: EscherTile) -> None:
+    def __init__(self, path: Path, drawing: Drawing, tile: EscherTile, widest: float) -> None:
         self.tile, self.box, self.count = tile, drawing.box, 0
         self.size, self.scale = float(np.sqrt(abs(tile.tile.signed_area))), 1.0
         if self.box is not None:
@@ -240,6 +249,7 @@ class _Carry:
             covered.require_aspect(path, "drawing", extent.tolist())
             self.scale = float(np.sqrt(np.prod((covered.high - covered.low) / extent)))
         self.tolerance = FLATNESS * self.size / self.scale
+        self.widest = widest * self.size / self.scale
 
     def __call__(self, points: Array, *, closed: bool) -> Array:
         here = points
@@ -267,9 +277,10 @@ def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
         )
     found: list[Part] = []
     for kind, paint in painted.items():
-        if kind == "stroke" and paint.gradient is None and regions.has_plain_stroke(shape):
-            width = shape.width * shape.scale * carry.scale
-            style, opacity = Style(None, paint.colour, width), paint.opacity
+        width = shape.width * shape.scale
+        line = kind == "stroke" and (width <= carry.widest or shape.keeps_its_width)
+        if line and paint.gradient is None and regions.has_plain_stroke(shape):
+            style, opacity = Style(None, paint.colour, width * carry.scale), paint.opacity
             lines = regions.lines(shape)
             curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
         else:
@@ -306,14 +317,18 @@ class Over(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def read_over(path: str | Path, tile: EscherTile) -> Over:
-    """Read the picture or drawing in a file, whichever its content is, over a tile with a map."""
+def read_over(path: str | Path, tile: EscherTile, *, followed: bool = False) -> Over:
+    """Read the picture or drawing in a file, whichever its content is, over a tile with a map.
+
+    In a drawing whose lines are to be `followed` by a machine, more strokes stay lines.
+    """
     tile.require_map()
     path = as_path(path, "the picture's file")
     check_file(path)
     head = read_head(path, 4096).lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith(b"<") or (path.suffix.lower() == ".svg" and b"\0" not in head[:64]):
-        drawing, notes = read_drawing(path, tile)
+        widest = WIDEST_FOLLOWED if followed else WIDEST_LINE
+        drawing, notes = read_drawing(path, tile, widest)
         return Over(None, drawing, notes)
     picture = read_picture(path, tile)
     return Over(picture, None, picture.notes)
@@ -330,10 +345,15 @@ def require_figures(tile: EscherTile, settings: MotifSettings, pictures: int) ->
         raise SettingError(f"{{{name}}} applies only to a tile of two figures; leave it out")
 
 
-def read_overs(paths: Sequence[str | Path | None], tile: EscherTile) -> list[Over]:
+def read_overs(
+    paths: Sequence[str | Path | None], tile: EscherTile, *, followed: bool = False
+) -> list[Over]:
     """Read what lies over the silhouette of each of a tile's figures, from no file for some."""
     figures = zip_longest(paths[: len(tile.figures)], tile.figures)
-    return [Over() if path is None else read_over(path, part.figure) for path, part in figures]
+    return [
+        Over() if path is None else read_over(path, part.figure, followed=followed)
+        for path, part in figures
+    ]
 
 
 def paint_motif(paint: Paint, motif: Motif) -> None:

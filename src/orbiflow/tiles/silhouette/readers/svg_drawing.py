@@ -322,11 +322,10 @@ class Drawing:
         if self.tokens > MAX_TOKENS:
             raise BadElement(element, "the paths hold too much data; simplify the drawing")
         paths = shape_paths(element, place)
-        matrix = place.matrix
-        if place.style.get("vector-effect") == "non-scaling-stroke":
-            matrix = np.diag([self.pixel()] * 2 + [1.0])
         own = as_number(element.get("pathLength"), -1.0)
-        drawn = DrawnShape(paths, place, matrix, own if own >= 0 else None)
+        drawn = DrawnShape(paths, place, place.matrix, own if own >= 0 else None)
+        if drawn.keeps_its_width:
+            drawn = replace(drawn, matrix=np.diag([self.pixel()] * 2 + [1.0]))
         return self._with_markers(element, drawn, place)
 
     def _with_markers(self, element: Element, shape: DrawnShape, place: Place) -> list[DrawnShape]:

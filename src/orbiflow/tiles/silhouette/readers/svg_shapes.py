@@ -66,6 +66,11 @@ class DrawnShape:
         return width if width >= 0 else 1.0
 
     @property
+    def keeps_its_width(self) -> bool:
+        """Whether its stroke is as wide wherever it is moved to, as `vector-effect` can say."""
+        return self.paint.get("vector-effect") == "non-scaling-stroke"
+
+    @property
     def dashes(self) -> list[float]:
         """The lengths of dashes and gaps in turn, an even number of them; none for a whole line."""
         words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
