@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from PIL import Image
 
 from exported import tile_of
 from orbiflow.arrays import Array
@@ -80,6 +81,22 @@ def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -
     page.get_by_role("button", name="Search again").wait_for()
     assert state(page) == "Stopped."
     assert page.locator(CARD).count() == len(studio.project(own)["tiles"])
+
+
+def test_what_a_search_has_to_say_is_shown(page, studio: RunningStudio, tmp_path) -> None:
+    own = studio.with_picture()
+    size = [studio.project(own)["silhouette"][name] for name in ("width", "height")]
+    pins = Image.new("L", size)
+    pins.paste(255, (150, 200, 250, 300))  # far from the outline
+    pins.save(tmp_path / "pins.png")
+    studio.client.put(f"projects/{own}/pins", content=(tmp_path / "pins.png").read_bytes())
+    small_searches(page, "IH4")
+    page.goto(f"/#/p/{own}/picture")
+    page.get_by_role("button", name="Find tiles").click()
+    said = page.locator(".said-notes")
+    said.get_by_text("keeps its shape there").wait_for()
+    page.wait_for_selector(DONE)
+    assert said.locator("li").count() == len(studio.project(own)["tasks"][0]["result"]["notes"])
 
 
 def test_stop_stays_under_the_mouse_whatever_the_search_does(page, studio: RunningStudio) -> None:

@@ -91,6 +91,12 @@ def search(
     names = searched_classes(target, whole)
     left = [name for k, name in enumerate(names) if not _is_done(job, k)]
     announce_tiles(job, on_event)
+    if settings.objective != "likeness" and (job.project / "pins.png").exists():
+        on_event(
+            Note(
+                "What was painted with “Keep its shape” counts only where the tile is to look alike"
+            )
+        )
     if not left:
         return Outcome({"tiles": len(names)})
     seen: dict[tuple[str, str], int] = {}

@@ -50,6 +50,7 @@ WARM_MODULES = (
 MIN_PROGRESS_STEP = 0.002  # of a task: smaller progress is not reported
 MAX_CALLS = 40  # of a process, one after another
 MAX_HELD = 3  # processes that are kept in memory while their tasks are paused
+OF_FILES = ("written ", "laid the ")  # how notes begin that are about files of the studio's own
 FAULT_TEXT = (
     "something went wrong inside orbiflow; the server's own output says what. Try other settings."
 )
@@ -318,10 +319,12 @@ class _Recorder:
                         (self.home / "tiles" / tile / stage / "card.json").read_text()
                     )
                     self.store.put_card(self.project, int(tile), card)
-                case Note(text=text, warning=warning) if not text.startswith("written "):
-                    self.notes.append(self._plain(text))
+                case Note(text=text, warning=warning) if not text.startswith(OF_FILES):
+                    if (plain := self._plain(text)) not in self.notes:
+                        self.notes.append(plain)
+                        self.store.change_task(self.number, result={"notes": self.notes})
                     if warning:
-                        self.store.notice(self.project, self._plain(text), warning=warning)
+                        self.store.notice(self.project, plain, warning=warning)
                 case _:
                     pass
 

@@ -12,6 +12,7 @@ from outlines import animal, searched
 
 SQUIRREL = animal("squirrel.dat")
 HEAD = (230, 190, 140)
+INSIDE = (514, 275, 20)  # a spot far from the outline
 QUICK = LikenessSearch(placements=80, held=12, starts=4, finalists=2, rounds=12, multiples=(2,))
 CLASSES = ["IH5", "IH7"]
 
@@ -66,6 +67,22 @@ def test_the_tile_itself_has_the_head(pinned: list[EscherTile]) -> None:
         boundary = shapely.Polygon(result.tile.polygon).exterior
         far = shapely.distance(shapely.points(np.stack([copy.real, copy.imag], 1)), boundary)
         assert far.mean() < 0.01 * np.sqrt(SQUIRREL.area)
+
+
+def test_a_small_pin_inside_is_heeded() -> None:
+    def strain(pins: Pins | None) -> float:
+        """How far the map is from conformal at the spot: w = a z + b conj(z) + c there."""
+        (tile,) = searched(SQUIRREL, CLASSES[:1], QUICK, pins=pins)[0]
+        assert tile.bending is not None
+        spot = shapely.Point(SQUIRREL.to_normal(INSIDE[:2]))
+        corners = tile.bending.rest[tile.bending.triangles]
+        (around,) = np.flatnonzero(shapely.contains(shapely.polygons(corners), spot))
+        index = tile.bending.triangles[around]
+        z, w = (own[index] @ [1, 1j] for own in (tile.bending.rest, tile.bending.images))
+        a, b, _ = np.linalg.solve(np.stack([z, z.conj(), np.ones(3)], axis=1), w)
+        return min(abs(a), abs(b)) / max(abs(a), abs(b))
+
+    assert strain(Pins.at(SQUIRREL, [INSIDE])) < strain(None) / 5
 
 
 def test_a_pinned_head_keeps_its_angle() -> None:

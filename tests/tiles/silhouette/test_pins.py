@@ -44,7 +44,20 @@ def test_a_spot_inside_reaches_the_outline() -> None:
     pins = Pins.at(target, [(5, 2)])
     assert pins.holds(target.to_normal([[5, 0], [5, 4]])).all()
     inside = Pins.at(target, [(5, 2, 0.5)])
-    assert any("touch no part of the outline" in note for note in inside.notes)
+    assert any("keeps its shape there" in note for note in inside.notes)
+
+
+def test_a_small_pin_inside_holds_the_triangle_around_it(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    mesh = triangulate(target.normal, 0.2)
+    middle = mesh.points[mesh.triangles[np.argmin(np.hypot(*mesh.points.T)[mesh.triangles].sum(1))]]
+    x, y = target.to_input(middle.mean(axis=0))
+    dot = Image.new("L", SIZE, 0)
+    ImageDraw.Draw(dot).ellipse((x - 2, y - 2, x + 2, y + 2), fill=255)
+    for pins in (Pins.at(target, [(x, y, 1)]), Pins.read([save(tmp_path, dot)], target)):
+        assert not pins.holds(mesh.points).any()
+        (part,) = pins.parts(mesh.points, mesh.triangles)
+        assert set(part) in [set(own) for own in mesh.triangles]
 
 
 def test_each_connected_part_is_one() -> None:

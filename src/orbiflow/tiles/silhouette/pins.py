@@ -3,10 +3,12 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
+import scipy.ndimage
 import scipy.sparse
 import scipy.sparse.csgraph
 import shapely
@@ -24,6 +26,7 @@ DEFAULT_RADIUS = 0.08  # default radius of a spot, in longer sides of the silhou
 # the shares of the outline beyond which the tile cannot be similar, and nothing is left to bend
 MUCH_PINNED_SHARE, MAX_PINNED_SHARE = 0.4, 0.9
 REACH_PAST_OUTLINE = 1.5  # the reach of a spot without a radius, in distances from the outline
+PAINTED_LEVEL = 0.1  # of a mask with soft edges: what is above this was painted
 _NUMBER = r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*"
 _SPOT = re.compile(rf"{_NUMBER}(?:,{_NUMBER}){{1,2}}")
 
@@ -118,9 +121,20 @@ class Pins:
             held |= 2 * (mask.weight(at) - 1) > mask.strength - 1
         return held
 
+    @cached_property
+    def middles(self) -> Array:
+        """The middle (K, 2) of each spot, and of each piece that is painted."""
+        painted = [_strongest(mask) for mask in self.masks]
+        return np.concatenate([self.spots[:, :2], *painted])
+
     def parts(self, points: Array, triangles: Integers) -> list[Integers]:
-        """Return the indices of a mesh's pinned points (N, 2), by parts that triangles connect."""
+        """Return the indices of a mesh's pinned points (N, 2), by parts that triangles connect.
+
+        Where triangles are large, a pin may have none of their corners: it holds the triangle around
+        its middle, in any case.
+        """
         held = self.holds(points)
+        held[triangles[_around(points, triangles, self.middles)]] = True
         pairs = np.concatenate([triangles[:, [k - 1, k]] for k in range(3)])
         pairs = pairs[held[pairs].all(axis=1)]
         shape = (len(held), len(held))
@@ -148,8 +162,26 @@ def _warnings(pins: Pins, target: Target) -> list[str]:
     if share > MUCH_PINNED_SHARE:
         return [f"the pins hold {percent(share)} of the outline: little is left to bend"]
     if not share:
-        return ["the pins touch no part of the outline: the tile's shape does not heed them"]
+        return [
+            "the pins lie inside: what they hold keeps its shape there, and the outline may bend"
+        ]
     return []
+
+
+def _strongest(mask: Emphasis) -> Array:
+    """Return the strongest point (K, 2) of each piece that is painted on a mask."""
+    pieces, count = cast(Any, scipy.ndimage.label(mask.mask > PAINTED_LEVEL))
+    found = scipy.ndimage.maximum_position(mask.mask, pieces, range(1, count + 1))
+    xmin, ymin, xmax, ymax = mask.box
+    shares = (np.reshape(found, (-1, 2))[:, ::-1] + 0.5) / mask.mask.shape[::-1]
+    return np.array([xmin, ymax]) + shares * (xmax - xmin, ymin - ymax)
+
+
+def _around(points: Array, triangles: Integers, middles: Array) -> Integers:
+    """Return which triangles (M,) of a mesh have one of the `middles` (K, 2) in them."""
+    corners = cast(NDArray[np.object_], shapely.polygons(points[triangles]))
+    pairs = shapely.STRtree(corners).query(shapely.points(middles), predicate="intersects")
+    return np.unique(pairs[1])
 
 
 def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:

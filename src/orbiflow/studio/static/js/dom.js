@@ -1,5 +1,7 @@
 /** Elements, controls, toasts and dialogs: what every page builds with. */
 
+import { sentence } from "./words.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 
 /**
@@ -200,6 +202,15 @@ export function toast(text, { bad = false } = {}) {
   while (box.children.length > 3) box.firstChild.remove();
   if (!bad) setTimeout(() => made.remove(), 6000);
 }
+
+/**
+ * What a reading or a search has to say, a sentence each; nothing for none.
+ *
+ * @param {string[]} texts
+ */
+export const notes = (texts) =>
+  texts.length > 0 &&
+  h("ul", { class: "said-notes soft small" }, texts.map((text) => h("li", {}, sentence(text))));
 
 /**
  * Call a function that may fail; if it does, say why.

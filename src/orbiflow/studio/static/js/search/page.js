@@ -1,6 +1,6 @@
 /** The search as it goes: all classes side by side, best first. */
 
-import { button, choice, confirmed, h, newest, put, style, toast, trying } from "../dom.js";
+import { button, choice, confirmed, h, newest, notes, put, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
 import { LATE, steering } from "../steering.js";
 import {
@@ -70,6 +70,7 @@ class SearchPage {
     };
     this.grid = h("ul", { class: "cards", onpointermove: moved });
     this.said = h("p", { class: "state-words", role: "status" });
+    this.noted = h("div", { role: "status" });
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
     this.steer = steering(this.api);
     this.again = button("", () => this.search(), { kind: "primary", image: "arrow" });
@@ -92,6 +93,7 @@ class SearchPage {
         this.deeds,
       ),
       this.bar,
+      this.noted,
       this.panel,
       this.empty,
       this.grid,
@@ -213,6 +215,8 @@ class SearchPage {
     this.bar.hidden = !alive(task);
     if (task?.state === "waiting") this.bar.removeAttribute("value");
     else this.bar.value = task?.share ?? 0;
+    const said = task?.result?.notes ?? [];
+    if (said.length !== this.noted.querySelectorAll("li").length) put(this.noted, notes(said));
     this.empty.hidden = Boolean(project.tiles.length) || alive(task);
     this.offer(task);
   }

@@ -1,6 +1,6 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
-import { button, h, newest, put, style, toast, trying } from "../dom.js";
+import { button, h, newest, notes as noted, put, style, toast, trying } from "../dom.js";
 import { sized } from "../tiling.js";
 import { alive, number, sentence } from "../words.js";
 import { paintingControls, readingControls } from "./controls.js";
@@ -415,16 +415,6 @@ function notes({ doubts, notes: said, left_out: others = [] }, grow) {
           ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
           : "A busy photograph? Draw round the head first: choose “Add” and the lasso. Then “Remove” what is too much.",
       ),
-    said.length > 0 &&
-      h(
-        "li",
-        {},
-        h(
-          "details",
-          {},
-          h("summary", {}, "How it was read"),
-          h("p", { class: "soft" }, said.map(sentence).join(" ")),
-        ),
-      ),
+    said.length > 0 && h("li", {}, noted(said)),
   );
 }
