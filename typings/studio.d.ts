@@ -121,6 +121,7 @@ interface Silhouette {
   doubts: string[];
   notes: string[];
   left_out?: Point[][];
+  coloured?: boolean;
 }
 
 interface Drawing {

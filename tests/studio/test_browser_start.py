@@ -49,6 +49,28 @@ def test_what_was_read_is_shown_and_what_was_left_out_is_said(page, drawing, stu
     assert studio.project(own)["name"] == "beast"
 
 
+def test_a_drawing_is_shown_in_its_colours_in_its_place(page, studio: RunningStudio) -> None:
+    body = '<path fill="#c03020" d="M30 40h120v80h-120z"/>'
+    body += '<circle fill="#20a040" cx="60" cy="70" r="15"/>'
+    head = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="10 20 200 160">'
+    own = studio.with_picture(f"{head}{body}</svg>".encode(), "house.svg")
+    assert studio.project(own)["silhouette"]["coloured"]
+    assert not studio.project(studio.with_picture())["silhouette"]["coloured"]
+    page.goto(f"/#/p/{own}/picture")
+    page.wait_for_selector(SETTLED)
+    seen = """([x, y]) => {
+        const canvas = document.querySelector("canvas.reading");
+        const scale = canvas.width / 200;
+        const context = canvas.getContext("2d");
+        return [...context.getImageData((x - 10) * scale, (y - 20) * scale, 1, 1).data];
+    }"""
+    red, green, _, _ = page.evaluate(seen, [120, 100])
+    assert red > 2 * green
+    red, green, _, _ = page.evaluate(seen, [60, 70])
+    assert green > 2 * red
+    assert min(page.evaluate(seen, [190, 160])) > 250
+
+
 def test_a_busy_picture_is_led_to_the_lasso(page, drawing) -> None:
     picture = Image.open(drawing)
     for k in range(8):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,15 @@ from orbiflow.tiles import (
     Target,
     doubts,
     open_image,
+    page_picture,
     parts_left_out,
     polygons_in,
 )
 
 BACKDROP_SIDE_PIXELS = 1200  # pixels of the backdrop's longer side
+SAMPLED_PIXELS = 400  # along a side, where it is asked for colours
+MIN_CONTRAST = 48  # of 255, of a colour that is another one
+MIN_COLOURED_SHARE = 0.01  # of a silhouette: more than its soft edge has
 SUPERSAMPLING = 3  # along each side of a pixel of what is drawn
 ABOUT_PARTS = ("kept the largest", "filled ")  # how notes on parts and holes begin
 PAPER, INK = (255, 255, 255), (70, 78, 92)
@@ -59,7 +64,7 @@ def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 
     end = OF_PICTURE[number]
     mended = reading.shaped(_mended(target, home / f"mend{end}.png", picture.size))
     write_atomic(home / f"backdrop{end}.png", png_bytes(picture))
-    document = {"shown": _shown(mended, picture.size), "target": _stored(mended)}
+    document = {"shown": _shown(mended, picture), "target": _stored(mended)}
     write_json(silhouette_file(home, number), document)
     return mended
 
@@ -100,6 +105,9 @@ def _picture(target: Target, content: FileContent) -> Image.Image:
     width, height = (
         np.maximum(1, np.round(extent * BACKDROP_SIDE_PIXELS / extent.max())).astype(int).tolist()
     )
+    if target.kind == "svg":
+        with suppress(InputFileError):  # too intricate for colours: what was read is shown in one
+            return page_picture(content, target.covered, (width, height))
     return _drawn(target, (width, height), "RGB", INK, PAPER)
 
 
@@ -145,8 +153,25 @@ def _mended(target: Target, file: Path, size: tuple[int, int]) -> Target:
     return replace(target, outline=placed(found.outline), notes=notes, seen=seen)
 
 
-def _shown(target: Target, size: tuple[int, int]) -> dict[str, Any]:
+def _is_coloured(picture: Image.Image, ring: list[list[float]]) -> bool:
+    """Whether a picture has several colours inside of a ring, such as eyes and lines."""
+    small = picture.convert("RGBA").resize(
+        (SAMPLED_PIXELS, SAMPLED_PIXELS), Image.Resampling.NEAREST
+    )
+    shares = np.array(ring) / picture.size * SAMPLED_PIXELS
+    inside = Image.new("1", small.size)
+    ImageDraw.Draw(inside).polygon(list(map(tuple, shares.tolist())), fill=1)
+    colours = np.asarray(small, dtype=float)[np.asarray(inside)]
+    colours = colours[colours[:, 3] > 127, :3]
+    if not len(colours):
+        return False
+    others = np.abs(colours - np.median(colours, axis=0)).max(axis=1) > MIN_CONTRAST
+    return bool(others.mean() > MIN_COLOURED_SHARE)
+
+
+def _shown(target: Target, picture: Image.Image) -> dict[str, Any]:
     """Return what a browser needs of the silhouette, in pixels of the backdrop."""
+    size = picture.size
 
     def pixels(ring: Any) -> list[list[float]]:
         return np.round(target.covered.shares(np.asarray(ring)) * size, 2).tolist()
@@ -154,8 +179,10 @@ def _shown(target: Target, size: tuple[int, int]) -> dict[str, Any]:
     lost, doubted = parts_left_out(target), [page_words(text) for text in doubts(target)]
     # what the page says of these in other words
     twice = ("kept the largest",) * bool(lost) + ("filled ",) * ("holes were" in "".join(doubted))
+    outline = pixels(target.outline)
     return {
-        "outline": pixels(target.outline),
+        "outline": outline,
+        "coloured": _is_coloured(picture, outline),
         "width": size[0],
         "height": size[1],
         "notes": [page_words(note) for note in target.notes if not note.startswith(twice)],

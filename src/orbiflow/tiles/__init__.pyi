@@ -68,6 +68,7 @@ from .make.exporting import sheet_content as sheet_content
 from .motifs.carried import Over as Over
 from .motifs.carried import read_over as read_over
 from .motifs.carried import with_map as with_map
+from .motifs.page_pictures import page_picture as page_picture
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animation as animation
 from .operations import animate as animate

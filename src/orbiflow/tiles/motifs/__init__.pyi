@@ -8,6 +8,7 @@ from .carried import read_over as read_over
 from .carried import read_overs as read_overs
 from .carried import require_figures as require_figures
 from .carried import with_map as with_map
+from .page_pictures import page_picture as page_picture
 from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid
 from .raster import Paint as Paint

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy
@@ -228,7 +228,7 @@ def read_drawing(
     parts: list[Part] = []
     for shape in drawing.shapes:
         try:
-            parts += _parts(shape, regions, carry)
+            parts += parts_of(shape, regions, carry)
         except (TooManyPoints, TooTangled, GEOSException) as error:
             raise InputFileError(
                 f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
@@ -267,7 +267,28 @@ class _Carry:
         return self.tile.forward(fine[:-1] if closed else fine)
 
 
-def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
+class Carry(Protocol):
+    """A map of a drawing's points.
+
+    - `size`: The size of the whole, in the units of the images.
+    - `scale`: The units of the images in one of the drawing's.
+    - `widest`: The widest stroke that stays a line, in the drawing's units.
+    """
+
+    size: float
+    scale: float
+    widest: float
+
+    def __call__(self, points: Array, *, closed: bool) -> Array:
+        """Return the images (M, 2) of a line's points (N, 2), and of some between them."""
+        ...
+
+
+def parts_of(shape: DrawnShape, regions: Regions, carry: Carry) -> list[Part]:
+    """Return what is filled and stroked of a shape, carried.
+
+    Raises `InputFileError` for a shape that reaches too far.
+    """
     drawing = regions.drawing
     reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
     painted = paints(drawing, shape)
@@ -291,7 +312,7 @@ def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
     return found
 
 
-def _area(region: BaseGeometry, carry: _Carry) -> list[Curve]:
+def _area(region: BaseGeometry, carry: Carry) -> list[Curve]:
     curves: list[Curve] = []
     for polygon in polygons_in(region):
         rings = [
@@ -302,7 +323,7 @@ def _area(region: BaseGeometry, carry: _Carry) -> list[Curve]:
     return curves
 
 
-def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
+def _line(carry: Carry, points: Array, path: SubPath) -> Curve:
     if path.closed and len(points) > 2 and np.allclose(points[0], points[-1]):
         points = points[:-1]
     closed = path.closed and len(points) > 2

@@ -31,16 +31,16 @@ function lines(context, pairs, pixel, ...path) {
  * @param {number} pixel
  */
 export function paintSilhouette(context, picture, silhouette, pixel) {
-  const { width, height, outline: ring, left_out: others = [] } = silhouette;
+  const { width, height, outline: ring, left_out: others = [], coloured } = silhouette;
   const outline = pathOf(ring);
   const rest = new Path2D(outline);
   rest.rect(0, 0, width, height);
   context.fillStyle = "#ffffff";
   context.fillRect(0, 0, width, height);
   context.drawImage(picture, 0, 0, width, height);
-  context.fillStyle = "rgb(255 255 255 / 62%)";
+  context.fillStyle = "rgb(255 255 255 / 72%)";
   context.fill(rest, "evenodd");
-  context.fillStyle = "rgb(15 143 134 / 55%)";
+  context.fillStyle = `rgb(15 143 134 / ${coloured ? 12 : 55}%)`;
   context.fill(outline);
   context.lineJoin = "round";
   lines(context, EDGE, pixel, outline);

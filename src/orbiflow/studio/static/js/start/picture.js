@@ -79,7 +79,7 @@ class PicturePage {
     this.lead = h(
       "p",
       { class: "soft" },
-      "The green shape is what we read. If something is missing or too much, mend it here.",
+      "What has a green line around it is what we read. If something is missing or too much, mend it here.",
     );
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
     this.both = bothPictures(this.page, this.number);
