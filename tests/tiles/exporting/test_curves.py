@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from exported import tile_of, tiles
 from orbiflow.tiles import CLASSES, Curve, Tile
-from orbiflow.tiles.page.outlines import CORNER, fitted, outline, turning
+from orbiflow.tiles.page.outlines import SHARP_CORNER, fitted, outline, turning
 
 
 def polyline(seed: int, count: int, rough: float) -> np.ndarray:
@@ -32,9 +32,35 @@ def test_fits_keep_their_tolerance(seed, count, rough, tolerance) -> None:
     flat = shapely.LineString(curve.flattened(tolerance / 100))
     apart = shapely.hausdorff_distance(flat, shapely.LineString(points), densify=0.05)
     assert apart <= 1.1 * tolerance  # densified: the measure itself is coarse
-    corners = points[1:-1][np.abs(turning(points)) > CORNER]
+    corners = points[1:-1][np.abs(turning(points)) > SHARP_CORNER]
     ends = {tuple(p) for p in curve.pieces[:, 0]}
     assert all(tuple(corner) in ends for corner in corners)
+
+
+def polygon(sides: int) -> np.ndarray:
+    turns = np.linspace(0, 2 * np.pi, sides + 1)
+    return 10 * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+
+
+def kinks(curve: Curve) -> np.ndarray:
+    """By how many radians it turns where its pieces meet."""
+    before = curve.pieces[:-1, 3] - curve.pieces[:-1, 2]
+    after = np.diff(curve.pieces, axis=1)[1:, 0]
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
+
+
+def test_a_coarse_arc_has_no_facets() -> None:
+    curve = fitted(polygon(10), 0.6)  # turns by 36 degrees
+    assert not curve.straight.any()
+    assert kinks(curve).max(initial=0) < 1e-9
+
+
+def test_what_turns_once_is_a_corner() -> None:
+    ring = polygon(6)
+    halved = np.insert(ring, range(1, 7), (ring[1:] + ring[:-1]) / 2, axis=0)
+    curve = fitted(halved, 0.6)
+    assert np.isclose(kinks(curve), np.pi / 3).sum() == 5
 
 
 def test_a_smooth_curve_takes_few_pieces_and_has_no_kinks() -> None:
@@ -43,14 +69,7 @@ def test_a_smooth_curve_takes_few_pieces_and_has_no_kinks() -> None:
     curve = fitted(wave, 0.05)
     assert len(curve.pieces) < 20
     assert not curve.straight.any()
-    before, after = (
-        curve.pieces[:-1, 3] - curve.pieces[:-1, 2],
-        np.diff(curve.pieces, axis=1)[1:, 0],
-    )
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    assert (
-        np.abs(cross / np.linalg.norm(before, axis=1) / np.linalg.norm(after, axis=1)).max() < 1e-9
-    )
+    assert kinks(curve).max() < 1e-9
 
 
 @settings(max_examples=25, deadline=None)

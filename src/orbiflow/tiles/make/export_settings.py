@@ -30,6 +30,7 @@ from orbiflow.units import (
 )
 
 PIECES = Group("Pieces")
+FINE = 0.01  # in mm: a step of a machine
 WRAPPED = ("mug", "phone")  # pages that things are wrapped in, and so without an edge
 PRINTER_EDGE = 5.0  # width in mm of the page's edge that printers at home leave empty
 
@@ -97,7 +98,7 @@ class ExportSettings(PageSettings, MotifSettings, group="Page and file"):
     """Add a mark of 100 mm on a layer of its own."""
 
     tolerance: Annotated[
-        Length | None, DefaultText("1/800 of the tile's size, at least 0.05mm")
+        Length | None, DefaultText("1/400 of the tile's size, at least 0.05mm")
     ] = None
     """Largest distance of curves from the tile's outline."""
 
@@ -213,6 +214,12 @@ class ExportSettings(PageSettings, MotifSettings, group="Page and file"):
     def deviation(self) -> float:
         """The tolerance in mm."""
         return usual_tolerance(self.tile_size) if self.tolerance is None else self.tolerance
+
+    @property
+    def fine(self) -> float:
+        """The tolerance in mm of what is flattened or fitted again: a part of the whole, and no more
+        than a cutter's own."""
+        return min(self.deviation / 4, FINE)
 
 
 _SHEET = {"area": PAGES["a4"], "margin": 10.0, "stroke": "#000000", "outline": 0.8}

@@ -221,8 +221,8 @@ def _neck_notes(placed: Layout) -> tuple[str, ...]:
 
 def sheet_content(scene: Scene, settings: ExportSettings) -> str | bytes:
     """Return the content of a sheet's file."""
-    fine = settings.deviation / 4
-    return write_scene(scene, settings.file_format, tolerance=fine, dpi=settings.dpi)
+    form, fine = settings.file_format, settings.fine
+    return write_scene(scene, form, tolerance=fine, dpi=settings.dpi)
 
 
 def sheet_names(out: Path, count: int) -> list[Path]:

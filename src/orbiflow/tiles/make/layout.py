@@ -53,7 +53,7 @@ class Layout:
     @property
     def fine(self) -> float:
         """The tolerance in mm of what is flattened or fitted again, a part of the whole."""
-        return self.settings.deviation / 4
+        return self.settings.fine
 
     def scene(self, layers: Iterable[Layer], tiles: tuple[PlacedTile, ...], **more: Any) -> Scene:
         """Return a scene of the page with these layers and tiles."""

@@ -11,11 +11,12 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.page.scene import Curve, bezier
+from orbiflow.tiles.page.scene import Booleans, Curve, bezier
 from orbiflow.tiles.tilings import EdgeImage, Edges, Tiles, as_tiling, edge_classes, edges
 
-# The angle in radians by which a polyline turns at a vertex that stays a corner
-CORNER = np.radians(30.0)
+# The angle in radians by which a polyline turns at a vertex that stays a corner; and where it turns on
+# beside it by at least a share of that, as a coarse arc does
+CORNER, SHARP_CORNER, ON_AN_ARC = np.radians(30.0), np.radians(70.0), 0.5
 
 _SAMPLES, _ROUNDS = 48, 4
 
@@ -31,12 +32,19 @@ def fitted(points: Array, tolerance: float) -> Curve:
     >>> len(arc.pieces)
     1
     """
-    turn = np.abs(turning(points))
-    corners = [0, *(np.flatnonzero(turn > CORNER) + 1), len(points) - 1]
+    corners = [0, *(np.flatnonzero(_is_corner(turning(points))) + 1), len(points) - 1]
     found: list[tuple[Array, bool]] = []
     for first, last in pairwise(corners):
         found += _run(points[first : last + 1], tolerance)
     return Curve(np.stack([piece for piece, _ in found]), np.array([flat for _, flat in found]))
+
+
+def _is_corner(turn: Array) -> Booleans:
+    """Return which turns (n,) are corners rather than parts of an arc."""
+    beside, sign = np.pad(turn, 1), np.sign(turn)
+    on = np.maximum(sign * beside[:-2], sign * beside[2:])
+    least = np.where(on > ON_AN_ARC * np.abs(turn), SHARP_CORNER, CORNER)
+    return np.abs(turn) > least
 
 
 def turning(points: Array) -> Array:

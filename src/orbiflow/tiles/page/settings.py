@@ -17,7 +17,7 @@ ColourRule = Literal["neighbour", "aspect", "one"]
 
 def usual_tolerance(tile_size: float) -> float:
     """Return the usual distance in mm of curves from the outline of a tile of this size."""
-    return max(0.05, tile_size / 800)
+    return max(0.05, tile_size / 400)
 
 
 class PageSettings(FileSettings):
