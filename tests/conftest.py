@@ -2,12 +2,16 @@
 
 import gc
 import os
+from collections.abc import Iterator
+from typing import Any
 
+import pytest
 import torch
 from hypothesis import HealthCheck, register_random, settings
 
 from bent_tiles import bent_tile_fixture, equivariant_fixture  # noqa: F401
 from small_searches import small_searches_fixture  # noqa: F401
+from studio.browser import chromium
 
 torch.set_num_threads(1)
 torch.set_warn_always(True)  # a warning must not depend on which test comes first
@@ -49,3 +53,21 @@ register_random(torch_random)
 def pytest_runtest_setup() -> None:
     """A test that draws without a seed draws the same whichever tests went before."""
     torch.manual_seed(0)
+
+
+@pytest.fixture(scope="module", name="browser")
+def browser_fixture() -> Iterator[Any]:
+    """A browser without windows; while it is there, no other loop of events can run."""
+    program = chromium()
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        own = playwright.chromium.launch(
+            executable_path=program,
+            args=[
+                *("--no-sandbox", "--disable-gpu"),
+                *("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"),
+            ],
+        )
+        yield own
+        own.close()

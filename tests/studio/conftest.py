@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from studio.browser import RunningStudio, chromium, running_studio
+from studio.browser import RunningStudio, running_studio
 from studio.served import Client, studio
 
 
@@ -24,24 +24,6 @@ def studio_fixture(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running
     """A studio that runs as the real command."""
     with running_studio(tmp_path_factory.mktemp("studio")) as own:
         yield own
-
-
-@pytest.fixture(scope="module", name="browser")
-def browser_fixture() -> Iterator[Any]:
-    """A browser without windows; while it is there, no other loop of events can run."""
-    program = chromium()
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        own = playwright.chromium.launch(
-            executable_path=program,
-            args=[
-                *("--no-sandbox", "--disable-gpu"),
-                *("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"),
-            ],
-        )
-        yield own
-        own.close()
 
 
 @pytest.fixture(name="page")

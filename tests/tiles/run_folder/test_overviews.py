@@ -8,6 +8,7 @@ import shlex
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ from orbiflow.tiles.run_folder.html_page import TRIED
 from shell_lines import call_by_orbiflow
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
-VOID = {"meta", "link", "img", "br", "path", "hr"}
+VOID = {"meta", "link", "img", "br", "path", "hr", "input"}
 ODD = 'a "boot" <script>&.png'
 
 
@@ -102,14 +103,15 @@ def test_a_page_names_everything_and_refers_to_what_is_there(
     page = Page((tmp_path / "index.html").read_text("utf-8"))
     assert ODD in page.words
     assert "IH21: it <crosses> itself" in page.words
-    assert {"html", "title", "main", "header", "nav", "style"} <= {tag for tag, _ in page.tags}
+    assert {"html", "title", "main", "header", "fieldset", "style"} <= {tag for tag, _ in page.tags}
     assert page.all("html")[0]["lang"] == "en"
     assert page.all("script") == [{}]
     assert page.all("link") == []
     assert not [name for _, attributes in page.tags for name in attributes if name[:2] == "on"]
     pictures = page.all("img")
-    assert all(picture["alt"] for picture in pictures)
-    assert len(pictures) == 3 * 3 + 1  # one has a flow
+    to_choose = [picture for picture in pictures if not picture["alt"]]
+    assert len(to_choose) == len(page.all("label")) == 3  # each in a label with words
+    assert len(pictures) == 3 + 3 * 3 + 1  # one has a flow
     ids = {attributes.get("id") for _, attributes in page.tags}
     assert [a["id"] for a in page.all("article")[:3]] == ["IH4", "IH6", "IH4-2"]
     for reference in [a["href"] for a in page.all("a")] + [p["src"] for p in pictures]:
@@ -130,11 +132,13 @@ def test_commands_of_a_page_can_be_copied_into_a_shell(
     refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
     page = Page(index_page([bent, refused, bent], [target], names, out=out))
     calls = [call_by_orbiflow(shlex.split(command)[1:]) for command in page.commands]
-    assert len(calls) == 3 * (10 + len(TRIED))
+    assert len(calls) == 10 + 3 * len(TRIED)
     assert all(isinstance(call, Call) for call in calls)
     flat = [call.flat for call in calls if isinstance(call, Call)]
-    assert [call["result"] for call in flat[:: len(calls) // 3]] == [Path(out) / n for n in names]
-    assert [call["force"] for call in flat[:: len(calls) // 3]] == [False, True, False]
+    palettes = flat[: 3 * len(TRIED) : len(TRIED)]
+    assert [call["result"] for call in palettes] == [Path(out) / n for n in names]
+    assert [call["force"] for call in palettes] == [False, True, False]
+    assert {call["result"] for call in flat[3 * len(TRIED) :]} == {Path(out) / "IH4"}
     files = [call["out"] for call in flat]
     assert len(set(files)) == len(files)
     assert {call["palette"] for call in flat if call.get("palette")} >= set(TRIED)
@@ -239,3 +243,27 @@ def test_a_sheet_shows_stars_and_how_tiles_lie(target: Target, bent: EscherTile)
         None, Rating(1.0), Rating(3.5), Rating(4.0)
     )}  # fmt: skip
     assert len(sheets) == 4
+
+
+def test_one_set_of_commands_for_the_tile_that_is_chosen(
+    target: Target, bent: EscherTile, flowed: EscherTile, tmp_path: Path, browser: Any
+) -> None:
+    refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
+    names = ["IH4", "IH6"]
+    (tmp_path / "index.html").write_text(index_page([bent, refused], [target], names), "utf-8")
+    page = browser.new_page()
+    page.goto((tmp_path / "index.html").as_uri())
+    shown = "article:visible h2"
+    assert page.locator(shown).count() == 1
+    assert "IH4" in page.locator(shown).inner_text()
+    page.get_by_role("radio", name="2. IH6").check(force=True)
+    assert "IH6" in page.locator(shown).inner_text()
+    first = page.locator(".make code").first.inner_text()
+    assert f"{tmp_path}/IH6 --force --for laser -o " in first
+    assert first.rstrip("'").endswith("-IH6.svg")
+    page.goto((tmp_path / "index.html").as_uri() + "#IH4")
+    page.reload()
+    assert "--force" not in page.locator(".make code").first.inner_text()
+    page.emulate_media(media="print")  # on paper are all
+    assert page.locator(shown).count() == 2
+    page.close()
