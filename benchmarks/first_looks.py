@@ -8,7 +8,6 @@ In the studio from the moment a search is asked for, alone and while another pro
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import socket
 import subprocess
@@ -23,7 +22,6 @@ import httpx
 from common import BUNDLED
 
 PATIENCE = 300.0  # seconds
-ONE_THREAD = {**os.environ, "OMP_NUM_THREADS": "1"}
 
 
 def until(holds: Callable[[], Any]) -> float:
@@ -41,11 +39,7 @@ def in_terminal(picture: Path, effort: str, out: Path) -> float:
     begin = time.perf_counter()
     command = [sys.executable, "-m", "orbiflow", "escherize", str(picture), "--effort", effort]
     with subprocess.Popen(
-        [*command, "--out", str(out)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=ONE_THREAD,
+        [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as process:
         assert process.stdout is not None
         for line in process.stdout:
@@ -62,9 +56,7 @@ def in_studio(picture: Path, effort: str, folder: Path) -> tuple[float, float]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     own = ["studio", "--port", str(port), "--data", str(folder), "--no-browser"]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "orbiflow", *own], stdout=subprocess.DEVNULL, env=ONE_THREAD
-    )
+    server = subprocess.Popen([sys.executable, "-m", "orbiflow", *own], stdout=subprocess.DEVNULL)
     client = httpx.Client(
         base_url=f"http://127.0.0.1:{port}/api/", headers={"X-Orbiflow": "1"}, trust_env=False
     )

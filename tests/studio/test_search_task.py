@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from PIL import Image
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from bent_tiles import bent_tile
 from orbiflow.errors import OrbiflowError
@@ -17,6 +18,7 @@ from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tasks import read, search
 from orbiflow.studio.tile_files import best_stage, put_tile, tile_folder
 from orbiflow.tiles import EscherTile, OverlapSearch, read_result
+from orbiflow.tiles.search import escherizing
 
 BOOT = b"[[0, 0], [30, 0], [34, 12], [22, 15], [20, 28], [8, 25]]"
 CHOICE = SearchChoice(effort="fast", classes=("IH4", "IH7"))
@@ -69,6 +71,26 @@ def test_tiles_appear_stage_by_stage(home: Path) -> None:
         assert tile.certificate.valid
         assert tile.bending is not None
     assert not list((home / "tiles").glob(".*"))
+
+
+def test_the_first_tile_waits_for_nothing_twice(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, threads = list[object](), set[int]()
+    near, put = escherizing.near_symmetry, tasks.put_tile
+
+    def put_with_threads(*given: Any) -> None:
+        threads.update(
+            pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"
+        )
+        put(*given)
+
+    monkeypatch.setattr(escherizing, "near_symmetry", lambda own: asked.append(own) or near(own))
+    monkeypatch.setattr(tasks, "put_tile", put_with_threads)
+    with threadpool_limits(2, user_api="blas"):
+        run(home, lambda seen: len(seen) == 1)
+    assert len(asked) == 1
+    assert threads == {1}  # more would wait for the processes that search
 
 
 def test_a_search_that_was_stopped_goes_on(home: Path) -> None:

@@ -24,6 +24,7 @@ from orbiflow.runtime import (
     ignore,
     is_object,
     make_folder,
+    one_blas_thread,
     operation,
     write_json,
 )
@@ -81,11 +82,19 @@ def search(
     cancel: Cancel = NEVER,
 ) -> Outcome:
     """Search for tiles of a project's silhouettes, and write each as soon as it is found."""
-    from orbiflow.studio.silhouette_file import has_second, load_target
-    from orbiflow.tiles import escherize, searched_classes
+    from orbiflow.studio.silhouette_file import has_second
 
     if has_second(job.project):
         return _search_pairs(job, settings, on_event, cancel)
+    with one_blas_thread():  # tiles are measured and written here, beside processes that search
+        return _search_single(job, settings, on_event, cancel)
+
+
+def _search_single(job: Job, settings: SearchChoice, on_event: Sink, cancel: Cancel) -> Outcome:
+    """Search for tiles of one silhouette, stage by stage, without the classes that are done."""
+    from orbiflow.studio.silhouette_file import load_target
+    from orbiflow.tiles import escherize, searched_classes
+
     target = load_target(job.project)
     whole = _search_settings(job.project, settings)
     names = searched_classes(target, whole)

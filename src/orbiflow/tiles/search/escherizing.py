@@ -152,8 +152,7 @@ def escherize(
     emphasis, pins = goal.emphasis, goal.pins
     method = method or settings.search_method
     task = _task(goal, method, settings.per_class, settings.force)
-    with one_blas_thread():
-        near = near_symmetry(target.normal) if method.takes_symmetric else None
+    near = _near_symmetry(target) if method.takes_symmetric else None
     names = _class_names(settings.classes, near)
     notes = list(goal.notes)
     if near is not None and near.stabiliser in SYMMETRIC_CLASSES:
@@ -178,7 +177,13 @@ def escherize(
 def searched_classes(target: Target, settings: EscherizeSettings) -> list[str]:
     """Return the names of the classes that a search with these settings looks at, in order."""
     asks = settings.search_method.takes_symmetric
-    return _class_names(settings.classes, near_symmetry(target.normal) if asks else None)
+    return _class_names(settings.classes, _near_symmetry(target) if asks else None)
+
+
+@functools.lru_cache(maxsize=2)  # who asks for the classes searches next
+def _near_symmetry(target: Target) -> NearSymmetry:
+    with one_blas_thread():
+        return near_symmetry(target.normal)
 
 
 def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> list[str]:
