@@ -141,6 +141,8 @@ interface Views {
   fill?: any;
   search?: { effort: string; objective: string; palette: string };
   closeup?: any;
+  /** What of the look of tiles was chosen: see look.js. */
+  look?: any;
   drawing?: any;
 }
 

@@ -239,7 +239,7 @@ def test_tilings_are_drawn_as_the_library_has_them(page) -> None:
 
 def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched) -> None:
     tile = studio.project(searched)["tiles"][0]["id"]
-    view = {"search": {"palette": "dusk"}, "closeup": {}}
+    view = {"look": {"palette": "dusk"}}
     studio.client.patch(f"projects/{searched}", json={"view": view})
     page.goto(f"/#/p/{searched}/take/{tile}")
     page.get_by_text("Page and file").click()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 import shapely
@@ -21,6 +23,7 @@ from artworks import (
 )
 from orbiflow.drawing import palette
 from orbiflow.tiles import CLASSES, ArtSettings, Artwork, Over, artwork, render_artwork
+from orbiflow.tiles.make import art_scene
 from orbiflow.tiles.motifs import picture_paint
 from orbiflow.tiles.motifs.carried import _places
 from orbiflow.tiles.motifs.raster import NOWHERE, region_sides, runs
@@ -200,3 +203,21 @@ def test_a_silhouette_with_y_up_is_drawn_the_same_way_up(name: str) -> None:
         points = second.curves[0].pieces[:, 0] * (1, -1)
         middle = first.curves[0].pieces[:, 0].mean(axis=0)
         np.testing.assert_allclose(points.mean(axis=0), middle, atol=1e-6)
+
+
+def test_tint_is_glass_of_each_tiles_colour_in_pixels_and_curves() -> None:
+    tile, grey = squirrel("IH4"), (200, 200, 200)
+    over = Over(flat(tile, "#c8c8c8"))
+    given = art_settings(area="120x90px", tint=0.5, outline=0.0, palette="#ff0000,#00ff00,#0000ff")
+    made = artwork(tile, given, over)
+    shown = {tuple(own) for own in render_artwork(made).reshape(-1, 3).tolist()}
+    glass = [tuple(200 if k == own else 100 for k in range(3)) for own in range(3)]
+    assert {*glass} <= shown
+    assert grey not in shown
+    motifs = art_scene(made).motifs
+    seen = {
+        Image.open(io.BytesIO(own.rasters[0].png)).getpixel((40, 40)) for own in motifs.values()
+    }
+    assert {colour[:3] for colour in seen} == {*glass}
+    plain = artwork(tile, given.replace(tint=0.0), over)
+    assert grey in {tuple(own) for own in render_artwork(plain).reshape(-1, 3).tolist()}

@@ -60,6 +60,7 @@ class Artwork(Outcome):
     - `page`: The copies of the tile and where they are.
     - `pictures`: The picture over the silhouette of each of the tile's figures, or None.
     - `motifs`: What is drawn over these, in each figure's units.
+    - `tint`: How much each tile's colour tints all that.
     - `notes`: What the user should know.
     """
 
@@ -68,6 +69,7 @@ class Artwork(Outcome):
     page: Page
     pictures: tuple[Picture | None, ...]
     motifs: tuple[Motif, ...]
+    tint: float
     notes: tuple[str, ...]
 
     @property
@@ -158,6 +160,7 @@ def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over 
         page=page,
         pictures=tuple(over.picture for over in known),
         motifs=motifs,
+        tint=settings.tint * any(over.picture or over.drawing for over in known),
         notes=(*said, *filter(None, [told]), *page.palette(chosen).shortage(page.count)),
     )
 
@@ -188,7 +191,7 @@ def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
     chosen, samples = palette(art.settings.palette), art.settings.samples
     shaded = art.page.palette(chosen)
     painted = [
-        Painted(paint.grid, paint.coloured(shaded, art.page.count), art.place(number))
+        Painted(paint.grid, paint.coloured(shaded, art.page.count, art.tint), art.place(number))
         for number, paint in enumerate(map(partial(paint_of, art), range(len(art.motifs))))
     ]
     return render_page(
@@ -234,6 +237,7 @@ def art_scene(art: Artwork) -> Scene:
         clipped=True,
         seam=SEAM / art.settings.pixels,
         motifs=motifs,
+        tint=art.tint,
         title=art.tile.name,
         notes=(f"Artwork of {name}, made with orbiflow {__version__}.",),
     )

@@ -16,7 +16,7 @@ from orbiflow.settings import (
     SettingError,
     Unit,
 )
-from orbiflow.tiles.motifs import MotifSettings
+from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import PageSettings
 from orbiflow.units import LineWidth, PageArea, PageLength
 
@@ -25,7 +25,7 @@ LONGEST = 30_000  # the longest side of a picture in pixels
 SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
 
 
-class ArtSettings(PageSettings, MotifSettings, group="Picture"):
+class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     """How a picture of a tiling is made.
 
     >>> ArtSettings(area="600x400px", dpi=100).area

@@ -15,7 +15,7 @@ from orbiflow.settings import (
     SettingError,
     Unit,
 )
-from orbiflow.tiles.motifs import MotifSettings
+from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import MARKS_EDGE, ColourRule, PageSettings, usual_tolerance
 from orbiflow.tiles.write import SceneFormat
 from orbiflow.units import (
@@ -41,7 +41,7 @@ COLOURED = ("print", "paper", "web", "stickers")  # what shows drawings in their
 PRINTED = ("print", "paper", "template", "colouring", "stickers")  # what is a PDF unless told
 
 
-class ExportSettings(PageSettings, MotifSettings, group="Page and file"):
+class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and file"):
     """How a tiling is drawn in real size; lengths in mm.
 
     >>> ExportSettings(purpose="laser", kerf=0.1, cut="pieces").outline
@@ -83,6 +83,8 @@ class ExportSettings(PageSettings, MotifSettings, group="Page and file"):
     ] = False
 
     colour: Annotated[ColourRule, OnlyWith(cut="none", because="lines have none")] = "neighbour"
+
+    tint: Annotated[float, Range(0, 1), OnlyWith(cut="none", because="lines have none")] = 0.0
 
     border: Annotated[bool, OnlyWith(cut="skeleton", clip=True)] = False
     """Cut the page's border, too."""

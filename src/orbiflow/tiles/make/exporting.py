@@ -158,7 +158,7 @@ def laid_out(
     notes = (*filter(None, [placed.outline.note, *offset]), *_neck_notes(placed))
     if overs:
         motifs = tuple(drawn_on(placed, number, over) for number, over in enumerate(overs))
-        placed = replace(placed, motifs=motifs)
+        placed = replace(placed, motifs=motifs, has_picture=any(pictures))
         carried = [note for part in given.figures for note in part.figure.notes]
         notes = (*carried, *(note for over in overs for note in over.notes), *notes)
     return placed, notes

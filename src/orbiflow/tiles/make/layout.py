@@ -49,6 +49,7 @@ class Layout:
     page: Page
     outline: Outline  # the tile's curves, on the page
     motifs: tuple[Motif, ...] = ()  # what lies on each of its prototiles, on the page
+    has_picture: bool = False  # whether a picture or drawing from a file is among them
 
     @property
     def fine(self) -> float:
@@ -148,6 +149,7 @@ def tiling_scene(layout: Layout) -> Scene:
         clipped=settings.clip,
         seam=SEAM if motifs else None,
         motifs=motifs,
+        tint=settings.tint * layout.has_picture,
         prototiles=layout.prototiles,
         tiles=layout.placed_tiles,
     )

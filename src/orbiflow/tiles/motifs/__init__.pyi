@@ -17,3 +17,4 @@ from .raster import rgb_of as rgb_of
 from .raster import ring_sides as ring_sides
 from .raster import runs as runs
 from .settings import MotifSettings as MotifSettings
+from .settings import TintSettings as TintSettings

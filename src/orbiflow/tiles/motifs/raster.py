@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, rgb
 from orbiflow.tiles.geometry import doubled_areas
+from orbiflow.tiles.page import glass
 
 NOWHERE = -1  # the label of samples that lie in no region
 
@@ -221,14 +222,19 @@ class Paint:
                 self.values[own] = self.values[there[0][near], there[1][near]]
             known[rows, columns] = True
 
-    def coloured(self, palette: Palette, colours: int) -> Array:
-        """Return the raster (colours, height, width, 3) in each colour of the palette."""
+    def coloured(self, palette: Palette, colours: int, tint: float = 0.0) -> Array:
+        """Return the raster (colours, height, width, 3) in each colour of the palette, tinted by it."""
         rgb, own, ink = self.values[..., :3], self.values[..., 3:4], self.values[..., 4:]
         fills, inks = (
             [rgb_of(colour(k)).astype(np.float32) for k in range(colours)]
             for colour in (palette.fill, palette.ink)
         )
-        return np.stack([rgb + own * f + ink * i for f, i in zip(fills, inks, strict=True)])
+        return np.stack(
+            [
+                rgb * glass(palette.fill(k), tint).astype(np.float32) + own * f + ink * i
+                for k, (f, i) in enumerate(zip(fills, inks, strict=True))
+            ]
+        )
 
 
 def rgb_of(colour: str) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.settings import Group, Option, Parsed, Repeated, SettingError, Settings
+from orbiflow.settings import Group, Option, Parsed, Range, Repeated, SettingError, Settings
 
 Strokes: TypeAlias = Literal["hatch", "echoes", "feathers"]
 
@@ -25,6 +25,13 @@ def eye_numbers(text: str) -> tuple[float, ...]:
 
 Eye: TypeAlias = Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")]
 ON_TILE = Group("On the tile")
+
+
+class TintSettings(Settings):
+    """How tiles tint what lies on them."""
+
+    tint: Annotated[float, Range(0, 1), ON_TILE] = 0.0
+    """How much the colour of each tile tints the picture on it: 0 not at all, 1 as coloured glass."""
 
 
 class MotifSettings(Settings):

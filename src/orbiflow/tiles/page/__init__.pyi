@@ -38,3 +38,4 @@ from .settings import USUAL_WIDTH as USUAL_WIDTH
 from .settings import ColourRule as ColourRule
 from .settings import PageSettings as PageSettings
 from .settings import usual_tolerance as usual_tolerance
+from .tinting import glass as glass

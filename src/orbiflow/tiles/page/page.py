@@ -32,6 +32,7 @@ from orbiflow.tiles.page.settings import (
     PageSettings,
     usual_tolerance,
 )
+from orbiflow.tiles.page.tinting import glass, tinted
 from orbiflow.tiles.tilings import (
     Colouring,
     Copies,
@@ -234,6 +235,7 @@ class Page:
         clipped: bool,
         seam: float | None = None,
         motifs: Sequence[Motif] = (),
+        tint: float = 0.0,
         **more: Any,
     ) -> Scene:
         """Return the copies as a scene: symbols, a use of them for each copy, a layer for each colour.
@@ -245,6 +247,7 @@ class Page:
             outlines: The outline of each prototile, on the page. Default: its polygon.
             clipped: Whether tiles are cut off at the box.
             motifs: What lies on each prototile, on the page; nothing lies on those beyond.
+            tint: How much a copy's colour tints what lies on it, from 0 to 1.
             more: Further fields of the scene.
         """
         given = enumerate(self.polygons if outlines is None else outlines)
@@ -258,8 +261,14 @@ class Page:
         if chosen is not None:
             chosen = self.palette(chosen)
             layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(self.box),))]
-        layers += self._tile_layers(chosen, line, clipped, seam, drawn)
+        layers += self._tile_layers(chosen, line, clipped, seam, drawn, tint)
         named = {symbol_of(k, MOTIF): motif for k, motif in drawn.items()}
+        if chosen is not None and tint:
+            named = {
+                symbol_of(k, tinted_name(colour)): tinted(motif, glass(chosen.fill(colour), tint))
+                for colour in sorted(set(self.colours.tolist()))
+                for k, motif in drawn.items()
+            }
         return Scene(*self.size, tuple(layers), symbols, self.box, motifs=named, **more)
 
     def empty(self, layers: Iterable[Layer], **more: Any) -> Scene:
@@ -273,6 +282,7 @@ class Page:
         clipped: bool,
         seam: float | None,
         drawn: Iterable[int],
+        tint: float,
     ) -> list[Layer]:
         kinds = range(len(self.tiling.prototiles))
         every, numbers = [self.uses(k) for k in kinds], [self.copies.prototiles == k for k in kinds]
@@ -288,7 +298,8 @@ class Page:
             fill, name = chosen.fill(colour), f"colour {colour + 1}"
             style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
             layers.append(Layer(name, "tiles", style, tuple(filter(len, own)), clipped))
-            on = tuple(replace(own[k], symbol=symbol_of(k, MOTIF)) for k in drawn if len(own[k]))
+            what = tinted_name(colour) if tint else MOTIF
+            on = tuple(replace(own[k], symbol=symbol_of(k, what)) for k in drawn if len(own[k]))
             if on:
                 ink = chosen.ink(colour)
                 layers.append(Layer(f"drawing on {name}", "drawing", Style(), on, clipped, ink))
@@ -322,6 +333,11 @@ def shades(chosen: Palette, known: Colouring) -> Palette:
 def symbol_of(prototile: int, what: str = "tile") -> str:
     """Return the name of a prototile's outline among a scene's symbols, or of its motif."""
     return what if prototile == 0 else f"{what}-{prototile + 1}"
+
+
+def tinted_name(colour: int) -> str:
+    """Return the name of what lies on tiles of a colour, which tints it."""
+    return f"{MOTIF}-colour-{colour + 1}"
 
 
 def edge_margin(tile_size: float) -> float:

@@ -161,6 +161,11 @@ export class Tiling {
     this.figures[figure] = { polygon, area, middle: { x, y }, radius, path: pathOf(polygon) };
   }
 
+  /** The outline of a figure, with as many points as are seen at a scale. */
+  pathAt(_scale, figure) {
+    return this.figures[figure].path;
+  }
+
   /** The mean area of the figures. */
   get area() {
     return this.figures.reduce((sum, { area }) => sum + area / this.figures.length, 0);
@@ -275,35 +280,48 @@ export function fill(palette, index) {
 }
 
 /**
- * Draw a tiling over the whole of a canvas, `ratio` device pixels a CSS pixel.
- * `line`: width of the outline in CSS pixels, 0 for none.
+ * Draw a tiling over the whole of a canvas, `ratio` device pixels a CSS pixel, with what lies on its tiles.
+ * `line`: width of the outline in CSS pixels, 0 for none. `skins`: of each figure null, or what `skinsOf` returns.
+ * `over(context, copy)` draws more on each copy, in the tile's own coordinates. Returns the copies.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Tiling} tiling
  * @param {Camera} camera
  * @param {Palette} palette
- * @param {{ width: number, height: number, ratio?: number, line?: number }} how
+ * @param {{ width: number, height: number, ratio?: number, line?: number, skins?: any[], over?: any }} how
  */
 export function paint(
   context,
   tiling,
   camera,
   palette,
-  { width, height, ratio = 1, line = 1.2 },
+  { width, height, ratio = 1, line = 1.2, skins, over },
 ) {
+  const paths = tiling.figures.map((_, k) => tiling.pathAt(camera.scale * ratio, k));
   const own = shaded(palette, tiling.colours);
+  const copies = tiling.copies(camera, width, height);
   context.lineJoin = "round";
-  for (const { colour, matrix, figure } of tiling.copies(camera, width, height)) {
-    const { path } = tiling.figures[figure];
-    const [a, b, c, d, e, f] = matrix;
-    context.setTransform(a * ratio, b * ratio, c * ratio, d * ratio, e * ratio, f * ratio);
-    context.fillStyle = fill(own, colour);
+  for (const copy of copies) {
+    const [path, skin] = [paths[copy.figure], skins?.[copy.figure]];
+    const [a, b, c, d, e, f] = copy.matrix;
+    /** @type {Matrix} */
+    const matrix = [a * ratio, b * ratio, c * ratio, d * ratio, e * ratio, f * ratio];
+    context.setTransform(...matrix);
+    context.fillStyle = context.strokeStyle = fill(own, copy.colour);
     context.fill(path);
-    context.strokeStyle = line ? palette.outline : context.fillStyle; // without a line: hide the seam
     context.lineWidth = (line || 0.7) / camera.scale;
-    context.stroke(path);
+    if (!line) context.stroke(path); // hide the seam
+    if (skin) {
+      context.setTransform(...times(matrix, skin.matrix));
+      context.drawImage(skin.in(context.fillStyle), 0, 0);
+      context.setTransform(...matrix);
+    }
+    over?.(context, copy);
+    context.strokeStyle = palette.outline;
+    if (line) context.stroke(path);
   }
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return copies;
 }
 
 /**
@@ -320,19 +338,17 @@ export function sized(canvas) {
 }
 
 /**
- * Draw a card's tiling into a canvas as large as it lies in the page.
+ * Draw a card's tiling into a canvas as large as it lies in the page; `skins(figures, scale)` gives what lies on it.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {Outlined} card
  * @param {Palette} palette
+ * @param {{ across?: number, line?: number, skins?: (figures: Figure[], scale: number) => any[] }} how
  */
-export function paintCard(canvas, card, palette, { across = 5, line = 1.2 } = {}) {
+export function paintCard(canvas, card, palette, { across = 5, line = 1.2, skins } = {}) {
   const { context, width, height, ratio } = sized(canvas);
   const tiling = new Tiling(card);
-  paint(context, tiling, Camera.fit(tiling, width, height, across), palette, {
-    width,
-    height,
-    ratio,
-    line,
-  });
+  const camera = Camera.fit(tiling, width, height, across);
+  const own = skins?.(tiling.figures, camera.scale * ratio);
+  paint(context, tiling, camera, palette, { width, height, ratio, line, skins: own });
 }

@@ -1,6 +1,6 @@
-/** A tiling whose tile and group move, and the scene that is painted of it. */
+/** A tiling whose tile and group move. */
 
-import { fill, pathOf, shaded, Tiling, times } from "../tiling.js";
+import { pathOf, Tiling } from "../tiling.js";
 
 const COARSE = 0.6; // pixels below which a side of the outline is left out
 
@@ -57,7 +57,7 @@ export class LiveTiling extends Tiling {
     this.simple = [];
   }
 
-  /** The outline of a figure with as many points as can be seen at a scale. */
+  /** @override */
   pathAt(scale, figure) {
     const known = this.simple[figure];
     if (known && Math.abs(Math.log2(known.scale / scale)) < 0.5) return known.path;
@@ -72,49 +72,4 @@ export class LiveTiling extends Tiling {
     this.simple[figure] = { scale, path: pathOf(kept) };
     return this.simple[figure].path;
   }
-}
-
-/**
- * Paint a tiling with what lies on its tiles. `skins`: of each figure null, or {canvas, matrix: its pixels to
- * the tile}. `over(context, copy)` draws more on each copy, in the tile's own coordinates. Returns the copies.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {LiveTiling} tiling
- * @param {import("../tiling.js").Camera} camera
- * @param {Palette} palette
- * @param {{ width: number, height: number, ratio: number, line: number, skins?: any[], over?: any }} how
- */
-export function paintScene(
-  context,
-  tiling,
-  camera,
-  palette,
-  { width, height, ratio, line, skins, over },
-) {
-  const paths = tiling.figures.map((_, k) => tiling.pathAt(camera.scale * ratio, k));
-  const own = shaded(palette, tiling.colours);
-  const copies = tiling.copies(camera, width, height);
-  const fills = new Map();
-  context.lineJoin = "round";
-  for (const copy of copies) {
-    const [path, skin] = [paths[copy.figure], skins?.[copy.figure]];
-    if (!fills.has(copy.colour)) fills.set(copy.colour, fill(own, copy.colour));
-    const [a, b, c, d, e, f] = copy.matrix;
-    /** @type {Matrix} */
-    const matrix = [a * ratio, b * ratio, c * ratio, d * ratio, e * ratio, f * ratio];
-    context.setTransform(...matrix);
-    context.fillStyle = fills.get(copy.colour);
-    context.fill(path);
-    if (skin) {
-      context.setTransform(...times(matrix, skin.matrix));
-      context.drawImage(skin.canvas, 0, 0);
-      context.setTransform(...matrix);
-    }
-    over?.(context, copy);
-    context.strokeStyle = line ? palette.outline : fills.get(copy.colour);
-    context.lineWidth = (line || 0.7) / camera.scale;
-    context.stroke(path);
-  }
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  return copies;
 }

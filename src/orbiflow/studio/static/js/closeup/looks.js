@@ -141,6 +141,14 @@ export function colourPanel(about, look, needed, change) {
  */
 export function shapePanel(look, { count, hasMap, hasArt }, change) {
   const pictures = count > 1 ? "pictures" : "picture";
+  const tint = slider("Colour over it", {
+    min: 0,
+    max: 1,
+    step: 0.05,
+    value: look.tint,
+    said: (v) => (v ? PERCENT(v) : "none"),
+  }, (share) => change({ tint: share }));
+  tint.hidden = !look.art;
   return h(
     "div",
     { class: "stack" },
@@ -159,7 +167,11 @@ export function shapePanel(look, { count, hasMap, hasArt }, change) {
       value: look.line,
       said: (v) => (v ? `${v} px` : "none"),
     }, (line) => change({ line })),
-    hasArt && check(`Show my ${pictures} on the tiles`, look.art, (art) => change({ art })),
+    hasArt && check(`Show my ${pictures} on the tiles`, look.art, (art) => {
+      tint.hidden = !art;
+      change({ art });
+    }),
+    hasArt && tint,
   );
 }
 

@@ -1,23 +1,22 @@
 /** The close-up of one tile: look, pull, draw. */
 
 import { client } from "../api.js";
-import { button, choice, h, newest, put, style, toast, trying } from "../dom.js";
+import { choice, h, newest, put, style, toast, trying } from "../dom.js";
+import { keeper, lookOf, paletteOf } from "../look.js";
+import { backdropOf } from "../skin.js";
 import { figuresOf } from "../tiling.js";
 import { capital, named } from "../words.js";
 import { Carry } from "./carry.js";
+import { Dress } from "./dress.js";
 import { LiveTiling } from "./live.js";
 import { colourPanel, HELP, penPanel, pullPanel, shapePanel, signPanel } from "./looks.js";
+import { Past } from "./past.js";
 import { Pen } from "./pen.js";
 import { Pulling } from "./pulling.js";
 import { kindsOf, paintSigns, placed, signAt } from "./signs.js";
-import { between, paintSkin, Pictures } from "./skin.js";
 import { Stage } from "./stage.js";
 
 const CALM = 8000; // ms after which a refusal makes way
-const SHARPER = 1.5; // times that the scale may change before the skin is painted anew
-
-/** What was undone and redone, by project: it outlives a change of the address. */
-const pasts = new Map();
 
 /**
  * @param {HTMLElement} root
@@ -44,28 +43,17 @@ class Closeup {
     this.about = about;
     this.home = `projects/${project.id}`;
     const kept = project.view?.closeup ?? {};
-    this.look = {
-      palette: project.view?.search?.palette ?? about.palettes[0].name,
-      custom: null,
-      line: 1.4,
-      art: false,
-      signs: false,
-      ...kept.look,
-      share: 1,
-    };
+    this.look = { ...lookOf(project, about), share: 1 };
+    this.keepLook = keeper(api, project);
     this.pull = { reach: 0.5, lattice: true, ...kept.pull };
     this.penSettings = { tool: "pencil", colour: "#1b1b1b", width: "medium", ...kept.pen };
     this.mode = kept.mode ?? "look";
-    this.past = pasts.get(project.id) ?? { done: [], undone: [] };
-    pasts.set(project.id, this.past);
     this.lit = null;
-    this.pictures = new Pictures(() => this.stale());
     this.keep = newest(
       () =>
         api.patch(this.home, {
           view: {
             closeup: {
-              look: { ...this.look, share: 1 },
               pull: this.pull,
               pen: this.penSettings,
               mode: this.mode,
@@ -81,7 +69,7 @@ class Closeup {
       events.on("project", (now) => this.#elsewhere(now)),
       events.on("gone", ({ tile }) => tile === this.view?.id && navigate(`p/${project.id}`)),
     ];
-    this.keys = (event) => this.#shortcut(event);
+    this.keys = (event) => this.past.key(event);
     addEventListener("keydown", this.keys);
   }
 
@@ -128,16 +116,19 @@ class Closeup {
     this.pen = new Pen(this.stage, this.penSettings, {
       drawn: (drawing, before) => this.#drawn(drawing, before),
       said: (text) => this.say(text),
-      marks: () => this.stale(),
+      marks: () => this.dress?.stale(),
+    });
+    this.dress = new Dress(this.project, this.look, this.stage, this.pen);
+    this.past = new Past(this.project.id, {
+      go: (step, side) => trying(() => this.#go(step, side)),
+      busy: () => Boolean(this.pulling.waiting || this.pulling.hand),
+      said: (text) => this.say(text),
     });
     this.stage.layers.push((context) => this.#overlay(context));
     this.stage.onhover = (place) => this.#hover(place);
-    this.stage.options.skins = () => this.#skins();
     this.stage.options.over = (context, copy) => this.pen.over(context, copy);
-    this.undoButton = button("Undo", () => this.undo(), { kind: "icon", image: "undo" });
-    this.redoButton = button("Redo", () => this.redo(), { kind: "icon", image: "redo" });
     this.stage.box.append(
-      h("div", { class: "past" }, this.undoButton, this.redoButton),
+      h("div", { class: "past" }, this.past.buttons),
       this.badge,
       this.hint,
       this.stage.zooms(),
@@ -163,7 +154,6 @@ class Closeup {
     );
     this.root.classList.add("closeup");
     put(this.root, h("div", { class: "closeup-page" }, this.stage.box, side), this.said);
-    this.#past(); // nothing can be undone before the tile is there
   }
 
   /** Show a tile of the project. */
@@ -171,13 +161,12 @@ class Closeup {
     const view = await this.api.get(`${this.home}/tiles/${id}`);
     if (this.closed) return;
     const drawing = this.view ? this.pen.drawing : this.project.view?.drawing;
-    if ((this.past.at ??= id) !== id && !quiet) Object.assign(this.past, { done: [], undone: [] });
-    this.past.at = id;
     this.view = view;
     this.figures = figuresOf(view);
     this.carries = this.figures.map((own) => new Carry(own));
     this.tiling = new LiveTiling(view);
     this.look.share = 1;
+    this.dress.use(this.figures);
     this.space = null;
     delete this.root.dataset.ready;
     this.pulling.use(null);
@@ -190,7 +179,7 @@ class Closeup {
     );
     this.#proved();
     this.#panels();
-    this.#past();
+    this.past.show(view, quiet);
     if (quiet) this.navigate(`p/${this.project.id}/t/${id}`, { quiet: true });
     if (this.mode === "pull") this.#ready(); // not waited for: what is next may be asked at once
   }
@@ -241,7 +230,7 @@ class Closeup {
         shapePanel(look, {
           count: this.figures.length,
           hasMap: this.figures.every(({ map }) => map),
-          hasArt: this.figures.some((_, k) => this.#backdropOf(k)),
+          hasArt: this.figures.some((figure, k) => backdropOf(this.project, figure, k)),
         }, change),
         this.signs,
         colourPanel(about, look, needed, change),
@@ -266,28 +255,18 @@ class Closeup {
     }
   }
 
-  /** The address of the picture that can be laid on a figure, if there is one. */
-  #backdropOf(k) {
-    const { map, covered } = this.figures[k];
-    const { silhouette } = (k ? this.project.second : this.project) ?? {};
-    return map && covered && silhouette?.backdrop;
-  }
-
   #change(what) {
     Object.assign(this.look, what);
     if ("share" in what) this.#between();
-    else this.keep();
-    if ("art" in what) this.stale();
+    else this.keepLook(what.palette === "own" ? { ...what, custom: this.look.custom } : what);
+    this.dress.stale();
     this.#palette();
     this.stage.redraw();
   }
 
   #palette() {
-    const { look, about } = this;
-    const known = about.palettes.find(({ name }) => name === look.palette) ?? about.palettes[0];
-    const own = look.palette === "own" && look.custom;
-    const palette = own ? { ...known, ...look.custom, shades: undefined } : known;
-    if (palette !== this.stage.options.palette) this.stale();
+    const { look } = this;
+    const palette = paletteOf(look, this.about);
     Object.assign(this.stage.options, { palette, line: look.line });
     this.stage.redraw();
   }
@@ -301,7 +280,7 @@ class Closeup {
       share >= 1 ? this.#rings() : this.figures.map(there),
       { exact: share >= 1 },
     );
-    this.stale();
+    this.dress.stale();
   }
 
   /** The outline of each figure, as it can be pulled if that is known. */
@@ -309,35 +288,6 @@ class Closeup {
     return this.space
       ? this.space.rings.map((ring) => ring.map((k) => this.space.polygon[k]))
       : this.figures.map(({ polygon }) => polygon);
-  }
-
-  stale() {
-    this.skin = null;
-    this.stage.redraw();
-  }
-
-  /** Pictures of what lies on each figure, painted anew when they are too coarse. */
-  #skins() {
-    if (this.pen.moving || (this.look.share < 1 && !this.look.art)) return null;
-    const scale = this.stage.camera.scale * Math.min(globalThis.devicePixelRatio || 1, 2);
-    if (!this.skin || Math.abs(Math.log(this.skin.asked / scale)) > Math.log(SHARPER)) {
-      const { look, tiling } = this;
-      const palette = this.stage.options.palette;
-      const own = this.figures.map((figure, k) => {
-        const url = look.art && this.#backdropOf(k);
-        const picture = url && this.pictures.at(url);
-        const art = picture && {
-          picture,
-          map: between(figure, look.share),
-          covered: figure.covered,
-          yDown: figure.y_down,
-        };
-        const marks = look.share < 1 ? { lines: [], eyes: [] } : this.pen.marks[k];
-        return paintSkin(tiling.figures[k], { art, marks, palette }, scale);
-      });
-      this.skin = { asked: scale, own };
-    }
-    return this.skin.own;
   }
 
   #overlay(context) {
@@ -388,14 +338,13 @@ class Closeup {
   }
 
   #pulledTo({ stopped, body }) {
-    this.pen.ride(this.pulling.puller, body, this.space);
+    this.dress.ride(this.pulling.puller, body, this.space);
     if (this.pulling.hand) {
       if (stopped && this.badge.dataset.kind !== "stopped") this.say("No further here.");
       if (stopped) this.tell("stopped", "No further here");
       else this.tell("moving", "Let go to check it");
     }
     if (!body && this.badge.dataset.kind !== "refused") this.#proved();
-    if (!body) this.stale();
     if (!body && this.later) {
       this.later();
       this.later = null;
@@ -408,7 +357,7 @@ class Closeup {
     try {
       const card = await this.api.post(`${this.home}/tiles/${before.id}/pulled`, { parameters });
       if (this.closed) return;
-      this.#did({ tile: [before.id, card.id] });
+      this.past.did({ tile: [before.id, card.id] });
       await this.open(card.id, { quiet: true });
       this.say("Proved to tile.");
     } catch (error) {
@@ -423,15 +372,15 @@ class Closeup {
   #restore() {
     this.pulling.back();
     if (this.badge.dataset.kind === "refused") this.#proved();
-    const first = this.past.done.find((step) => step.tile);
-    if (first && first.tile[0] !== this.view.id) {
-      this.#did({ tile: [this.view.id, first.tile[0]] });
-      this.open(first.tile[0], { quiet: true });
+    const { first } = this.past;
+    if (first && first !== this.view.id) {
+      this.past.did({ tile: [this.view.id, first] });
+      this.open(first, { quiet: true });
     }
   }
 
   #drawn(drawing, before) {
-    this.#did({ drawing: [before, drawing] });
+    this.past.did({ drawing: [before, drawing] });
     this.#keepDrawn(drawing);
   }
 
@@ -445,55 +394,17 @@ class Closeup {
     this.keepDrawing(drawing);
   }
 
-  #did(step) {
-    this.past.done.push(step);
-    this.past.undone.length = 0;
-    this.#past();
-  }
-
-  #past() {
-    this.undoButton.disabled = !this.past.done.length && !this.view?.parent;
-    this.redoButton.disabled = !this.past.undone.length;
-  }
-
-  async undo() {
-    if (!this.past.done.length && this.view?.parent) {
-      this.past.done.push({ tile: [this.view.parent, this.view.id] });
+  /**
+   * Go back before a step, or on after it.
+   *
+   * @param {import("./past.js").Step} step
+   * @param {0 | 1} side
+   */
+  async #go({ tile, drawing }, side) {
+    if (tile) await this.open(tile[side], { quiet: true });
+    else {
+      this.pen.use(this.carries, drawing[side]);
+      this.#keepDrawn(drawing[side]);
     }
-    await this.#go(this.past.done, this.past.undone, 0, "Undone.");
-  }
-
-  async redo() {
-    await this.#go(this.past.undone, this.past.done, 1, "Done again.");
-  }
-
-  async #go(from, to, side, words) {
-    if (this.going || this.pulling.waiting || this.pulling.hand) return;
-    const step = from.pop();
-    if (!step) return;
-    this.going = true;
-    to.push(step);
-    try {
-      if (step.tile) await this.open(step.tile[side], { quiet: true });
-      else {
-        this.pen.use(this.carries, step.drawing[side]);
-        this.#keepDrawn(step.drawing[side]);
-      }
-      this.say(words);
-    } catch (error) {
-      toast(error.message, { bad: true });
-    }
-    this.going = false;
-    this.#past();
-  }
-
-  #shortcut(event) {
-    const typing = event.target.matches?.("input[type=text], input[type=number], textarea, select");
-    if (typing || !(event.ctrlKey || event.metaKey) || event.altKey) return;
-    const key = event.key.toLowerCase();
-    if (key === "z") event.shiftKey ? this.redo() : this.undo();
-    else if (key === "y") this.redo();
-    else return;
-    event.preventDefault();
   }
 }

@@ -1,6 +1,6 @@
 /** The tool that draws on the tile: pencil, rubber and eyes, in all copies at once. */
 
-import { eyeInto, lineInto } from "./skin.js";
+import { eyeInto, lineInto } from "../skin.js";
 import { beside, rubbed, short, simplified } from "./lines.js";
 import { Riders } from "./carry.js";
 
@@ -161,15 +161,15 @@ export class Pen {
   }
 
   /** Show what is drawn where the tile is pulled to; `body` is null when it rests. */
-  ride(puller, body, space) {
+  ride(moving, body) {
     if (!body) {
       this.moving = null;
       return;
     }
-    if (this.moving?.puller !== puller) {
-      const riders = new Riders(space.body);
+    if (this.moving?.of !== moving) {
+      const { riders } = moving;
       this.moving = {
-        puller,
+        of: moving,
         marks: this.marks.map(({ lines, eyes }) => ({
           lines: lines.map((line) => ({
             ...line,

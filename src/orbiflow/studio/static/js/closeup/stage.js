@@ -1,10 +1,9 @@
 /** The canvas: what it shows, how it is moved by mouse, touch and keys, and when it is painted. */
 
-import { Camera, inverse, moved, sized } from "../tiling.js";
+import { Camera, inverse, moved, paint, sized } from "../tiling.js";
 /** @import { LiveTiling } from "./live.js" */
 import { h } from "../dom.js";
 import { beside } from "./lines.js";
-import { paintScene } from "./live.js";
 
 const LEAST_TILE = 26; // pixels of a tile when far away
 const MOST_TILE = 3; // canvases that a tile fills when near
@@ -85,7 +84,7 @@ export class Stage {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = palette.paper ?? "#ffffff";
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    this.copies = paintScene(context, this.tiling, this.camera, palette, {
+    this.copies = paint(context, this.tiling, this.camera, palette, {
       width,
       height,
       ratio,

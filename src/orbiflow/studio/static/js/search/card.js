@@ -1,16 +1,20 @@
 /** One tile of a search: a small tiling, its stars, and what can be done with it. */
 
 import { button, h } from "../dom.js";
-import { paintCard } from "../tiling.js";
+import { skinsOf } from "../skin.js";
+import { figuresOf, paintCard } from "../tiling.js";
 import { capital, STAGES, starText, starWords } from "../words.js";
 
 /**
  * A card that can be told to change: {root, update(card, palette), paint()}.
  *
  * @param {Project} project
- * @param {{ more(card: Card): void, remove(card: Card): void }} actions
+ * @param {{ api: Api, pictures: any, look: any, more(card: Card): void, remove(card: Card): void }} actions
  */
 export function cardView(project, actions) {
+  /** @type {TileView | null} */
+  let view = null;
+  let asked = "";
   const canvas = h("canvas", { "aria-hidden": "true" });
   const stars = h("span", { class: "stars", role: "img" });
   const word = h("span", { class: "word" });
@@ -51,7 +55,22 @@ export function cardView(project, actions) {
     const key = `${canvas.clientWidth} ${canvas.clientHeight}`;
     if (!anew && key === painted) return;
     painted = key;
-    paintCard(canvas, shown, palette, { across: canvas.clientWidth > 480 ? 6 : 4.5 });
+    const { look, pictures } = actions;
+    const how = { look, palette, pictures };
+    paintCard(canvas, shown, palette, {
+      across: canvas.clientWidth > 480 ? 6 : 4.5,
+      skins: (outlines, scale) => view && skinsOf(project, figuresOf(view), outlines, how, scale),
+    });
+  }
+
+  /** Ask for the map by which a picture is laid on the tile, once for each of its stages. */
+  async function fetchMap({ id, stage }) {
+    if (!actions.look.art || asked === `${id} ${stage}`) return;
+    asked = `${id} ${stage}`;
+    const found = await actions.api.get(`projects/${project.id}/tiles/${id}`).catch(() => null);
+    if (asked !== `${id} ${stage}`) return;
+    view = found;
+    paint();
   }
 
   /**
@@ -81,6 +100,7 @@ export function cardView(project, actions) {
     more.setAttribute("aria-label", `More like this: ${about}`);
     take.setAttribute("aria-label", `Take away: ${about}`);
     if (anew) paint();
+    fetchMap(card);
   }
   return { root, update, paint };
 }

@@ -16,6 +16,8 @@ import {
   STATES,
 } from "../words.js";
 import { cardView } from "./card.js";
+import { keeper, lookOf, paletteOf } from "../look.js";
+import { Pictures } from "../skin.js";
 import { reordered } from "./moving.js";
 
 const NINE = 9; // classes that are searched for every picture
@@ -48,10 +50,12 @@ class SearchPage {
     this.wanted = {
       effort: "normal",
       objective: "likeness",
-      palette: about.palettes[0].name,
       ...project.view?.search,
     };
     this.keep = newest(() => api.patch(this.place, { view: { search: this.wanted } }), 400);
+    this.look = lookOf(project, about);
+    this.keepLook = keeper(api, project);
+    this.pictures = new Pictures(() => this.views.forEach((view) => view.paint()));
     this.views = new Map();
     this.spare = []; // cards that hold a place
     this.touched = -Infinity; // when the mouse last moved over the cards
@@ -146,29 +150,31 @@ class SearchPage {
     );
   }
 
-  get palette() {
-    const { palettes } = this.about;
-    return palettes.find(({ name }) => name === this.wanted.palette) ?? palettes[0];
-  }
-
   /** The choice of colours. */
   colours() {
     const dots = h("span", { class: "dots", "aria-hidden": "true" });
-    const show = () =>
+    const show = () => {
+      this.palette = paletteOf(this.look, this.about);
       put(
         dots,
         this.palette.colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })),
       );
-    const list = h("select", {
-      "aria-label": "Colours",
-      onchange: () => {
-        this.wanted.palette = list.value;
-        show();
-        this.arrange();
-        this.keep();
+    };
+    const names = this.about.palettes.map(({ name }) => name).concat(this.look.custom ? "own" : []);
+    const list = h(
+      "select",
+      {
+        "aria-label": "Colours",
+        onchange: () => {
+          this.look.palette = list.value;
+          this.keepLook({ palette: list.value });
+          show();
+          this.arrange();
+        },
       },
-    }, this.about.palettes.map(({ name }) => h("option", { value: name }, capital(name))));
-    list.value = this.palette.name;
+      names.map((name) => h("option", { value: name }, capital(name === "own" ? "my own" : name))),
+    );
+    list.value = this.look.palette;
     show();
     return h("label", { class: "palette row" }, dots, list);
   }

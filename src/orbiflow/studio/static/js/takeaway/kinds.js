@@ -237,17 +237,14 @@ export function lengthIn(value) {
 const OWN = "My own colours";
 
 /**
- * The colours that were chosen in this project: {palette, value, options}: to draw with, as a setting,
- * and the words of all that can be chosen, by value.
+ * The colours of a look: {value, options}: as a setting, and the words of all that can be chosen, by value.
+ *
+ * @param {ReturnType<typeof import("../look.js").lookOf>} look
+ * @param {About} about
  */
-export function colours({ view }, { palettes }) {
-  const { palette: name, custom } = view?.closeup?.look ?? {};
-  const found = [name, view?.search?.palette].map((wanted) =>
-    palettes.find((own) => own.name === wanted)
-  );
-  const palette = found.find(Boolean) ?? palettes[0];
-  const options = Object.fromEntries(palettes.map((own) => [own.name, undefined]));
-  if (name !== "own" || !custom) return { palette, value: palette.name, options };
-  const value = [...custom.colours, `outline=${custom.outline}`].join(",");
-  return { palette: { ...palette, ...custom }, value, options: { [value]: OWN, ...options } };
+export function colours({ palette, custom }, { palettes }) {
+  const options = Object.fromEntries(palettes.map(({ name }) => [name, undefined]));
+  if (!custom) return { value: palette, options };
+  const own = [...custom.colours, `outline=${custom.outline}`].join(",");
+  return { value: palette === "own" ? own : palette, options: { [own]: OWN, ...options } };
 }

@@ -2,7 +2,9 @@
 
 import { button, choice, h, icon, put, style, trying } from "../dom.js";
 import { form } from "../forms.js";
-import { paintCard } from "../tiling.js";
+import { keeper, lookOf, paletteOf } from "../look.js";
+import { backdropOf, Pictures, skinsOf } from "../skin.js";
+import { figuresOf, paintCard } from "../tiling.js";
 import { LATE } from "../steering.js";
 import { alive } from "../words.js";
 import { colours, KINDS, lengthIn } from "./kinds.js";
@@ -10,7 +12,17 @@ import { isMade, madeBefore, picture, words } from "./made.js";
 import { trueSize } from "./truesize.js";
 
 const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
-const NEVER = ["tile", "result", "out", "force", "picture", "drawing", "eyes", "second_eyes"]; // what the page itself sets, or drawings hold
+const NEVER = [
+  "tile",
+  "result",
+  "out",
+  "force",
+  "picture",
+  "drawing",
+  "eyes",
+  "second_eyes",
+  "tint",
+]; // what the page itself sets, or drawings hold
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 /**
@@ -22,6 +34,7 @@ export async function show(root, page) {
   if (!card) throw new Error("This tile is not there any more.");
   await style("takeaway");
   const own = new TakeawayPage(page, card);
+  own.view = await page.api.get(`projects/${page.project.id}/tiles/${card.id}`);
   own.build(root);
   await own.choose("export");
   return () => own.close();
@@ -39,7 +52,12 @@ class TakeawayPage {
     this.navigate = navigate;
     this.card = card;
     this.place = `projects/${project.id}`;
-    this.colours = colours(project, about);
+    this.about = about;
+    this.look = lookOf(project, about);
+    this.keepLook = keeper(api, project);
+    this.pictures = new Pictures(() => this.paint());
+    /** @type {TileView | null} */
+    this.view = null;
     this.schemas = new Map();
     this.task = null; // the one whose result is shown
     this.stale = false; // whether settings were changed since
@@ -129,9 +147,14 @@ class TakeawayPage {
   }
 
   paint() {
-    if (this.canvas.clientWidth) {
-      paintCard(this.canvas, this.card, this.colours.palette, { across: 6 });
-    }
+    if (!this.canvas.clientWidth) return;
+    const { look, pictures, project, view } = this;
+    const palette = paletteOf(look, this.about);
+    const how = { look, palette, pictures };
+    paintCard(this.canvas, this.card, palette, {
+      across: 6,
+      skins: (outlines, scale) => view && skinsOf(project, figuresOf(view), outlines, how, scale),
+    });
   }
 
   /** Show the settings of another kind of thing. */
@@ -143,7 +166,7 @@ class TakeawayPage {
     if (this.kind !== kind) return;
     const schema = structuredClone(this.schemas.get(kind));
     const { palette } = schema.properties;
-    const { options, value } = this.colours;
+    const { options, value } = colours(this.look, this.about);
     if (palette) palette.enum = Object.keys(options);
     const { first, words: names } = KINDS[kind];
     this.form = form(schema, {
@@ -151,7 +174,10 @@ class TakeawayPage {
       words: { ...names, palette: { ...names.palette, options } },
       hidden: NEVER,
       start: { ...KINDS[kind].start, ...(palette && { palette: value }) },
-    }, () => this.changed());
+    }, () => {
+      this.keepLooks();
+      this.changed();
+    });
     this.layers = this.laidOn(kind);
     put(
       this.wishes,
@@ -170,13 +196,21 @@ class TakeawayPage {
     const isDrawn = [drawing, two && drawing.second].some((own) =>
       own && (own.strokes?.length || own.eyes?.length)
     );
-    const pictures = [this.project, two && this.project.second].filter((own) =>
-      own && PICTURES.includes(own.input?.type)
+    const pictures = figuresOf(this.view).filter((figure, k) =>
+      backdropOf(this.project, figure, k) &&
+      PICTURES.includes((k ? this.project.second : this.project).input?.type)
     );
     const layer = (name, text, checked) => ({
       name,
       text,
-      box: h("input", { type: "checkbox", checked, onchange: () => this.changed() }),
+      box: h("input", {
+        type: "checkbox",
+        checked,
+        onchange: ({ target }) => {
+          if (name === "picture") this.looks({ art: target.checked });
+          this.changed();
+        },
+      }),
     });
     return [
       isDrawn && layer("drawing", "With what you drew on it", true),
@@ -185,9 +219,22 @@ class TakeawayPage {
         `With your ${two ? "pictures on the tiles" : "picture on each tile"}, in ${
           two ? "their" : "its"
         } own colours`,
-        false,
+        this.look.art,
       ),
     ].filter((own) => own && DRAWN.includes(kind));
+  }
+
+  /** What is chosen here of the look holds everywhere. */
+  keepLooks() {
+    const given = this.form.now("palette");
+    const { value, options } = colours(this.look, this.about);
+    if (given && given !== value) this.looks({ palette: options[given] ? "own" : given });
+  }
+
+  looks(what) {
+    Object.assign(this.look, what);
+    this.keepLook(what);
+    this.paint();
   }
 
   /** Show the size at once; what was made before is no longer what is asked for. */
@@ -199,6 +246,14 @@ class TakeawayPage {
     this.tell();
   }
 
+  /** What is to be made, as the server takes it. */
+  settings() {
+    const layers = this.layers.filter(({ box }) => box.checked).map(({ name }) => [name, true]);
+    const chosen = { tile: this.card.id, ...Object.fromEntries(layers), ...this.form.values() };
+    const isTinted = chosen.picture && [undefined, "none"].includes(this.form.now("cut"));
+    return isTinted ? { ...chosen, tint: this.look.tint } : chosen;
+  }
+
   /** Make it, or stop what is being made. */
   async press() {
     if (performance.now() - this.turned < LATE) return; // meant for what the button said before
@@ -206,8 +261,7 @@ class TakeawayPage {
       await this.api.post(`tasks/${this.task.id}/cancel`);
       return;
     }
-    const layers = this.layers.filter(({ box }) => box.checked).map(({ name }) => [name, true]);
-    const settings = { tile: this.card.id, ...Object.fromEntries(layers), ...this.form.values() };
+    const settings = this.settings();
     try {
       this.task =
         (await this.api.post(`${this.place}/tasks`, { operation: this.kind, settings })).task;

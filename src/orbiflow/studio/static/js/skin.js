@@ -1,9 +1,10 @@
 /** What lies on a tile, as one picture of the prototile: the artwork, lines and eyes. */
 
-import { inverse, moved } from "../tiling.js";
+import { laidOn } from "./texture.js";
+import { inverse, moved } from "./tiling.js";
 
 const MOST = 1400; // pixels along a side
-const BLEED = 0.7; // pixels by which triangles overlap, so that no seam shows
+const PAD = 4; // pixels around a figure
 
 /**
  * An eye as exports draw it: white, dark ring, pupil and a light.
@@ -70,41 +71,6 @@ export class Pictures {
   }
 }
 
-/** Lay triangles of a picture onto their images. `shares` are places in the picture, 0 to 1. */
-function triangles(context, picture, { images, shares, list }, scale) {
-  const [wide, high] = [
-    picture.naturalWidth || picture.width,
-    picture.naturalHeight || picture.height,
-  ];
-  const base = context.getTransform();
-  for (const corners of list) {
-    const [a, b, c] = corners.map((k) => images[k]);
-    const [p, q, r] = corners.map((k) => [shares[k][0] * wide, shares[k][1] * high]);
-    const size = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-    if (Math.abs(size) < 1e-9) continue;
-    const part = (j) => {
-      const [u, v] = [b[j] - a[j], c[j] - a[j]];
-      const x = (u * (r[1] - p[1]) - v * (q[1] - p[1])) / size;
-      const y = (v * (q[0] - p[0]) - u * (r[0] - p[0])) / size;
-      return [x, y, a[j] - x * p[0] - y * p[1]];
-    };
-    const [[ax, ay, ae], [bx, by, be]] = [part(0), part(1)];
-    const middle = [(a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3];
-    context.save();
-    context.beginPath();
-    for (const [x, y] of [a, b, c]) {
-      const [u, v] = [x - middle[0], y - middle[1]];
-      const grow = 1 + BLEED / Math.max(1, scale * Math.hypot(u, v));
-      context.lineTo(middle[0] + grow * u, middle[1] + grow * v);
-    }
-    context.clip();
-    context.transform(ax, bx, ay, by, ae, be);
-    context.drawImage(picture, 0, 0);
-    context.restore();
-    context.setTransform(base);
-  }
-}
-
 /**
  * The map to what lies a share of the way from a figure's silhouette, in its place, to the tile.
  *
@@ -122,50 +88,121 @@ export function between({ map, place = [1, 0, 0, 1, 0, 0] }, share) {
   return { ...map, images: map.images.map(there) };
 }
 
+/** A picture of what lies on a figure; where there is a picture below, each copy tints it by its colour. */
+class Skin {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {Matrix} matrix its pixels to the tile
+   * @param {number} tint from 0 to 1: the colour's share
+   */
+  constructor(canvas, matrix, tint) {
+    this.canvas = canvas;
+    this.matrix = matrix;
+    this.tint = tint;
+    this.tinted = new Map();
+  }
+
+  /** @param {string} colour */
+  in(colour) {
+    if (!this.tint) return this.canvas;
+    if (!this.tinted.has(colour)) {
+      const made = document.createElement("canvas");
+      Object.assign(made, { width: this.canvas.width, height: this.canvas.height });
+      const context = made.getContext("2d");
+      context.drawImage(this.canvas, 0, 0);
+      context.globalCompositeOperation = "multiply";
+      context.globalAlpha = this.tint;
+      context.fillStyle = colour;
+      context.fillRect(0, 0, made.width, made.height);
+      Object.assign(context, { globalCompositeOperation: "destination-in", globalAlpha: 1 });
+      context.drawImage(this.canvas, 0, 0);
+      this.tinted.set(colour, made);
+    }
+    return this.tinted.get(colour);
+  }
+}
+
 /**
  * Paint a figure's skin at a scale (pixels a unit), or null if nothing lies on it.
  * `art`: {picture, map, covered, yDown} or null; `marks`: {lines: [{points, colour, width}], eyes: [{at, radius,
  * light}]}.
  *
  * @param {Figure} figure
- * @param {{ art: any, marks: any, palette: Palette }} what
+ * @param {{ art: any, marks: any, palette: Palette, tint?: number }} what
  * @param {number} scale
  */
-export function paintSkin(figure, { art, marks, palette }, scale) {
+export function paintSkin(figure, { art, marks, palette, tint = 0 }, scale) {
   if (!art && !marks.lines.length && !marks.eyes.length) return null;
   const xs = figure.polygon.map((p) => p[0]);
   const ys = figure.polygon.map((p) => p[1]);
   const [low, high] = [[Math.min(...xs), Math.min(...ys)], [Math.max(...xs), Math.max(...ys)]];
   const size = Math.max(high[0] - low[0], high[1] - low[1]);
   const own = Math.min(scale, MOST / size);
-  const pad = 2 / own;
+  const pad = PAD / own;
   const canvas = document.createElement("canvas");
   canvas.width = Math.ceil((high[0] - low[0] + 2 * pad) * own);
   canvas.height = Math.ceil((high[1] - low[1] + 2 * pad) * own);
   const context = canvas.getContext("2d");
   /** @type {Matrix} */
   const matrix = [own, 0, 0, own, (pad - low[0]) * own, (pad - low[1]) * own];
-  context.setTransform(...matrix);
   if (art) {
     const [from, to] = art.covered;
     const shares = art.map.rest.map(([x, y]) => {
       const v = (y - from[1]) / (to[1] - from[1]);
       return [(x - from[0]) / (to[0] - from[0]), art.yDown ? v : 1 - v];
     });
-    triangles(
-      context,
-      art.picture,
-      { images: art.map.images, shares, list: art.map.triangles },
-      own,
-    );
-    context.globalCompositeOperation = "destination-in";
+    const images = art.map.images.map((point) => moved(matrix, point));
+    const triangles = { images, shares, list: art.map.triangles };
+    const laid = laidOn(art.picture, triangles, canvas.width, canvas.height);
+    // a little past the outline, or what is below would show between two copies
+    context.setTransform(...matrix);
     context.fill(figure.path);
+    context.lineWidth = 1.4 / own;
+    context.lineJoin = "round";
+    context.stroke(figure.path);
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.globalCompositeOperation = "source-in";
+    context.drawImage(laid, 0, 0);
     context.globalCompositeOperation = "source-over";
   }
+  context.setTransform(...matrix);
   context.save();
   context.clip(figure.path); // a line ends where its tile does
   for (const { points, colour, width } of marks.lines) lineInto(context, points, colour, width);
   context.restore();
   for (const { at, radius, light } of marks.eyes) eyeInto(context, at, radius, palette, light);
-  return { canvas, matrix: inverse(matrix), scale: own };
+  return new Skin(canvas, inverse(matrix), art ? tint : 0);
+}
+
+/**
+ * The address of the picture that can be laid on a figure of a tile, if there is one.
+ *
+ * @param {Project} project
+ * @param {FigureView} figure
+ * @param {number} k its number
+ */
+export function backdropOf(project, { map, covered }, k) {
+  const { silhouette } = (k ? project.second : project) ?? {};
+  return map && covered && silhouette?.backdrop;
+}
+
+/**
+ * The skins of a tile's figures at a scale.
+ *
+ * @param {Project} project
+ * @param {FigureView[]} figures
+ * @param {Figure[]} outlines how the figures lie
+ * @param {{ look: any, palette: Palette, pictures: Pictures, marks?: any[], share?: number }} how
+ * @param {number} scale
+ */
+export function skinsOf(project, figures, outlines, how, scale) {
+  const { look, palette, pictures, marks, share = 1 } = how;
+  return figures.map((figure, k) => {
+    const url = look.art && backdropOf(project, figure, k);
+    const picture = url && pictures.at(url);
+    const map = picture && between(figure, share);
+    const art = map && { picture, map, covered: figure.covered, yDown: figure.y_down };
+    const own = { art, marks: marks?.[k] ?? { lines: [], eyes: [] }, palette, tint: look.tint };
+    return paintSkin(outlines[k], own, scale);
+  });
 }

@@ -1,0 +1,56 @@
+/** How a project's tiles look, one choice for all pages: colours, outline, picture and its tint. */
+
+import { newest } from "./dom.js";
+
+/** Whether tiles can show what lies under a silhouette: not if that is of one colour. */
+const isColoured = (own) => Boolean(own?.silhouette?.coloured);
+
+/**
+ * The look of a project's tiles.
+ *
+ * @param {Project} project
+ * @param {About} about
+ */
+export function lookOf(project, about) {
+  const { look, closeup, search } = project.view ?? {};
+  return {
+    palette: search?.palette ?? about.palettes[0].name,
+    custom: null,
+    line: 1.4,
+    signs: false,
+    tint: 0.35,
+    ...closeup?.look, // where it was kept before
+    art: [project, project.second].some(isColoured),
+    ...look,
+  };
+}
+
+/**
+ * The palette of a look, which may be the user's own.
+ *
+ * @param {Pick<ReturnType<typeof lookOf>, "palette" | "custom">} look
+ * @param {About} about
+ * @returns {Palette}
+ */
+export function paletteOf({ palette, custom }, { palettes }) {
+  const found = palettes.find(({ name }) => name === palette) ?? palettes[0];
+  return palette === "own" && custom ? { ...found, ...custom, shades: undefined } : found;
+}
+
+/**
+ * A function that keeps what changes of a project's look.
+ *
+ * @param {Api} api
+ * @param {Project} project
+ */
+export function keeper(api, project) {
+  const send = newest(
+    () => api.patch(`projects/${project.id}`, { view: { look: project.view.look } }),
+    400,
+  );
+  /** @param {object} what */
+  return (what) => {
+    project.view = { ...project.view, look: { ...project.view?.look, ...what } };
+    send();
+  };
+}

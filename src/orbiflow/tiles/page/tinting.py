@@ -1,0 +1,43 @@
+"""What lies on a tile seen through the tile's colour, as through glass."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+from PIL import Image
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import png_bytes, rgb
+from orbiflow.tiles.page.scene import INK, Motif, Part, Raster
+
+
+def glass(colour: str, tint: float) -> Array:
+    """Return the shares (3,) of red, green and blue that a colour lets through at a tint of 0 to 1.
+
+    >>> glass("#ff8000", 0.5).round(2).tolist()
+    [1.0, 0.75, 0.5]
+    """
+    return 1 - tint * (1 - np.array(rgb(colour)) / 255)
+
+
+def tinted(motif: Motif, through: Array) -> Motif:
+    """Return a motif as seen through `glass`; what is drawn in a layer's ink stays."""
+
+    def seen(colour: str | None) -> str | None:
+        if colour is None or colour == INK:
+            return colour
+        return "#" + "".join(f"{round(v):02x}" for v in np.array(rgb(colour)) * through)
+
+    def part(own: Part) -> Part:
+        style = own.style._replace(fill=seen(own.style.fill), stroke=seen(own.style.stroke))
+        return own._replace(style=style)
+
+    def raster(own: Raster) -> Raster:
+        pixels = np.asarray(Image.open(io.BytesIO(own.png)).convert("RGBA")).astype(float)
+        pixels[..., :3] *= through
+        return own._replace(png=png_bytes(Image.fromarray((pixels + 0.5).astype(np.uint8), "RGBA")))
+
+    parts, rasters = tuple(map(part, motif.parts)), tuple(map(raster, motif.rasters))
+    return replace(motif, parts=parts, rasters=rasters)
