@@ -122,6 +122,7 @@ interface Silhouette {
   notes: string[];
   left_out?: Point[][];
   coloured?: boolean;
+  mark?: string;
 }
 
 interface Drawing {

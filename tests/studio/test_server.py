@@ -12,8 +12,9 @@ import pytest
 from PIL import Image, ImageDraw
 
 from bent_tiles import bent_tile
-from orbiflow.runtime import ItemDone
+from orbiflow.runtime import ItemDone, ignore
 from orbiflow.studio.tile_files import put_tile, tile_number
+from orbiflow.studio.words import is_outdated
 from orbiflow.tiles import EscherTile, certify, read_result
 from studio.served import SQUARE, Client, done, join_tasks, new_project, studio
 
@@ -280,9 +281,34 @@ def test_a_project_goes_into_a_file_and_comes_back(client: Client, project: str)
     for name in ("outline", "width", "height"):
         assert one["silhouette"][name] == other["silhouette"][name]
     (before,), (after,) = one["tiles"], other["tiles"]
-    assert {**after, "id": 0} == {**before, "id": 0}
+    assert after == {**before, "id": after["id"], "found_for": [other["silhouette"]["mark"]]}
     folder = client.studio.store.home(opened["id"]) / "tiles" / str(after["id"]) / "final" / "tile"
     assert certify(read_result(folder).tile).valid
+
+
+def test_tiles_of_an_outline_since_mended_are_known_as_such_in_a_file_too(client: Client) -> None:
+    address = new_project(client)
+    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
+    store, name = client.studio.store, address.split("/")[-1]
+    mark = client.get(address).json()["silhouette"]["mark"]
+    tile, number = EscherTile(bent_tile("IH4", 40.0), name="house-IH4"), tile_number(901, 0)
+    put_tile(store.home(name), number, "final", tile, ignore, {"found_for": [mark]})
+    card = json.loads((store.home(name) / f"tiles/{number}/final/card.json").read_text())
+    store.put_card(name, number, card)
+    assert not is_outdated(card, store.project(name))
+
+    def saved_and_opened() -> dict[str, Any]:
+        content = client.get(f"{address}/file").content
+        opened = client.post("/api/projects/open", content=content).json()["id"]
+        join_tasks()
+        return client.get(f"/api/projects/{opened}").json()
+
+    same = saved_and_opened()
+    assert not is_outdated(same["tiles"][0], same)
+    done(client, client.put(f"{address}/reading", json={"smooth": 0.05}))
+    assert is_outdated(card, store.project(name))
+    mended = saved_and_opened()
+    assert is_outdated(mended["tiles"][0], mended)
 
 
 def test_a_project_with_a_picture_that_was_painted_over_comes_back(client: Client) -> None:

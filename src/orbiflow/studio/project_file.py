@@ -67,7 +67,7 @@ def write_project(home: Path, document: Mapping[str, Any], out: Path) -> None:
     Args:
         home: The project's folder.
         document: Its name, kind, view and reading; its input's name; the same of a `second` picture;
-            and `tiles`, each with its `id` and `parent`.
+            and `tiles`, each with its `id`, its `parent`, and whether it is `outdated`.
         out: The file.
     """
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
@@ -211,3 +211,24 @@ def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile
         parent = entry.get("parent")
         found.append((tile, number, parent if type(parent) is int else None))
     return found
+
+
+def ancestors(number: int, parents: Mapping[int, int | None]) -> list[int]:
+    """Return the tiles that a tile was made from by hand, its parent first, as far as they are known.
+
+    >>> ancestors(3, {1: None, 2: 1, 3: 2, 4: 77})
+    [2, 1]
+    """
+    found: list[int] = []
+    parent = parents.get(number)
+    while parent is not None and parent in parents and parent not in (number, *found):
+        found.append(parent)
+        parent = parents.get(parent)
+    return found
+
+
+def outdated_tiles(document: Mapping[str, Any]) -> set[int]:
+    """Return the numbers of the tiles that were found for another outline than the file's."""
+    entries = [entry for entry in document["tiles"] if is_object(entry)]
+    old = [entry.get("id") for entry in entries if entry.get("outdated") is True]
+    return {number for number in old if type(number) is int}

@@ -29,6 +29,7 @@ from orbiflow.studio.words import (
     MASKS,
     NAMES,
     OF_PICTURE,
+    is_outdated,
     plain_name,
     shown_project,
     shown_summary,
@@ -91,7 +92,10 @@ def file(project: str, here: Studio) -> FileResponse:
     if own["kind"] != "tile":
         raise OrbiflowError("only projects of tiles are saved as a file; take the model away")
     names = ("name", "kind", "view", "reading", "input", "second")
-    tiles = [{name: card[name] for name in ("id", "parent")} for card in cards]
+    tiles = [
+        {"id": card["id"], "parent": card["parent"], "outdated": is_outdated(card, own)}
+        for card in cards
+    ]
     out = here.store.home(project) / f".{secrets.token_hex(4)}.tmp"
     document = {**{name: own[name] for name in names}, "tiles": tiles}
     write_project(here.store.home(project), document, out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from contextlib import suppress
 from dataclasses import replace
@@ -87,6 +88,12 @@ def load_target(home: Path, number: int = 0) -> Target:
     stored["outline"] = np.array(stored["outline"])
     stored["size"] = stored["size"] and tuple(stored["size"])
     return Target(**{**stored, "corner": tuple(stored["corner"]), "notes": tuple(stored["notes"])})
+
+
+def marks_of(home: Path) -> list[str]:
+    """Return what tells each of a project's silhouettes, as it was read last, from every other."""
+    files = [silhouette_file(home), *[silhouette_file(home, 1)] * has_second(home)]
+    return [json.loads(file.read_text())["shown"].get("mark", "") for file in files]
 
 
 def _stored(target: Target) -> dict[str, Any]:
@@ -182,6 +189,7 @@ def _shown(target: Target, picture: Image.Image) -> dict[str, Any]:
     outline = pixels(target.outline)
     return {
         "outline": outline,
+        "mark": hashlib.sha256(json.dumps(outline).encode()).hexdigest()[:12],
         "coloured": _is_coloured(picture, outline),
         "width": size[0],
         "height": size[1],

@@ -43,7 +43,8 @@ JSON = {"input", "reading", "silhouette", "view", "settings", "result", "card", 
 
 SUMMARY = """
 SELECT p.id, p.kind, p.name, p.changed, p.silhouette IS NOT NULL AS drawn,
-    (SELECT count(*) FROM tiles t WHERE t.project = p.id) AS tiles,
+    (SELECT count(DISTINCT coalesce(json_extract(t.card, '$.root'), t.id)) FROM tiles t
+        WHERE t.project = p.id) AS tiles,
     EXISTS(SELECT 1 FROM tasks t WHERE t.project = p.id AND t.state IN ('waiting', 'running')) AS busy
 FROM projects p ORDER BY p.changed DESC
 """

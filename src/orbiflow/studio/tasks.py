@@ -34,6 +34,7 @@ from orbiflow.studio.tile_files import (
     STAGES,
     announce_tiles,
     best_stage,
+    origin_of_pulled,
     put_tile,
     tile_folder,
     tile_number,
@@ -92,7 +93,7 @@ def search(
 
 def _search_single(job: Job, settings: SearchChoice, on_event: Sink, cancel: Cancel) -> Outcome:
     """Search for tiles of one silhouette, stage by stage, without the classes that are done."""
-    from orbiflow.studio.silhouette_file import load_target
+    from orbiflow.studio.silhouette_file import load_target, marks_of
     from orbiflow.tiles import escherize, searched_classes
 
     target = load_target(job.project)
@@ -109,12 +110,13 @@ def _search_single(job: Job, settings: SearchChoice, on_event: Sink, cancel: Can
     if not left:
         return Outcome({"tiles": len(names)})
     seen: dict[tuple[str, str], int] = {}
+    origin = {"found_for": marks_of(job.project)}
 
     def show(tile: EscherTile, stage: str) -> None:
         name = tile.isohedral_class
         place = seen[name, stage] = seen.get((name, stage), -1) + 1
         number = tile_number(job.task, names.index(name) * PER_CLASS + place)
-        put_tile(job.project, number, stage, tile, on_event)
+        put_tile(job.project, number, stage, tile, on_event, origin)
 
     result = escherize(
         target,
@@ -137,7 +139,7 @@ def _search_single(job: Job, settings: SearchChoice, on_event: Sink, cancel: Can
 
 def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel) -> Outcome:
     """Search for tiles of both silhouettes: those of a stage replace the ones before, in order."""
-    from orbiflow.studio.silhouette_file import load_target
+    from orbiflow.studio.silhouette_file import load_target, marks_of
     from orbiflow.tiles import escherize
 
     if choice.objective != "likeness":
@@ -148,11 +150,12 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
     settings = _search_settings(job.project, choice).replace(workers=cores())
     announce_tiles(job, on_event)
     shown: dict[str, list[int]] = {stage: [] for stage in STAGES}
+    origin = {"found_for": marks_of(job.project)}
 
     def show(tile: EscherTile, stage: str) -> None:
         number = tile_number(job.task, len(shown[stage]))
         shown[stage].append(number)
-        put_tile(job.project, number, stage, tile, on_event)
+        put_tile(job.project, number, stage, tile, on_event, origin)
 
     result = escherize(one, settings, second=two, on_tile=show, on_event=on_event, cancel=cancel)
     found = {"tiles": len(result.tiles)}
@@ -202,7 +205,16 @@ def _is_done(job: Job, place: int) -> bool:
 @operation("studio open")
 def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Take up a project's file that was uploaded into an empty project."""
-    from orbiflow.studio.project_file import ENDING, read_pictures, read_tiles, reading_of, unpack
+    from orbiflow.studio.project_file import (
+        ENDING,
+        ancestors,
+        outdated_tiles,
+        read_pictures,
+        read_tiles,
+        reading_of,
+        unpack,
+    )
+    from orbiflow.studio.silhouette_file import marks_of
 
     project = job.project
     with tempfile.TemporaryDirectory(dir=project) as folder:
@@ -219,10 +231,16 @@ def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> O
             file.replace(project / file.name)
         read_pictures(project, document)
     numbers = {number: tile_number(job.task, place) for place, (_, number, _) in enumerate(tiles)}
-    for tile, number, parent in tiles:
+    parents = {number: parent for _, number, parent in tiles}
+    marks = marks_of(project) if pictures else []
+    for tile, number, _ in tiles:
         cancel.check()
-        known = None if parent is None else numbers.get(parent)
-        put_tile(project, numbers[number], STAGES[-1], tile, on_event, parent=known)
+        known = [numbers[own] for own in ancestors(number, parents)]
+        origin: dict[str, Any] = {"parent": known[0], "root": known[-1]} if known else {}
+        if marks:
+            old = number in outdated_tiles(document)
+            origin["found_for"] = ["earlier"] if old else marks[: len(tile.figures)]
+        put_tile(project, numbers[number], STAGES[-1], tile, on_event, origin)
     second = pictures.get(1)
     opened = {
         "name": str(document["name"]),
@@ -276,7 +294,7 @@ def pull(
     cancel.check()
     found = pulled(read_result(tile_folder(job.project, tile)), parameters)
     number, stage = tile_number(job.task, 0), STAGES[-1]
-    put_tile(job.project, number, stage, found, on_event, parent=tile)
+    put_tile(job.project, number, stage, found, on_event, origin_of_pulled(job.project, tile))
     if place := best_stage(job.project, number):  # at hand when it is pulled again
         write_json(place / SPACE, space_json(found))
     return Outcome({"tile": number})

@@ -6,12 +6,13 @@ task makes. So a task that starts again gives its tiles the same numbers.
 
 from __future__ import annotations
 
+import json
 import secrets
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import ItemDone, Sink, write_json
@@ -48,19 +49,42 @@ def tile_folder(home: Path, number: int) -> Path:
 
 
 def put_tile(
-    home: Path, number: int, stage: str, tile: EscherTile, on_event: Sink, parent: int | None = None
+    home: Path,
+    number: int,
+    stage: str,
+    tile: EscherTile,
+    on_event: Sink,
+    origin: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a certified `EscherTile` as a stage of a tile, and announce it."""
+    """Write a certified `EscherTile` as a stage of a tile, and announce it.
+
+    Args:
+        home: The project's folder.
+        number: The number of the tile.
+        stage: How far its search is.
+        tile: The tile.
+        on_event: What is told.
+        origin: Where it comes from, for its card: `parent`, the tile that it was made from by hand;
+            `root`, the first of these; `found_for`, the marks of the silhouettes that it is like.
+    """
     from orbiflow.studio.tile_view import tile_card, tile_view
     from orbiflow.tiles import save_tiles
 
     def write(staged: Path) -> None:
-        card = tile_card(tile, number, stage, parent)
+        card = tile_card(tile, number, stage) | dict(origin or {})
         write_json(staged / CARD, card)
         write_json(staged / VIEW, tile_view(card, tile))
         save_tiles([tile], staged / SAVED)
 
     put_stage(home, number, stage, write, on_event)
+
+
+def origin_of_pulled(home: Path, number: int) -> dict[str, Any]:
+    """Return where a tile comes from that is made by hand from the one with this number."""
+    found = best_stage(home, number)
+    card = {} if found is None else json.loads((found / CARD).read_text())
+    known = {name: card[name] for name in ("found_for",) if name in card}
+    return {"parent": number, "root": card.get("root") or number, **known}
 
 
 def put_stage(

@@ -12,9 +12,7 @@ from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
 from orbiflow.tiles import EscherTile, Rating, border, colouring, narrowest_neck
 
 
-def tile_card(
-    tile: EscherTile, number: int, stage: str, parent: int | None = None
-) -> dict[str, Any]:
+def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
     """Return what a list of tiles shows: its tiling, stars and words.
 
     A tile that figures divide has `figures`, each with its name, stars, polygon and neck, where they
@@ -23,8 +21,7 @@ def tile_card(
     Args:
         tile: A certified tile.
         number: Its number in the studio.
-        stage: How far its search is: sketch, better, final; or pulled.
-        parent: The number of the tile that it was made from by hand.
+        stage: How far its search is: sketch, better, final.
     """
     rating, aspects = tile.rating or Rating(1), tile.tiling.aspects
     colours = colouring(tile.tiling)
@@ -37,7 +34,7 @@ def tile_card(
         "score": tile.score if tile.score == tile.score else 0.0,
         "arrangement": tile.arrangement,
         "certified": tile.certificate.valid,
-        "parent": parent,
+        "parent": None,
         **_outline(tile.tile.polygon),
         "y_down": tile.y_down,
         "group": {
