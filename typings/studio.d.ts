@@ -36,6 +36,8 @@ interface Card {
   arrangement: string;
   certified: boolean;
   parent: number | null;
+  root?: number;
+  found_for?: string[];
   polygon: Point[];
   y_down: boolean;
   neck: [Point, Point];
@@ -140,7 +142,7 @@ interface Reading {
 /** What a project remembers of its pages. */
 interface Views {
   fill?: any;
-  search?: { effort: string; objective: string; palette: string };
+  search?: { effort: string; objective: string; palette?: string };
   closeup?: any;
   /** What of the look of tiles was chosen: see look.js. */
   look?: any;

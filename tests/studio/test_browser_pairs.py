@@ -125,7 +125,7 @@ def test_both_figures_are_shown_pulled_drawn_on_and_taken_away(
     stars = page.locator(".stars").first
     assert all(name[:9] in stars.inner_text() for name in names)
     assert all(name in stars.get_attribute("aria-label") for name in names)
-    page.get_by_text("How to search").click()
+    page.get_by_text("How long").wait_for()
     assert page.get_by_text("What counts").count() == 0
     page.goto(f"/#/p/{own}/t/{tile}")
     page.get_by_label("Show my pictures on the tiles").check()

@@ -196,6 +196,75 @@ def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
         page.close()
 
 
+def test_how_long_a_search_takes_is_chosen_beside_its_button(page, studio: RunningStudio) -> None:
+    own = studio.with_picture()
+    page.goto(f"/#/p/{own}/picture")
+    page.get_by_role("radio", name="Quick").check()
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name="Find tiles").click()
+    assert caught.value.post_data_json["settings"]["effort"] == "fast"
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Search again").wait_for()
+    assert page.get_by_role("radio", name="Quick").is_checked()
+
+
+def test_tiles_of_an_opened_project_are_counted_though_none_were_searched(
+    page, studio: RunningStudio, searched
+) -> None:
+    saved = studio.client.get(f"projects/{searched}/file").content
+    opened = studio.client.post("projects/open", content=saved).json()["id"]
+    page.goto(f"/#/p/{opened}")
+    page.wait_for_selector(CARD)
+    count = len(studio.project(opened)["tiles"])
+    assert state(page).startswith(f"{count} tile")
+
+
+def test_tiles_of_an_outline_since_changed_are_marked_and_searched_anew(
+    page, studio: RunningStudio
+) -> None:
+    own = studio.with_picture()
+    studio.search(own, "IH4")
+    studio.found(own)
+    small_searches(page, "IH4")
+    page.goto(f"/#/p/{own}")
+    page.wait_for_selector(CARD)
+    assert page.get_by_text("of an earlier outline").count() == 0
+    studio.client.put(f"projects/{own}/reading", json={"smooth": 0.05})
+    page.get_by_text("1 tile was found before you changed the picture").wait_for()
+    assert page.locator(f"{CARD}.old").count() == 1
+    page.get_by_role("button", name="Search anew").click()
+    page.wait_for_selector(".card[data-stage=final]:not(.old)")
+    assert page.locator(CARD).first.get_attribute("class").split() == ["card"]
+
+
+def test_pulled_versions_of_a_tile_are_on_its_card(page, studio: RunningStudio) -> None:
+    own = studio.with_picture()
+    studio.search(own, "IH4")
+    (first,) = (tile["id"] for tile in studio.found(own))
+
+    def pull(tile: int) -> int:
+        start = studio.client.get(f"projects/{own}/tiles/{tile}/space").json()["start"]
+        pulled = f"projects/{own}/tiles/{tile}/pulled"
+        return studio.client.post(pulled, json={"parameters": start}).json()["id"]
+
+    second = pull(first)
+    third = pull(second)
+    page.goto(f"/#/p/{own}")
+    page.wait_for_selector(CARD)
+    assert page.locator(CARD).count() == 1
+    assert state(page).startswith("1 tile and 2 pulled versions")
+    card = page.locator(CARD)
+    assert card.get_attribute("data-tile") == str(third)
+    card.get_by_role("button", name="As found").click()
+    assert card.get_attribute("data-tile") == str(first)
+    assert card.get_by_role("link", name="Open").get_attribute("href").endswith(f"/t/{first}")
+    (summary,) = (one for one in studio.client.get("projects").json() if one["id"] == own)
+    assert summary["tiles"] == 1
+    studio.client.delete(f"projects/{own}/tiles/{second}")  # what was pulled from it stays here
+    page.get_by_text("1 tile and 1 pulled version,").wait_for()
+    assert page.locator(CARD).count() == 1
+
+
 def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio, searched) -> None:
     small_searches(page, "IH4")
     page.goto(f"/#/p/{searched}")

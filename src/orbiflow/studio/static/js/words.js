@@ -35,6 +35,17 @@ export const STATES = {
 export const alive = (task) => ["waiting", "running", "paused"].includes(task?.state);
 
 /**
+ * Whether a tile was found for an outline that has been changed since.
+ *
+ * @param {Pick<Card, "found_for">} card
+ * @param {Project} project
+ */
+export function isOutdated({ found_for: marks = [] }, project) {
+  const now = [project, project.second].map((own) => own?.silhouette?.mark);
+  return marks.some((mark, k) => now[k] && now[k] !== mark);
+}
+
+/**
  * @param {number} count
  * @param {string} one
  * @param {string} [many]

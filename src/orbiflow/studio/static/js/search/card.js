@@ -1,12 +1,12 @@
 /** One tile of a search: a small tiling, its stars, and what can be done with it. */
 
-import { button, h } from "../dom.js";
+import { button, h, put } from "../dom.js";
 import { skinsOf } from "../skin.js";
 import { figuresOf, paintCard } from "../tiling.js";
-import { capital, STAGES, starText, starWords } from "../words.js";
+import { capital, isOutdated, STAGES, starText, starWords } from "../words.js";
 
 /**
- * A card that can be told to change: {root, update(card, palette), paint()}.
+ * A card of a tile and what was pulled from it, that can be told to change: {root, update(versions, palette), paint()}.
  *
  * @param {Project} project
  * @param {{ api: Api, pictures: any, look: any, more(card: Card): void, remove(card: Card): void }} actions
@@ -38,10 +38,12 @@ export function cardView(project, actions) {
     image: "bin",
   });
   const take = h("a", { class: "button quiet" }, "Take away");
+  const versions = h("div", { class: "versions", role: "group", "aria-label": "Versions" });
   const root = h(
     "li",
     { class: "card" },
     link,
+    versions,
     h("div", { class: "row deeds" }, take, more, h("span", { class: "grow" }), drop),
   );
   /** @type {Card | null} */
@@ -73,11 +75,42 @@ export function cardView(project, actions) {
     paint();
   }
 
+  let known = "";
+  let chosen = 0;
+
+  /**
+   * Show the version that is chosen, the last one if none is.
+   *
+   * @param {Card[]} group
+   * @param {Palette} colours
+   */
+  function update(group, colours) {
+    const ids = group.map(({ id }) => id).join();
+    if (ids !== known) chosen = group.at(-1).id; // a tile that was just pulled is shown
+    const own = `${ids} ${chosen}`;
+    if (own !== versions.dataset.own) {
+      versions.dataset.own = own;
+      versions.hidden = group.length < 2;
+      put(
+        versions,
+        group.map(({ id, parent }, k) =>
+          button(parent ? `Pulled ${k || ""}`.trim() : "As found", () => {
+            chosen = id;
+            update(group, colours);
+            /** @type {HTMLElement} */ (versions.querySelector("[aria-pressed=true]")).focus();
+          }, { kind: "quiet", "aria-pressed": String(id === chosen) })
+        ),
+      );
+    }
+    known = ids;
+    tell(group.find(({ id }) => id === chosen), colours);
+  }
+
   /**
    * @param {Card} card
    * @param {Palette} colours
    */
-  function update(card, colours) {
+  function tell(card, colours) {
     const anew = !shown || shown.polygon !== card.polygon || palette !== colours;
     [shown, palette] = [card, colours];
     root.dataset.tile = String(card.id);
@@ -90,7 +123,13 @@ export function cardView(project, actions) {
     word.textContent = card.stars && !card.figures ? capital(card.word) : "";
     lies.textContent = capital(card.arrangement);
     name.textContent = card.parent ? `${card.class_name}, pulled` : card.class_name;
-    stage.textContent = card.stage === "final" ? "" : STAGES[card.stage] ?? "";
+    const old = isOutdated(card, project);
+    root.classList.toggle("old", old);
+    stage.textContent = old
+      ? "of an earlier outline"
+      : card.stage === "final"
+      ? ""
+      : STAGES[card.stage] ?? "";
     const about = `${capital(card.word || "a tile")}, ${card.arrangement}`;
     link.setAttribute(
       "aria-label",

@@ -1,23 +1,13 @@
 /** The search as it goes: all classes side by side, best first. */
 
-import { button, choice, confirmed, h, newest, notes, put, style, toast, trying } from "../dom.js";
+import { button, confirmed, h, notes, put, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
-import { LATE, steering } from "../steering.js";
-import {
-  alive,
-  capital,
-  EFFORT_TIMES,
-  EFFORTS,
-  number,
-  OBJECTIVE_MEANINGS,
-  OBJECTIVES,
-  PAIR_TIMES,
-  sentence,
-  STATES,
-} from "../words.js";
-import { cardView } from "./card.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { Pictures } from "../skin.js";
+import { LATE, steering } from "../steering.js";
+import { alive, capital, isOutdated, number, sentence, STATES } from "../words.js";
+import { wishes } from "../wishes.js";
+import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
 
 const NINE = 9; // classes that are searched for every picture
@@ -41,18 +31,14 @@ export async function show(root, page) {
 
 class SearchPage {
   /** @param {Page} page */
-  constructor({ api, events, project, about }) {
+  constructor(page) {
+    const { api, events, project, about } = page;
+    this.wishes = wishes(page);
     this.api = api;
     this.events = events;
     this.project = project;
     this.about = about;
     this.place = `projects/${project.id}`;
-    this.wanted = {
-      effort: "normal",
-      objective: "likeness",
-      ...project.view?.search,
-    };
-    this.keep = newest(() => api.patch(this.place, { view: { search: this.wanted } }), 400);
     this.look = lookOf(project, about);
     this.keepLook = keeper(api, project);
     this.pictures = new Pictures(() => this.views.forEach((view) => view.paint()));
@@ -80,7 +66,8 @@ class SearchPage {
     this.again = button("", () => this.search(), { kind: "primary", image: "arrow" });
     this.deeds = h("div", { class: "row" }, this.steer.root, this.again);
     this.heading = h("h1", { tabindex: "-1" }, "Tiles");
-    this.panel = this.wishes();
+    const { effort, objective } = this.wishes;
+    this.panel = h("div", { class: "wishes" }, effort, objective);
     this.empty = h(
       "div",
       { class: "lonely stack" },
@@ -94,17 +81,19 @@ class SearchPage {
         { class: "head" },
         h("div", { class: "grow" }, this.heading, this.said),
         this.colours(),
+        this.panel,
         this.deeds,
       ),
       this.bar,
       this.noted,
-      this.panel,
       this.empty,
       this.grid,
     );
     this.watch = new ResizeObserver(() => this.views.forEach((view) => view.paint(false)));
     this.watch.observe(this.grid);
-    this.off = ["card", "gone", "refresh", "task"].map((kind) => this.events.on(kind, this.soon));
+    this.off = ["card", "gone", "refresh", "silhouette", "task"].map((kind) =>
+      this.events.on(kind, this.soon)
+    );
     this.arrange();
     this.tell();
   }
@@ -114,40 +103,6 @@ class SearchPage {
     this.watch.disconnect();
     cancelAnimationFrame(this.due);
     clearTimeout(this.later);
-  }
-
-  /** How to search: how long, and what counts. */
-  wishes() {
-    const wish = (label, name, options, meanings) => {
-      const meaning = h("p", { class: "soft small" }, meanings[this.wanted[name]]);
-      return h(
-        "div",
-        { class: "stack" },
-        choice(label, options, this.wanted[name], (own) => {
-          this.wanted[name] = own;
-          meaning.textContent = meanings[own] ?? "";
-          this.keep();
-        }),
-        meaning,
-      );
-    };
-    return h(
-      "details",
-      { class: "panel wishes", open: !this.project.tiles.length },
-      h("summary", {}, "How to search"),
-      h(
-        "div",
-        { class: "wish" },
-        wish(
-          "How long",
-          "effort",
-          this.about.efforts.map((own) => [own, EFFORTS[own] ?? own]),
-          this.project.second ? PAIR_TIMES : EFFORT_TIMES,
-        ),
-        !this.project.second &&
-          wish("What counts", "objective", Object.entries(OBJECTIVES), OBJECTIVE_MEANINGS),
-      ),
-    );
   }
 
   /** The choice of colours. */
@@ -186,11 +141,10 @@ class SearchPage {
   }
 
   start(words, more = {}) {
-    const { effort, objective } = this.wanted;
     return trying(async () => {
       await this.api.post(`${this.place}/tasks`, {
         operation: "search",
-        settings: { effort, ...(!this.project.second && { objective }), ...more },
+        settings: { ...this.wishes.settings(), ...more },
       });
       toast(words);
     });
@@ -215,16 +169,30 @@ class SearchPage {
   /** Say how far the search is. */
   tell() {
     const { task, project } = this;
-    const words = stateWords(task, project);
+    const words = stateWords(task, project, this.groups.length);
     if (this.said.textContent !== words) this.said.textContent = words;
     this.said.classList.toggle("error", task?.state === "failed");
     this.bar.hidden = !alive(task);
     if (task?.state === "waiting") this.bar.removeAttribute("value");
     else this.bar.value = task?.share ?? 0;
     const said = task?.result?.notes ?? [];
-    if (said.length !== this.noted.querySelectorAll("li").length) put(this.noted, notes(said));
+    const old = this.groups.filter(([first]) => isOutdated(first, project)).length;
+    const told = JSON.stringify([said, old, alive(task)]);
+    if (told !== this.told) put(this.noted, old > 0 && this.earlier(old, task), notes(said));
+    this.told = told;
     this.empty.hidden = Boolean(project.tiles.length) || alive(task);
     this.offer(task);
+  }
+
+  /** Say that tiles are of an outline that has been changed since. */
+  earlier(count, task) {
+    const tiles = number(count, "tile was", "tiles were");
+    return h(
+      "div",
+      { class: "notice row" },
+      h("span", { class: "grow" }, `${tiles} found before you changed the picture.`),
+      !alive(task) && button("Search anew", () => this.search(), { image: "arrow" }),
+    );
   }
 
   /**
@@ -240,7 +208,6 @@ class SearchPage {
     this.turned = this.busy === undefined ? -Infinity : performance.now();
     this.busy = this.again.hidden = this.panel.hidden = busy;
     this.steer.root.hidden = !busy;
-    if (busy) this.panel.open = false;
     /** @type {HTMLButtonElement} */
     const first = this.deeds.querySelector("button:not([hidden], [hidden] *)");
     if (held) first.focus();
@@ -251,29 +218,41 @@ class SearchPage {
     return performance.now() - this.turned > LATE && this.start("The search begins.");
   }
 
+  /** The tiles, each with what was pulled from it, best first; those of an earlier outline last. */
+  get groups() {
+    const groups = new Map();
+    for (const card of [...this.project.tiles].sort((a, b) => a.id - b.id)) {
+      const own = card.root ?? card.id;
+      groups.set(own, [...(groups.get(own) ?? []), card]);
+    }
+    const old = ([first]) => Number(isOutdated(first, this.project));
+    return [...groups.values()].sort((a, b) => old(a) - old(b) || better(a[0], b[0]));
+  }
+
   /** Show the cards in their order; cards that stay move there calmly, but not away from the mouse. */
   arrange() {
-    const { views, grid } = this;
-    const cards = [...this.project.tiles].sort(better);
+    const { views, grid, groups } = this;
+    const key = ([{ id, root }]) => root ?? id;
     if (performance.now() - this.touched < REST) {
       const places = new Map([...grid.children].map((child, k) => [child, k]));
-      const place = ({ id }) => places.get(views.get(id)?.root) ?? Infinity;
-      cards.sort((a, b) => (place(a) === place(b) ? better(a, b) : place(a) - place(b)));
+      const place = (group) => places.get(views.get(key(group))?.root) ?? Infinity;
+      const now = new Map(groups.map((group) => [group, place(group)]));
+      groups.sort((a, b) => (now.get(a) === now.get(b) ? 0 : now.get(a) - now.get(b)));
       clearTimeout(this.later);
       this.later = setTimeout(this.soon, REST);
     }
-    const kept = new Set(cards.map(({ id }) => id));
-    for (const id of [...views.keys()]) if (!kept.has(id)) views.delete(id);
-    for (const { id } of cards) if (!views.has(id)) views.set(id, cardView(this.project, this));
-    reordered(grid, [...cards.map(({ id }) => views.get(id).root), ...this.ghosts()]);
-    cards.forEach((card) => views.get(card.id).update(card, this.palette));
+    const keys = groups.map(key);
+    for (const id of [...views.keys()]) if (!keys.includes(id)) views.delete(id);
+    for (const id of keys) if (!views.has(id)) views.set(id, cardView(this.project, this));
+    reordered(grid, [...keys.map((id) => views.get(id).root), ...this.ghosts()]);
+    groups.forEach((group) => views.get(key(group)).update(group, this.palette));
   }
 
   /** Empty cards hold the places of the nine classes until the first tiles are done. */
   ghosts() {
     const { tiles } = this.project;
     const begun = alive(this.task) && !tiles.some(({ stage }) => stage === "final");
-    const missing = begun ? Math.max(0, NINE - tiles.length) : 0;
+    const missing = begun ? Math.max(0, NINE - this.groups.length) : 0;
     while (this.spare.length < missing) {
       this.spare.push(h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {})));
     }
@@ -282,13 +261,18 @@ class SearchPage {
 }
 
 /**
- * What there is to say of a search.
+ * What there is to say of a search, and of `tiles` with what was pulled from them.
  *
  * @param {Task | undefined} task
  * @param {Project} project
+ * @param {number} tiles
  */
-function stateWords(task, { tiles: { length: tiles }, second }) {
-  if (!task) return "Nothing has been searched yet.";
+function stateWords(task, { tiles: { length: every }, second }, tiles) {
+  const pulled = every > tiles ? ` and ${number(every - tiles, "pulled version")}` : "";
+  const found = `${
+    number(tiles, "tile")
+  }${pulled}, best first. Each one covers the plane: we proved it.`;
+  if (!task) return tiles ? found : "Nothing has been searched yet.";
   if (task.state === "failed") return sentence(task.error);
   if (task.state === "waiting") {
     return task.place > 0
@@ -301,5 +285,5 @@ function stateWords(task, { tiles: { length: tiles }, second }) {
   }
   if (task.state !== "done") return `${STATES[task.state]}.`;
   if (!tiles) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
-  return `${number(tiles, "tile")}, best first. Each one covers the plane: we proved it.`;
+  return found;
 }

@@ -2,6 +2,7 @@
 
 import { button, h, newest, notes as noted, put, style, toast, trying } from "../dom.js";
 import { sized } from "../tiling.js";
+import { wishes } from "../wishes.js";
 import { alive, number, sentence } from "../words.js";
 import { paintingControls, readingControls } from "./controls.js";
 import { Marks } from "./marks.js";
@@ -43,6 +44,7 @@ class PicturePage {
   constructor(page, number) {
     const { api, events, project, navigate } = page;
     this.page = page;
+    this.wishes = wishes(page);
     this.number = number;
     this.api = api;
     this.events = events;
@@ -97,7 +99,7 @@ class PicturePage {
     this.side = h(
       "div",
       { class: "stack side" },
-      h("div", { class: "go" }, this.find),
+      h("div", { class: "go" }, this.find, this.wishes.effort),
       this.both.root,
       this.said,
       this.controls.root,
@@ -361,11 +363,9 @@ class PicturePage {
     return trying(async () => {
       await Promise.all([this.read, ...Object.values(this.send)].map((pending) => pending.done()));
       await this.settled();
-      const { second, view } = this.project;
-      const { objective = "likeness", effort = "normal" } = view?.search ?? {};
       await this.api.post(`${this.place}/tasks`, {
         operation: "search",
-        settings: { effort, ...(!second && { objective }) },
+        settings: this.wishes.settings(),
       });
       this.navigate(`p/${this.project.id}`);
     }).then(() => {
