@@ -133,3 +133,33 @@ def test_one_look_for_all_pages(page: Any, studio: RunningStudio, coloured: str,
     page.wait_for_selector(".badge[data-kind=proved]")
     assert page.get_by_role("radio", name="earth").is_checked()
     assert not page.get_by_label("Show my picture on the tiles").is_checked()
+
+
+def test_a_preview_follows_each_setting(page: Any, coloured: str, tile: int) -> None:
+    page.goto(f"/#/p/{coloured}/take/{tile}")
+    image = page.locator(".live img")
+    image.wait_for()
+
+    def changed(deed: Any) -> str:
+        before = image.get_attribute("src")
+        deed()
+        page.wait_for_function("old => document.querySelector('.live img').src !== old", arg=before)
+        return image.get_attribute("src")
+
+    picture = page.get_by_label("With your picture")
+    plain = changed(lambda: picture.uncheck())
+    assert changed(lambda: picture.check()) != plain
+    purpose = page.get_by_label("What is it for?")
+    changed(lambda: purpose.select_option("laser"))
+    assert not picture.is_checked()  # it would be engraved
+    changed(lambda: purpose.select_option("print"))
+    assert picture.is_checked()
+    page.get_by_label("How long is one tile?").fill("99999")
+    page.get_by_label("How long is one tile?").press("Tab")
+    page.get_by_text("must be above 0 and at most 20000").wait_for()
+    assert page.get_by_label("How long is one tile?").evaluate(
+        "box => box !== document.activeElement"
+    )
+    changed(lambda: page.get_by_role("radio", name="Animation").check())
+    page.get_by_text("One moment of the animation").wait_for()
+    page.wrong[:] = [said for said in page.wrong if "422" not in said]

@@ -12,7 +12,7 @@ import shapely
 
 from bent_tiles import bent_tile
 from exported import dxf_lines
-from orbiflow.studio.tasks import with_drawing
+from orbiflow.studio.taking import with_drawing
 from orbiflow.studio.tile_files import put_tile, tile_folder, tile_number
 from orbiflow.tiles import (
     EscherTile,

@@ -20,7 +20,8 @@ from orbiflow.runtime import Event, ItemDone, ignore
 from orbiflow.studio import open_project, tasks
 from orbiflow.studio.pulled_tiles import PullSpace, pulled, space_json
 from orbiflow.studio.settings import Job, SearchChoice
-from orbiflow.studio.tasks import read, search, with_drawing
+from orbiflow.studio.taking import with_drawing
+from orbiflow.studio.tasks import read, search
 from orbiflow.studio.tile_files import best_stage, put_tile, tile_folder
 from orbiflow.studio.tile_view import tile_card, tile_view
 from orbiflow.tiles import EscherTile, colouring, read_result, save_tiles

@@ -27,7 +27,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.settings import Count, OnlyWith, Range, Settings
 from orbiflow.studio.settings import Job
-from orbiflow.studio.tasks import export_folder, files_of
+from orbiflow.studio.taking import export_folder, files_of
 
 if TYPE_CHECKING:
     from orbiflow.density import Density

@@ -62,6 +62,7 @@ KINDS = {
     "search": Kind("studio search"),
     "space": Kind("studio space", "quick"),
     "pull": Kind("studio pull", "quick"),
+    "preview": Kind("studio preview", "quick"),
     "export": Kind("studio take", makes="export"),
     "art": Kind("studio take", makes="art"),
     "solid": Kind("studio take", makes="solid"),

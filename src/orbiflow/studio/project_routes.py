@@ -23,7 +23,8 @@ from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
 from orbiflow.studio.routes import Routes, Studio, body_object, save_body
 from orbiflow.studio.store import Missing
-from orbiflow.studio.tasks import PREVIEW, SPACE, export_folder
+from orbiflow.studio.taking import PREVIEW, export_folder
+from orbiflow.studio.tasks import SPACE
 from orbiflow.studio.tile_files import VIEW, best_stage, tile_number
 from orbiflow.studio.words import (
     MASKS,
@@ -147,13 +148,9 @@ async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
     operation, settings = given.get("operation"), given.get("settings", {})
     if not isinstance(operation, str) or not is_object(settings):
         raise OrbiflowError("a task has an operation and settings")
-    own = here.store.project(project)
-    view = own["view"]
-    if "drawing" in settings:  # as it is now
-        drawn = view.get("drawing", {}) if settings["drawing"] is True else {}
-        settings = {**settings, "drawing": json.dumps(drawn)}
+    settings = with_what_is_drawn(here, project, settings)
     if kind_of_work(operation).makes or operation == "film":
-        settings = {**settings, "called": own["name"]}
+        settings = {**settings, "called": here.store.project(project)["name"]}
     return await here.submit(project, operation, settings)
 
 
@@ -387,6 +384,35 @@ async def pulled(request: Request, project: str, tile: int, here: Studio) -> dic
     if task["state"] != "done":
         raise OrbiflowError(task["error"] or "the change was cancelled; pull again")
     return here.store.card(project, tile_number(task["id"], 0))
+
+
+@routes("POST", "/projects/{project}/tiles/{tile}/preview")
+async def live_preview(request: Request, project: str, tile: int, here: Studio) -> dict[str, Any]:
+    """Draw what a take-away of a tile would be, in place of one that is still being drawn."""
+    given = await body_object(request)
+    operation, settings = str(given.get("operation")), given.get("settings", {})
+    if operation not in ("export", "art", "solid", "animate") or not is_object(settings):
+        raise OrbiflowError("a preview has an operation that makes something, and settings")
+    stage_of(here, project, tile)
+    kind = kind_of_work(operation)
+    call = kind.call(here.store.home(project), 1, with_what_is_drawn(here, project, settings))
+    flat = {name: call.flat[name] for name in ("makes", "settings", "picture", "drawing")}
+    if given.get("instead"):
+        await run_in_threadpool(here.queue.forget, project, "preview")
+    task = await here.done(project, "preview", {**flat, "tile": tile})
+    here.store.delete_task(task["id"])
+    if task["state"] != "done":
+        raise OrbiflowError(task["error"] or "another preview has taken the place of this one")
+    return task["result"]
+
+
+def with_what_is_drawn(here: Studio, project: str, settings: dict[str, Any]) -> dict[str, Any]:
+    """Return settings that say whether a drawing is wanted with the drawing as it is now."""
+    if "drawing" not in settings:
+        return settings
+    view = here.store.project(project)["view"]
+    drawn = view.get("drawing", {}) if settings["drawing"] is True else {}
+    return {**settings, "drawing": json.dumps(drawn)}
 
 
 def _made(here: Studio, task: int, name: str) -> Path:

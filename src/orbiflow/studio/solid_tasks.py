@@ -28,7 +28,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.solids import FillSettings
 from orbiflow.studio.settings import Job
-from orbiflow.studio.tasks import export_folder, files_of
+from orbiflow.studio.taking import export_folder, files_of
 from orbiflow.studio.tile_files import (
     CARD,
     SAVED,

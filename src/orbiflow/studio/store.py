@@ -266,6 +266,17 @@ class Store:
         query = f"SELECT * FROM tasks WHERE state IN ({marks}) {where} ORDER BY id"
         return self._rows(query, *UNDONE, *values)
 
+    def delete_task(self, task: int) -> None:
+        """Forget a task; one that is gone is left alone."""
+        with suppress(Missing):
+            project = self.task(task)["project"]
+            with self._changing(project) as data:
+                data.execute("DELETE FROM tasks WHERE id = ?", (task,))
+                data.execute(
+                    "DELETE FROM events WHERE project = ? AND kind = 'task' AND subject = ?",
+                    (project, str(task)),
+                )
+
     def change_task(self, task: int, **changes: Any) -> None:
         """Change columns of a task; one that is gone is left alone."""
         with suppress(Missing):

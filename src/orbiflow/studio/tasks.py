@@ -1,19 +1,15 @@
-"""What the studio's workers do for tiles: read a picture, search, pull, and write files to download."""
+"""What the studio's workers do for tiles: read a picture, search, and pull."""
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
-import time
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
     NEVER,
-    Call,
     Cancel,
     Note,
     Outcome,
@@ -22,13 +18,10 @@ from orbiflow.runtime import (
     as_part,
     cores,
     ignore,
-    is_object,
-    make_folder,
     one_blas_thread,
     operation,
     write_json,
 )
-from orbiflow.studio.kinds_of_work import WITH_DRAWING, file_name, making_call
 from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tile_files import (
     STAGES,
@@ -40,7 +33,7 @@ from orbiflow.studio.tile_files import (
     tile_number,
     tiles_of,
 )
-from orbiflow.studio.words import OF_PICTURE
+from orbiflow.studio.words import OF_PICTURE, PREFIXES
 from orbiflow.tiles import ReadingSettings
 
 if TYPE_CHECKING:
@@ -252,8 +245,6 @@ def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> O
 
 
 SPACE = "pull.json"
-PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
-PREFIXES = ("", "second_")  # of settings and arguments of the first figure, and of the second
 
 
 @operation("studio space")
@@ -298,142 +289,3 @@ def pull(
     if place := best_stage(job.project, number):  # at hand when it is pulled again
         write_json(place / SPACE, space_json(found))
     return Outcome({"tile": number})
-
-
-def with_drawing(
-    drawing: str, result: Path, files: dict[str, Any], settings: dict[str, Any], scratch: Path
-) -> tuple[Path, dict[str, Any], dict[str, Any]]:
-    """Return the result, files and settings of a take-away with a drawing on its tile.
-
-    Args:
-        drawing: What the project remembers as its drawing, as JSON; "" for nothing.
-        result: The tile's folder.
-        files: The files that the take-away is given; the pictures go below the drawing.
-        settings: The settings of `export` or `art`.
-        scratch: A folder for what is written on the way.
-    """
-    from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
-    from orbiflow.tiles import read_result, save_tiles
-
-    try:
-        parts = json.loads(drawing or "{}")
-    except (ValueError, RecursionError):
-        raise OrbiflowError("the drawing is no JSON; reload the page") from None
-    drawings = [parts, parts.get("second")] if is_object(parts) else []
-    if not any(is_object(own) and (own.get("strokes") or own.get("eyes")) for own in drawings):
-        return result, files, settings
-    given = read_result(result)
-    tile, scratch = with_any_map(given), make_folder(scratch)
-    if tile is not given:
-        result = save_tiles([tile], scratch / "tile")
-    for number, (own, part) in enumerate(zip(drawings, tile.figures, strict=False)):
-        end, prefix = OF_PICTURE[number], PREFIXES[number]
-        under: Path | None = files.get(f"{prefix}picture")
-        if under is not None and under.suffix not in PICTURE_ENDINGS:
-            under = under.with_name(f"backdrop{end}.png")
-        made = drawing_settings(own, part.figure, scratch, under, f"drawing{end}")
-        if made["picture"] is not None:
-            files = {**files, f"{prefix}picture": made["picture"]}
-        if made["eyes"]:
-            settings = {**settings, f"{prefix}eyes": made["eyes"]}
-    return result, files, settings
-
-
-PREVIEW = "preview.png"
-SCRATCH = ".drawn"  # a folder for what is written on the way
-MAX_DRAWN_BYTES = 30_000_000  # bytes of a solid that is drawn
-PREVIEW_SIDE_PIXELS = 1000.0  # pixels of a preview's longer side
-
-
-def export_folder(home: Path, task: int) -> Path:
-    """Return the folder of the files that a task of a project makes to be taken away."""
-    return home / "exports" / str(task)
-
-
-def files_of(folder: Path) -> list[dict[str, Any]]:
-    """Return the name and the size in bytes of each file in a folder, by name."""
-    files = sorted(file for file in folder.iterdir() if file.is_file())
-    return [{"name": file.name, "bytes": file.stat().st_size} for file in files]
-
-
-@operation("studio take")
-def take(
-    job: Job,
-    makes: str,
-    tile: int,
-    settings: str = "{}",
-    picture: bool = False,
-    drawing: str = "",
-    called: str = "",
-    *,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
-) -> Outcome:
-    """Write what a user takes away of a tile.
-
-    Args:
-        makes: The operation that writes it: export, art, solid or animate.
-        tile: The number of the tile.
-        settings: Its settings, as JSON.
-        picture: Whether the pictures that were uploaded go onto the figures.
-        drawing: What was drawn on the tile, as JSON.
-        called: The name of the project, with which that of the file begins.
-    """
-    folder = make_folder(export_folder(job.project, job.task))
-    given, result = json.loads(settings), tile_folder(job.project, tile)
-    files = _pictures(job.project, result) if picture else {}
-    if drawing and makes in WITH_DRAWING:
-        result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
-    name = file_name(makes, given, result, called)
-    call = making_call(makes, given, result, out=folder / name, **files)
-    done = call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
-    written = files_of(folder)
-    preview = False
-    with suppress(OrbiflowError):  # what was asked for is there
-        preview = _preview(call, folder / written[0]["name"], folder, cancel)
-    facts = {name: value for name, value in done.summary.items() if name not in ("file", "files")}
-    return Outcome(
-        {
-            "takeaway": job.task,
-            "files": written,
-            "preview": preview,
-            "facts": facts,
-            "chosen": json.loads(settings),
-            "made": time.time(),
-        }
-    )
-
-
-def _pictures(home: Path, result: Path) -> dict[str, Any]:
-    """Return the pictures that were uploaded for the figures of a tile, by argument."""
-    from orbiflow.studio.silhouette_file import input_file
-    from orbiflow.tiles import read_result
-
-    found: dict[str, Any] = {}
-    for prefix, end, _ in zip(PREFIXES, OF_PICTURE, read_result(result).figures, strict=False):
-        for file in home.glob(f"input{end}.*"):
-            if file.suffix in (*PICTURE_ENDINGS, ".svg"):
-                found[f"{prefix}picture"] = file
-    return found or {"picture": input_file(home)}
-
-
-def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
-    """Write a picture of a take-away if it can be drawn; return whether it was."""
-    if first.suffix == ".png":
-        shutil.copyfile(first, folder / PREVIEW)
-        return True
-    if call.operation.name in ("solid", "build") and first.stat().st_size < MAX_DRAWN_BYTES:
-        from orbiflow.drawing import read_triangles, solid_picture
-
-        solid_picture(read_triangles(first)).save(folder / PREVIEW)
-        return True
-    if call.operation.name != "export":
-        return False
-    settings = call.arguments["settings"]
-    small = settings.replace(
-        format="png", dpi=min(300.0, 25.4 * PREVIEW_SIDE_PIXELS / max(settings.page))
-    )
-    call.operation.function(
-        **{**call.arguments, "settings": small, "out": folder / PREVIEW}, cancel=cancel
-    )
-    return (folder / PREVIEW).is_file()

@@ -19,6 +19,9 @@ MASKS = ("mend", "pins", "emphasis")
 OF_PICTURE = ("", "-2")
 """What the names of the files of a project's first and second picture end in."""
 
+PREFIXES = ("", "second_")
+"""What settings and arguments of the first figure begin with, and those of the second."""
+
 LABELS = {
     "tile_size": "the length of a tile",
     "area": "the width and height",

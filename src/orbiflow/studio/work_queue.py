@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import signal
 import threading
 from collections import Counter
@@ -39,6 +40,9 @@ READINGS = frozenset({*READS, "density table", "mesh read"})
 
 WARM_MODULES = (
     "orbiflow.studio.tasks",
+    "orbiflow.studio.taking",
+    "orbiflow.tiles.make.art",
+    "orbiflow.tiles.write.png",
     "orbiflow.studio.pulled_tiles",
     "orbiflow.studio.silhouette_file",
     "orbiflow.studio.tile_view",
@@ -54,6 +58,9 @@ OF_FILES = ("written ", "laid the ")  # how notes begin that are about files of 
 FAULT_TEXT = (
     "something went wrong inside orbiflow; the server's own output says what. Try other settings."
 )
+
+OWN_FILE = re.compile(r"^(backdrop|drawing|input)(-2)?\.[a-z]+: ")
+"""How errors begin that are about the project's picture, by a name that nobody gave it."""
 
 log = logging.getLogger("orbiflow.studio")
 Spawn = Callable[[], CallProcess]
@@ -361,4 +368,4 @@ class _Recorder:
         """Return a text in the page's words, without the paths of this machine."""
         for folder in (self.home, self.home.resolve(), self.store.folder, Path.home()):
             text = text.replace(f"{folder}{os.sep}", "")
-        return page_words(text)
+        return page_words(OWN_FILE.sub("", text))

@@ -1,2 +1,3 @@
 from .settings import AnimationSettings as AnimationSettings
 from .writers import animation as animation
+from .writers import still as still

@@ -17,7 +17,7 @@ import numpy as np
 from PIL import Image
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette, limited
+from orbiflow.drawing import Palette, limited, png_bytes
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Motion, Places, eased, frames, motion
 from orbiflow.tiles.motion.settings import AnimationSettings
@@ -59,6 +59,14 @@ def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
         parts += [Part((curve,), fill) for curve, fill in zip(curves, fills, strict=True)]
         parts += [Part((curve,), motion.line) for curve in curves if motion.line.width]
     return Scene(*page.size, (Layer("frame", "tiles", Style(), tuple(parts)),))
+
+
+def still(tile: TileSource, settings: AnimationSettings, progress: float, side: float) -> bytes:
+    """Return one frame of an animation as a PNG, its longer side at most so many pixels."""
+    made = motion(as_tile(tile), settings.for_file(None))
+    image = scene_image(frame_scene(made, made.palette(settings), progress))
+    image.thumbnail((side, side))
+    return png_bytes(image)
 
 
 def write_gif(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:

@@ -28,14 +28,15 @@ from orbiflow.tiles.page.scene import (
 from orbiflow.tiles.silhouette import fill
 
 
-def flattened(scene: Scene, tolerance: float) -> Scene:
+def flattened(scene: Scene, tolerance: float, *, cut_pictures: bool = True) -> Scene:
     """Return a scene in which each copy of a motif has parts and pictures of its own.
 
-    Where the symbol or the page cuts a motif off, curves become polygons within `tolerance`.
+    Where the symbol or the page cuts a motif off, curves become polygons within `tolerance`. A writer
+    that draws layers in their window alone need not have the page cut pictures off.
     """
     own = {name: _within(motif, scene, tolerance) for name, motif in scene.motifs.items()}
     layers = tuple(
-        replace(layer, items=tuple(_items(layer, own, shapely.box(*scene.clip))))
+        replace(layer, items=tuple(_items(layer, own, shapely.box(*scene.clip), cut_pictures)))
         for layer in scene.layers
     )
     return replace(scene, layers=layers, motifs={}) if own else scene
@@ -62,16 +63,20 @@ def _within(motif: Motif, scene: Scene, tolerance: float) -> Motif:
     return cut_off(motif, shapely.Polygon(ring), whole_strokes=False)
 
 
-def _items(layer: Layer, motifs: dict[str, Motif], window: shapely.Polygon) -> Iterator[Item]:
+def _items(
+    layer: Layer, motifs: dict[str, Motif], window: shapely.Polygon, cut_pictures: bool
+) -> Iterator[Item]:
     for item in layer.items:
         if not isinstance(item, Uses) or item.symbol not in motifs:
             yield item
             continue
         for which, offset in zip(item.which, item.offsets, strict=True):
             placed = motifs[item.symbol].moved(item.linear[which], offset)
+            whole = placed.rasters
             if layer.clipped:
-                placed = cut_off(placed, window)
-            yield from placed.rasters
+                own = placed if cut_pictures else replace(placed, rasters=())
+                placed = cut_off(own, window)
+            yield from placed.rasters if cut_pictures else whole
             for part in placed.parts:
                 fill, stroke = (layer.ink if c == INK else c for c in part.style[:2])
                 yield part._replace(style=part.style._replace(fill=fill, stroke=stroke))

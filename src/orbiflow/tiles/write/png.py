@@ -70,7 +70,7 @@ def scene_image(scene: Scene, pixels: float = 1.0) -> Image.Image:
 def _drawn(scene: Scene, pixels: float) -> tuple[Image.Image, list[str]]:
     """Return a scene as a picture, and its colours if they are few and all is opaque."""
     size = round(scene.width * pixels), round(scene.height * pixels)
-    scene = flattened(scene, FLATNESS / pixels)
+    scene = flattened(scene, FLATNESS / pixels, cut_pictures=False)
     sheets = [_sheet(scene, layer, pixels, size) for layer in scene.layers]
     colours = _few_colours(sheets)
     picture = painted(sheets, size, ground=GROUND, colours=colours).convert("RGB")

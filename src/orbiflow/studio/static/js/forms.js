@@ -187,7 +187,7 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
       ),
     );
   }
-  function refuse(name, text) {
+  function refuse(name, text, focus = true) {
     if (!controls.has(name)) return false;
     const { root, box } = controls.get(name);
     const said = h("p", { class: "error small", role: "alert" }, text);
@@ -195,11 +195,13 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     root.append(said);
     root.closest("details")?.setAttribute("open", "");
     box.setAttribute("aria-invalid", "true");
-    box.addEventListener("input", () => {
+    const fine = () => {
       said.remove();
       box.removeAttribute("aria-invalid");
-    }, { once: true });
-    box.focus();
+    };
+    box.addEventListener("input", fine, { once: true });
+    box.addEventListener("change", fine, { once: true });
+    if (focus) box.focus();
     return true;
   }
   fit();

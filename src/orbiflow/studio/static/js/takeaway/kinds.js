@@ -35,6 +35,9 @@ const PLAIN = {
   warn_neck: "Tell me where it is thinner than",
 };
 
+/** What shows no colours of tiles. */
+export const COLOURLESS = ["laser", "plotter", "template", "colouring"];
+
 const SHARED = { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" };
 
 const plain = (words) => ({
@@ -93,7 +96,7 @@ export const KINDS = {
         about: "",
         title: "Colours",
         not: {
-          purpose: ["laser", "plotter", "template", "colouring"],
+          purpose: COLOURLESS,
           cut: ["skeleton", "jigsaw", "template"],
           filled: [false],
         },

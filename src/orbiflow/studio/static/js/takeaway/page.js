@@ -6,9 +6,10 @@ import { keeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf, Pictures, skinsOf } from "../skin.js";
 import { figuresOf, paintCard } from "../tiling.js";
 import { LATE } from "../steering.js";
-import { alive } from "../words.js";
-import { colours, KINDS, lengthIn } from "./kinds.js";
+import { alive, sentence } from "../words.js";
+import { COLOURLESS, colours, KINDS, lengthIn } from "./kinds.js";
 import { isMade, madeBefore, picture, words } from "./made.js";
+import { Preview } from "./preview.js";
 import { trueSize } from "./truesize.js";
 
 const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
@@ -74,7 +75,14 @@ class TakeawayPage {
         parts,
       );
     this.canvas = h("canvas", { role: "img", "aria-label": `A tiling: ${this.card.arrangement}` });
-    this.shown = h("div", { class: "preview" }, this.canvas);
+    this.live = new Preview(
+      this.api,
+      `${this.place}/tiles/${this.card.id}`,
+      this.canvas,
+      (error, notes) => this.heard(error, notes),
+    );
+    this.shown = h("div", { class: "preview" }, this.live.root);
+    this.noted = h("ul", { class: "notice", hidden: true });
     this.said = h("div", { class: "stack said", role: "status" });
     this.size = trueSize(this.card);
     this.real = section("panel real", "true", "In its true size", this.size.root);
@@ -96,7 +104,7 @@ class TakeawayPage {
       h(
         "div",
         { class: "take" },
-        h("div", { class: "stack" }, this.shown, this.said, this.real, this.earlier),
+        h("div", { class: "stack" }, this.shown, this.noted, this.said, this.real, this.earlier),
         h(
           "div",
           { class: "stack side" },
@@ -144,6 +152,15 @@ class TakeawayPage {
   close() {
     this.off.forEach((stop) => stop());
     this.watch.disconnect();
+    this.live.close();
+  }
+
+  /** What the preview has to say: why it cannot be made, or what is to be known of it. */
+  heard(error, notes) {
+    if (error && this.form.refuse(error.setting, error.message, false)) return;
+    const words = error ? [error.message] : notes;
+    this.noted.hidden = !words.length;
+    put(this.noted, words.map((text) => h("li", {}, sentence(text))));
   }
 
   paint() {
@@ -179,6 +196,7 @@ class TakeawayPage {
       this.changed();
     });
     this.layers = this.laidOn(kind);
+    this.suits = null;
     put(
       this.wishes,
       this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)),
@@ -207,7 +225,7 @@ class TakeawayPage {
         type: "checkbox",
         checked,
         onchange: ({ target }) => {
-          if (name === "picture") this.looks({ art: target.checked });
+          if (name === "picture" && this.suits) this.looks({ art: target.checked });
           this.changed();
         },
       }),
@@ -237,18 +255,34 @@ class TakeawayPage {
     this.paint();
   }
 
+  /** The picture is laid on what shows its colours, as the look says; else if that is wished, where it can be. */
+  fitPicture() {
+    const { box } = this.layers.find(({ name }) => name === "picture") ?? {};
+    const [purpose, format] = ["purpose", "format"].map((name) => this.form.now(name));
+    const suits = !COLOURLESS.includes(purpose);
+    if (!box) return;
+    if (suits !== this.suits) box.checked = suits && this.look.art;
+    this.suits = suits;
+    const holds = purpose !== "plotter" && !["dxf", "json"].includes(format);
+    box.disabled = box.parentElement.hidden = !holds && this.project.input?.type !== "svg";
+  }
+
   /** Show the size at once; what was made before is no longer what is asked for. */
   changed() {
+    this.fitPicture();
     const size = lengthIn(this.form.now("tile_size"));
     this.real.hidden = !(size && KINDS[this.kind].solid);
     if (!this.real.hidden) this.size.show(size, this.form.now("warn_neck"));
     this.stale = true;
+    this.live.ask(this.kind, this.settings(), KINDS[this.kind].title.toLowerCase());
     this.tell();
   }
 
   /** What is to be made, as the server takes it. */
   settings() {
-    const layers = this.layers.filter(({ box }) => box.checked).map(({ name }) => [name, true]);
+    const layers = this.layers.filter(({ box }) => box.checked && !box.disabled).map((
+      { name },
+    ) => [name, true]);
     const chosen = { tile: this.card.id, ...Object.fromEntries(layers), ...this.form.values() };
     const isTinted = chosen.picture && [undefined, "none"].includes(this.form.now("cut"));
     return isTinted ? { ...chosen, tint: this.look.tint } : chosen;
@@ -285,7 +319,7 @@ class TakeawayPage {
     const key = made && !this.stale ? this.task.id : null;
     if (key !== this.seen) {
       this.seen = key;
-      put(this.shown, (key && picture(this.task)) || this.canvas);
+      put(this.shown, (key && picture(this.task)) || this.live.root);
       this.paint();
       if (this.news) this.shown.scrollIntoView({ block: "nearest" });
       this.news = false;

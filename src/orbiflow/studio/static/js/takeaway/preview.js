@@ -1,0 +1,76 @@
+/** What will be made, drawn small by what makes it, as soon as a setting changes. */
+
+import { h, put } from "../dom.js";
+
+const PATIENCE = 1500; // ms after which a drawing that is no longer wanted is given up
+const SLOW = 400; // ms after which it is said that one is being drawn
+
+const SAYS = {
+  animate: "One moment of the animation. It moves once it is made.",
+  solid: "Small and coarse; it is made in full.",
+};
+
+export class Preview {
+  /**
+   * @param {Api} api
+   * @param {string} place the address of the tile
+   * @param {HTMLElement} meanwhile what is shown until the first one is there
+   * @param {(error: import("../api.js").Refusal | null, notes: string[]) => void} told
+   */
+  constructor(api, place, meanwhile, told) {
+    this.api = api;
+    this.place = place;
+    this.told = told;
+    this.says = h("p", { class: "soft small", "aria-live": "polite" });
+    this.image = h("div", { class: "live" }, meanwhile);
+    this.root = h("div", { class: "stack" }, this.image, this.says);
+    this.wanted = "";
+    /** @type {AbortController | null} */
+    this.running = null;
+  }
+
+  /** Draw what these settings make; of several that are asked for meanwhile, the last. */
+  ask(operation, settings, title) {
+    const wanted = JSON.stringify({ operation, settings });
+    if (wanted === this.wanted) return;
+    this.wanted = wanted;
+    this.title = title;
+    const late = this.running && performance.now() - this.began > PATIENCE;
+    if (late) this.running.abort();
+    if (!this.running || late) this.#draw(late);
+  }
+
+  async #draw(instead) {
+    const [running, asked] = [new AbortController(), this.wanted];
+    this.running = running;
+    this.began = performance.now();
+    const slow = setTimeout(() => this.image.setAttribute("aria-busy", "true"), SLOW);
+    const { operation, settings } = JSON.parse(asked);
+    try {
+      const found = await this.api.post(`${this.place}/preview`, { operation, settings, instead }, {
+        signal: running.signal,
+      });
+      if (running !== this.running) return;
+      const src = `data:image/png;base64,${found.image}`;
+      put(this.image, h("img", { src, alt: `What will be made: ${this.title}` }));
+      this.says.textContent = SAYS[operation] ?? "";
+      this.told(null, found.notes);
+    } catch (error) {
+      if (running !== this.running || error.name === "AbortError") return;
+      if (asked === this.wanted) this.told(error, []);
+    } finally {
+      clearTimeout(slow);
+      if (running === this.running) {
+        this.image.removeAttribute("aria-busy");
+        this.running = null;
+        if (asked !== this.wanted) this.#draw(false);
+      }
+    }
+  }
+
+  close() {
+    this.wanted = "";
+    this.running?.abort();
+    this.running = null;
+  }
+}

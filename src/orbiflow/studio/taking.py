@@ -1,0 +1,260 @@
+"""What the studio's workers do for what is taken away of a tile: show it, and write its files."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import (
+    NEVER,
+    Call,
+    Cancel,
+    Note,
+    Outcome,
+    Sink,
+    as_part,
+    ignore,
+    is_object,
+    make_folder,
+    operation,
+)
+from orbiflow.studio.kinds_of_work import WITH_DRAWING, file_name, making_call
+from orbiflow.studio.settings import Job
+from orbiflow.studio.tile_files import tile_folder
+from orbiflow.studio.words import OF_PICTURE, PREFIXES
+
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
+
+
+def with_drawing(
+    drawing: str, result: Path, files: dict[str, Any], settings: dict[str, Any], scratch: Path
+) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    """Return the result, files and settings of a take-away with a drawing on its tile.
+
+    Args:
+        drawing: What the project remembers as its drawing, as JSON; "" for nothing.
+        result: The tile's folder.
+        files: The files that the take-away is given; the pictures go below the drawing.
+        settings: The settings of `export` or `art`.
+        scratch: A folder for what is written on the way.
+    """
+    from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
+    from orbiflow.tiles import read_result, save_tiles
+
+    try:
+        parts = json.loads(drawing or "{}")
+    except (ValueError, RecursionError):
+        raise OrbiflowError("the drawing is no JSON; reload the page") from None
+    drawings = [parts, parts.get("second")] if is_object(parts) else []
+    if not any(is_object(own) and (own.get("strokes") or own.get("eyes")) for own in drawings):
+        return result, files, settings
+    given = read_result(result)
+    tile, scratch = with_any_map(given), make_folder(scratch)
+    if tile is not given:
+        result = save_tiles([tile], scratch / "tile")
+    for number, (own, part) in enumerate(zip(drawings, tile.figures, strict=False)):
+        end, prefix = OF_PICTURE[number], PREFIXES[number]
+        under: Path | None = files.get(f"{prefix}picture")
+        if under is not None and under.suffix not in PICTURE_ENDINGS:
+            under = under.with_name(f"backdrop{end}.png")
+        made = drawing_settings(own, part.figure, scratch, under, f"drawing{end}")
+        if made["picture"] is not None:
+            files = {**files, f"{prefix}picture": made["picture"]}
+        if made["eyes"]:
+            settings = {**settings, f"{prefix}eyes": made["eyes"]}
+    return result, files, settings
+
+
+PREVIEW = "preview.png"
+SCRATCH = ".drawn"  # a folder for what is written on the way
+MAX_DRAWN_BYTES = 30_000_000  # bytes of a solid that is drawn
+PREVIEW_SIDE_PIXELS = 1000.0  # pixels of a preview's longer side
+LIVE_SIDE_PIXELS = 800.0  # of one that follows every setting
+LEAST_TILE_PIXELS = 8.1  # of a tile, below which no picture of it can be made
+SHOWN_PROGRESS = 0.7  # share of an animation at which it is shown
+
+
+def export_folder(home: Path, task: int) -> Path:
+    """Return the folder of the files that a task of a project makes to be taken away."""
+    return home / "exports" / str(task)
+
+
+def files_of(folder: Path) -> list[dict[str, Any]]:
+    """Return the name and the size in bytes of each file in a folder, by name."""
+    files = sorted(file for file in folder.iterdir() if file.is_file())
+    return [{"name": file.name, "bytes": file.stat().st_size} for file in files]
+
+
+@operation("studio preview")
+def preview(
+    job: Job,
+    makes: str,
+    tile: int,
+    settings: str = "{}",
+    picture: bool = False,
+    drawing: str = "",
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Draw what a user would take away of a tile, small, by what makes the file.
+
+    The outcome has the `image`, a PNG in base 64, and its `notes`.
+
+    Args:
+        makes: As for `studio take`, like the others.
+    """
+    del on_event
+    folder = make_folder(export_folder(job.project, job.task))
+    notes: list[str] = []
+
+    def hear(event: object) -> None:
+        if isinstance(event, Note) and not event.text.startswith("written "):
+            notes.append(event.text)
+
+    try:
+        given, result = json.loads(settings), tile_folder(job.project, tile)
+        files = _small_pictures(job.project, result) if picture else {}
+        if drawing and makes in WITH_DRAWING:
+            result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
+        call = making_call(makes, given, result, **files)
+        image = _drawn(call, folder, hear, cancel)
+        return Outcome({"image": base64.b64encode(image).decode(), "notes": notes})
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _small_pictures(home: Path, result: Path) -> dict[str, Any]:
+    """Return the pictures of `_pictures`, those of pixels as the page shows them, which are smaller."""
+    found = _pictures(home, result)
+    for end, prefix in zip(OF_PICTURE, PREFIXES, strict=True):
+        small, own = home / f"backdrop{end}.png", found.get(f"{prefix}picture")
+        if own is not None and own.suffix in PICTURE_ENDINGS and small.exists():
+            found[f"{prefix}picture"] = small
+    return found
+
+
+def _drawn(call: Call, folder: Path, hear: Sink, cancel: Cancel) -> bytes:
+    """Return a picture of what a call would write, small."""
+    settings, makes = call.arguments["settings"], call.operation.name
+    if makes == "animate":
+        from orbiflow.tiles.motion import still
+
+        return still(call.arguments["result"], settings, SHOWN_PROGRESS, LIVE_SIDE_PIXELS)
+    out = folder / PREVIEW
+    # what holds no pixels refuses pictures
+    if makes == "solid" or settings.file_format in ("dxf", "json"):
+        out = out.with_suffix(f".{settings.file_format}")
+    else:
+        settings = _small(settings, LIVE_SIDE_PIXELS)
+    arguments = {**call.arguments, "settings": settings, "out": out}
+    done = call.operation.function(**arguments, on_event=hear, cancel=cancel)
+    if makes == "solid":
+        _preview(call, min(folder.glob(f"*{out.suffix}")), folder, cancel)
+    elif out.suffix == ".png":
+        out = min(folder.glob("*.png"))  # of several sheets the first
+    else:
+        from orbiflow.tiles import write_scene
+
+        drawn = write_scene(done.scenes[0], "png", dpi=_small_dpi(settings, LIVE_SIDE_PIXELS))
+        return bytes(drawn) if isinstance(drawn, bytes) else b""
+    return (out if out.suffix == ".png" else folder / PREVIEW).read_bytes()
+
+
+def _small(settings: Any, side: float) -> Any:
+    """Return settings of the same page as a PNG whose longer side has so many pixels."""
+    same = {} if getattr(settings, "repeat", None) else {"area": settings.page}
+    return settings.replace(format="png", dpi=_small_dpi(settings, side), **same)
+
+
+def _small_dpi(settings: Any, side: float) -> float:
+    """Return the pixels to an inch at which a page has this longer side, or tiles show at all."""
+    least = 0.0 if settings.tile_size is None else 25.4 * LEAST_TILE_PIXELS / settings.tile_size
+    return min(settings.dpi, max(least, 25.4 * side / max(settings.page)))
+
+
+@operation("studio take")
+def take(
+    job: Job,
+    makes: str,
+    tile: int,
+    settings: str = "{}",
+    picture: bool = False,
+    drawing: str = "",
+    called: str = "",
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Write what a user takes away of a tile.
+
+    Args:
+        makes: The operation that writes it: export, art, solid or animate.
+        tile: The number of the tile.
+        settings: Its settings, as JSON.
+        picture: Whether the pictures that were uploaded go onto the figures.
+        drawing: What was drawn on the tile, as JSON.
+        called: The name of the project, with which that of the file begins.
+    """
+    folder = make_folder(export_folder(job.project, job.task))
+    given, result = json.loads(settings), tile_folder(job.project, tile)
+    files = _pictures(job.project, result) if picture else {}
+    if drawing and makes in WITH_DRAWING:
+        result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
+    name = file_name(makes, given, result, called)
+    call = making_call(makes, given, result, out=folder / name, **files)
+    done = call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
+    written = files_of(folder)
+    preview = False
+    with suppress(OrbiflowError):  # what was asked for is there
+        preview = _preview(call, folder / written[0]["name"], folder, cancel)
+    facts = {name: value for name, value in done.summary.items() if name not in ("file", "files")}
+    return Outcome(
+        {
+            "takeaway": job.task,
+            "files": written,
+            "preview": preview,
+            "facts": facts,
+            "chosen": json.loads(settings),
+            "made": time.time(),
+        }
+    )
+
+
+def _pictures(home: Path, result: Path) -> dict[str, Any]:
+    """Return the pictures that were uploaded for the figures of a tile, by argument."""
+    from orbiflow.studio.silhouette_file import input_file
+    from orbiflow.tiles import read_result
+
+    found: dict[str, Any] = {}
+    for prefix, end, _ in zip(PREFIXES, OF_PICTURE, read_result(result).figures, strict=False):
+        for file in home.glob(f"input{end}.*"):
+            if file.suffix in (*PICTURE_ENDINGS, ".svg"):
+                found[f"{prefix}picture"] = file
+    return found or {"picture": input_file(home)}
+
+
+def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
+    """Write a picture of a take-away if it can be drawn; return whether it was."""
+    if first.suffix == ".png":
+        shutil.copyfile(first, folder / PREVIEW)
+        return True
+    if call.operation.name in ("solid", "build") and first.stat().st_size < MAX_DRAWN_BYTES:
+        from orbiflow.drawing import read_triangles, solid_picture
+
+        solid_picture(read_triangles(first)).save(folder / PREVIEW)
+        return True
+    if call.operation.name != "export":
+        return False
+    settings = call.arguments["settings"]
+    small = _small(settings, PREVIEW_SIDE_PIXELS)
+    call.operation.function(
+        **{**call.arguments, "settings": small, "out": folder / PREVIEW}, cancel=cancel
+    )
+    return (folder / PREVIEW).is_file()

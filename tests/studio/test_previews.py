@@ -1,0 +1,93 @@
+"""What the page of take-aways shows before anything is made: the same that is made then."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bent_tiles import bent_tile
+from orbiflow.studio.tile_files import put_tile, tile_number
+from orbiflow.tiles import EscherTile
+from studio.served import SQUARE, Client, done, new_project
+
+STROKE = {"colour": "#d02030", "width": 1.5, "points": [[0.0, 0.0], [4.0, 2.0]]}
+
+
+@pytest.fixture(scope="module")
+def address(client: Client) -> str:
+    """The address of a tile of a project that was drawn on."""
+    project = new_project(client)
+    done(client, client.put(f"{project}/input?name=house.json", content=SQUARE))
+    store, name = client.studio.store, project.split("/")[-1]
+    number = tile_number(900, 0)
+    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
+    put_tile(store.home(name), number, "final", tile, lambda _: None)
+    folder = store.home(name) / "tiles" / str(number) / "final"
+    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
+    client.patch(project, json={"view": {"drawing": {"strokes": [STROKE], "eyes": []}}})
+    return f"{project}/tiles/{number}"
+
+
+def preview(client: Client, address: str, operation: str, **settings: Any) -> Any:
+    """Ask for a preview; return the server's answer."""
+    number = int(address.rsplit("/", 1)[1])
+    body = {"operation": operation, "settings": {"tile": number, **settings}}
+    return client.post(f"{address}/preview", json=body)
+
+
+def image_of(answer: Any) -> Image.Image:
+    assert answer.status_code == 200, answer.text
+    return Image.open(io.BytesIO(base64.b64decode(answer.json()["image"])))
+
+
+def test_it_is_what_is_made_and_nothing_is_left_of_it(client: Client, address: str) -> None:
+    project, number = address.split("/tiles/")
+    known = client.get(project).json()["tasks"]
+    settings = {
+        "drawing": True,
+        "purpose": "print",
+        "area": "120x80mm",
+        "format": "png",
+        "dpi": 100,
+    }
+    shown = np.asarray(image_of(preview(client, address, "export", **settings)).convert("RGB"))
+    assert client.get(project).json()["tasks"] == known
+    body = {"operation": "export", "settings": {"tile": int(number), **settings}}
+    task = done(client, client.post(f"{project}/tasks", json=body))
+    [file] = task["result"]["files"]
+    made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").content
+    wanted = np.asarray(Image.open(io.BytesIO(made)).convert("RGB"))
+    assert shown.shape == wanted.shape
+    assert (shown == wanted).all()
+    plain = image_of(preview(client, address, "export", **{**settings, "drawing": False}))
+    assert (np.asarray(plain.convert("RGB")) != wanted).any()
+
+
+@pytest.mark.parametrize(
+    ("operation", "settings"),
+    [
+        ("export", {"purpose": "laser", "format": "dxf"}),
+        ("export", {"cut": "pieces", "kerf": 0.2, "bed": "100x100mm", "area": "200x200mm"}),
+        ("art", {"area": "3000x2000px"}),
+        ("solid", {"kind": "cutter"}),
+        ("animate", {"kind": "grow"}),
+    ],
+)
+def test_all_that_can_be_made_is_shown_small(
+    client: Client, address: str, operation: str, settings: dict[str, Any]
+) -> None:
+    assert 200 < max(image_of(preview(client, address, operation, **settings)).size) <= 1200
+
+
+def test_what_cannot_be_made_is_refused_beside_its_setting(client: Client, address: str) -> None:
+    answer = preview(client, address, "export", tile_size="99999mm")
+    assert (answer.status_code, answer.json()["setting"]) == (422, "tile_size")
+    assert preview(client, address, "search").status_code == 422
+    missing = client.post(f"{address}7/preview", json={"operation": "export", "settings": {}})
+    assert missing.status_code == 404
