@@ -238,7 +238,7 @@ def test_a_picture_that_failed_before_says_so_and_leads_back(page, studio) -> No
     assert studio.client.get(f"projects/{own}").status_code == 404
 
 
-def test_an_animal_is_taken_by_keyboard_and_the_project_renamed_and_deleted(page, studio) -> None:
+def test_an_animal_is_taken_by_keyboard_and_the_project_renamed(page, studio) -> None:
     page.goto("/")
     first = page.locator(".animal").first
     first.focus()
@@ -248,10 +248,57 @@ def test_an_animal_is_taken_by_keyboard_and_the_project_renamed_and_deleted(page
     page.get_by_label("Name of the project").fill("My beast")
     studio.until(lambda: studio.project(own)["name"] == "My beast")
     page.goto("/#/")
-    page.get_by_role("button", name="Delete My beast").click()
-    page.get_by_role("button", name="Delete it").click()
-    page.get_by_role("link", name="My beast").wait_for(state="detached")
-    assert studio.client.get(f"projects/{own}").status_code == 404
+    page.get_by_role("button", name="Rename My beast").click()
+    page.get_by_label("Its name").fill("Your beast")
+    page.keyboard.press("Enter")
+    page.get_by_role("link", name="Your beast").wait_for()
+    assert studio.project(own)["name"] == "Your beast"
+
+
+def test_a_project_is_duplicated_with_all_that_is_in_it(page, studio, searched) -> None:
+    name = studio.project(searched)["name"]
+    page.goto("/")
+    page.get_by_role("button", name=f"Duplicate {name}", exact=True).click()
+    page.get_by_role("link", name=f"{name} (copy)").wait_for()
+    made = next(
+        one for one in studio.client.get("projects").json() if one["name"] == f"{name} (copy)"
+    )
+    one, other = studio.project(searched), studio.project(made["id"])
+    assert [card["polygon"] for card in one["tiles"]] == [
+        card["polygon"] for card in other["tiles"]
+    ]
+    assert one["silhouette"]["outline"] == other["silhouette"]["outline"]
+
+
+def test_a_project_is_deleted_when_the_page_is_left_unless_that_is_taken_back(
+    page, studio: RunningStudio
+) -> None:
+    def there(own: str) -> bool:
+        return studio.client.get(f"projects/{own}").status_code == 200
+
+    own, other = (studio.with_picture(name=f"{name}.json") for name in ("keep me", "drop me"))
+    page.goto("/")
+    for name in ("keep me", "drop me"):
+        page.get_by_role("button", name=f"Delete {name}", exact=True).click()
+    assert there(own)
+    assert there(other)
+    page.locator(".gone", has_text="keep me").get_by_role("button", name="Undo").click()
+    page.get_by_role("link", name="keep me").click()
+    page.wait_for_selector(READ)
+    studio.until(lambda: not there(other))
+    assert there(own)
+    page.goto("/#/")
+    page.get_by_role("button", name="Delete keep me", exact=True).click()
+    page.reload()
+    studio.until(lambda: not there(own))
+
+
+def test_projects_stand_above_the_animals(page, studio: RunningStudio) -> None:
+    studio.with_picture()
+    page.goto("/")
+    page.wait_for_selector(".project")
+    headings = page.locator("h2").all_inner_texts()
+    assert headings[:2] == ["Your projects", "Or take one of ours"]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -19,7 +19,7 @@ export class Refusal extends Error {
  * @param {Options} [options]
  * @returns {Promise<any>}
  */
-async function call(method, path, body, { signal } = {}) {
+async function call(method, path, body, { signal, keepalive } = {}) {
   const headers = { "X-Orbiflow": "1", "X-Orbiflow-Client": client };
   const raw = body instanceof Blob;
   if (body !== undefined && !raw) headers["Content-Type"] = "application/json";
@@ -29,6 +29,7 @@ async function call(method, path, body, { signal } = {}) {
       method,
       headers,
       signal,
+      keepalive,
       body: raw || body === undefined ? body : JSON.stringify(body),
     });
   } catch (error) {
@@ -55,7 +56,7 @@ async function call(method, path, body, { signal } = {}) {
   return found;
 }
 
-/** @typedef {{ signal?: AbortSignal }} Options */
+/** @typedef {{ signal?: AbortSignal, keepalive?: boolean }} Options */
 
 export const api = {
   /** @type {(path: string, options?: Options) => Promise<any>} */

@@ -32,6 +32,7 @@ const ICONS = {
   upload: "M12 16V4m-5 5 5-5 5 5M4 16v3a1 1 0 0 0 1 1h14a1 1 0 0 0 1-1v-3",
   camera: "M4 8h3l2-3h6l2 3h3v11H4zM12 10a3.5 3.5 0 1 0 0 7 3.5 3.5 0 0 0 0-7",
   pencil: "m4 20 1-5L16 4l4 4L9 19zM14 6l4 4",
+  copy: "M9 9h11v11H9zM5 15H4V4h11v1",
   paste: "M9 4h6v3H9zM9 5H6v15h12V5h-3",
   open: "M3 19V5h6l2 3h10v11z",
   undo: "M9 14 4 9l5-5M4 9h10a6 6 0 0 1 0 12h-3",

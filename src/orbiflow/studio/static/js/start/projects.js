@@ -1,0 +1,134 @@
+/** The projects on the first page: go on with one, rename it, duplicate it, or delete it and take that back. */
+
+import { button, dialog, h, icon, put, trying } from "../dom.js";
+import { ago, number } from "../words.js";
+
+const PAGES = { density: "d", solid: "s" }; // of projects that are no tiles
+const SOME = 10; // projects that are shown at first
+
+export class Projects {
+  /** @param {Api} api */
+  constructor(api) {
+    this.api = api;
+    this.most = SOME;
+    /** @type {Set<string>} */
+    this.leaving = new Set(); // deleted when the page is left: until then that can be taken back
+    this.root = h("section", { "aria-labelledby": "yours", hidden: true });
+    this.left = () => this.forget();
+    addEventListener("pagehide", this.left);
+  }
+
+  close() {
+    removeEventListener("pagehide", this.left);
+    this.forget();
+  }
+
+  forget() {
+    for (const id of this.leaving) {
+      trying(() => this.api.remove(`projects/${id}`, { keepalive: true }));
+    }
+    this.leaving.clear();
+  }
+
+  /** Show the projects that there are, newest first; the others when they are asked for. */
+  async show() {
+    const found = await this.api.get("projects");
+    this.root.hidden = !found.length;
+    this.heading = h("h2", { id: "yours", tabindex: "-1" }, "Your projects");
+    put(
+      this.root,
+      this.heading,
+      h("ul", { class: "projects" }, found.slice(0, this.most).map((own) => this.card(own))),
+      found.length > this.most &&
+        button(`Show all ${found.length}`, () => this.all(), { image: "more" }),
+    );
+  }
+
+  /** Do something with the projects, then show them anew. */
+  async after(work) {
+    await trying(work);
+    await trying(() => this.show());
+    this.heading.focus();
+  }
+
+  all() {
+    return this.after(() => {
+      this.most = Infinity;
+    });
+  }
+
+  card(own) {
+    const place = h("li", { class: "project" });
+    const deed = (words, image, onclick) =>
+      button(`${words} ${own.name}`, onclick, { kind: "quiet icon", image });
+    const whole = () => {
+      put(
+        place,
+        link(own),
+        h(
+          "div",
+          { class: "row" },
+          deed("Rename", "pencil", () => this.rename(own)),
+          own.kind === "tile" && deed("Duplicate", "copy", () => this.duplicate(own)),
+          deed("Delete", "bin", gone),
+        ),
+      );
+    };
+    const gone = () => {
+      this.leaving.add(own.id);
+      const undo = button("Undo", () => {
+        this.leaving.delete(own.id);
+        whole();
+        place.querySelector("a").focus();
+      }, { image: "undo" });
+      const text = `“${own.name}” is deleted when you leave this page.`;
+      put(place, h("div", { class: "gone stack", role: "status" }, h("p", {}, text), undo));
+      undo.focus();
+    };
+    (this.leaving.has(own.id) ? gone : whole)();
+    return place;
+  }
+
+  async rename({ id, name }) {
+    const box = h("input", { type: "text", maxlength: 80, value: name, "aria-label": "Its name" });
+    const given = await dialog("Rename this project", (close) => {
+      const save = (event) => {
+        event.preventDefault();
+        close(box.value.trim());
+      };
+      const done = button("Rename it", () => {}, { kind: "primary", type: "submit" });
+      return h("form", { class: "stack", onsubmit: save }, box, h("footer", {}, done));
+    });
+    if (given) await this.after(() => this.api.patch(`projects/${id}`, { name: given }));
+  }
+
+  /** Go by the project's file, which has all but what was taken away of it. */
+  duplicate({ id, name }) {
+    return this.after(async () => {
+      const answer = await fetch(`api/projects/${id}/file`);
+      if (!answer.ok) throw new Error("The project cannot be copied now. Reload the page.");
+      const made = await this.api.post("projects/open", await answer.blob());
+      await this.api.patch(`projects/${made.id}`, { name: `${name} (copy)` });
+    });
+  }
+}
+
+function link({ id, kind, name, thumb, tiles, busy, changed }) {
+  const path = PAGES[kind] ? `${PAGES[kind]}/${id}` : tiles || busy ? `p/${id}` : `p/${id}/picture`;
+  const empty = { density: "a table", solid: "a mesh", tile: "no tiles yet" };
+  const facts = [
+    tiles ? number(tiles, kind) : empty[kind],
+    busy ? "at work" : ago(changed),
+  ];
+  return h(
+    "a",
+    { href: `#/${path}` },
+    h(
+      "span",
+      { class: "thumb" },
+      thumb ? h("img", { src: thumb, alt: "", loading: "lazy" }) : icon("picture"),
+    ),
+    h("span", { class: "project-name" }, name),
+    h("span", { class: "soft small" }, facts.join(" · ")),
+  );
+}
