@@ -298,7 +298,7 @@ STATES: dict[str, Callable[[Visit], Any]] = {
     "start-refused": start_refused,
     "start-full": start_full,
     "start-draw": lambda on: on.dialog("Draw a shape"),
-    "start-delete": lambda on: on.dialog("Delete"),
+    "start-rename": lambda on: on.dialog("Rename"),
     "picture": lambda on: on.picture(),
     "picture-doubts": lambda on: on.picture(**DOUBTS),
     "picture-brush": lambda on: on.paint("Add"),
