@@ -158,7 +158,7 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
     for options in ((), ("--data", data, "--center", "pi,0,-pi")):
         drawn = orbiflow(*plot, *options)
         assert drawn.status == 0, drawn.err
-        assert "drawn in two dimensions, this torus has 3" in drawn.out
+        assert "drawn in two dimensions, here are 3" in drawn.out
         assert {path.name for path in out.iterdir()} == {"samples.png"}
     wrong = orbiflow(*plot, "--center", "0,0")
     assert wrong.status == 2

@@ -60,6 +60,7 @@ from .regions.settings import resolvable_masses as resolvable_masses
 from .run_folder import written_files as written_files
 from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
+from .spaces.mixed import MixedTorus as MixedTorus
 from .spaces.patches import to_klein as to_klein
 from .spaces.quotient import QuotientSpace as QuotientSpace
 from .spaces.round import ProjectivePlane as ProjectivePlane

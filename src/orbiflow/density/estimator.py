@@ -44,7 +44,7 @@ from orbiflow.density.inference import (
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
-from orbiflow.density.spaces import QuotientSpace, Space, check_measure, space_for
+from orbiflow.density.spaces import MixedTorus, QuotientSpace, Space, check_measure, space_for
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
@@ -68,7 +68,7 @@ def seed_of(random_state: RandomState) -> int:
 
 def _signature() -> inspect.Signature:
     """The constructor's parameters, which include all settings by name."""
-    own = {"unit": None, "missing": "refuse"}
+    own = {"unit": None, "missing": "refuse", "linear": ()}
     others = own | {entry.name: entry.default for entry in fields_of(DensitySettings)}
     kinds = inspect.Parameter
     return inspect.Signature(
@@ -87,6 +87,8 @@ class DensityEstimator:
             "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
         unit: The unit of angles, and of rotations in three columns: "radians", "degrees" or "turns".
             Default: radians, if no value is beyond 2 pi.
+        linear: Columns of a torus that are real numbers rather than angles, such as lengths or
+            temperatures, by their names or numbers from 0.
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
         settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
@@ -116,11 +118,13 @@ class DensityEstimator:
         *,
         unit: str | None = None,
         missing: str = "refuse",
+        linear: Sequence[str | int] = (),
         **settings: Any,
     ) -> None:
         self.space = space
         self.unit = unit
         self.missing = missing
+        self.linear = linear
         check_names(settings, fields_of(DensitySettings), "DensityEstimator")
         defaults = {entry.name: entry.default for entry in fields_of(DensitySettings)}
         vars(self).update({**defaults, **settings})
@@ -220,7 +224,7 @@ class DensityEstimator:
         both: list[tuple[str | int, float]] = [*(given or {}).items(), *angles.items()]
         known = given_named(self.space_, both, names)
         values = {names[axis]: float(value) for axis, (_, value) in zip(known, both, strict=True)}
-        for doubt in given_doubts(self.space_, values):
+        for doubt in given_doubts(self.space_, values, names):
             warnings.warn(doubt, DataWarning, stacklevel=2)
         left = [name for axis, name in enumerate(names) if axis not in known]
         return self._of(conditional(density, known), left)
@@ -335,7 +339,7 @@ class DensityEstimator:
         return {name: v for name, v in given.items() if v != defaults[name].default}
 
     def _space_name(self) -> str:
-        return self.space.name if isinstance(self.space, Space) else str(self.space)
+        return self.space.data_name if isinstance(self.space, Space) else str(self.space)
 
     def _space_for(self, data: Array, names: tuple[str, ...] | None) -> Space:
         """Return the space of data, once they are known to be of it, and warn of what is doubtful."""
@@ -344,6 +348,8 @@ class DensityEstimator:
         require_values(data, names)
         own = self.space if isinstance(self.space, Space) else None
         space, unit = self._space_name(), self.unit
+        if self.linear or isinstance(own, MixedTorus):
+            return self._mixed_space(data, names)
         if own is not None and is_angular(own.name, data.shape[1]):
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):
@@ -354,6 +360,29 @@ class DensityEstimator:
         if isinstance(self.space, Space):
             return self.space
         return space_for(self.space, data, unit=found, seed=self.settings().seed)
+
+    def _mixed_space(self, data: Array, names: tuple[str, ...] | None) -> Space:
+        """Return the space of data some of whose columns are real."""
+        own, width = self.space if isinstance(self.space, Space) else None, data.shape[1]
+        called = names or tuple(f"column{k}" for k in range(1, width + 1))
+        if isinstance(own, MixedTorus):
+            real = np.flatnonzero(own.is_real).tolist()
+            if self.linear or len(own.lines) != width:
+                raise SettingError(f"the space says which of {len(own.lines)} columns are real")
+        elif self.space != "torus":
+            raise SettingError(
+                f"{{linear}} is for columns beside angles on a torus, not {self._space_name()}"
+            )
+        else:
+            real = axes_named(self.linear, called)
+        angles = [k for k in range(width) if k not in real]
+        unit = own.unit if own is not None else self.unit
+        if angles:
+            beside = tuple(called[k] for k in angles) if names else None
+            unit = unit_of("torus", data[:, angles], beside, unit, stacklevel=5)
+        if own is not None:
+            return own
+        return MixedTorus.for_columns(data, real, called, unit=unit or "radians")
 
     def _checked(self, X: ArrayLike) -> Array:
         """Return data in the order of the fit; warn of those that seem to be in another unit."""
@@ -370,12 +399,12 @@ class DensityEstimator:
 
     def _in_order(self, X: ArrayLike) -> Array:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""
-        data, names = data_of(self.space_.name, X, in_order=False, stacklevel=5)
+        data, names = data_of(self.space_.data_name, X, in_order=False, stacklevel=5)
         fitted = [str(name) for name in getattr(self, "feature_names_in_", ())]
         if names is None or list(names) == fitted:
             return data
         if all(re.fullmatch(r"(column|angle)\d+", name) for name in fitted):  # they have no names
-            check_columns(self.space_.name, names)
+            check_columns(self.space_.data_name, names)
             return data
         if sorted(names) != sorted(fitted) or len(set(fitted)) < len(fitted):
             # a frame may have other cases, as tables may

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -108,7 +107,7 @@ def fold(
         "rows": len(scores),
         "fitted": len(fitted.table.values),
         "log_likelihood": mean,
-        "uniform": -math.log(estimator.space_.volume),
+        "uniform": operations.uniform_score(estimator, unseen.table.values, unseen.weights),
         "report": estimator.report_.to_json(),
         "seconds": time.perf_counter() - begin,
     }

@@ -26,10 +26,11 @@ from orbiflow.density.cross_validation.splits import (
     fits_of,
     held_out,
     splits_of,
+    uniform_logs,
 )
 from orbiflow.density.data import is_angular
 from orbiflow.density.pictures import space_title
-from orbiflow.density.tables import append_columns
+from orbiflow.density.tables import TableRows, append_columns, linear_among
 from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
 
@@ -112,7 +113,7 @@ class CvOverview:
             "components": asked.settings,
             "rows": len(rows.table.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
-            "uniform": -math.log(rows.space.volume),
+            "uniform": float(uniform_logs(rows).mean()),
             "fits": {
                 "all": len(self.fits),
                 "done": states.count("done"),
@@ -215,6 +216,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         "data": Path("rows.npy"),
         "space": space,
         "cell": asked.where.cell,
+        "linear": _numbers(split.rows, asked.where.linear) or None,
         "fold": fit.fold,
         "columns": tuple(str(k + 1) for k in range(angles)),
         "held": str(angles + weighted + grouped + 1),
@@ -229,6 +231,12 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     }
     call = runtime.find("density fold").call({k: v for k, v in given.items() if v is not None})
     return batch.Item(fit.key, fit.name, call, split.read)
+
+
+def _numbers(rows: TableRows, linear: Sequence[str]) -> tuple[str, ...]:
+    """Return the numbers, from 1, of the real columns, which are not named in a table of numbers."""
+    columns = rows.table.columns
+    return tuple(str(columns.index(name) + 1) for name in linear_among(columns, linear))
 
 
 MOST_LISTED = 200
@@ -261,7 +269,7 @@ def cv_page(
         rows=rows,
         place=space_title(rows.space),
         groups=None if rows.labels is None else len(np.unique(rows.labels)),
-        uniform=-math.log(rows.space.volume),
+        uniform=float(uniform_logs(rows).mean()),
         made=made,
         why=comparison,
         waiting=waiting,

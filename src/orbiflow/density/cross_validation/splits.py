@@ -19,9 +19,10 @@ from orbiflow.density import comparing
 from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
-from orbiflow.density.inference import chart_of_rows
-from orbiflow.density.spaces import Space, space_for
-from orbiflow.density.tables import TableRows, angle_unit, read_rows, read_table
+from orbiflow.density.inference import at_observed, chart_of_rows
+from orbiflow.density.models import UniformDensity
+from orbiflow.density.spaces import MixedTorus, Space, space_for
+from orbiflow.density.tables import TableRows, angle_unit, linear_among, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Note, Sink, one_blas_thread
 
@@ -99,21 +100,26 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     """Return the rows of the table that count."""
     where, group = asked.where, asked.rows.group
     rows = read_rows(
-        asked.data, asked.rows, tell, space=where.space, width=where.width, group=group
+        asked.data,
+        asked.rows,
+        tell,
+        space=where.space,
+        width=where.width,
+        group=group,
+        linear=where.linear,
     )
     if rows.weights is not None:
         weighed(torch.zeros(len(rows.weights), 1), rows.weights)  # refuses what is no weight
         rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
     unit = angle_unit(asked.where, table, tell)
-    space = space_for(
-        where.space,
-        table.values,
-        unit=unit,
-        seed=asked.density.seed,
-        cell=where.cell,
-        fractional=where.fractional,
-    )
+    names = linear_among(table.columns, where.linear)
+    real = [table.columns.index(name) for name in names]
+    if real:
+        space: Space = MixedTorus.for_columns(table.values, real, table.columns, unit=unit)
+    else:
+        how: dict[str, Any] = {"cell": where.cell, "fractional": where.fractional}
+        space = space_for(where.space, table.values, unit=unit, seed=asked.density.seed, **how)
     may_lack = asked.rows.missing == "marginalise"
     counts, place = places(chart_of_rows(space, table.values, may_lack=may_lack))
     if len(counts) <= LEAST_PLACES:
@@ -206,8 +212,17 @@ def held_out(
         found = _read(folder / entry.name / SCORES, held)
         scores[settings.index(fit.setting), fit.split - 1, held] = found
     if UNIFORM in settings:
-        scores[settings.index(UNIFORM)] = -math.log(rows.space.volume)
+        scores[settings.index(UNIFORM)] = uniform_logs(rows)
     return HeldOut(tuple(settings), scores)
+
+
+def uniform_logs(rows: CvRows) -> Array:
+    """Return the log density (N,) in natural measure of the uniform distribution at each row."""
+    may_lack = rows.space.is_torus
+    points = chart_of_rows(rows.space, rows.table.values, may_lack=may_lack)
+    if math.isfinite(rows.space.volume):  # the same where something is missing
+        return np.full(len(points), -math.log(rows.space.volume))
+    return at_observed(UniformDensity(rows.space), points, measure="natural").numpy()
 
 
 def _read(path: Path, held: NDArray[np.int64]) -> Array:

@@ -91,7 +91,8 @@ def given_named(
         axis = _named_axis(key, names)
         if axis in found:
             raise OrbiflowError(f"{names[axis]!r} is given twice")
-        found[axis] = as_number(value, repr(names[axis])) / torus.period
+        number = torch.tensor(as_number(value, repr(names[axis])), dtype=torch.float64)
+        found[axis] = float(torus.turns(axis, number))
     return found
 
 
@@ -131,7 +132,7 @@ def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Te
         if not observed:
             continue
         some = points[rows][:, observed]
-        own = Torus(len(observed), unit=str(density.space.unit))
+        own = check_torus(density.space, "densities at missing angles").of_axes(observed)
         whole = len(observed) == density.space.dim
         value = density.log_prob(some) if whole else density.log_marginal(some, observed)
         found[rows] = value + own.log_density_factor(some, measure)
@@ -143,4 +144,6 @@ def chart_of_rows(space: Space, data: ArrayLike, *, may_lack: bool) -> Tensor:
     if not may_lack:
         return space.to_chart(data)
     torus = check_torus(space, "densities of rows that lack angles")
-    return torus.project(observed_rows(data, "data", torus) / torus.period)
+    rows = observed_rows(data, "data", torus)
+    turns = [torus.turns(axis, column) for axis, column in enumerate(rows.mT)]
+    return torus.project(torch.stack(turns, dim=1))

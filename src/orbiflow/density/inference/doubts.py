@@ -20,7 +20,7 @@ from orbiflow.density.data import (
 )
 from orbiflow.density.inference.angles import at_observed
 from orbiflow.density.models import Density
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import MixedTorus, Space
 from orbiflow.errors import OrbiflowError, SettingError, literal
 
 FEW_ROWS = 10
@@ -45,10 +45,12 @@ def data_doubts(
         SettingError: For codes for missing values; `cure` says what to do with them.
     """
     space, width = density.space, values.shape[1] if values.ndim == 2 else 0
+    called = [f"column{k}" for k in range(1, width + 1)] if names is None else list(names)
+    if isinstance(space, MixedTorus) and width == len(space.lines):
+        return _mixed_doubts(density, space, values, called, cure)
     unit = data_unit(space, width)
     if unit is None or not values.size:
         return []
-    called = [f"column{k}" for k in range(1, width + 1)] if names is None else list(names)
     # a few angles in radians that go on turning may be among the codes
     read_as = unit if len(values) >= FEW_ROWS else "degrees"
     refuse_codes(space.name, values, called, read_as, cure)
@@ -69,13 +71,35 @@ def data_doubts(
     return [_beyond(called[int(most.argmax())], float(most.max()), unit, other)]
 
 
-def given_doubts(space: Space, given: Mapping[str, float]) -> list[str]:
+def _mixed_doubts(
+    density: Density, space: MixedTorus, values: Array, names: Sequence[str], cure: str
+) -> list[str]:
+    """Return doubts about the angles among columns of which some are real."""
+    angles: list[int] = np.flatnonzero(~space.is_real).tolist()
+    own, unit = values[:, angles], str(space.unit)
+    called = [names[k] for k in angles]
+    refuse_codes("torus", own, called, unit if len(own) >= FEW_ROWS else "degrees", cure)
+    other = seeming_unit(own, unit) if own.size else None
+    if other is None or len(values) < FEW_ROWS:
+        return []
+    factors = np.where(space.is_real, 1.0, TURNS[unit] / TURNS[other])
+    if not _is_likelier(density, values, factors):
+        return []
+    return [
+        f"{' and '.join(called)}: these seem to be {other}, the model's are {unit}: convert them"
+    ]
+
+
+def given_doubts(space: Space, given: Mapping[str, float], names: Sequence[str]) -> list[str]:
     """Return what makes one doubt that known angles, by name, are in the unit of a torus.
 
     Raises:
         SettingError: For a code for missing values.
     """
-    unit = str(space.unit)
+    unit, real = str(space.unit), set[str]()
+    if isinstance(space, MixedTorus):
+        real = {name for name, own in zip(names, space.is_real, strict=True) if own}
+    given = {name: value for name, value in given.items() if name not in real}
     for name, value in given.items():
         if codes_among(np.array([value]), TURNS["degrees"]):
             text = f"{name!r} is {value:g}, which seems to stand for a missing value: leave it out"
@@ -102,8 +126,8 @@ def _beyond(name: str, value: float, unit: str, other: str) -> str:
     )
 
 
-def _is_likelier(density: Density, values: Array, factor: float) -> bool:
-    """Return whether values (N, k) are likelier as a rule if they are multiplied by a factor."""
+def _is_likelier(density: Density, values: Array, factor: float | Array) -> bool:
+    """Return whether values (N, k) are likelier as a rule if they are multiplied by factors (k,)."""
     whole = values[np.isfinite(values).all(axis=1)]
     if not len(whole):
         return False

@@ -128,7 +128,7 @@ def conditional(
 def _restricted(
     density: Density, split: Split, torus: Torus, accuracy: float, progress: Progress | None
 ) -> Mixture:
-    space = Torus(len(split.kept), unit=str(torus.unit))
+    space = torus.of_axes(split.kept)
     accuracy = as_number(accuracy, "accuracy")
     if not 0 < accuracy <= MOST_OFF:
         raise OrbiflowError(f"accuracy must be above 0 and at most {MOST_OFF}, got {accuracy}")

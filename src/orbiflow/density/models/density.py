@@ -288,9 +288,10 @@ class Density(Distribution):
         check_measure(measure)
         if measure == CHART:
             return self.log_chart(points)
-        volume = math.log(self.space.volume)
-        natural = 0.0 if self.space.is_round else -volume
-        return self.log_density(points) + natural + (volume if measure == "uniform" else 0.0)
+        values = self.log_density(points)
+        if self.space.is_round:
+            return values + (math.log(self.space.volume) if measure == "uniform" else 0.0)
+        return values if measure == "uniform" else values - self.space.log_area(points)
 
     def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, sample_shape: Any = (), generator: torch.Generator | None = None

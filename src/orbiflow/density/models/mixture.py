@@ -14,7 +14,7 @@ from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
 from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.spaces import Space, Torus
+from orbiflow.density.spaces import MixedTorus, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
 from orbiflow.typed_torch import listed
@@ -215,8 +215,7 @@ class PartialDensity(Density, kind="partial"):
     article = "a part of another density"
 
     def __init__(self, whole: Density, split: Split) -> None:
-        unit = str(as_instance(whole.space, Torus, "the whole's space").unit)
-        super().__init__(Torus(len(split.kept), unit=unit))
+        super().__init__(as_instance(whole.space, Torus, "the whole's space").of_axes(split.kept))
         self.whole, self.split = whole, split
         self.log_given = 0.0
         if split.given:
@@ -294,7 +293,9 @@ class PartialDensity(Density, kind="partial"):
     def header(self) -> dict[str, Any]:
         kept, given = list(self.split.kept), list(self.split.given)
         whole = density_parts(self.whole, "whole")[0]
-        return {"dim": self.split.dim, "kept": kept, "given": given, "whole": whole}
+        axes = self.whole.space.settings().get("axes")
+        own = {} if axes is None else {"axes": axes}
+        return {"dim": self.split.dim, "kept": kept, "given": given, "whole": whole, **own}
 
     def tensors(self) -> dict[str, Tensor]:
         values = torch.tensor(self.split.values, dtype=torch.float64)
@@ -314,7 +315,10 @@ class PartialDensity(Density, kind="partial"):
             and all(map(math.isfinite, values))
         ):
             raise OrbiflowError(f"parts {kept!r} and {given!r} of {dim!r} angles")
-        whole_space = Torus(dim, unit=str(space.settings().get("unit")))
+        unit, lines = str(space.settings().get("unit")), header.get("axes")
+        whole_space = Torus(dim, unit=unit) if lines is None else MixedTorus(lines, unit=unit)
+        if whole_space.dim != dim or whole_space.of_axes(axes[: space.dim]) != space:
+            raise OrbiflowError(f"columns {lines!r} of {dim!r}")
         whole = density_from(whole_space, header["whole"], within(tensors, "whole."))
         return cls(
             whole, Split(dim, tuple(axes[: space.dim]), tuple(axes[space.dim :]), (*values,))

@@ -95,10 +95,10 @@ def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
     if space.dim != 2:
         where = out if single else f"the picture in {out}"
         return (
-            f"density, flow and surface are drawn in two dimensions, this {space.name} has "
-            f"{space.dim}: {where} shows samples, angle by angle"
+            f"density, flow and surface are drawn in two dimensions, here are {space.dim}: {where} "
+            "shows samples, column by column"
         )
-    if not space.is_planar:
+    if not space.is_surface:
         return f"written to {out}"
     if single:
         return f"written {out}, a page for each figure; a folder gets the surface to turn, too"

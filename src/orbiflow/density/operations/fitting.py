@@ -61,7 +61,13 @@ def fit(
     _check(where, settings, reading)
     with runtime.one_thread():
         rows = tables.read_rows(
-            data, reading, on_event, space=where.space, width=where.width, group=reading.group
+            data,
+            reading,
+            on_event,
+            space=where.space,
+            width=where.width,
+            group=reading.group,
+            linear=where.linear,
         )
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
@@ -108,6 +114,9 @@ def fit_rows(
     unit = tables.angle_unit(where, rows.table, tell)
     unit = unit if is_angular(where.space, values.shape[1]) else where.unit
     given = {name: getattr(settings, name) for name in settings.fields_given}
+    names = tables.linear_among(rows.table.columns, where.linear)
+    if names:
+        given["linear"] = [rows.table.columns.index(name) for name in names]
     estimator = DensityEstimator(space_of(where), unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
@@ -150,7 +159,7 @@ def _document(
         "log_likelihood": {
             "natural": _mean_score(estimator, rows.table.values[scored], weights),
             "natural_rows": len(scored),
-            "uniform": -math.log(space.volume),
+            "uniform": uniform_score(estimator, rows.table.values[scored], weights),
             "square_train": -report.train_nll,
             "square_validation": -report.validation_nll,
         },
@@ -164,6 +173,20 @@ def _mean_score(estimator: DensityEstimator, values: Array, weights: Array | Non
     points = inference.chart_of_rows(estimator.space_, values, may_lack=may_lack)
     scores = inference.at_observed(estimator.density_, points, measure="natural")
     counted = fitting.weighed(scores[:, None], weights)
+    return fitting.mean_of(counted.points[:, 0], counted.weights)
+
+
+def uniform_score(estimator: DensityEstimator, values: Array, weights: Array | None) -> float:
+    """Return the mean log density in natural measure of the uniform distribution at rows (N, k)."""
+    space = estimator.space_
+    if math.isfinite(space.volume):
+        return -math.log(space.volume)
+    may_lack = estimator.missing == "marginalise"
+    points = inference.chart_of_rows(space, values, may_lack=may_lack)
+    uniform = models.UniformDensity(space)
+    counted = fitting.weighed(
+        inference.at_observed(uniform, points, measure="natural")[:, None], weights
+    )
     return fitting.mean_of(counted.points[:, 0], counted.weights)
 
 

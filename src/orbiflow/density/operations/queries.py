@@ -349,7 +349,7 @@ def conditional(
         evidence = saved.evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
         words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
-        ratio = f"{math.exp(evidence):.3g} times that of even angles{rare}"
+        ratio = f"{math.exp(evidence):.3g} times that of the uniform density{rare}"
         on_event(runtime.Note(f"the density at {words} is {ratio}"))
         over_uniform = {"log_density_of_given_over_uniform": evidence}
         origin = {"given": known, **over_uniform, "model": str(model)}

@@ -21,7 +21,7 @@ from orbiflow.density.data import doubts_of_other_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.run_folder import SAMPLES, write_files
-from orbiflow.density.spaces import Space, Torus
+from orbiflow.density.spaces import MixedTorus, Space, Torus
 from orbiflow.density.tables import Table, TableError, TableSettings, column_names, listing, to_csv
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
@@ -104,7 +104,7 @@ def check_fits(
         raise TableError(literal(text))
     doubts = inference.data_doubts(density, table.values, table.columns, tables.CURE)
     if [name.casefold() for name in table.columns] != [name.casefold() for name in wanted]:
-        doubts += doubts_of_other_columns(space.name, table.values, table.columns, own)
+        doubts += doubts_of_other_columns(space.data_name, table.values, table.columns, own)
     for doubt in doubts:
         tell(Note(f"WARNING: {data}: {doubt}"))
 
@@ -169,7 +169,7 @@ def condition_of(
                 literal(repr(both[0]))
                 + " is both among {columns} and {given}; name it in one of them"
             )
-    for doubt in inference.given_doubts(space, known):
+    for doubt in inference.given_doubts(space, known, names):
         tell(Note(f"WARNING: {doubt}"))
     return known, given, kept
 
@@ -252,6 +252,8 @@ def _words(density: Density, names: list[str], out: Path) -> str:
         )
     per = f"per {str(density.space.unit).removesuffix('s')}"
     power = "" if len(names) == 1 else f"^{len(names)}"
+    if isinstance(density.space, MixedTorus):
+        per, power = "per unit of each column", ""
     return f"the density of {', '.join(names)}, {per}{power}, {exact}; written to {out}"
 
 
@@ -260,8 +262,9 @@ def _table(density: Density) -> Array:
     space = density.space
     if not isinstance(space, Torus):
         raise OrbiflowError(f"a table of angles needs a torus, not the {space.name}")
-    line = (np.arange(TABLE_ROWS[space.dim]) / TABLE_ROWS[space.dim] - 0.5) * space.period
-    data = np.stack(np.meshgrid(*[line] * space.dim, indexing="ij"), axis=-1).reshape(-1, space.dim)
+    count = TABLE_ROWS[space.dim]
+    lines = [space.even_line(axis, count) for axis in range(space.dim)]
+    data = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, space.dim)
     with torch.no_grad():
         logs = density.log_prob(space.to_chart(data), measure="natural")
     return np.column_stack([data, logs.exp().numpy()])

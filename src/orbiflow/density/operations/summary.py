@@ -96,6 +96,8 @@ def _check(where: SpaceSettings, reading: CountedRowSettings, picture: Path | No
             "{space} must be torus, sphere or projective-plane: summaries are of angles, directions "
             f"and axes; got {literal(repr(where.space))}"
         )
+    if where.linear:
+        raise SettingError("{linear} is for densities: a summary is of angles; leave it out")
     if where.space != "torus":
         if reading.missing == "marginalise":
             raise SettingError("{missing} marginalise is for angles on a torus; use {missing} drop")

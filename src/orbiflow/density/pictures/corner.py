@@ -85,15 +85,19 @@ def corner_picture(
         panels.draw_ticks(axes, row, column)
         if dim == 1:
             t = torch.linspace(0, 1, 721, dtype=torch.float64)
-            line = density_at(density, panels.view.to_chart(t[:, None]), "square")
+            line = density_at(density, panels.view.to_chart(t[:, None]), "natural")
+            line = line * panels.view.volume  # as the histograms have it
             axes.plot(t.numpy(), line, color=frames.INK, linewidth=sheet.pen(1.6, 0.6))
     counts = {} if below is None else {"data": len(below)}
     counts["samples"] = len(above)
     panels.write_heads(counts, most)
     title = f"{'Angles' if dim > 1 else 'Angle'} on the {frames.space_title(space)}"
+    if real := frames.real_spans(space):
+        title = "Angles beside real columns" if len(real) < dim else "Real columns"
     caption = " and ".join(f"{count} {what}" for what, count in counts.items())
     caption += f", at most {most} of each as dots" if dim > 1 else ""
-    return Picture(panels.figure, sheet, title, f"{caption}. Angles in {space.unit}.")
+    unit = "" if len(real) == dim else f" Angles in {space.unit}."
+    return Picture(panels.figure, sheet, title, f"{caption}.{unit}")
 
 
 def _draw_histograms(axes: Axes, sheet: Sheet, samples: Array, data: Array | None) -> None:

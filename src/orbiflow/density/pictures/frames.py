@@ -11,14 +11,14 @@ import textwrap
 import unicodedata
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from torch import Tensor, tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.pictures.colours import Shade, bar_ticks, minor_places
-from orbiflow.density.spaces import Space, whole_turn
+from orbiflow.density.spaces import MixedTorus, Space, whole_turn
 from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError, SettingError
 
@@ -47,13 +47,42 @@ class View(NamedTuple):
 
     def to_chart(self, points: Tensor) -> Tensor:
         """Return points (N, d) of the window, in [0, 1]^d, as chart points."""
-        return points + tensor(self.low, dtype=points.dtype)
+        found = points + tensor(self.low, dtype=points.dtype)
+        for axis, (least, most) in real_spans(self.space).items():
+            values = least + points[:, axis] * (most - least)
+            found[:, axis] = cast(MixedTorus, self.space).turns(axis, values)
+        return found
 
     def places(self, points: Tensor) -> Array:
-        """Return where chart points (N, d) lie in the window, in [0, 1]^d."""
-        moved = chart_points(self.space, points) - tensor(self.low)
+        """Return where chart points (N, d) lie in the window, in [0, 1]^d.
+
+        What is beyond the window of a real column is not in [0, 1].
+        """
+        own = chart_points(self.space, points)
         # a translation commutes with the torus' group, and is 0 elsewhere
-        return self.space.project(moved).numpy()
+        found = self.space.project(own - tensor(self.low)).numpy()
+        spans = real_spans(self.space)
+        data = self.space.from_chart(own) if spans else found
+        for axis, (least, most) in spans.items():
+            found[:, axis] = (data[:, axis] - least) / (most - least)
+        return found
+
+    @property
+    def volume(self) -> float:
+        """The natural measure of the window: of a torus all of it."""
+        sides = [most - least for least, most in real_spans(self.space).values()]
+        if not sides:
+            return self.space.volume
+        turns = len(self.space.columns) - len(sides)
+        return math.prod(sides) * whole_turn(str(self.space.unit)) ** turns
+
+
+def real_spans(space: Space) -> dict[int, tuple[float, float]]:
+    """Return the values between which a window shows each real column, by its number."""
+    if not isinstance(space, MixedTorus):
+        return {}
+    lines = {axis: space.even_line(axis, 2) for axis in np.flatnonzero(space.is_real).tolist()}
+    return {axis: (float(ends[0]), float(ends[1])) for axis, ends in lines.items()}
 
 
 def chart_points(space: Space, points: Tensor) -> Tensor:
@@ -85,6 +114,7 @@ def view_of(
     # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
     even = np.round(24 * turns) / 24
     turns = np.where(abs(turns - even) < 1e-3, even, turns)
+    turns[[*real_spans(space)]] = 0.5
     return View(space, names, turns - 0.5)
 
 
@@ -103,6 +133,8 @@ def space_title(space: Space) -> str:
     >>> space_title(make_space("klein-bottle"))
     'Klein bottle'
     """
+    if real := real_spans(space):
+        return "cylinder" if len(real) == 1 and space.dim == 2 else "product of circles and lines"
     if space.data_group is not None and space.data_group.name:
         return f"plane modulo {space.data_group.name}"
     return space.name.replace("-", " ").replace("klein", "Klein")
@@ -132,7 +164,8 @@ def symbol(name: str) -> str:
 
 def axis_label(view: View, column: int) -> str:
     """Return the name and the unit of an angle."""
-    return f"{cut(view.names[column], MAX_NAME)} ({view.space.unit or ''})"
+    name = cut(view.names[column], MAX_NAME)
+    return name if column in real_spans(view.space) else f"{name} ({view.space.unit or ''})"
 
 
 def shortened(label: str, side: float, sheet: Sheet) -> str:
@@ -159,6 +192,8 @@ def legible(at: list[float], texts: list[str], side: float, size: float) -> list
 
 def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
     """Return the label of an axis of a torus or Klein bottle, and the places and texts of its ticks."""
+    if span := real_spans(view.space).get(axis):
+        return axis_label(view, axis), *_ticks(*span)
     if view.space.is_torus:
         low = float(view.low[axis])
         quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
@@ -169,6 +204,15 @@ def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
         turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
         label = axis_label(view, 1 - axis)
     return label, places, [angle_text(t, view.space.unit) for t in turns]
+
+
+def _ticks(least: float, most: float) -> tuple[list[float], list[str]]:
+    """Return places in [0, 1] of round numbers between two, and their texts."""
+    from matplotlib.ticker import MaxNLocator
+
+    values = [v for v in MaxNLocator(5).tick_values(least, most) if least <= v <= most]
+    texts = [f"{value:.6g}".replace("-", "\N{MINUS SIGN}") for value in values]
+    return [float(value - least) / (most - least) for value in values], texts
 
 
 def angle_text(turns: float, unit: str | None) -> str:

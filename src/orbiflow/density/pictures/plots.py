@@ -24,7 +24,7 @@ from orbiflow.density.pictures.coastlines import coastlines_for, simplified
 from orbiflow.density.pictures.colours import COLOURS
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
 from orbiflow.density.pictures.figures import plane_ground
-from orbiflow.density.pictures.frames import INK, view_of
+from orbiflow.density.pictures.frames import INK, real_spans, view_of
 from orbiflow.density.pictures.grounds import region_lines
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import PlateCarree, chosen_map
@@ -109,7 +109,7 @@ def plot_density(
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
-    flowless = shown.space.is_planar and not shown.flows
+    flowless = shown.space.is_surface and not shown.flows
     notes = ("there is no flow in this density, and so no picture of one",) * flowless
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
@@ -118,7 +118,7 @@ def plot_density(
     if "flow.png" in files and not settings.sheet.printed:
         files["flow.png"] = figures.few_colours(files["flow.png"])
     contents: dict[str, str | bytes] = {**files}
-    if shown.space.is_planar:
+    if shown.space.is_surface:
         told(0.75, f"drawing {PAGE}")
         lines = simplified(shown.coastlines, PAGE_POINTS)
         contents[PAGE] = density_page(
@@ -175,7 +175,7 @@ class _Shown:
         density, settings, data, samples = self.density, self.settings, self.data, self.samples
         if self.space.dim != 2:
             made = {"samples": partial(corner_picture, density, data, samples, settings)}
-            if self.space.dim == 1:
+            if self.space.dim == 1 and not real_spans(self.space):
                 what = "samples" if data is None else "data"
                 made["rose"] = partial(rose_picture, density, self.points, settings, what=what)
             return made
@@ -183,7 +183,7 @@ class _Shown:
         dots = self.points if settings.dots else None
         draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
         makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
-        if self.flows and self.space.has_square:
+        if self.flows and self.space.has_square and not real_spans(self.space):
             makers["flow"] = partial(figures.flow_picture, density, settings)
         if data is not None or settings.samples is not None:
             draw = partial(figures.samples_picture, density, data, samples, settings)
@@ -276,7 +276,9 @@ def _draw_angle(figure: Figure, density: Density, data: Array) -> None:
     count = min(72, max(12, round(2 * len(data) ** (1 / 3))))
     places = view.places(density.space.to_chart(data))[:, 0]
     t = torch.linspace(0, 1, SIZE[0], dtype=torch.float64)
-    line = density.log_prob(view.to_chart(t[:, None]), measure="square").exp().numpy()
+    line = (
+        density.log_prob(view.to_chart(t[:, None]), measure="natural").exp().numpy() * view.volume
+    )
     axes = figure.add_axes((0.02, 0.03, 0.96, 0.94))
     bars, *_ = axes.hist(places, count, range=(0, 1), density=True, rwidth=0.95, color=BARS)
     axes.plot(t, line, color=INK, linewidth=1.5)

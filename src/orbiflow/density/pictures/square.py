@@ -64,10 +64,12 @@ class Square(Ground):
 
     def pixels(self, count: int) -> Pixels:
         middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
-        x, y = (middles + low for low in self.view.low)
-        points = torch.stack(torch.meshgrid(x, y, indexing="xy"), dim=-1).reshape(-1, 2)
+        grid = torch.stack(torch.meshgrid(middles, middles, indexing="xy"), dim=-1)
+        points = self.view.to_chart(grid.reshape(-1, 2))
         areas = self.space.log_area(points).exp().numpy()
-        side, every = square_pixel(self.space, float(x[1] - x[0])), np.ones((count, count), bool)
+        if frames.real_spans(self.space):  # the window is even in the data
+            areas = np.ones_like(areas)
+        side, every = square_pixel(self.space, 1 / count), np.ones((count, count), bool)
         size = f"1/{count} of a side"
         return Pixels(points, every, every.ravel(), areas, side, size, (0, 1, 0, 1))
 
@@ -90,12 +92,14 @@ class Square(Ground):
         axes.set_xlim(0, 1)
         axes.set_ylim(0, 1)
         axes.set_aspect("equal")
-        for spine in axes.spines.values():
-            spine.set_visible(False)
         self._draw_ticks(axes, sheet, side, panel.labelled)
         # signs that can be made out in a small square and are no larger than letters in a large one
         head = 1.1 * sheet.em / side if sheet.printed else HEAD
-        for order, pair in enumerate(edge_pairs(self.space.group)):
+        real = frames.real_spans(self.space)
+        for spine in axes.spines.values():
+            spine.set_visible(bool(real))
+            spine.set_color("#8a8a86")
+        for order, pair in enumerate([] if real else edge_pairs(self.space.group)):
             for edge in pair:
                 _draw_edge(axes, edge, EDGE_COLOURS[order % 2], order + 1, sheet, head)
         for corner, order in cone_points(self.space.group):
@@ -108,7 +112,9 @@ class Square(Ground):
                 self._write_place(axes, corner, sheet)
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
-        parts = ["The edges with one arrow head are one edge, and so are those with two"]
+        parts = list[str]()
+        if not frames.real_spans(self.space):
+            parts += ["The edges with one arrow head are one edge, and so are those with two"]
         parts += [
             f"{SIGNS[order]} are cone points of a {TURNS[order]} turn, which no flow moves"
             for order in self._orders
@@ -181,6 +187,7 @@ class Square(Ground):
             Line2D([], [], color=colour, linewidth=0.28 * size, marker=">",
                    label=f"both {name} edges are one edge")
             for colour, name in zip(EDGE_COLOURS, ("orange", "blue"), strict=True)
+            if not frames.real_spans(self.space)
         ]  # fmt: skip
         style: dict[str, Any] = {"linestyle": "none"}
         for order in self._orders:

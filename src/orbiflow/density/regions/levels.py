@@ -18,7 +18,7 @@ from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.regions.settings import MAX_SAMPLES, MIN_SAMPLES, SAMPLES, samples_for
 from orbiflow.density.spaces import whole_turn
-from orbiflow.errors import SettingError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import one_thread
 
 SAMPLES_PER_EVEN_POINT = 4
@@ -97,6 +97,10 @@ class DensityLevels:
         smooth: float | None = None,
     ) -> None:
         self.density, self.smooth = density_of(density), smooth
+        if not math.isfinite(self.density.space.volume):
+            raise OrbiflowError(
+                "regions of highest density are of angles alone, not of real columns"
+            )
         count = as_whole(samples, "samples", MIN_SAMPLES, MAX_SAMPLES)
         generator = torch.Generator().manual_seed(as_whole(seed, "seed", 0, 2**63 - 1))
         self.points: Tensor = self.density.sample((count,), generator).double()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Self
 
@@ -83,6 +84,24 @@ class Torus(_AngleSpace):
     def cover(self, data: ArrayLike) -> Tensor:
         table = checked_table(data, (self.dim,), f"{self.dim} angles")
         return torch.tensor(table / self.period)
+
+    def turns(self, axis: int, values: Tensor) -> Tensor:
+        """Return the chart coordinates of values of one column, in any shape."""
+        del axis
+        return values / self.period
+
+    def period_of(self, axis: int) -> float:
+        """Return the period of a column of the data, 0 if it has none."""
+        del axis
+        return self.period
+
+    def even_line(self, axis: int, count: int) -> Array:
+        """Return even values (count,) of a column, from minus half a turn on."""
+        return (np.arange(count) / count - 0.5) * self.period_of(axis)
+
+    def of_axes(self, axes: Sequence[int]) -> Torus:
+        """Return the space of some columns alone, by their numbers from 0."""
+        return Torus(len(axes), unit=str(self.unit))
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
         del data, points

@@ -108,6 +108,11 @@ class Space(ABC):
         """Return the space that suits data (N, k) in its dimension, unit and rotation."""
 
     @property
+    def data_name(self) -> str:
+        """The name of the space whose data, in their columns, are like its own."""
+        return self.name
+
+    @property
     def dim(self) -> int:
         """The dimension d of the space."""
         return self.group.dim
@@ -121,6 +126,11 @@ class Space(ABC):
     def is_planar(self) -> bool:
         """Whether the chart is the square, on which densities are drawn and tabulated."""
         return self.has_square and self.dim == 2
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the square, its edges glued, is a surface that can be turned and flowed on."""
+        return self.is_planar
 
     @property
     def dimensions(self) -> str:
@@ -167,6 +177,10 @@ class Space(ABC):
     def log_area(self, points: Tensor) -> Tensor:
         """Return the logarithm of natural area over chart area (...,) at points (..., d)."""
         return torch.full_like(points[..., 0], math.log(self.volume))
+
+    def log_uniform(self, points: Tensor) -> Tensor:
+        """Return the log density (...,) in natural measure of the uniform distribution at points."""
+        return torch.full_like(points[..., 0], -math.log(self.volume))
 
     @property
     @abstractmethod
@@ -338,7 +352,7 @@ def space_class(name: str) -> type[Space]:
     from orbiflow.density import spaces  # whose classes import this file
 
     # whose files hold all classes
-    _ = spaces.Torus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace
+    _ = spaces.MixedTorus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace
     if not is_a(name, str) or name not in SPACE_CLASSES:
         raise OrbiflowError(
             f"unknown space {name!r}; there are {', '.join(SPACE_CLASSES)}, and groups such as p4m, "

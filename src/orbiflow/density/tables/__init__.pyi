@@ -13,6 +13,7 @@ from .rows import CURE as CURE
 from .rows import TableRows as TableRows
 from .rows import angle_unit as angle_unit
 from .rows import columns_in as columns_in
+from .rows import linear_among as linear_among
 from .rows import read_rows as read_rows
 from .settings import CountedRowSettings as CountedRowSettings
 from .settings import GroupedRowSettings as GroupedRowSettings

@@ -102,16 +102,18 @@ def read_rows(
     width: int | None = None,
     group: str | None = None,
     model_space: str | None = None,
+    linear: Sequence[str] = (),
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
     Without `columns` in the settings, those are taken whose names say that they are what the `space`
     takes, in its order. If no name says so, all columns of numbers are taken but those that number
-    the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
+    the rows, those of weights, counts and groups and, on a torus, those that are no angles by name and
+    are not among the `linear` ones.
     Strikes beside dips become directions of dip on this space or on `model_space`, that of a model.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
-    reader = _Reader(path, rows, tell, space, width)
+    reader = _Reader(path, rows, tell, space, width, tuple(linear))
     weighing, counting = map(reader.column, (rows.weights, getattr(rows, "counts", None)))
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
     if group is not None and rows.columns is None:
@@ -130,8 +132,9 @@ def read_rows(
     _check_width(path, table, space, width, others)
     if space in DIRECTIONS:
         check_hemispheres(path, table, rows.header)
-    if space == "torus":
-        tell_of_calm(path, table, rows, tell)
+    angles = without_linear(table, linear, path)
+    if space == "torus" and angles.columns:
+        tell_of_calm(path, angles, rows, tell)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
@@ -148,6 +151,7 @@ class _Reader:
     tell: Sink
     space: str | None
     width: int | None
+    linear: tuple[str, ...] = ()
 
     @property
     def missing(self) -> dict[str, Any]:
@@ -194,8 +198,8 @@ class _Reader:
         if width is None:
             table = self._data_alone(table)
         if self.space == "torus":
-            table = _angles_alone(table, self.tell)
-            _tell_of_names(table, self.tell)
+            table = _angles_alone(table, self.tell, self.linear)
+            _tell_of_names(without_linear(table, self.linear, self.path), self.tell)
         return table.complete(self.path, **self.missing, missing_codes=self.rows.missing_codes)
 
     def _by_name(self, space: str, names: Sequence[str]) -> tuple[str, ...] | None:
@@ -218,7 +222,8 @@ class _Reader:
             # what the header leaves empty is called "column1" by now
             given = name if table.header is None or name in table.header else ""
             known = table.values[~np.isnan(table.values[:, column]), column]
-            if len(table.columns) > 1 and is_identifier(given, known):
+            real = name in linear_among(table.columns, self.linear)
+            if len(table.columns) > 1 and not real and is_identifier(given, known):
                 table = table.without(column)
                 text = f"left out the column {name!r}, which numbers the rows; name all to keep it"
                 self.tell(Note(text))
@@ -250,11 +255,37 @@ def _with_dip_directions(table: Table, rows: RowSettings, space: str | None, tel
     return replace(table, values=values, columns=columns)
 
 
-def _angles_alone(table: Table, tell: Sink) -> Table:
+def linear_among(names: Sequence[str], linear: Sequence[str]) -> list[str]:
+    """Return the columns, by their names, that are to be real numbers.
+
+    >>> linear_among(["Phi", "Length", "column3"], ["length", "3"])
+    ['Length', 'column3']
+    """
+    wanted = {own.casefold() for own in linear} | {f"column{own}" for own in linear}
+    return [name for name in names if name.casefold() in wanted]
+
+
+def without_linear(table: Table, linear: Sequence[str], path: Path) -> Table:
+    """Return a table without its real columns; refuse those that it lacks."""
+    found = linear_among(table.columns, linear)
+    if len(found) != len(set(linear)):
+        raise TableError(
+            literal(f"{path}: the columns are {listing(table.columns)}")
+            + ", and {linear} names "
+            + literal(listing(linear))
+            + "; give the names of the table"
+        )
+    for name in found:
+        table = table.without(table.columns.index(name))
+    return table
+
+
+def _angles_alone(table: Table, tell: Sink, linear: Sequence[str] = ()) -> Table:
     """Return a table without the columns that are no angles by their names."""
     named = table.header is not None or table.delimiter is None
     counts_first = sorted(table.columns, key=lambda name: not is_count_named(name))
-    for name in counts_first if named else ():
+    real = linear_among(table.columns, linear)
+    for name in (name for name in counts_first if named and name not in real):
         is_count = is_count_named(name)
         if (is_count or is_other_quantity(name)) and len(table.columns) > 1:
             table = table.without(table.columns.index(name))
@@ -343,6 +374,10 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     The user is also told of a cell that was not given: data of another size would be folded into it.
     """
     space = where.space
+    if where.linear:
+        table = without_linear(table, where.linear, Path("the table"))
+        if not table.columns:
+            return where.unit or "radians"
     if space not in SPACES and where.cell is None:
         tell(
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")

@@ -51,6 +51,9 @@ class SpaceSettings(Settings, group="Density"):
     )
     """The data are fractions of the cell's vectors, as in CIF, and not lengths along x, y and z."""
 
+    linear: Annotated[tuple[str, ...], DefaultText("none")] = ()
+    """Columns of a torus that are real numbers rather than angles, such as length,temperature."""
+
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
     """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
 
@@ -58,6 +61,10 @@ class SpaceSettings(Settings, group="Density"):
         """Check that there is such a space, and that only angles have a unit."""
         if self.cell is not None and self.space in SPACES:
             raise SettingError(f"{{cell}} applies to groups, not to the {self.space}")
+        if self.linear and self.space != "torus":
+            raise SettingError(
+                f"{{linear}} is for columns beside angles on a torus, not on the {self.space}"
+            )
         _ = self.width  # which makes the group
         check_unit(self.space, self.unit)
 

@@ -1,0 +1,213 @@
+"""Angles beside real columns: exactly normalised, in the data's own units, whatever is asked."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from orbiflow.density import (
+    Density,
+    DensityEstimator,
+    MixedTorus,
+    Torus,
+    UniformDensity,
+    conditional,
+    density_to_bytes,
+    marginal,
+    read_density,
+)
+from orbiflow.errors import OrbiflowError, SettingError
+
+reals = st.floats(-1e4, 1e4)
+scales = st.floats(1e-3, 1e3)
+
+
+def data_of(count: int, seed: int = 0) -> np.ndarray:
+    """An angle in degrees, a length that follows it, a temperature with heavy tails."""
+    rng = np.random.default_rng(seed)
+    angle = rng.vonmises(0.5, 2.0, count)
+    length = 1.5 + 0.02 * np.cos(angle) + 0.01 * rng.normal(size=count)
+    return np.column_stack(
+        [np.degrees(angle), length, 290 + 8 * np.sin(angle) + rng.standard_t(3, size=count)]
+    )
+
+
+@pytest.fixture(scope="module", name="fit")
+def fit_fixture() -> DensityEstimator:
+    settings = {"components": "mixture,chains", "unit": "degrees", "linear": (1,)}
+    return DensityEstimator("torus", **settings).fit(data_of(400)[:, :2])
+
+
+@given(reals, scales, st.lists(st.tuples(st.floats(-7, 7), st.floats(-50, 50)), min_size=1))
+def test_data_come_back_and_areas_are_those_of_the_map(
+    centre: float, scale: float, rows: list[tuple[float, float]]
+) -> None:
+    space = MixedTorus([None, (centre, scale)])
+    data = np.array([[angle, centre + scale * z] for angle, z in rows])
+    points = space.to_chart(data)
+    again = space.from_chart(points)
+    turns = (again[:, 0] - data[:, 0]) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    np.testing.assert_allclose((again[:, 1] - data[:, 1]) / scale, 0, atol=1e-6)
+    # the derivative of the turns by the data is the density of Student's t
+    student = stats.t.logpdf(data[:, 1], 4, centre, scale)
+    logs = space.log_uniform(points).numpy() + np.log(2 * np.pi)
+    np.testing.assert_allclose(logs, student, rtol=1e-5, atol=1e-5)
+
+
+def test_the_uniform_density_is_students_t() -> None:
+    space = MixedTorus([(3.0, 0.5)])
+    at = np.linspace(-2, 8, 50)
+    found = UniformDensity(space).log_prob(space.to_chart(at[:, None]), measure="natural")
+    np.testing.assert_allclose(found.numpy(), stats.t.logpdf(at, 4, 3.0, 0.5), rtol=1e-7)
+    relative = UniformDensity(space).log_prob(space.to_chart(at[:, None]), measure="uniform")
+    assert relative.abs().max() < 1e-12
+
+
+def test_it_integrates_to_one_over_turns_and_all_reals(fit: DensityEstimator) -> None:
+    angles = np.arange(360) + 0.5
+
+    def over_angles(lengths: np.ndarray) -> np.ndarray:
+        rows = np.column_stack([np.tile(angles, len(lengths)), np.repeat(lengths, 360)])
+        return np.exp(fit.score_samples(rows)).reshape(-1, 360).sum(axis=1)
+
+    # Gauss-Legendre on ever longer pieces to both sides
+    ends = np.concatenate([[1.5], 1.5 + 0.004 * 1.5 ** np.arange(28)])
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    mass = 0.0
+    for side in (1, -1):
+        for low, high in pairwise(ends):
+            at = (low + high) / 2 + (high - low) / 2 * nodes
+            mass += float(over_angles(1.5 + side * (at - 1.5)) @ weights) * (high - low) / 2
+    assert mass == pytest.approx(1, abs=1e-6)
+
+
+def test_a_conditional_is_a_ratio(fit: DensityEstimator) -> None:
+    lengths = np.linspace(1.47, 1.53, 9)[:, None]
+    at = np.column_stack([np.full(9, 40.0), lengths])
+    ratio = fit.score_samples(at) - fit.marginal(0).score_samples([[40.0]])
+    found = fit.conditional({0: 40.0})
+    assert isinstance(found.space_, MixedTorus)
+    np.testing.assert_allclose(found.score_samples(lengths), ratio, atol=2e-3)
+    assert isinstance(fit.conditional({1: 1.5}).space_, Torus)
+    mean = found.sample(4000, random_state=0).mean()
+    assert mean == pytest.approx(1.5 + 0.02 * np.cos(np.radians(40)), abs=0.003)
+
+
+def test_samples_follow_the_density(fit: DensityEstimator) -> None:
+    drawn = fit.sample(3000, random_state=1)
+    alone = fit.marginal(1)
+    grid = np.linspace(1.40, 1.60, 2001)
+    mass = np.exp(alone.score_samples(grid[:, None])) * (grid[1] - grid[0])
+    share = np.interp(np.sort(drawn[:, 1]), grid, np.cumsum(mass))
+    even = (np.arange(3000) + 0.5) / 3000
+    assert np.abs(share - even).max() < 0.03
+    assert (np.abs(drawn[:, 0]) <= 180).all()
+
+
+def test_gradients_are_per_unit_of_each_column(fit: DensityEstimator) -> None:
+    rows = data_of(5, seed=3)[:, :2]
+    slopes = fit.score_gradient(rows)
+    for column, step in enumerate((1e-3, 1e-7)):
+        move = np.zeros(2)
+        move[column] = step
+        rise = (fit.score_samples(rows + move) - fit.score_samples(rows - move)) / (2 * step)
+        np.testing.assert_allclose(slopes[:, column], rise, rtol=1e-4, atol=1e-4 / step**0.5)
+
+
+def test_it_is_near_the_truth_and_far_above_independence() -> None:
+    rng = np.random.default_rng(0)
+    angle, unseen = rng.vonmises(0, 2, 1500), rng.vonmises(0, 2, 4000)
+
+    def rows(own: np.ndarray) -> np.ndarray:
+        return np.column_stack([own, 3 + np.cos(own) / 2 + 0.2 * rng.normal(size=len(own))])
+
+    held = rows(unseen)
+    fit = DensityEstimator("torus", linear=(1,), components="kernels,mixture,chains", seed=0)
+    fit.fit(rows(angle))
+    truth = stats.vonmises.logpdf(held[:, 0], 2)
+    truth += stats.norm.logpdf(held[:, 1], 3 + np.cos(held[:, 0]) / 2, 0.2)
+    regret = float((truth - fit.score_samples(held)).mean())
+    assert 0 < regret < 0.04
+
+
+def back(density: Density, folder: Path) -> Density:
+    """What its file gives back."""
+    path = folder / "density.safetensors"
+    path.write_bytes(density_to_bytes(density))
+    return read_density(path)[0]
+
+
+def test_files_give_the_same_density_back(fit: DensityEstimator, tmp_path: Path) -> None:
+    points = fit.space_.to_chart(data_of(20, seed=5)[:, :2])
+    again = back(fit.density_, tmp_path)
+    assert again.space == fit.space_
+    assert torch.equal(again.log_prob(points), fit.density_.log_prob(points))
+
+
+def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    data = np.column_stack([rng.vonmises(0, 2, (300, 4)), rng.normal(size=300)])
+    space = MixedTorus.for_columns(data, [4], "abcde")
+    whole = DensityEstimator(space, components="chains").fit(data).density_
+    for part in (marginal(whole, [1, 2, 4]), conditional(whole, {0: 0.1})):
+        assert isinstance(part.space, MixedTorus)
+        points = part.space.to_chart(np.full((3, part.space.dim), 0.3))
+        again = back(part, tmp_path)
+        assert torch.allclose(again.log_prob(points), part.log_prob(points))
+
+
+def test_rows_that_lack_a_value_count_by_the_others() -> None:
+    data = data_of(300)
+    data[::3, 1], data[1::3, 2] = np.nan, np.nan
+    settings = {"unit": "degrees", "linear": (1, 2), "missing": "marginalise", "seed": 0}
+    fit = DensityEstimator("torus", components="kernels,mixture", **settings).fit(data)
+    some = data[:6].copy()
+    scores = fit.score_samples(some)
+    alone = fit.marginal(0, 2).score_samples(some[[0]][:, [0, 2]])
+    assert scores[0] == pytest.approx(alone[0], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("space", "linear", "words"),
+    [
+        ("sphere", (1,), "linear is for columns beside angles on a torus, not sphere"),
+        ("torus", ("speed",), "no column 'speed'"),
+        ("torus", (0, 0), "given twice"),
+    ],
+)
+def test_columns_that_cannot_be_real(space: str, linear: tuple, words: str) -> None:
+    with pytest.raises(OrbiflowError, match=words):
+        DensityEstimator(space, linear=linear).fit(np.ones((50, 2)))
+
+
+def test_a_column_of_one_value_and_lines_that_are_none() -> None:
+    data = data_of(50)[:, :2]
+    data[:, 1] = 1.5
+    with pytest.raises(OrbiflowError, match="has one value alone"):
+        DensityEstimator("torus", unit="degrees", linear=(1,)).fit(data)
+    wrongs: list[Any] = [[(1.0, 0.0)], [(np.nan, 1.0)], [(1.0,)], ["ab"]]
+    for wrong in wrongs:
+        with pytest.raises(OrbiflowError):
+            MixedTorus(wrong)
+    with pytest.raises(SettingError, match="the space says which"):
+        DensityEstimator(MixedTorus([None, (0, 1)]), linear=(1,)).fit(data)
+
+
+def test_radians_in_the_place_of_degrees_are_doubted() -> None:
+    rows = data_of(200)[:, :2] + (150.0, 0.0)
+    settings = {"components": "mixture", "unit": "degrees", "linear": (1,)}
+    fit = DensityEstimator("torus", **settings).fit(rows)
+    rows[:, 0] = (rows[:, 0] + 180) % 360 - 180
+    fit.score_samples(rows)
+    rows[:, 0] = np.radians(rows[:, 0])
+    with pytest.warns(UserWarning, match="seem to be radians"):
+        fit.score_samples(rows)
