@@ -42,6 +42,18 @@ class Advice(str):
         return with_names(self.template, name)
 
 
+def advice_of(error: Exception) -> str:
+    """Return the message of an error: an `Advice` where it names settings.
+
+    >>> advice_of(InputFileError(Advice("too dark: try another {threshold}")))
+    'too dark: try another threshold'
+    """
+    if isinstance(error, SettingError):
+        return Advice(error.template)
+    first = error.args[0] if error.args else ""
+    return first if isinstance(first, Advice) else str(error)
+
+
 class SettingError(OrbiflowError):
     """A setting or an argument that cannot be used.
 

@@ -93,7 +93,7 @@ def test_labels_are_no_compass_words(content: str, tmp_path: Path) -> None:
 )
 def test_times_of_day_are_refused_by_cause(times: str, tmp_path: Path) -> None:
     for content in (times, "time\n" + times):
-        with pytest.raises(TableError, match=r"not a number; convert it to .*: 15 for each hour"):
+        with pytest.raises(TableError, match=r"not a number.*; convert it to .*: 15 for each hour"):
             read_table(write(tmp_path, content), columns=None, width=None)
     row = "t,phi\n" + "".join(f"{time},1.5\n" for time in times.split("\n") if time)
     assert read_table(write(tmp_path, row), columns=None, width=None).columns == ("phi",)

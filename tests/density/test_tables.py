@@ -120,6 +120,12 @@ def test_single_column(tmp_path: Path) -> None:
         ("1,\n3,4\n", "1 cell empty, NaN or infinite, .* line 1,"),
         ("a,b\n1,2\n3\n", "line 3 has 1 cell and line 1 has 2"),
         ("a,b\n" + "1,2\n" * 200 + "1,2,3\n", "line 202 has 3 cells and line 1 has 2"),
+        ("a,b\n1,x\ny,2\n3,4\n", "line 2: column 'b': 'x' .* line 3: column 'a': 'y' is not"),
+        ("a,b\n1\n2\n" + "3,4\n" * 9, "line 2 has 1 cell .* line 3 has 1 cell"),
+        (
+            "a,b\n" + "1,2\n" * 200 + "1\n1,2\n" + "7\n" * 9,
+            "line 202 has 1 cell .*also, line 204 has 1 cell.* and 3 more",
+        ),
         ('a,b\n1,"2\n', "line 2: .* quotation mark"),
         ('a,b\n"1"x,2\n', "line 2: .* quotation mark"),
         ("a,b,c\n1,2,3\n", r"2 columns .* it has 3 \(its columns: a, b, c\).* choose with columns"),

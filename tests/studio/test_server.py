@@ -84,6 +84,29 @@ def test_a_polygon_stays_in_its_picture_when_it_is_mended(client: Client) -> Non
     assert high == pytest.approx(size, abs=3)
 
 
+def test_what_is_refused_is_in_the_pages_words(client: Client) -> None:
+    address, picture = new_project(client), Image.new("L", (90, 90), 255)
+    picture.paste(250, (20, 20, 50, 50))
+    task = done(client, client.put(f"{address}/input?name=my cat.png", content=painted(picture)))
+    assert task["state"] == "failed"
+    assert task["error"].startswith("my cat.png: the image is all but blank")
+    assert task["error"].endswith("raise the contrast or try another edge (Where it ends)")
+    answer = client.put(f"{address}/reading", json={"smooth": 7})
+    assert answer.json()["error"].startswith("smoothing must be")
+
+
+def test_what_is_painted_is_called_by_what_the_page_calls_it(client: Client) -> None:
+    address = new_project(client)
+    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
+    own = client.get(address).json()["silhouette"]
+    mask = Image.new("L", (own["width"], own["height"]))
+    mask.putpixel((0, 0), 255)
+    client.put(f"{address}/pins", content=painted(mask))
+    task = make(client, address, "search", effort="fast", classes=["IH4"])
+    assert task["error"].startswith("what you painted with “Keep its shape”: ")
+    assert "pins" not in task["error"]
+
+
 def painted(shape: Any) -> bytes:
     data = io.BytesIO()
     shape.save(data, "png")

@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, advice_of
 from orbiflow.runtime import Failed, Finished, ItemDone, Note, Progress
 from orbiflow.studio import Store, WorkQueue
 from orbiflow.studio.hub import Hub
@@ -240,7 +240,7 @@ def test_mistakes_are_told_in_the_words_of_the_page(bench: Bench) -> None:
     with pytest.raises(OrbiflowError) as caught:
         sampled(np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]))
     task = bench.search(bench.project())
-    bench.made[-1].say(Failed(str(caught.value), "mistake"))
+    bench.made[-1].say(Failed(advice_of(caught.value), "mistake"))
     bench.made[-1].say(None)
     join_tasks()
     told = bench.store.task(task)["error"]

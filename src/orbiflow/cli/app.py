@@ -21,7 +21,7 @@ from rich.markup import escape
 from orbiflow import __version__
 from orbiflow.arguments import meant
 from orbiflow.commands import OPERATIONS
-from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.errors import Advice, OrbiflowError, SettingError, advice_of, literal
 from orbiflow.kinds import FlagKind, ListKind, PathKind
 from orbiflow.runtime import Cancelled, Operation, Polled, find, use_one_thread
 from orbiflow.settings import Field, Hidden
@@ -52,9 +52,9 @@ def run(words: Sequence[str]) -> int:
         except CycloptsError as error:
             raise _mistake(error, _operation(words), words) from error
     except OrbiflowError as error:
-        text = str(error)
-        if isinstance(error, SettingError) and (operation := _operation(words)):
-            text = error.named(_namer(operation))
+        text = advice_of(error)
+        if isinstance(text, Advice) and (operation := _operation(words)):
+            text = text.named(_namer(operation))
         _to_standard_error(f"[bold red]error:[/] {escape(text)}")
         return 2
     except (KeyboardInterrupt, Cancelled):

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from orbiflow.arguments import described
-from orbiflow.errors import SettingError, literal
+from orbiflow.errors import Advice, SettingError, literal
 from orbiflow.runtime.files import is_object
 from orbiflow.settings import Field, check_names
 
@@ -38,12 +38,16 @@ class Event:
         cls.kind = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
     def to_json(self) -> dict[str, Any]:
-        """Return the event as JSON has it; `event_from_json` restores an equal one."""
+        """Return the event as JSON has it; `event_from_json` restores an equal one.
+
+        A text that names settings has its `template` beside it.
+        """
         values = {
             name: str(value) if isinstance(value, Path) else value
             for name, value in vars(self).items()
         }
-        return {"kind": self.kind, **values}
+        templates = [value.template for value in values.values() if isinstance(value, Advice)]
+        return {"kind": self.kind, **values, **({"template": templates[0]} if templates else {})}
 
 
 @dataclass(frozen=True)
@@ -194,10 +198,15 @@ def event_from_json(document: object) -> Event:
         raise SettingError(
             f"unknown kind of event {literal(described(kind))}; there are {', '.join(EVENTS)}"
         )
-    given = {name: value for name, value in document.items() if name != "kind"}
+    given = {name: value for name, value in document.items() if name not in ("kind", "template")}
     fields = _fields(EVENTS[kind])
     check_names(given, fields.values(), kind)
-    return EVENTS[kind](**{name: _read(fields[name], value) for name, value in given.items()})
+    read = {name: _read(fields[name], value) for name, value in given.items()}
+    template = document.get("template")
+    for name in ("text", "message"):
+        if isinstance(template, str) and name in read:
+            read[name] = Advice(template)
+    return EVENTS[kind](**read)
 
 
 @cache

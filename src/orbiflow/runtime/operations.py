@@ -41,7 +41,7 @@ from importlib import import_module
 from typing import Any, Literal, ParamSpec, TypeVar, cast
 
 from orbiflow.arguments import as_instance, described, meant
-from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.errors import OrbiflowError, SettingError, advice_of, literal
 from orbiflow.extras import naming_extras
 from orbiflow.runtime.events import (
     Cancel,
@@ -235,7 +235,7 @@ class Call:
             raise
         except Exception as error:
             known = isinstance(error, OrbiflowError)
-            message = str(error) if known else f"{type(error).__name__}: {error}"
+            message = advice_of(error) if known else f"{type(error).__name__}: {error}"
             if not broken:
                 send(Failed(message, "mistake" if known else "error"))
             raise

@@ -21,7 +21,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from orbiflow import __version__
 from orbiflow.drawing import PALETTES, Palette
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, advice_of
 from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
 from orbiflow.studio import density_routes, project_routes, solid_routes
@@ -32,6 +32,7 @@ from orbiflow.studio.project_routes import ANIMALS, animal_file
 from orbiflow.studio.routes import Routes, Studio
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Missing, Store
+from orbiflow.studio.words import page_words
 from orbiflow.studio.work_queue import WorkQueue
 
 STATIC = Path(__file__).parent / "static"
@@ -144,7 +145,7 @@ async def _error_answer(_request: Request, error: Exception) -> JSONResponse:
     if isinstance(error, OrbiflowError):
         about = {"setting": error.setting} if isinstance(error, RefusedSetting) else {}
         status = 404 if isinstance(error, Missing) else 422
-        return JSONResponse({"error": str(error), **about}, status)
+        return JSONResponse({"error": page_words(advice_of(error)), **about}, status)
     if isinstance(error, HTTPException):
         words = {404: "there is nothing here; go back to the start page"}
         text = words.get(error.status_code, "this request cannot be answered; reload the page")

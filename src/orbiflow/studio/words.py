@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -12,9 +13,6 @@ from orbiflow.studio.store import Store
 
 NAMES = {"tile": "New tile", "density": "New density", "solid": "New solid"}
 """What a project of each kind is called before it has a name."""
-
-MASKS = ("mend", "pins", "emphasis")
-"""What is painted over a picture."""
 
 OF_PICTURE = ("", "-2")
 """What the names of the files of a project's first and second picture end in."""
@@ -31,27 +29,56 @@ LABELS = {
     "invert": "side (The animal is)",
     "smooth": "smoothing",
     "thicken": "Thin parts",
+    "unit": "the way angles are counted",
 }
 """What the pages call settings whose names say too little."""
 
 ON_THE_PAGE = {
-    "with smooth 0.01": "with a little smoothing",
-    "set threshold": "set another edge (Where it ends)",
+    "with smoothing 0.01": "with a little smoothing",
+    "say so with missing codes, and leave their rows out with drop missing; or make": "make",
+    "give the way angles are counted": "choose under “How angles are counted”:",
 }
-"""What errors of the reader say of its options, and what the page has for them."""
+"""What messages say of options, once these are named, and what the page has for them."""
 
 
 def page_words(text: str) -> str:
-    """Return a message of the reader in the page's own words.
+    """Return a message in the page's own words.
 
-    >>> page_words("raise the contrast or set threshold")
-    'raise the contrast or set another edge (Where it ends)'
+    >>> page_words(Advice("raise the contrast or try another {threshold}"))
+    'raise the contrast or try another edge (Where it ends)'
     """
     if isinstance(text, Advice):
-        return text.named(lambda name: LABELS.get(name, name))
+        text = text.named(lambda name: LABELS.get(name, name.replace("_", " ")))
     for words, meant in ON_THE_PAGE.items():
         text = text.replace(words, meant)
     return text
+
+
+PAINTED = {
+    "mend": "what you added or removed",
+    "pins": "what you painted with “Keep its shape”",
+    "emphasis": "what you painted with “Matters most”",
+}
+"""What messages call the files of what is painted over a picture."""
+
+MASKS = tuple(PAINTED)
+"""What is painted over a picture."""
+
+
+def own_names(text: str, project: Mapping[str, Any]) -> str:
+    """Return a message with the user's own names of files, in place of the studio's.
+
+    >>> own = {"input": {"name": "cat.svg", "type": "svg"}, "second": None}
+    >>> own_names("input.svg: no page; pins.png: not on it", own)
+    'cat.svg: no page; what you painted with “Keep its shape”: not on it'
+    """
+    names = {f"{name}{end}.png": words for end in OF_PICTURE for name, words in PAINTED.items()}
+    for end, given in zip(OF_PICTURE, (project, project["second"]), strict=True):
+        if given and (file := given["input"]):
+            own = file["name"]
+            names |= {f"{name}{end}.{file['type']}": own for name in ("input", "table", "mesh")}
+    every = "|".join(map(re.escape, names))
+    return re.sub(rf"(?<![\w-])({every})", lambda found: names[found[1]], text)
 
 
 def plain_name(given: Any, otherwise: str) -> str:

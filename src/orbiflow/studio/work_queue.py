@@ -33,7 +33,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.store import Missing, Store
-from orbiflow.studio.words import OF_PICTURE, page_words, plain_name
+from orbiflow.studio.words import OF_PICTURE, own_names, page_words, plain_name
 
 READINGS = frozenset({*READS, "density table", "mesh read"})
 """Tasks whose results the later ones of their project use."""
@@ -59,8 +59,8 @@ FAULT_TEXT = (
     "something went wrong inside orbiflow; the server's own output says what. Try other settings."
 )
 
-OWN_FILE = re.compile(r"^(backdrop|drawing|input)(-2)?\.[a-z]+: ")
-"""How errors begin that are about the project's picture, by a name that nobody gave it."""
+OWN_FILE = re.compile(r"^(backdrop|drawing)(-2)?\.[a-z]+: ")
+"""How errors begin that are about a picture of the studio's own, by a name that nobody gave it."""
 
 log = logging.getLogger("orbiflow.studio")
 Spawn = Callable[[], CallProcess]
@@ -365,7 +365,10 @@ class _Recorder:
                 self.store.delete_tile(self.project, number)
 
     def _plain(self, text: str) -> str:
-        """Return a text in the page's words, without the paths of this machine."""
+        """Return a text in the page's words, with the user's names of files, without paths."""
+        text = page_words(text)
         for folder in (self.home, self.home.resolve(), self.store.folder, Path.home()):
             text = text.replace(f"{folder}{os.sep}", "")
-        return page_words(OWN_FILE.sub("", text))
+        with suppress(Missing):
+            text = own_names(text, self.store.project(self.project))
+        return OWN_FILE.sub("", text)

@@ -122,7 +122,7 @@ def test_threshold_and_invert_override(tmp_path: Path) -> None:
     assert reading.notes == ("shape as set: dark on light (threshold 0.20, as given)",)
     # Interpolated towards a light ground, a low threshold draws the edge inwards.
     assert iou(reading.outline, [[20, 10], [40, 10], [40, 50], [20, 50]]) > 0.9
-    with pytest.raises(InputFileError, match=r"fills the whole image .* set invert"):
+    with pytest.raises(InputFileError, match=r"fills the whole image .* another invert"):
         read_outline(path, invert=True)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -108,16 +108,36 @@ def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
         ) from exc
 
 
-def check_length(
-    path: Path, number: int, row: list[str], first: int, expected: int, delimiter: str
+def check_lengths(
+    path: Path, rows: Iterable[tuple[int, list[str]]], first: int, expected: int, delimiter: str
 ) -> None:
-    """Check that a row has as many cells as the first line."""
-    if (n := len(row)) != expected:
+    """Check that rows, each with the number of its line, have as many cells as the first line."""
+    found = [
+        f"line {number} has {len(row)} cell{'s' * (len(row) != 1)}"
+        for number, row in rows
+        if len(row) != expected
+    ]
+    if found:
         spaced = "; a name with a space in it counts as two" if delimiter == " " else ""
         raise InputFileError(
-            f"{path}: line {number} has {n} cell{'s' * (n != 1)} and line {first} has {expected}; "
+            f"{path}: {found[0]} and line {first} has {expected}{and_others(found[1:])}; "
             f"give every line as many{spaced}"
         )
+
+
+def and_others(faults: Sequence[str]) -> str:
+    """Return what a message of the first fault of a file says of the others, in brackets.
+
+    >>> and_others(["line 4 has 2 cells"]), and_others([])
+    (' (also, line 4 has 2 cells)', '')
+    """
+    listed = ", ".join(faults[:MAX_LISTED])
+    more = f", and {len(faults) - MAX_LISTED} more" * (len(faults) > MAX_LISTED)
+    return f" (also, {listed}{more})" if faults else ""
+
+
+MAX_LISTED = 6
+"""Faults of a file that are listed after the first."""
 
 
 SAMPLE = 100
@@ -181,8 +201,8 @@ def layout_of(
     check_count(path, len(rows[0]), tables.MAX_COLUMNS, "columns")
     if has_header is not False and _has_row_names(rows):
         rows[0] = ["", *rows[0]]
-    for (number, _), row in zip(sample, rows, strict=True):
-        check_length(path, number, row, first, len(rows[0]), delimiter)
+    numbers = [number for number, _ in sample]
+    check_lengths(path, zip(numbers, rows, strict=True), first, len(rows[0]), delimiter)
     written = list(zip(*rows, strict=True))
     units = tuple(unit_of_cells(column) for column in written)
     cells = [[bare(cell, own) for cell, own in zip(row, units, strict=True)] for row in rows]

@@ -13,6 +13,7 @@ from array import array
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,14 @@ from orbiflow.density.tables.cells import (
     plain,
     unit_of_cell,
 )
-from orbiflow.density.tables.layout import Layout, check_length, layout_of, split_line, text_lines
+from orbiflow.density.tables.layout import (
+    Layout,
+    and_others,
+    check_lengths,
+    layout_of,
+    split_line,
+    text_lines,
+)
 from orbiflow.density.tables.table import (
     BLOCK,
     Reading,
@@ -56,12 +64,16 @@ def read_text(path: Path, reading: Reading) -> Table:
     numbers = _Numbers(path, names, tuple(layout.units[i] for i in picked), layout.marks)
     values, lines, comments = array("d"), array("q"), 0
     cells: list[str] = []
-    for number, line, is_comment in text_lines(path):
+    every = text_lines(path)
+    for number, line, is_comment in every:
         if is_comment or number == layout.header_line:
             comments += is_comment and number != layout.header_line
             continue
         row = split_line(path, number, line, layout.delimiter)
-        check_length(path, number, row, layout.first, len(layout.names), layout.delimiter)
+        if len(row) != len(layout.names):
+            rest = ((n, split_line(path, n, own, layout.delimiter)) for n, own, c in every if not c)
+            rows = chain([(number, row)], rest)
+            check_lengths(path, rows, layout.first, len(layout.names), layout.delimiter)
         lines.append(number)
         cells.extend([row[i] for i in picked])
         if len(cells) >= BLOCK * len(picked):
@@ -132,7 +144,23 @@ class _Numbers:
                 with suppress(ValueError):
                     return list(map(float, plainly))
         k, start = len(self.names), len(lines) - len(cells) // len(self.names)
-        return [self._one(lines[start + i // k], i % k, cell) for i, cell in enumerate(cells)]
+        found, faults = list[float](), list[TableError]()
+        for i, cell in enumerate(cells):
+            try:
+                found.append(self._one(lines[start + i // k], i % k, cell))
+            except TableError as error:
+                faults.append(error)
+        if faults:
+            raise self._of_all(faults)
+        return found
+
+    def _of_all(self, faults: Sequence[TableError]) -> TableError:
+        """Return the first of errors, which tells of the others."""
+        head, mark, cure = faults[0].template.partition(";")
+        begin = literal(f"{self.path}: ")
+        others = [own.template.partition(";")[0].removeprefix(begin) for own in faults[1:]]
+        of_cells = [other for other in others if other.startswith("line ")]
+        return TableError(head + and_others(of_cells) + mark + cure)
 
     def _one(self, line: int, column: int, cell: str) -> float:
         decimal, other = self.marks.decimal, OTHER[self.marks.decimal]

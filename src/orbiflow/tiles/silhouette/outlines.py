@@ -253,7 +253,8 @@ def sampled(
     if fine is None:
         raise SettingError(
             "parts of the silhouette are too thin to be followed: draw them thicker, round them off "
-            "with {smooth} 0.01, or, if a photograph was read badly, cut it out or set {threshold}"
+            "with {smooth} 0.01, or, if a photograph was read badly, cut it out or try another "
+            "{threshold}"
         )
     middle = with_corners(ring, corners, MIDDLE_MULTIPLE * len(coarse), phase * MIDDLE_MULTIPLE)
     if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:

@@ -14,7 +14,7 @@ from PIL import Image
 
 from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
 from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE, without_card, without_frame
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.label_masks import label_mask
@@ -207,8 +207,11 @@ def _cut(path: Source, picture: Picture) -> float:
     low, high = float(np.median(channel[~above])), float(np.median(channel[above]))
     if high - low < MIN_CONTRAST:
         raise InputFileError(
-            f"{path}: the image is all but blank, its luminance is {low:.2f} to {high:.2f}; "
-            "raise the contrast or give a threshold"
+            Advice(
+                literal(f"{path}: the image is all but blank")
+                + f", its luminance is {low:.2f} to {high:.2f}; raise the contrast or try another "
+                "{threshold}"
+            )
         )
     return (low + high) / 2
 
@@ -225,8 +228,10 @@ def _polarity(
     notes = [f"shape {how}: {kind} ({threshold})"]
     if invert is None and 0.3 < light < 0.7:
         notes.append(
-            f"only {max(light, 1 - light):.0%} of the image's border is background; if the wrong "
-            f"part was taken, set invert to {not shape_is_light}"
+            Advice(
+                f"only {max(light, 1 - light):.0%} of the image's border is background; if the "
+                "wrong part was taken, try another {invert}"
+            )
         )
     return shape_is_light, notes
 

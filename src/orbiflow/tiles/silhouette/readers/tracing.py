@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.contours import level_curves
-from orbiflow.errors import InputFileError
+from orbiflow.errors import Advice, InputFileError, literal
 from orbiflow.tiles.geometry import polygons_in, signed_area
 from orbiflow.tiles.silhouette.outlines import left_out, outer_ring, thinned
 from orbiflow.tiles.silhouette.readers.reading import Source
@@ -63,8 +63,10 @@ def trace(
     notes += parts
     if shape.all():
         raise InputFileError(
-            f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels); leave a "
-            "margin around it, or set invert to take the other part"
+            Advice(
+                literal(f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels)")
+                + "; leave a margin around it, or try another {invert} to take the other part"
+            )
         )
     if _is_cut_off(shape):
         notes.append("the shape touches the image's border and may be cut off there")
@@ -72,8 +74,11 @@ def trace(
     area = polygon.area * scale**2
     if area < MIN_AREA:
         raise InputFileError(
-            f"{path}: the largest shape covers only {area:.1f} pixels, at least {MIN_AREA:.0f} are "
-            "needed; give a larger image, or set threshold or invert"
+            Advice(
+                literal(f"{path}: the largest shape covers only {area:.1f} pixels")
+                + f", at least {MIN_AREA:.0f} are needed; give a larger image, or try another "
+                "{threshold} or {invert}"
+            )
         )
     tolerance = SIMPLIFY_TOLERANCE
     if stepped:
