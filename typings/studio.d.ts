@@ -102,7 +102,7 @@ interface FigureView {
 }
 
 /** A tile on a page of its own, with what is shown of it or of each of its figures. */
-type TileView = Card & FigureView & { elements: Elements; figures?: FigureView[] };
+type TileView = Card & FigureView & { notes?: string[]; elements: Elements; figures?: FigureView[] };
 
 interface Task {
   id: number;

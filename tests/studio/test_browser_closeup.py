@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -180,6 +181,38 @@ def test_a_refusal_springs_back_is_said_once_and_makes_way(closeup, tile) -> Non
     page.wait_for_selector(f"{BADGE}[data-kind=proved]")
     # the refusal is an answer of the server, which browsers note
     page.wrong[:] = [said for said in page.wrong if "422" not in said]
+
+
+def test_a_check_shows_how_far_it_is_and_can_be_stopped(page, studio, searched: str, tile) -> None:
+    running = {"id": 999, "operation": "pull", "state": "running", "share": 0.4, "what": "checking"}
+    event = f"event: task\ndata: {json.dumps(running)}\n\n"
+    page.route(
+        "**/events?after*", lambda r: r.fulfill(content_type="text/event-stream", body=event)
+    )
+    held, stopped = list[Any](), list[str]()
+    page.route("**/pulled", lambda route: held.append(route))
+    page.route("**/tasks/999/cancel", lambda r: stopped.append(r.request.url) or r.fulfill(json={}))
+    page.goto(f"/#/p/{searched}/t/{tile['id']}")
+    page.wait_for_selector(f"{BADGE}[data-kind=proved]")
+    choose(page, "Pull")
+    pulled(page, 26.0, 14.0)
+    page.wait_for_selector(f"{BADGE}:has-text('Checking … 40 %')")
+    page.get_by_role("button", name="Stop").click()
+    studio.until(lambda: page.wait_for_timeout(20) or stopped)
+    held[0].fulfill(status=422, json={"error": "the change was cancelled; pull again"})
+    page.wait_for_selector(f"{BADGE}[data-kind=refused]")
+    assert page.get_by_role("button", name="Stop").count() == 0
+    page.wrong.clear()  # a refusal is noted, and a stream that ends
+
+
+def test_notes_of_the_tile_and_of_its_search_are_shown(page, searched: str, tile) -> None:
+    def noted(route: Any) -> None:
+        answer = route.fetch()
+        route.fulfill(json={**answer.json(), "notes": ["its thinnest part was rounded off"]})
+
+    page.route(f"**/tiles/{tile['id']}", noted)
+    page.goto(f"/#/p/{searched}/t/{tile['id']}")
+    page.get_by_text("Its thinnest part was rounded off").wait_for()
 
 
 def test_the_help_says_what_moves_the_view(closeup) -> None:

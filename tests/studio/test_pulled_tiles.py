@@ -54,6 +54,29 @@ def nudged(tile: EscherTile, seed: int, reach: float) -> Array:
     return space.start + reach * room * move / abs(space.polygon(move)).max()
 
 
+def test_a_pull_tells_how_far_it_is_and_can_be_ended() -> None:
+    tile, heard = squirrel("IH4"), list[float]()
+    given = nudged(tile, 3, 0.3)
+    assert pulled(tile, given, heard.append).certificate.valid
+    assert heard
+    assert all(0 <= share < 1 for share in heard)
+
+    class Ended(Exception):
+        pass
+
+    def end(_: float) -> None:
+        raise Ended
+
+    with pytest.raises(Ended):
+        pulled(tile, given, end)
+
+
+def test_notes_of_a_tile_are_told_once() -> None:
+    tile = squirrel("IH4").changed(notes=("rounded", "rounded", "grown"), no_map="too thin")
+    told = tile_view({"figures": []}, tile)["notes"]
+    assert told == ["rounded", "grown", "too thin"]
+
+
 @settings(max_examples=4)
 @given(swirled.filter(is_sound), seeds)
 def test_what_the_browser_is_told_is_the_space_of_the_tile(tile: Tile, seed: int) -> None:

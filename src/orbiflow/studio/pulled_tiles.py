@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
     Bending,
     EscherTile,
+    Frame,
     Likeness,
     Rating,
     SearchFacts,
@@ -44,6 +46,10 @@ BODY_SPACING = 2.5  # distance of points inside the body, in mean sides of the o
 NEGLIGIBLE_ENTRY = 1e-12  # entry of the space's matrix that is nothing but rounding
 AREA_BOUNDS = (0.05, 20.0)  # area of a pulled tile, and of its lattice's cell, in those of before
 SAME_POINT_DISTANCE = 1e-7  # in the tile's size: vertices of figures this near to others are these
+QUICK_SHARPENINGS = 4  # tries to unfold the inside after one step of a pull
+MOST_STEPS = 32  # in which the inside follows a pull
+Way = Callable[[float], Array]  # the polygon of a figure at a share of the way, 0 to 1
+Told = Callable[[float], object]
 PULLED = ("its outline was pulled by hand",)
 CROSSED = "the outline crosses itself there, so tiles would overlap: pull it less far"
 OTHER_SIZE = "the tile has become much too small or too large: pull it less far"
@@ -194,8 +200,10 @@ def _sparse(matrix: Array) -> dict[str, Any]:
     }
 
 
-def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
+def pulled(tile: EscherTile, parameters: Any, told: Told = lambda _: None) -> EscherTile:
     """Return the certified tile for parameters of its `PullSpace`, with the maps carried on.
+
+    `told` hears the share of the way on which the inside has followed, and may raise to end it.
 
     Raises:
         OrbiflowError: for parameters that are not of this tile's space.
@@ -210,8 +218,12 @@ def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
     given = as_array(parameters, "the parameters of a pulled tile", space.start.shape)
     _check(space, given)
     whole, points = space.tile(given), space.polygon(given)
+
+    def on_the_way(share: float) -> Array:
+        return space.polygon(space.start + share * (given - space.start))
+
     if not tile.parts:
-        found = _figure(tile, whole, space.first.polygon, COMPARED_POINTS)
+        found = _figure(tile, whole, on_the_way, COMPARED_POINTS, told)
     else:
         parts = list[Any]()
         for part, ring, kept in zip(tile.parts, space.rings, space.kept, strict=True):
@@ -219,7 +231,8 @@ def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
             corners = tuple(kept[list(before.tile.corners)].tolist())
             own = Tile(back(points[ring]), whole.group.conjugate(*back), corners=corners)
             count = COMPARED_POINTS // len(tile.parts)
-            figure = _figure(before, own, back(space.points[ring]), count)
+            way = partial(_own_ring, on_the_way, ring, back)
+            figure = _figure(before, own, way, count, told)
             parts.append(part._replace(figure=figure))
         found = EscherTile(
             whole,
@@ -250,8 +263,30 @@ def _check(space: PullSpace, parameters: Array) -> None:
         raise CertificationError(CROSSED)
 
 
-def _figure(before: EscherTile, tile: Tile, ring: Array, count: int) -> EscherTile:
-    """Return a figure that was pulled to `tile` from a ring, with its map and likeness carried on.
+def _own_ring(way: Way, ring: Integers, back: Callable[[Array], Array], share: float) -> Array:
+    """Return the ring of a figure, in its own coordinates, a share of the way."""
+    return back(way(share)[ring])
+
+
+def _carried(bending: Bending, frame: Frame, way: Way, told: Told) -> Bending:
+    """Return the map to a polygon that moved on a way, in as few steps as it follows without folds."""
+
+    def follow(own: Bending, start: float, end: float, steps: int) -> Bending:
+        told(start)
+        try:
+            rings = (frame.to_normal(way(share)) for share in (start, end))
+            return carried_on(own, *rings, sharpenings=QUICK_SHARPENINGS)
+        except OrbiflowError:
+            if steps >= MOST_STEPS:
+                raise
+        middle = (start + end) / 2
+        return follow(follow(own, start, middle, 2 * steps), middle, end, 2 * steps)
+
+    return follow(bending, 0.0, 1.0, 1)
+
+
+def _figure(before: EscherTile, tile: Tile, way: Way, count: int, told: Told) -> EscherTile:
+    """Return a figure that was pulled to `tile` on a way, with its map and likeness carried on.
 
     It is compared with its silhouette at so many points.
     """
@@ -272,7 +307,7 @@ def _figure(before: EscherTile, tile: Tile, ring: Array, count: int) -> EscherTi
     if bending is None or frame is None:
         return found.changed(no_map=before.no_map or "its run left no map")
     try:
-        bending = carried_on(bending, frame.to_normal(ring), frame.to_normal(tile.polygon))
+        bending = _carried(bending, frame, way, told)
     except OrbiflowError as error:
         return found.changed(map_source=TileMap(frame=frame), no_map=str(error))
     rest, images = _outlines(bending, count)

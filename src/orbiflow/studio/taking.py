@@ -154,7 +154,7 @@ def _drawn(call: Call, folder: Path, hear: Sink, cancel: Cancel) -> bytes:
     else:
         settings = _small(settings, LIVE_SIDE_PIXELS)
     arguments = {**call.arguments, "settings": settings, "out": out}
-    done = call.operation.function(**arguments, on_event=hear, cancel=cancel)
+    done: Any = call.operation.function(**arguments, on_event=hear, cancel=cancel)
     if makes == "solid":
         _preview(call, min(folder.glob(f"*{out.suffix}")), folder, cancel)
     elif out.suffix == ".png":

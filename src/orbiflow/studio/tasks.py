@@ -282,8 +282,12 @@ def pull(
     from orbiflow.studio.pulled_tiles import pulled, space_json
     from orbiflow.tiles import read_result
 
-    cancel.check()
-    found = pulled(read_result(tile_folder(job.project, tile)), parameters)
+    def told(share: float) -> None:
+        cancel.check()
+        on_event(Progress(share, "checking"))
+
+    told(0.0)
+    found = pulled(read_result(tile_folder(job.project, tile)), parameters, told)
     number, stage = tile_number(job.task, 0), STAGES[-1]
     put_tile(job.project, number, stage, found, on_event, origin_of_pulled(job.project, tile))
     if place := best_stage(job.project, number):  # at hand when it is pulled again

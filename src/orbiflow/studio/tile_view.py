@@ -76,9 +76,15 @@ def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
 
     `elements` is what the group's symmetries are, one of each kind up to the lattice, in the input's
     units: the corners of a `cell`, `centres` with their order, `mirrors` and `glides` with a point and
-    a direction.
+    a direction. `notes` are sentences on how the tile was made.
     """
-    view = {**card, "elements": elements_json(tile.tile.group, tile.tile.center)}
+    figures = [part.figure for part in tile.figures]
+    said = [own for figure in figures for own in (*figure.notes, figure.no_map) if own]
+    view = {
+        **card,
+        "notes": list(dict.fromkeys([*tile.notes, *said])),
+        "elements": elements_json(tile.tile.group, tile.tile.center),
+    }
     if not tile.parts:
         return {**view, **figure_view(tile, 0)}
     shown = [{**own, **figure_view(tile, k)} for k, own in enumerate(card["figures"])]

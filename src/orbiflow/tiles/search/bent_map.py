@@ -187,11 +187,13 @@ def divided(mesh: Mesh, at: Array, images: Array) -> tuple[Mesh, Array]:
     return Mesh(extended(mesh.points), triangles, sides, at_side, mesh.size), extended(images)
 
 
-def carried_on(bending: Bending, before: Array, after: Array) -> Bending:
+def carried_on(
+    bending: Bending, before: Array, after: Array, sharpenings: int | None = None
+) -> Bending:
     """Return a map to a tile `before` (N, 2), composed with the move of its vertices to `after` (N, 2).
 
     All are in normal form; the polygons may be clockwise. The inside follows harmonically and is
-    untangled; an `OrbiflowError` if it cannot follow without folds.
+    untangled, for so many `sharpenings` at most; an `OrbiflowError` if it cannot follow without folds.
     """
     first = border(bending.triangles)
     order = np.concatenate([first, np.setdiff1d(np.arange(len(bending.rest)), first)])
@@ -210,7 +212,7 @@ def carried_on(bending: Bending, before: Array, after: Array) -> Bending:
     along = np.interp((shares(mesh) - offset) % mesh.size, numbers, knots)
     steps = [np.interp(along, places, np.append(step, step[0])) for step in (new - old).T]
     images = images + harmonic(mesh, np.stack(steps, axis=-1))
-    return Bending(mesh.points, unfolded(mesh, images), mesh.triangles)
+    return Bending(mesh.points, unfolded(mesh, images, sharpenings), mesh.triangles)
 
 
 TILE_POINTS, SILHOUETTE_POINTS = 240, 480  # points along the two outlines that are matched

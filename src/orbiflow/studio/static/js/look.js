@@ -44,13 +44,16 @@ export function paletteOf({ palette, custom }, { palettes }) {
  * @param {Project} project
  */
 export function keeper(api, project) {
+  const chosen = {}; // on this page: what the server tells meanwhile may be older
   const send = newest(
-    () => api.patch(`projects/${project.id}`, { view: { look: project.view.look } }),
+    () =>
+      api.patch(`projects/${project.id}`, { view: { look: { ...project.view?.look, ...chosen } } }),
     400,
   );
   /** @param {object} what */
   return (what) => {
-    project.view = { ...project.view, look: { ...project.view?.look, ...what } };
+    Object.assign(chosen, what);
+    project.view = { ...project.view, look: { ...project.view?.look, ...chosen } };
     send();
   };
 }

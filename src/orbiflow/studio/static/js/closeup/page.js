@@ -1,11 +1,11 @@
 /** The close-up of one tile: look, pull, draw. */
 
 import { client } from "../api.js";
-import { choice, h, newest, put, style, toast, trying } from "../dom.js";
+import { button, choice, h, newest, notes, put, style, toast, trying } from "../dom.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf } from "../skin.js";
 import { figuresOf } from "../tiling.js";
-import { capital, named } from "../words.js";
+import { alive, capital, named } from "../words.js";
 import { Carry } from "./carry.js";
 import { Dress } from "./dress.js";
 import { LiveTiling } from "./live.js";
@@ -16,6 +16,7 @@ import { Pulling } from "./pulling.js";
 import { kindsOf, paintSigns, placed, signAt } from "./signs.js";
 import { Stage } from "./stage.js";
 
+const percent = (share) => `${Math.round(100 * share)} %`;
 const CALM = 8000; // ms after which a refusal makes way
 
 /**
@@ -60,13 +61,14 @@ class Closeup {
             },
           },
         }),
-      600,
+      300,
     );
     this.keepDrawing = newest((drawing) => api.patch(this.home, { view: { drawing } }), 500);
     this.#build();
     this.offs = [
       events.on("card", (card) => this.#better(card)),
       events.on("project", (now) => this.#elsewhere(now)),
+      events.on("task", () => this.#checking()),
       events.on("gone", ({ tile }) => tile === this.view?.id && navigate(`p/${project.id}`)),
     ];
     this.keys = (event) => this.past.key(event);
@@ -102,6 +104,15 @@ class Closeup {
   #build() {
     this.said = h("p", { class: "unseen", role: "status", "aria-live": "polite" });
     this.badge = h("p", { class: "badge" });
+    this.stop = button(
+      "Stop",
+      () => trying(() => this.api.post(`tasks/${this.checked.id}/cancel`)),
+      {
+        image: "stop",
+        kind: "stop",
+        hidden: true,
+      },
+    );
     this.hint = h("p", { class: "hint", hidden: true });
     this.stage = new Stage({
       label: "The tiling, without end",
@@ -130,11 +141,13 @@ class Closeup {
     this.stage.box.append(
       h("div", { class: "past" }, this.past.buttons),
       this.badge,
+      this.stop,
       this.hint,
       this.stage.zooms(),
     );
     this.heading = h("h1", { tabindex: "-1" }, "Close up");
     this.kind = h("p", { class: "soft small" });
+    this.noted = h("div");
     this.modes = choice(
       "What to do",
       [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]],
@@ -147,7 +160,7 @@ class Closeup {
     const side = h(
       "div",
       { class: "closeup-side" },
-      h("div", {}, this.heading, this.kind),
+      h("div", {}, this.heading, this.kind, this.noted),
       this.modes,
       this.panel,
       this.help,
@@ -177,6 +190,7 @@ class Closeup {
     this.kind.textContent = [named(view), view.class_name, view.group.name].filter(Boolean).join(
       " · ",
     );
+    this.#note();
     this.#proved();
     this.#panels();
     this.past.show(view, quiet);
@@ -330,7 +344,23 @@ class Closeup {
     this.badge.dataset.kind = kind;
     this.badge.textContent = text;
     clearTimeout(this.calming);
+    if (kind !== "checking") this.stop.hidden = true;
     if (kind === "refused") this.calming = setTimeout(() => this.#proved(), CALM);
+  }
+
+  /** All that is to be known of the tile, and of the work that made it. */
+  #note() {
+    const work = this.project.tasks.find(({ id }) => id === Math.floor(this.view.id / 1000));
+    const said = new Set([...(this.view.notes ?? []), ...(work?.result?.notes ?? [])]);
+    put(this.noted, said.size > 0 && notes([...said]));
+  }
+
+  /** How far the check of a pulled tile is; it can be stopped. */
+  #checking() {
+    const { badge, project } = this;
+    this.checked = project.tasks.find((own) => own.operation === "pull" && alive(own));
+    this.stop.hidden = !this.checked || badge.dataset.kind !== "checking";
+    if (!this.stop.hidden) this.tell("checking", `Checking … ${percent(this.checked.share)}`);
   }
 
   #proved() {
@@ -354,6 +384,7 @@ class Closeup {
   async #released(parameters) {
     const before = this.view;
     this.tell("checking", "Checking …");
+    this.#checking();
     try {
       const card = await this.api.post(`${this.home}/tiles/${before.id}/pulled`, { parameters });
       if (this.closed) return;
