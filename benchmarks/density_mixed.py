@@ -59,7 +59,7 @@ def _backbone(count: int, rng: np.random.Generator) -> Data:
 def _log_backbone(x: Data) -> Data:
     terms = [
         np.log(weight)
-        + stats.vonmises.logpdf(x[:, :2], kappa, loc=means).sum(axis=1)
+        + np.asarray(stats.vonmises.logpdf(x[:, :2], kappa, loc=means)).sum(axis=1)
         + stats.norm.logpdf(x[:, 2], length, spread)
         for weight, means, kappa, length, spread in STATES
     ]

@@ -9,7 +9,7 @@ from typing import Any
 
 import torch
 from torch import Tensor
-from torch.autograd import Function
+from torch.autograd import Function, forward_ad
 from torch.optim import Optimizer
 
 _torch: Any = torch
@@ -31,3 +31,22 @@ def listed(tensor: Tensor) -> list[Any]:
     """Return the numbers of a tensor as nested lists, one level per dimension (at least one)."""
     values: Any = tensor
     return values.tolist()
+
+
+# torch uses these itself, but has neither public names nor types for them
+_core: Any = torch._C  # pyright: ignore[reportPrivateUsage]
+_forward_mode: Any = forward_ad
+
+
+def transformed() -> bool:
+    """Return whether `torch.func` (vmap, grad, jvp and what builds on them) or forward mode is active.
+
+    Tensors may then stand for batches, or carry tangents. torch has no public function for this; its
+    own autograd functions ask the same.
+    """
+    return _core._are_functorch_transforms_active() or _forward_mode._current_level >= 0
+
+
+def is_old_batch(tensor: Tensor) -> bool:
+    """Return whether torch's older vectorization has batched a tensor."""
+    return bool(_core._functorch.is_legacy_batchedtensor(tensor))

@@ -9,7 +9,6 @@ from .protocol import lipschitz_bound as lipschitz_bound
 from .protocol import prepared as prepared
 from .protocol import prepared_with_divergence as prepared_with_divergence
 from .protocol import prepared_with_jacobian as prepared_with_jacobian
-from .protocol import transformed as transformed
 from .spline_field import SplineField as SplineField
 from .spline_field import has_even_grid as has_even_grid
 from .symmetrization import PeriodicFeatures as PeriodicFeatures

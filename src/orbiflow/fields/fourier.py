@@ -19,9 +19,9 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.fields.invariants import InvariantBasis, InvariantField, coefficient_bound
-from orbiflow.fields.protocol import plain_gradients, refuse_old_batches, transformed
+from orbiflow.fields.protocol import plain_gradients, refuse_old_batches
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.typed_torch import applied, linalg
+from orbiflow.typed_torch import applied, linalg, transformed
 
 # the size of the working arrays for one block of points; 1 to 3 MiB measured fastest
 BLOCK_BYTES = 2**21

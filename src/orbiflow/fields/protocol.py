@@ -24,9 +24,9 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
-from torch.autograd import forward_ad
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import is_old_batch, transformed
 
 VectorField = Callable[[Tensor], Tensor]
 """A map from points (..., d) to vectors (..., d)."""
@@ -126,20 +126,6 @@ def _is_differentiable(field: VectorField, points: Tensor) -> bool:
     return _values(field, points).requires_grad
 
 
-# torch uses these itself, but has neither public names nor types for them
-_core: Any = torch._C  # pyright: ignore[reportPrivateUsage]
-_forward_mode: Any = forward_ad
-
-
-def transformed() -> bool:
-    """Return whether `torch.func` (vmap, grad, jvp and what builds on them) or forward mode is active.
-
-    Tensors may then stand for batches, or carry tangents. torch has no public function for this; its
-    own autograd functions ask the same.
-    """
-    return _core._are_functorch_transforms_active() or _forward_mode._current_level >= 0
-
-
 def plain_gradients(
     function: Callable[..., Any], inputs: tuple[Tensor, ...], ctx: Any, cotangents: Any
 ) -> list[Tensor | None]:
@@ -168,7 +154,7 @@ def plain_gradients(
 
 def refuse_old_batches(*gradients: Tensor) -> None:
     """Refuse gradients that torch's older vectorization has batched."""
-    if any(_core._functorch.is_legacy_batchedtensor(gradient) for gradient in gradients):
+    if any(map(is_old_batch, gradients)):
         raise OrbiflowError(
             "a field cannot be differentiated with vectorize=True or is_grads_batched=True: "
             "torch.func.vmap(torch.func.jacrev(field))(points) gives its Jacobians"

@@ -17,9 +17,9 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariants import InvariantBasis, InvariantField
-from orbiflow.fields.protocol import plain_gradients, refuse_old_batches, transformed
+from orbiflow.fields.protocol import plain_gradients, refuse_old_batches
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.typed_torch import applied, fft, linalg
+from orbiflow.typed_torch import applied, fft, linalg, transformed
 
 TAPS = 4  # the number of coefficients along an axis that a cubic spline's value depends on
 

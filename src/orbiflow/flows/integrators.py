@@ -20,8 +20,8 @@ import torch
 from torch import Tensor
 
 from orbiflow.errors import CoarseStepsWarning, OrbiflowError
-from orbiflow.fields import lipschitz_bound, transformed
-from orbiflow.typed_torch import linalg
+from orbiflow.fields import lipschitz_bound
+from orbiflow.typed_torch import linalg, transformed
 
 if TYPE_CHECKING:
     from orbiflow.flows.flow import Flow

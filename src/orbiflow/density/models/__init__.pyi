@@ -14,6 +14,7 @@ from .density import Weighted as Weighted
 from .evaluation import kl_by_quadrature as kl_by_quadrature
 from .evaluation import log_density_gradient as log_density_gradient
 from .evaluation import midpoints as midpoints
+from .figures import Estimate as Estimate
 from .files import density_to_bytes as density_to_bytes
 from .files import read_density as read_density
 from .flow import MOST_DIM as MOST_DIM

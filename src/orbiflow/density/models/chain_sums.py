@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.sums import LOG2_E
+from orbiflow.typed_torch import transformed
 
 SCALES = (1.0, 4.0, 16.0)
 """A component's concentrations are divided by these, each with its own weight: heavy tails.
@@ -99,6 +100,9 @@ class ChainSum:
     def log(self, points: Tensor) -> Tensor:
         """Return the logarithm (N,) of the sum at points (N, d) in turns; differentiable."""
         fit, _ = self._fits.at(seen_angles(2 * math.pi * points))
+        if transformed():  # which knows no faint rows: each term by logarithms
+            scales = fit.new_tensor(SCALES)[:, None]
+            return (fit[:, None] / scales + self._log_peaks).flatten(1).logsumexp(dim=1)
         wide, middle, narrow = at_scales(fit)
         total = wide @ self._peaks[0] + middle @ self._peaks[1] + narrow @ self._peaks[2]
         least = math.exp(FAINTEST_LOG[total.dtype] + FELT_LOG_RATIO) * self._peaks.sum()

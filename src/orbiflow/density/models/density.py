@@ -11,9 +11,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import torch
 from torch import Tensor
-from torch.distributions import Distribution, constraints
+from torch.distributions import constraints
 
 from orbiflow.arguments import as_instance, as_points
+from orbiflow.density.models.figures import WithFigures
 from orbiflow.density.models.tensors import destination, moved, shape_of, source_of
 from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
@@ -33,7 +34,7 @@ KINDS: dict[str, type[Density]] = {}
 """The classes of densities that a file can hold, by the names they have there."""
 
 
-class Density(Distribution):
+class Density(WithFigures):
     """A normalised density on an identification space, invariant under the space's group.
 
     A `torch.distributions.Distribution` over chart points: canonical representatives in [0, 1]^d,
@@ -315,17 +316,6 @@ class Density(Distribution):
             return torch.empty(*shape, self.space.chart_dim, dtype=self.dtype, device=self.device)
         drawn = self.draw(shape.numel(), source).to(dtype=self.dtype, device=self.device)
         return drawn.reshape(*shape, self.space.chart_dim)
-
-    @torch.no_grad()
-    def entropy(
-        self, count: int = 16384, *, measure: str = CHART, generator: torch.Generator | None = None
-    ) -> Tensor:
-        """Return a Monte Carlo estimate of -E[log p] in nats, from `count` samples.
-
-        It is with respect to `measure`, by default that of `log_prob`; "natural" gives the entropy in
-        the user's units or per steradian.
-        """
-        return -self.log_prob(self.sample((count,), generator), measure=measure).mean()
 
     def to(self, *wanted: Any) -> Self:
         """Return a copy elsewhere: `to("cuda")`, `to(torch.float32)`, `to("cuda", torch.float32)`.

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.typed_torch import applied
+from orbiflow.typed_torch import applied, transformed
 
 FAINT_LOG = -80.0
 """Logarithm, relative to the largest, of terms that no sum in double precision can feel."""
@@ -221,7 +221,7 @@ def near_log_sum(terms: Terms, features: Tensor, floor: float = -math.inf) -> Te
     Differentiable in the features: the gradient in closed form, as fast as the sum; higher
     derivatives by autograd through all terms.
     """
-    if features.shape[1] * terms.size < FEWEST_PAIRS:
+    if features.shape[1] * terms.size < FEWEST_PAIRS or transformed():
         return terms.plain_log_sum(features)
     if not (features.requires_grad and torch.is_grad_enabled()):
         return _Walk(features, terms, floor).log_sum

@@ -1,0 +1,125 @@
+"""Means, modes, masses, entropies and divergences of densities, against closed forms and draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import integrate, stats
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    DensityEstimator,
+    MixedTorus,
+    UniformDensity,
+    make_space,
+)
+from orbiflow.errors import OrbiflowError
+
+ONE = torch.ones(1, dtype=torch.float64)
+
+
+def von_mises(turns: float, kappa: float) -> AdaptiveKernels:
+    """A von Mises distribution of one angle."""
+    space = make_space("torus", dim=1)
+    return AdaptiveKernels(space, torch.tensor([[turns]]).double(), kappa * ONE[:, None], ONE)
+
+
+@pytest.fixture(scope="module", name="pair")
+def pair_fixture() -> DensityEstimator:
+    rng = np.random.default_rng(0)
+    data = np.concatenate([rng.vonmises([0.5, -2.0], 6, (150, 2)), rng.vonmises(2.5, 9, (90, 2))])
+    return DensityEstimator("torus", components="kernels,mixture,chains").fit(data)
+
+
+@given(st.floats(0, 1), st.floats(0.1, 5000), st.floats(-0.49, 0.49))
+def test_masses_of_a_von_mises_distribution(turns: float, kappa: float, at: float) -> None:
+    density = von_mises(turns, kappa)
+    x = 2 * np.pi * at
+    middle = 2 * np.pi * turns
+    true = stats.vonmises.cdf(x, kappa, loc=middle) - stats.vonmises.cdf(-np.pi, kappa, loc=middle)
+    found = density.cdf(torch.tensor([[at]]).double())
+    assert float(found[0]) == pytest.approx(true, abs=1e-7)
+    back = float(density.icdf(found)[0, 0])
+    assert float(density.cdf(torch.tensor([[back]]).double())[0]) == pytest.approx(true, abs=1e-7)
+    apart = (float(density.mean[0]) - turns + 0.5) % 1 - 0.5
+    assert abs(apart) < 1e-6
+    apart = (float(density.mode[0]) - turns + 0.5) % 1 - 0.5
+    assert abs(apart) < 1e-5
+
+
+@given(st.floats(0.2, 300))
+def test_entropies_and_divergences_lie_within_their_errors(kappa: float) -> None:
+    one, other = von_mises(0.2, kappa), von_mises(0.3, 2.0)
+    value, error = one.estimated_entropy(measure="natural")
+    assert abs(value - stats.vonmises.entropy(kappa)) < 6 * error + 1e-9
+    assert float(one.entropy()) == float(one.entropy())
+    angles = np.linspace(-np.pi, np.pi, 20001)
+    p, q = (
+        stats.vonmises.logpdf(angles, k, loc=2 * np.pi * m) for k, m in ((kappa, 0.2), (2.0, 0.3))
+    )
+    true = integrate.trapezoid(np.exp(p) * (p - q), angles)
+    value, error = one.divergence(other)
+    assert abs(value - true) < 6 * error + 1e-9
+    assert float(torch.distributions.kl_divergence(one, other)) == value
+
+
+def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> None:
+    drawn = pair.sample(40_000, random_state=0)
+    directions = np.angle(np.exp(1j * drawn).mean(axis=0))
+    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.02
+    top = pair.score_samples(pair.mode()[None])
+    assert top[0] >= pair.score_samples(drawn[:5000]).max() - 1e-9
+    alone = pair.marginal(0)
+    shares = alone.cdf(np.sort(drawn[:, 0])[:, None])
+    assert np.abs(shares - (np.arange(40_000) + 0.5) / 40_000).max() < 0.015
+    assert np.allclose(
+        alone.cdf(alone.quantile([0.1, 0.5, 0.9])[:, None]), [0.1, 0.5, 0.9], atol=1e-6
+    )
+    assert pair.kl_divergence(pair) == (0.0, 0.0)
+    assert pair.entropy().error < 0.01
+
+
+def test_a_real_column_has_quantiles_and_a_mean() -> None:
+    rng = np.random.default_rng(1)
+    data = rng.normal(5, 2, (2000, 1))
+    fit = DensityEstimator("torus", linear=(0,), components="kernels,mixture").fit(data)
+    assert fit.mean()[0] == pytest.approx(data.mean(), abs=0.1)
+    wanted = np.quantile(data, [0.05, 0.5, 0.95])
+    assert fit.quantile([0.05, 0.5, 0.95]) == pytest.approx(wanted, abs=0.3)
+    assert fit.entropy().value == pytest.approx(stats.norm(5, 2).entropy(), abs=0.06)
+    other = DensityEstimator("torus", linear=(0,), components="mixture").fit(data + 1.0)
+    assert fit.kl_divergence(other).value == pytest.approx(1 / 8, abs=0.04)
+
+
+def test_directions_have_a_mean_and_axes_have_none() -> None:
+    rng = np.random.default_rng(2)
+    data = np.column_stack([rng.normal(40, 8, 300), rng.normal(170, 12, 300)])
+    fit = DensityEstimator("sphere", components="kernels").fit(data)
+    assert np.abs(fit.mean() - data.mean(axis=0)).max() < 2
+    assert np.abs(fit.mode() - data.mean(axis=0)).max() < 8
+    for name in ("projective-plane", "klein-bottle"):
+        with pytest.raises(OrbiflowError, match="have no mean"):
+            _ = UniformDensity(make_space(name)).mean
+    with pytest.raises(OrbiflowError, match="no order"):
+        fit.density_.cdf(torch.zeros(1, 2))
+    with pytest.raises(OrbiflowError, match="take its marginal"):
+        UniformDensity(make_space("torus")).cdf(torch.zeros(1, 2))
+    with pytest.raises(OrbiflowError, match="cannot be compared"):
+        fit.density_.divergence(UniformDensity(MixedTorus([None, (0, 1)])))
+    with pytest.raises(OrbiflowError, match="from 0 to 1"):
+        von_mises(0.1, 2.0).icdf(torch.tensor([1.5]))
+
+
+def test_it_can_be_mapped_over_points(pair: DensityEstimator) -> None:
+    points = torch.rand(7, 2, dtype=torch.float64)
+    parts = [part for _, part in pair.density_.parts()]
+    for density in (*parts, pair.density_):
+        values = torch.func.vmap(density.log_prob)(points)
+        assert torch.allclose(values, density.log_prob(points), atol=1e-12)
+        slopes = torch.func.vmap(torch.func.grad(density.log_prob))(points)
+        own = points.clone().requires_grad_()
+        (wanted,) = torch.autograd.grad(density.log_prob(own).sum(), own)
+        assert torch.allclose(slopes, wanted, atol=1e-9)
