@@ -17,16 +17,21 @@ from orbiflow.runtime import is_list, is_object, write_atomic
 from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, open_image, orient, triangulate
 
 MAX_STROKES, MAX_POINTS, MAX_EYES = 2000, 100_000, 60
+MAX_RINGS = 200  # around one part that is filled
 SUPERSAMPLING = 2  # pixels, across, of which one pixel of a picture with lines is the mean
 COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
 class Stroke(NamedTuple):
-    """A line with its width and points (N, 2), in the silhouette's coordinates."""
+    """A line with its width and points (N, 2), in the silhouette's coordinates, or a filled part.
+
+    A part has the `rings` (N, 2) around it, of which some are holes.
+    """
 
     colour: str
     width: float
     points: Array
+    rings: tuple[Array, ...] = ()
 
 
 def with_any_map(tile: EscherTile) -> EscherTile:
@@ -74,7 +79,7 @@ def read_drawing(drawing: Any) -> tuple[list[Stroke], tuple[tuple[float, ...], .
     if not is_list(strokes) or not is_list(eyes):
         raise OrbiflowError("a drawing has a list of strokes and a list of eyes")
     found = [_stroke(one) for one in strokes[: MAX_STROKES + 1]]
-    count = sum(len(one.points) for one in found)
+    count = sum(len(one.points) + sum(map(len, one.rings)) for one in found)
     if len(found) > MAX_STROKES or count > MAX_POINTS or len(eyes) > MAX_EYES:
         raise OrbiflowError(
             f"the drawing is too large: it may have {MAX_STROKES} lines with {MAX_POINTS} points in "
@@ -89,7 +94,11 @@ def _stroke(given: Any) -> Stroke:
     if not COLOUR.fullmatch(colour):
         raise OrbiflowError(f"the colour of a line must be like #2a9d8f, got {colour!a:.40}")
     width = as_number(stroke.get("width"), "the width of a line", 0)
-    return Stroke(colour, width, as_array(points, "the points of a line", ("N", 2)))
+    rings = stroke.get("rings") or []
+    if not is_list(rings) or len(rings) > MAX_RINGS:
+        raise OrbiflowError(f"a part that is filled has a list of at most {MAX_RINGS} rings")
+    around = tuple(as_array(ring, "a ring of what is filled", ("N", 2)) for ring in rings)
+    return Stroke(colour, width, as_array(points, "the points of a line", ("N", 2)), around)
 
 
 def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
@@ -98,26 +107,42 @@ def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
     wide, tall = size = covered.high - covered.low
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide:.9g} {tall:.9g}">']
     for stroke in strokes:
+        if stroke.rings:
+            path = "".join(f"M{_path(covered.shares(ring) * size)}Z" for ring in stroke.rings)
+            parts.append(f'<path d="{path}" fill="{stroke.colour}" fill-rule="evenodd"/>')
+            continue
         points = covered.shares(stroke.points) * size
         ends = points if len(points) > 1 else np.stack([points[0], points[0] + 1e-3])
-        path = "L".join(f"{x:.6g} {y:.6g}" for x, y in ends)
         parts.append(
-            f'<path d="M{path}" fill="none" stroke="{stroke.colour}" '
+            f'<path d="M{_path(ends)}" fill="none" stroke="{stroke.colour}" '
             f'stroke-width="{stroke.width:.6g}" stroke-linecap="round" stroke-linejoin="round" '
             'vector-effect="non-scaling-stroke"/>'
         )
     return "\n".join([*parts, "</svg>\n"])
 
 
+def _path(points: Array) -> str:
+    return "L".join(f"{x:.6g} {y:.6g}" for x, y in points.tolist())
+
+
 def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
     """Return a picture with the lines drawn over it."""
-    from PIL import Image, ImageDraw
+    from PIL import Image, ImageChops, ImageDraw
 
     image = open_image(picture)[0].convert("RGBA")
     layer = Image.new("RGBA", (SUPERSAMPLING * image.width, SUPERSAMPLING * image.height))
     covered, pen = tile.covered, ImageDraw.Draw(layer)
     scale = layer.width / float(covered.high[0] - covered.low[0])
     for stroke in strokes:
+        if stroke.rings:
+            inside = Image.new("1", layer.size)
+            for ring in stroke.rings:
+                places = (covered.shares(ring) * layer.size).ravel().tolist()
+                one = Image.new("1", layer.size)
+                ImageDraw.Draw(one).polygon(places, fill=1)
+                inside = ImageChops.logical_xor(inside, one)
+            layer.paste((*rgb(stroke.colour), 255), mask=inside)
+            continue
         points = covered.shares(stroke.points) * layer.size
         draw_line(pen, points, scale * stroke.width, (*rgb(stroke.colour), 255))
     image.alpha_composite(layer.resize(image.size))

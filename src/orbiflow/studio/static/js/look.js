@@ -19,6 +19,7 @@ export function lookOf(project, about) {
     line: 1.4,
     signs: false,
     tint: 0.35,
+    drawn: true,
     ...closeup?.look, // where it was kept before
     art: [project, project.second].some(isColoured),
     ...look,

@@ -50,6 +50,21 @@ export function lineInto(context, points, colour, width) {
   context.stroke();
 }
 
+/** Draw a line, or fill a part with its `rings`. */
+export function markInto(context, { points, colour, width, rings }) {
+  if (!rings) {
+    lineInto(context, points, colour, width);
+    return;
+  }
+  context.fillStyle = colour;
+  context.beginPath();
+  for (const ring of rings) {
+    ring.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+    context.closePath();
+  }
+  context.fill("evenodd");
+}
+
 /** Pictures by their addresses; `came()` when one is there. */
 export class Pictures {
   constructor(came) {
@@ -168,7 +183,7 @@ export function paintSkin(figure, { art, marks, palette, tint = 0 }, scale) {
   context.setTransform(...matrix);
   context.save();
   context.clip(figure.path); // a line ends where its tile does
-  for (const { points, colour, width } of marks.lines) lineInto(context, points, colour, width);
+  for (const line of marks.lines) markInto(context, line);
   context.restore();
   for (const { at, radius, light } of marks.eyes) eyeInto(context, at, radius, palette, light);
   return new Skin(canvas, inverse(matrix), art ? tint : 0);

@@ -66,7 +66,9 @@ export class Dress {
     if (look.share < 1 && !look.art) return null;
     const scale = stage.camera.scale * Math.min(globalThis.devicePixelRatio || 1, moving ? 1 : 2);
     if (!this.known || Math.abs(Math.log(this.known.scale / scale)) > Math.log(SHARPER)) {
-      const marks = look.share < 1 || moving ? this.figures.map(() => NO_MARKS) : pen.marks;
+      const marks = look.share < 1 || moving || !look.drawn
+        ? this.figures.map(() => NO_MARKS)
+        : pen.marks;
       const { palette } = stage.options;
       const how = { look, palette, pictures: this.pictures, marks, share: look.share };
       const own = skinsOf(this.project, this.#now(), stage.tiling.figures, how, scale);

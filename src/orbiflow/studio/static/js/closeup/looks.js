@@ -22,6 +22,22 @@ const PEN_COLOURS = [
   ["#2f7d4f", "Green"],
   ["#2563a8", "Blue"],
 ];
+/** @type {[string, string, any][]} */
+const TOOLS = [
+  ["pencil", "Pencil", "pencil"],
+  ["line", "Line", "line"],
+  ["fill", "Fill", "fill"],
+  ["eye", "Eye", "eye"],
+  ["rubber", "Rubber", "rub"],
+];
+/** What can be chosen for each. */
+const USES = {
+  pencil: ["colour", "size", "mirror"],
+  line: ["colour", "size", "mirror"],
+  fill: ["colour"],
+  eye: ["eye", "mirror"],
+  rubber: [],
+};
 const PERCENT = (value) => `${Math.round(100 * value)} %`;
 
 function check(words, checked, onchange) {
@@ -275,11 +291,13 @@ export function pullPanel(pull, change, back) {
 /**
  * What is drawn with.
  *
- * @param {{ tool: string, colour: string, width: string }} pen
+ * @param {{ tool: string, colour: string, size: number, eye: number, mirror: boolean }} pen
  * @param {(what: object) => void} change
  * @param {() => void} clear
+ * @param {boolean} drawn whether the drawing is shown
+ * @param {(drawn: boolean) => void} show
  */
-export function penPanel(pen, change, clear) {
+export function penPanel(pen, change, clear, drawn, show) {
   const name = unique("pen");
   const well = h("input", {
     type: "color",
@@ -311,31 +329,34 @@ export function penPanel(pen, change, clear) {
       well,
     ),
   );
-  const lines = h(
-    "div",
-    { class: "stack", hidden: pen.tool !== "pencil" },
-    swatches,
-    choice(
-      "Line",
-      [["thin", "Thin"], ["medium", "Medium"], ["thick", "Thick"]],
-      pen.width,
-      (width) => change({ width }),
-    ),
-  );
+  const size = (title, name, min, max) =>
+    slider(title, {
+      min,
+      max,
+      step: 0.001,
+      value: pen[name],
+      said: (v) => `${(100 * v).toFixed(1)} % of a tile`,
+    }, (value) => change({ [name]: value }));
+  const parts = {
+    colour: swatches,
+    size: size("Size of the brush", "size", 0.004, 0.12),
+    eye: size("Size of an eye", "eye", 0.015, 0.15),
+    mirror: check("The same on the other side", pen.mirror, (mirror) => change({ mirror })),
+  };
+  const fit = (tool) => {
+    for (const [name, part] of Object.entries(parts)) part.hidden = !USES[tool].includes(name);
+  };
+  fit(pen.tool);
   return h(
     "div",
     { class: "stack" },
     h("p", { class: "soft" }, "Draw inside any tile: the same appears in all of them."),
-    choice(
-      "Draw with",
-      [["pencil", "Pencil", "pencil"], ["rubber", "Rubber", "rub"], ["eye", "Eye"]],
-      pen.tool,
-      (tool) => {
-        lines.hidden = tool !== "pencil";
-        change({ tool });
-      },
-    ),
-    lines,
+    choice("Draw with", TOOLS, pen.tool, (tool) => {
+      fit(tool);
+      change({ tool });
+    }),
+    Object.values(parts),
+    check("Show the drawing", drawn, show),
     h(
       "p",
       { class: "small soft by-keys" },

@@ -16,6 +16,7 @@ import { Pulling } from "./pulling.js";
 import { kindsOf, paintSigns, placed, signAt } from "./signs.js";
 import { Stage } from "./stage.js";
 
+const PEN = { tool: "pencil", colour: "#1b1b1b", size: 0.018, eye: 0.045, mirror: false };
 const percent = (share) => `${Math.round(100 * share)} %`;
 const CALM = 8000; // ms after which a refusal makes way
 
@@ -47,7 +48,7 @@ class Closeup {
     this.look = { ...lookOf(project, about), share: 1 };
     this.keepLook = keeper(api, project);
     this.pull = { reach: 0.5, lattice: true, ...kept.pull };
-    this.penSettings = { tool: "pencil", colour: "#1b1b1b", width: "medium", ...kept.pen };
+    this.penSettings = { ...PEN, ...kept.pen };
     this.mode = kept.mode ?? "look";
     this.lit = null;
     this.keep = newest(
@@ -261,10 +262,18 @@ class Closeup {
     } else {
       put(
         this.panel,
-        penPanel(this.penSettings, (what) => {
-          Object.assign(this.penSettings, what);
-          this.keep();
-        }, () => this.#setDrawing({ strokes: [], eyes: [] })),
+        penPanel(
+          this.penSettings,
+          (what) => {
+            Object.assign(this.penSettings, what);
+            this.keep();
+          },
+          () => this.#setDrawing({ strokes: [], eyes: [] }),
+          this.look.drawn,
+          (drawn) => {
+            change({ drawn });
+          },
+        ),
       );
     }
   }
@@ -281,7 +290,7 @@ class Closeup {
   #palette() {
     const { look } = this;
     const palette = paletteOf(look, this.about);
-    Object.assign(this.stage.options, { palette, line: look.line });
+    Object.assign(this.stage.options, { palette, line: look.line, drawn: look.drawn });
     this.stage.redraw();
   }
 

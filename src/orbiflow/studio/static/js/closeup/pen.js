@@ -1,11 +1,11 @@
 /** The tool that draws on the tile: pencil, rubber and eyes, in all copies at once. */
 
-import { eyeInto, lineInto } from "../skin.js";
+import { eyeInto, lineInto, markInto } from "../skin.js";
+import { partAround } from "./bucket.js";
 import { beside, rubbed, short, simplified } from "./lines.js";
 import { Riders } from "./carry.js";
 
-export const WIDTHS = { thin: 0.008, medium: 0.018, thick: 0.04 }; // in sizes of the tile
-const EYE = 0.045;
+const PIECES = 40; // of a straight line, which bends with the tile
 const NEAR = 0.0015; // by which a line may be simplified
 const LONGEST = 0.03; // side of a line
 const RUBBER = 0.03;
@@ -18,8 +18,26 @@ const drawnOn = (drawing, figure) => {
   return { strokes, eyes };
 };
 
+/** Points on the way from one to another. */
+const straight = ([a, b], [c, d]) =>
+  [...Array(PIECES + 1).keys()].map((k) => [
+    a + k / PIECES * (c - a),
+    b + k / PIECES * (d - b),
+  ]);
+
+/** Whether a place is inside of rings, of which holes are some. */
+const isInside = (rings, [x, y]) =>
+  rings.reduce(
+    (odd, ring) =>
+      ring.reduce((own, [a, b], k) => {
+        const [c, d] = ring[(k + 1) % ring.length];
+        return (b > y) !== (d > y) && x < a + (y - b) / (d - b) * (c - a) ? !own : own;
+      }, odd),
+    false,
+  );
+
 export class Pen {
-  /** `settings`: {tool: "pencil" | "rubber" | "eye", colour, width}; `on`: {drawn(drawing), said(text), marks()}. */
+  /** `settings`: {tool: "pencil" | "line" | "fill" | "rubber" | "eye", colour, size, eye, mirror}; `on`: {drawn(drawing), said(text), marks()}. */
   constructor(stage, settings, on) {
     this.stage = stage;
     this.settings = settings;
@@ -44,10 +62,11 @@ export class Pen {
     this.marks = this.carries.map((carry, figure) => {
       const { strokes, eyes } = drawnOn(this.drawing, figure);
       return {
-        lines: strokes.map(({ points, colour, width }) => ({
+        lines: strokes.map(({ points, colour, width, rings }) => ({
           points: points.map((point) => carry.forward(point)),
           colour,
           width: width * carry.scale, // as exports keep it
+          rings: rings?.map((ring) => ring.map((point) => carry.forward(point))),
         })),
         eyes: eyes.map(([x, y, radius]) => this.#eye(figure, [x, y], radius)),
       };
@@ -59,7 +78,7 @@ export class Pen {
   #eye(figure, point, radius) {
     const carry = this.carries[figure];
     const at = carry.forward(point);
-    const grown = radius * carry.growth(point, 0.5 * EYE * this.size / carry.scale);
+    const grown = radius * carry.growth(point, 0.02 * this.size / carry.scale);
     return { at, radius: Math.min(grown, ROOM * this.#room(figure, at)), light: carry.light };
   }
 
@@ -73,8 +92,10 @@ export class Pen {
     const found = this.stage.copyAt(place);
     if (!found) return false;
     this.before = this.drawing;
-    if (this.settings.tool === "eye") this.#addEye(found);
-    else if (this.settings.tool === "rubber") this.#rub(found);
+    const { tool } = this.settings;
+    if (tool === "eye") this.#addEye(found);
+    else if (tool === "fill") this.#fill(found);
+    else if (tool === "rubber") this.#rub(found, true);
     else this.line = { copy: found.copy, points: [found.at] };
     this.stage.redraw();
     return true;
@@ -91,6 +112,10 @@ export class Pen {
   #draw({ copy, at }) {
     const same = copy.aspect === this.line.copy.aspect &&
       String(copy.cell) === String(this.line.copy.cell);
+    if (this.settings.tool === "line") {
+      if (same) this.line.points = straight(this.line.points[0], at);
+      return;
+    }
     if (same) {
       this.line.points.push(at);
       return;
@@ -113,35 +138,68 @@ export class Pen {
     this.#carried();
   }
 
+  /** A ring or line of the tile in the silhouette, and how large a tile is there. */
+  #kept(figure, points) {
+    const carry = this.carries[figure];
+    const size = this.size / carry.scale;
+    return points.map((point) => carry.inverse(point).map((value) => short(value, size)));
+  }
+
+  /** Points, and their mirror image from left to right where that is wished. */
+  #bothSides(figure, points) {
+    const { map } = this.carries[figure];
+    if (!this.settings.mirror || !map) return [points];
+    const xs = map.rest.map(([x]) => x);
+    const twice = Math.min(...xs) + Math.max(...xs);
+    return [points, points.map(([x, y, ...more]) => [twice - x, y, ...more])];
+  }
+
   #keepLine() {
     const { figure } = this.line.copy;
-    const carry = this.carries[figure];
     const points = simplified(this.line.points, NEAR * this.size, LONGEST * this.size);
-    const size = this.size / carry.scale; // in the silhouette
-    const own = points.map((point) => carry.inverse(point).map((value) => short(value, size)));
-    const stroke = {
-      colour: this.settings.colour,
-      width: short(WIDTHS[this.settings.width] * size, size),
-      points: own,
-    };
+    const size = this.size / this.carries[figure].scale; // in the silhouette
+    const { colour, size: width } = this.settings;
     const { strokes, eyes } = drawnOn(this.drawing, figure);
-    this.#change(figure, { strokes: [...strokes, stroke], eyes });
+    const fresh = this.#bothSides(figure, this.#kept(figure, points)).map((own) => ({
+      colour,
+      width: short(width * size, size),
+      points: own,
+    }));
+    this.#change(figure, { strokes: [...strokes, ...fresh], eyes });
+  }
+
+  /** Fill a part; what is filled lies under all lines. */
+  #fill({ copy: { figure }, at }) {
+    const { lines } = this.marks[figure];
+    const rings = partAround(this.stage.tiling.figures[figure], lines, at);
+    if (!rings.length) return;
+    const kept = rings.map((ring) => this.#kept(figure, ring));
+    const { strokes, eyes } = drawnOn(this.drawing, figure);
+    const part = { colour: this.settings.colour, width: 0, points: kept[0], rings: kept };
+    const last = strokes.findLastIndex((stroke) => stroke.rings) + 1;
+    this.#change(figure, { strokes: strokes.toSpliced(last, 0, part), eyes });
   }
 
   #addEye({ copy: { figure }, at }) {
-    const carry = this.carries[figure];
-    const size = this.size / carry.scale;
-    const [x, y] = carry.inverse(at).map((value) => short(value, size));
+    const size = this.size / this.carries[figure].scale;
+    const [[x, y]] = this.#kept(figure, [at]);
     const { strokes, eyes } = drawnOn(this.drawing, figure);
-    this.#change(figure, { strokes, eyes: [...eyes, [x, y, short(EYE * size, size)]] });
+    const fresh = this.#bothSides(figure, [[x, y, short(this.settings.eye * size, size)]]).flat();
+    this.#change(figure, { strokes, eyes: [...eyes, ...fresh] });
   }
 
-  #rub({ copy: { figure }, at }) {
+  /** Rub out lines and eyes; where the rubber is put down, also the part that is filled there. */
+  #rub({ copy: { figure }, at }, first = false) {
     const reach = RUBBER * this.size;
     const [before, marks] = [drawnOn(this.drawing, figure), this.marks[figure]];
     let hit = false;
     const strokes = before.strokes.flatMap((stroke, k) => {
-      const { points, width } = marks.lines[k];
+      const { points, width, rings } = marks.lines[k];
+      if (rings) {
+        const gone = first && isInside(rings, at);
+        hit ||= gone;
+        return gone ? [] : [stroke];
+      }
       const parts = rubbed(points, at, reach + width / 2);
       if (!parts) return [stroke];
       hit = true;
@@ -174,13 +232,17 @@ export class Pen {
           lines: lines.map((line) => ({
             ...line,
             seats: line.points.map((point) => riders.seat(point)),
+            ringSeats: line.rings?.map((ring) => ring.map((point) => riders.seat(point))),
           })),
           eyes: eyes.map((eye) => ({ ...eye, seat: riders.seat(eye.at) })),
         })),
       };
     }
     for (const { lines, eyes } of this.moving.marks) {
-      for (const line of lines) line.points = line.seats.map((seat) => Riders.at(seat, body));
+      for (const line of lines) {
+        line.points = line.seats.map((seat) => Riders.at(seat, body));
+        line.rings = line.ringSeats?.map((ring) => ring.map((seat) => Riders.at(seat, body)));
+      }
       for (const eye of eyes) eye.at = Riders.at(eye.seat, body);
     }
   }
@@ -189,16 +251,17 @@ export class Pen {
   over(context, { figure }) {
     if (!this.line && !this.moving) return;
     const { palette } = this.stage.options;
-    const { lines, eyes } = this.moving?.marks[figure] ?? { lines: [], eyes: [] };
+    const hidden = !this.moving || !this.stage.options.drawn;
+    const { lines, eyes } = hidden ? { lines: [], eyes: [] } : this.moving.marks[figure];
     context.save();
     context.clip(this.stage.tiling.figures[figure].path);
-    for (const { points, colour, width } of lines) lineInto(context, points, colour, width);
+    for (const line of lines) markInto(context, line);
     if (this.line?.copy.figure === figure) {
       lineInto(
         context,
         this.line.points,
         this.settings.colour,
-        WIDTHS[this.settings.width] * this.size,
+        this.settings.size * this.size,
       );
     }
     context.restore();
@@ -229,12 +292,14 @@ export class Pen {
         this.penDown = false;
         this.on.said("The pen is up.");
       } else if (this.down(this.pen)) {
-        this.penDown = this.settings.tool !== "eye";
+        this.penDown = !["eye", "fill"].includes(this.settings.tool);
         if (!this.penDown) this.up();
         this.on.said(
           this.penDown
             ? "The pen is down. Arrow keys draw; press space to lift it."
-            : "An eye is in its place.",
+            : this.settings.tool === "eye"
+            ? "An eye is in its place."
+            : "The part is filled.",
         );
       }
       return true;

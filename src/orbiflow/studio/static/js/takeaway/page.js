@@ -231,7 +231,7 @@ class TakeawayPage {
       }),
     });
     return [
-      isDrawn && layer("drawing", "With what you drew on it", true),
+      isDrawn && layer("drawing", "With what you drew on it", this.look.drawn),
       pictures.length > 0 && layer(
         "picture",
         `With your ${two ? "pictures on the tiles" : "picture on each tile"}, in ${

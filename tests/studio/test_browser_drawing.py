@@ -1,0 +1,134 @@
+"""Drawing on a tile in a real browser: straight lines, parts that are filled, mirror images, sizes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import pytest
+import shapely
+
+from studio.browser import BOOT, RunningStudio
+
+CANVAS = ".closeup-canvas"
+COLOUR_AT = """(canvas, [x, y]) => {
+    const ratio = canvas.width / canvas.clientWidth;
+    return [...canvas.getContext("2d").getImageData(x * ratio, y * ratio, 1, 1).data].slice(0, 3);
+}"""
+RED, BLUE = [200, 50, 43], [37, 99, 168]
+
+
+@pytest.fixture(name="pen")
+def pen_fixture(page: Any, studio: RunningStudio, searched: str) -> Iterator[Any]:
+    """The page on which a tile is drawn on, close up; what is drawn is gone afterwards."""
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.goto(f"/#/p/{searched}/t/{tile}")
+    page.wait_for_selector(".badge[data-kind=proved]")
+    page.get_by_role("radio", name="Draw", exact=True).check()
+    for _ in range(4):
+        page.get_by_role("button", name="Nearer").click()
+    yield page
+    page.close()
+    studio.client.patch(f"projects/{searched}", json={"view": {"drawing": {}, "closeup": {}}})
+
+
+def middle(page: Any) -> tuple[float, float]:
+    box = page.locator(CANVAS).bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def drag(page: Any, *places: tuple[float, float]) -> None:
+    """Draw along places, given from the middle of the canvas."""
+    x, y = middle(page)
+    page.mouse.move(x + places[0][0], y + places[0][1])
+    page.mouse.down()
+    for u, v in places[1:]:
+        page.mouse.move(x + u, y + v, steps=4)
+    page.mouse.up()
+
+
+def colour(page: Any, x: float, y: float) -> list[int]:
+    """Return the colour of the canvas at a place from its middle."""
+    box = page.locator(CANVAS).bounding_box()
+    page.wait_for_timeout(80)
+    place = [box["width"] / 2 + x, box["height"] / 2 + y]
+    return page.locator(CANVAS).evaluate(COLOUR_AT, place)
+
+
+def drawn(studio: RunningStudio, own: str, strokes: int, eyes: int = 0) -> dict[str, Any]:
+    """Return what the project remembers, once it has so many lines and parts, and eyes."""
+
+    def found() -> Any:
+        now = studio.project(own)["view"].get("drawing") or {}
+        counts = len(now.get("strokes", [])), len(now.get("eyes", []))
+        return now if counts == (strokes, eyes) else None
+
+    return studio.until(found)
+
+
+def test_a_box_of_straight_lines_is_filled_to_its_lines(
+    pen: Any, studio: RunningStudio, searched: str
+) -> None:
+    pen.get_by_role("radio", name="Line", exact=True).check()
+    pen.get_by_role("radio", name="Black").check()
+    corners = [(-30, -30), (30, -30), (30, 30), (-30, 30), (-30, -30)]
+    for one, other in pairwise(corners):
+        drag(pen, one, (5, 5), other)  # where it went meanwhile does not count
+    assert colour(pen, 0, -30) == [27, 27, 27]
+    before, beyond = colour(pen, 0, 0), colour(pen, 0, 42)
+    pen.get_by_role("radio", name="Fill").check()
+    pen.get_by_role("radio", name="Red").check()
+    drag(pen, (0, 0))
+    assert colour(pen, 0, 0) == RED != before
+    assert colour(pen, 0, -30) == [27, 27, 27]
+    assert colour(pen, 0, 42) == beyond
+    strokes = drawn(studio, searched, 5)["strokes"]
+    assert [bool(one.get("rings")) for one in strokes] == [True, *[False] * 4]  # under the lines
+    # what is filled is in what is made
+    tile = studio.project(searched)["tiles"][0]["id"]
+    body = {"operation": "art", "settings": {"tile": tile, "drawing": True, "format": "svg"}}
+    task = studio.client.post(f"projects/{searched}/tasks", json=body).json()["task"]["id"]
+    made = studio.until(
+        lambda: next(
+            (
+                t
+                for t in studio.project(searched)["tasks"]
+                if (t["id"], t["state"]) == (task, "done")
+            ),
+            None,
+        )
+    )
+    name = made["result"]["files"][0]["name"]
+    assert "#c8322b" in studio.client.get(f"takeaways/{task}/files/{name}").text
+    # the drawing can be hidden
+    pen.get_by_label("Show the drawing").uncheck()
+    assert colour(pen, 0, 0) == before
+    pen.get_by_label("Show the drawing").check()
+    # the rubber takes the part away, and leaves the lines
+    pen.get_by_role("radio", name="Rubber").check()
+    drag(pen, (0, 0))
+    drawn(studio, searched, 4)
+    assert colour(pen, 0, 0) == before
+
+
+def test_sizes_and_the_other_side(pen: Any, studio: RunningStudio, searched: str) -> None:
+    pen.get_by_label("Size of the brush").fill("0.08")
+    pen.get_by_label("The same on the other side").check()
+    pen.get_by_role("radio", name="Blue").check()
+    drag(pen, (-8, 0), (8, 0))
+    one, other = drawn(studio, searched, 2)["strokes"]
+    assert one["width"] == other["width"]
+    size = shapely.Polygon(json.loads(BOOT)).area ** 0.5
+    assert one["width"] == pytest.approx(0.08 * size, rel=0.1)
+    sums = [a[0] + b[0] for a, b in zip(one["points"], other["points"], strict=True)]
+    assert max(sums) - min(sums) < 0.01 * size
+    assert [p[1] for p in one["points"]] == [p[1] for p in other["points"]]
+    pen.get_by_label("The same on the other side").uncheck()
+    pen.get_by_role("radio", name="Eye").check()
+    for value in ("0.03", "0.09"):
+        pen.get_by_label("Size of an eye").fill(value)
+        drag(pen, (0, -20))
+    eyes = drawn(studio, searched, 2, 2)["eyes"]
+    assert eyes[1][2] == pytest.approx(3 * eyes[0][2], rel=0.02)
