@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -131,7 +133,7 @@ def test_smoothing_joins_parts_as_before_once_something_is_painted(
     for _ in range(15):
         page.keyboard.press("ArrowRight")
     studio.until(lambda: area_of(studio.project(own)) > 1.5 * whole)
-    page.get_by_text("left out").wait_for(state="detached")
+    page.get_by_text("1 part is left out").wait_for(state="detached")
 
 
 def test_painting_mends_the_shape_and_can_be_undone(page, drawing, studio: RunningStudio) -> None:
@@ -162,6 +164,86 @@ def test_marks_are_kept_and_only_on_the_animal(page, drawing, studio: RunningStu
     studio.until(lambda: studio.project(own)["pins"])
     page.get_by_role("button", name="Undo").click()
     studio.until(lambda: studio.project(own)["pins"] is None)
+
+
+def test_sliders_and_starting_over_can_be_undone_and_done_again(
+    page, drawing, studio: RunningStudio
+) -> None:
+    own = begun(page, drawing)
+    page.get_by_role("radio", name="Matters most").check()
+    stroke(page, "canvas.reading", (0.2, 0.3), (0.3, 0.4))
+    page.get_by_label("Smoothing").focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    studio.until(lambda: studio.project(own)["reading"]["smooth"] == 0.01)
+    page.get_by_role("button", name="Start over").click()
+    studio.until(lambda: not studio.project(own)["emphasis"])
+    studio.until(lambda: studio.project(own)["reading"]["smooth"] == 0)
+    undo = page.get_by_role("button", name="Undo")
+    undo.click()
+    studio.until(lambda: studio.project(own)["emphasis"])
+    studio.until(lambda: studio.project(own)["reading"]["smooth"] == 0.01)
+    assert page.get_by_label("Smoothing").input_value() == "0.01"
+    undo.click()  # the slider went in one go
+    studio.until(lambda: studio.project(own)["reading"]["smooth"] == 0)
+    assert studio.project(own)["emphasis"]
+    undo.click()
+    studio.until(lambda: not studio.project(own)["emphasis"])
+    assert undo.is_disabled()
+    page.keyboard.press("Control+y")
+    studio.until(lambda: studio.project(own)["emphasis"])
+
+
+def test_what_is_painted_while_the_picture_is_nearer_is_where_it_was_painted(
+    page, drawing, studio: RunningStudio
+) -> None:
+    own = begun(page, drawing)
+    canvas = page.locator("canvas.reading")
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 0.2 * box["width"], box["y"] + 0.3 * box["height"])
+    page.mouse.wheel(0, -600)  # what is under the mouse stays there
+    page.get_by_role("radio", name="Keep its shape").check()
+    stroke(page, "canvas.reading", (0.2, 0.3))
+    address = studio.until(lambda: studio.project(own)["pins"])
+    mask = Image.open(io.BytesIO(studio.client.get(f"{studio.address}{address}").content))
+    white = np.argwhere(np.asarray(mask.convert("L")) > 127)
+    (upper, left), (lower, right) = white.min(axis=0), white.max(axis=0) + 1
+    assert (left + right) / 2 == pytest.approx(0.2 * mask.width, abs=2)
+    assert (upper + lower) / 2 == pytest.approx(0.3 * mask.height, abs=2)
+    assert right - left < 0.75 * 0.04 * mask.width  # the nearer, the finer
+    near = canvas.evaluate("canvas => canvas.toDataURL()")
+    page.get_by_role("button", name="Fit").click()
+    assert canvas.evaluate("canvas => canvas.toDataURL()") != near
+    canvas.focus()
+    for key in ("+", "0"):
+        page.keyboard.press(key)
+
+
+def test_two_fingers_bring_the_picture_nearer_and_paint_nothing(
+    page, drawing, studio: RunningStudio
+) -> None:
+    own = begun(page, drawing)
+    seen = "document.querySelector('canvas.reading').toDataURL()"
+    before = page.evaluate(seen)
+    page.evaluate(
+        """() => {
+            const canvas = document.querySelector("canvas.reading");
+            canvas.setPointerCapture = () => {};
+            const { x, y } = canvas.getBoundingClientRect();
+            const touch = (kind, pointerId, u, v) => canvas.dispatchEvent(new PointerEvent(kind, {
+                pointerId, pointerType: "touch", clientX: x + u, clientY: y + v, bubbles: true,
+            }));
+            touch("pointerdown", 1, 100, 100);
+            touch("pointermove", 1, 104, 100);
+            touch("pointerdown", 2, 200, 100);
+            touch("pointermove", 2, 300, 100);
+            touch("pointerup", 1, 104, 100);
+            touch("pointerup", 2, 300, 100);
+        }"""
+    )
+    assert page.evaluate(seen) != before
+    assert page.get_by_role("button", name="Undo").is_disabled()
+    assert studio.project(own)["mend"] is None
 
 
 @pytest.mark.parametrize("how", ["mouse", "keyboard"])

@@ -245,7 +245,7 @@ def test_mistakes_are_told_in_the_words_of_the_page(bench: Bench) -> None:
     join_tasks()
     told = bench.store.task(task)["error"]
     assert "with a little smoothing" in told
-    assert told.endswith("set another edge (Where it ends)")
+    assert told.endswith("try another edge (Where it ends)")
 
 
 def test_a_tile_is_on_its_card_before_the_search_ends(bench: Bench) -> None:

@@ -93,6 +93,21 @@ export function button(text, onclick, { kind = "", image, ...rest } = {}) {
   );
 }
 
+/**
+ * Buttons to come nearer, go farther and see all.
+ *
+ * @param {(by: number) => any} zoom
+ * @param {() => any} fit
+ */
+export const zooms = (zoom, fit) =>
+  h(
+    "div",
+    { class: "zooms" },
+    button("+", () => zoom(1.35), { "aria-label": "Nearer" }),
+    button("−", () => zoom(1 / 1.35), { "aria-label": "Farther" }),
+    button("Fit", fit),
+  );
+
 let count = 0;
 /**
  * A name that no other element of the page has.

@@ -2,7 +2,7 @@
 
 import { Camera, inverse, moved, paint, sized } from "../tiling.js";
 /** @import { LiveTiling } from "./live.js" */
-import { h } from "../dom.js";
+import { h, zooms } from "../dom.js";
 import { beside } from "./lines.js";
 
 const LEAST_TILE = 26; // pixels of a tile when far away
@@ -115,23 +115,7 @@ export class Stage {
 
   /** Buttons to come nearer, go farther and see all. */
   zooms() {
-    return h(
-      "div",
-      { class: "zooms" },
-      h("button", {
-        type: "button",
-        class: "button icon",
-        "aria-label": "Nearer",
-        onclick: () => this.zoom(1.35),
-      }, "+"),
-      h("button", {
-        type: "button",
-        class: "button icon",
-        "aria-label": "Farther",
-        onclick: () => this.zoom(1 / 1.35),
-      }, "−"),
-      h("button", { type: "button", class: "button", onclick: () => this.fit() }, "Fit"),
-    );
+    return zooms((by) => this.zoom(by), () => this.fit());
   }
 
   /** Move the picture by pixels. */

@@ -19,7 +19,7 @@ const MEANINGS = {
 };
 
 /**
- * Sliders and choices for `reading`, {threshold, invert, smooth, thicken}, which they change and tell: {root, reset(), grow(share)}.
+ * Sliders and choices for `reading`, {threshold, invert, smooth, thicken}, which they change and tell: {root, take(reading)}.
  *
  * @param {Reading} reading
  * @param {() => void} changed
@@ -62,7 +62,7 @@ export function readingControls(reading, changed) {
     value: reading.thicken,
     said: (value) => (value ? `at least ${(100 * value).toFixed(0)} % wide` : "as they are"),
   }, (value) => change({ thicken: value }));
-  const part = choice(
+  const side = choice(
     "The animal is",
     [[null, "found by itself"], [false, "dark"], [true, "light"]],
     reading.invert,
@@ -71,25 +71,22 @@ export function readingControls(reading, changed) {
   const root = h(
     "section",
     { class: "panel stack", "aria-label": "How the picture is read" },
-    part,
+    side,
     h("label", { class: "check" }, auto, "Find the edge of the animal by itself"),
     level,
     smoothing,
     growing,
   );
-  const reset = () => {
-    auto.checked = true;
-    change({ threshold: null, invert: null, smooth: 0, thicken: 0 });
-    level.set(0.5);
-    smoothing.set(0);
-    growing.set(0);
-    part.set(null);
+  /** Take other values, and show them. */
+  const take = (part) => {
+    change(part);
+    auto.checked = reading.threshold === null;
+    level.set(reading.threshold ?? 0.5);
+    smoothing.set(reading.smooth);
+    growing.set(reading.thicken);
+    side.set(reading.invert);
   };
-  const grow = (share) => {
-    change({ thicken: share });
-    growing.set(share);
-  };
-  return { root, reset, grow };
+  return { root, take };
 }
 
 /**

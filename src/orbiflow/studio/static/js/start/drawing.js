@@ -3,12 +3,14 @@
 import { button, choice, dialog, h } from "../dom.js";
 import { drawStroke, Marks } from "./marks.js";
 import { pointing } from "./pointing.js";
+import { States } from "./states.js";
 
 const SIDE = 1000;
 
 /** Resolves with a PNG, black on white, or undefined. */
 export function drawn() {
   const marks = new Marks(SIDE, SIDE);
+  const states = new States(marks.strokes);
   let black = true;
   let stroke = null;
   let cross = null;
@@ -41,22 +43,20 @@ export function drawn() {
   }
 
   return dialog("Draw a shape", (close) => {
-    const back = button("Undo", () => {
-      marks.undo();
+    const go = (step) => () => {
+      marks.strokes = states.go(step);
       tell();
-    }, { kind: "quiet", image: "undo" });
-    const again = button("Redo", () => {
-      marks.redo();
-      tell();
-    }, { kind: "quiet", image: "redo" });
+    };
+    const back = button("Undo", go(-1), { kind: "quiet", image: "undo" });
+    const again = button("Redo", go(1), { kind: "quiet", image: "redo" });
     const use = button("Use this shape", () => {
       cross = null;
       paint();
       canvas.toBlob(close, "image/png");
     }, { kind: "primary" });
     const tell = () => {
-      back.disabled = !marks.strokes.length;
-      again.disabled = !marks.undone.length;
+      back.disabled = !states.can(-1);
+      again.disabled = !states.can(1);
       use.disabled = !marks.strokes.some((one) => one.black);
       paint();
     };
@@ -70,7 +70,10 @@ export function drawn() {
         paint();
       },
       end() {
-        if (stroke && stroke.points.length > 2) marks.add(stroke);
+        if (stroke && stroke.points.length > 2) {
+          marks.add(stroke);
+          states.add(marks.strokes);
+        }
         stroke = null;
         tell();
       },

@@ -1,4 +1,4 @@
-/** What people paint over a picture: strokes on layers, with undo and redo, as masks to send. */
+/** What people paint over a picture: strokes on layers, as masks to send. */
 
 /**
  * Draw a stroke, whose shape is "brush" or "lasso", in a colour.
@@ -35,38 +35,22 @@ export class Marks {
     this.width = width;
     this.height = height;
     this.strokes = [];
-    this.undone = [];
     this.before = {};
   }
 
   add(stroke) {
-    this.strokes.push(stroke);
-    this.undone = [];
-  }
-
-  /** Take back the last stroke; returns it. */
-  undo() {
-    const last = this.strokes.pop();
-    if (last) this.undone.push(last);
-    return last;
-  }
-
-  redo() {
-    const last = this.undone.pop();
-    if (last) this.strokes.push(last);
-    return last;
+    this.strokes = [...this.strokes, stroke];
   }
 
   /** Forget all strokes, and what the layers began with. */
   clear() {
     this.strokes = [];
-    this.undone = [];
     this.before = {};
   }
 
   /** The strokes that touch a layer. */
-  of(layer) {
-    return this.strokes.filter((stroke) => stroke.layer === layer || stroke.erases);
+  of(layer, strokes = this.strokes) {
+    return strokes.filter((stroke) => stroke.layer === layer || stroke.erases);
   }
 
   /** Begin a layer with a mask that the server has: white counts, black does too if `both`. */

@@ -1,18 +1,24 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
-import { button, h, newest, notes as noted, put, style, toast, trying } from "../dom.js";
+import { button, h, newest, put, style, toast, trying, zooms } from "../dom.js";
 import { sized } from "../tiling.js";
 import { wishes } from "../wishes.js";
-import { alive, number, sentence } from "../words.js";
+import { alive, sentence } from "../words.js";
 import { paintingControls, readingControls } from "./controls.js";
+import { findings } from "./findings.js";
 import { Marks } from "./marks.js";
 import { paintBrush, paintSilhouette, paintStrokes, tinted, touches } from "./overlay.js";
 import { pointing } from "./pointing.js";
 import { addSecond, bothPictures } from "./second.js";
+import { States } from "./states.js";
+import { View } from "./view.js";
 
 const LAYERS = ["mend", "pins", "emphasis"];
-const MANY = 6; // parts left out, from which a picture is a photograph with a background
-const KEYS = "With the keyboard: arrow keys move the brush, Space begins and ends a stroke.";
+/** @type {Reading} */
+const AS_FOUND = { threshold: null, invert: null, smooth: 0, thicken: 0 };
+const ONE_GO = 700; // ms between two moves of a slider that are undone together
+const KEYS =
+  "With the keyboard: arrow keys move the brush, Space begins and ends a stroke, plus and minus zoom.";
 
 /**
  * @param {HTMLElement} root
@@ -52,14 +58,16 @@ class PicturePage {
     this.navigate = navigate;
     this.place = `projects/${project.id}`;
     this.pen = { tool: "add", shape: "brush", size: 4 };
+    this.reading = { ...AS_FOUND, ...this.own.reading };
     this.marks = new Marks(1, 1);
+    this.view = new View(1, 1);
+    this.states = new States(this.state);
     /** @type {HTMLImageElement | undefined} */
     this.picture = undefined;
     this.shown = ""; // the address of the picture
     this.tints = new Map(); // the marks in their colours, painted anew when strokes change
     this.known = 0; // strokes that the outline on the screen knows
     this.sent = 0; // strokes that the server has
-    this.reading = { threshold: null, invert: null, smooth: 0, thicken: 0, ...this.own.reading };
     this.read = newest(async () =>
       this.began(await api.put(`${this.place}/reading?number=${number}`, this.reading))
     );
@@ -75,7 +83,12 @@ class PicturePage {
       role: "application",
       "aria-label": `The picture with the outline that was read. ${KEYS}`,
     });
-    this.stage = h("div", { class: "stage", hidden: true }, this.canvas);
+    this.stage = h(
+      "div",
+      { class: "stage", hidden: true },
+      this.canvas,
+      zooms((by) => this.zoom(by), () => this.zoom(0)),
+    );
     this.heading = h("h1", { tabindex: "-1" }, this.title);
     this.said = h("div", { class: "said stack", role: "status" });
     this.lead = h(
@@ -85,16 +98,10 @@ class PicturePage {
     );
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
     this.both = bothPictures(this.page, this.number);
-    this.back = button("Undo", () => this.changed(this.marks.undo()), {
-      kind: "quiet",
-      image: "undo",
-    });
-    this.again = button("Redo", () => this.changed(this.marks.redo()), {
-      kind: "quiet",
-      image: "redo",
-    });
+    this.back = button("Undo", () => this.go(-1), { kind: "quiet", image: "undo" });
+    this.again = button("Redo", () => this.go(1), { kind: "quiet", image: "redo" });
     const clear = button("Start over", () => this.startOver(), { kind: "quiet", image: "bin" });
-    this.controls = readingControls(this.reading, () => this.read());
+    this.controls = readingControls(this.reading, () => this.reads());
     this.unread = h("div", { class: "lonely stack", role: "status" });
     this.side = h(
       "div",
@@ -120,24 +127,34 @@ class PicturePage {
 
   listen() {
     pointing(this.canvas, () => [this.marks.width, this.marks.height], {
-      begin: (point) => this.begin(point),
+      begin: (point) => this.begin(this.view.at(point)),
       move: (points) => {
-        this.stroke?.points.push(...points);
+        this.stroke?.points.push(...points.map((point) => this.view.at(point)));
         this.paint();
       },
       end: () => this.end(),
+      stop: () => {
+        this.stroke = null;
+      },
+      zoom: (by, point) => this.zoom(by, point),
+      pan: (distance) => {
+        this.view.pan(distance);
+        this.paint();
+      },
       hover: (point) => {
         this.cross = point;
         this.paint();
       },
     });
     this.keys = (event) => {
+      const key = event.key.toLowerCase();
       if (
-        !(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" ||
-        event.target.type === "text"
-      ) return;
+        !(event.ctrlKey || event.metaKey) || !"zy".includes(key) || event.target.type === "text"
+      ) {
+        return;
+      }
       event.preventDefault();
-      this.changed(event.shiftKey ? this.marks.redo() : this.marks.undo());
+      this.go(event.shiftKey || key === "y" ? 1 : -1);
     };
     document.addEventListener("keydown", this.keys);
     this.watch = new ResizeObserver(() => this.paint());
@@ -201,14 +218,61 @@ class PicturePage {
       ),
     );
     this.marks = marks;
+    this.view = new View(width, height);
+    this.states = new States(this.state);
+  }
+
+  /** What can be undone: what is painted, and how the picture is read. */
+  get state() {
+    const { strokes, before } = this.marks;
+    return { strokes, before, reading: { ...this.reading } };
+  }
+
+  /** Undo or redo: send what differs. */
+  go(step) {
+    const { marks } = this;
+    const old = this.state;
+    const now = this.states.go(step);
+    if (!now) return;
+    const differing = LAYERS.filter((layer) => {
+      const [was, is] = [old, now].map(({ strokes }) => marks.of(layer, strokes));
+      return old.before[layer] !== now.before[layer] || was.length !== is.length ||
+        was.some((stroke, k) => stroke !== is[k]);
+    });
+    Object.assign(marks, { strokes: now.strokes, before: now.before });
+    if (JSON.stringify(now.reading) !== JSON.stringify(old.reading)) {
+      this.undoing = true;
+      this.controls.take(now.reading);
+      this.undoing = false;
+    }
+    this.changed(differing);
+  }
+
+  /** The reading was changed: one step back undoes all that a slider does in one go. */
+  reads() {
+    this.read();
+    if (this.undoing) return;
+    const now = performance.now();
+    this.states.add(this.state, now - this.slid < ONE_GO);
+    this.slid = now;
+    this.tell();
+  }
+
+  /** Come nearer by a factor, or with 0 show all; returns whether that changed anything. */
+  zoom(by, point) {
+    const before = this.view.nearer;
+    this.view.zoom(by, point);
+    this.paint();
+    return this.view.nearer !== before;
   }
 
   paint() {
-    const { own: { silhouette }, picture, marks, pen } = this;
+    const { own: { silhouette }, picture, marks, pen, view } = this;
     if (!silhouette || !picture) return;
     const { context, width, ratio } = sized(this.canvas);
-    const pixel = marks.width / width;
-    context.setTransform(ratio / pixel, 0, 0, ratio / pixel, 0, 0);
+    const pixel = marks.width / width / view.nearer;
+    const scale = ratio / pixel;
+    context.setTransform(scale, 0, 0, scale, -view.x * scale, -view.y * scale);
     paintSilhouette(context, picture, silhouette, pixel);
     paintStrokes(context, {
       marks: ["pins", "emphasis"].filter((layer) => marks.has(layer)).map((layer) =>
@@ -219,7 +283,12 @@ class PicturePage {
       tool: pen.tool,
     });
     if (this.cross) {
-      paintBrush(context, this.cross, pen.shape === "lasso" ? 4 * pixel : this.brush() / 2, pixel);
+      paintBrush(
+        context,
+        view.at(this.cross),
+        pen.shape === "lasso" ? 4 * pixel : this.brush() / 2,
+        pixel,
+      );
     }
   }
 
@@ -228,9 +297,9 @@ class PicturePage {
     return this.tints.get(layer);
   }
 
-  /** The width of the brush in pixels of the picture. */
+  /** The width of the brush in pixels of the picture: the nearer, the finer. */
   brush() {
-    return (this.pen.size / 100) * Math.max(this.marks.width, this.marks.height);
+    return (this.pen.size / 100) * Math.max(this.marks.width, this.marks.height) / this.view.nearer;
   }
 
   begin(point) {
@@ -259,16 +328,18 @@ class PicturePage {
       return this.paint();
     }
     this.marks.add(stroke);
-    return this.changed(stroke);
+    this.states.add(this.state);
+    this.slid = -Infinity;
+    return this.changed(
+      LAYERS.filter((layer) => stroke.layer === layer || (stroke.erases && this.marks.has(layer))),
+    );
   }
 
-  /** A stroke came or went: send the layers that it touches. */
-  changed(stroke) {
-    if (!stroke) return;
+  /** Layers were painted on, or are as they were before: send them. */
+  changed(layers) {
     this.tints.clear();
     this.known = Math.min(this.known, this.marks.strokes.length);
-    LAYERS.filter((layer) => stroke.layer === layer || (stroke.erases && this.marks.has(layer)))
-      .forEach((layer) => this.send[layer]());
+    layers.forEach((layer) => this.send[layer]());
     this.tell();
   }
 
@@ -285,11 +356,10 @@ class PicturePage {
 
   startOver() {
     this.marks.clear();
-    this.tints.clear();
-    this.known = 0;
-    Object.values(this.send).forEach((go) => go());
-    this.controls.reset();
-    this.tell();
+    this.slid = performance.now(); // one step with the reading
+    this.states.add(this.state);
+    this.controls.take(AS_FOUND);
+    this.changed(LAYERS);
   }
 
   /** Take note of a reading that has begun, if its events have not told of it already. */
@@ -307,13 +377,13 @@ class PicturePage {
 
   /** Say what was read, and which buttons do something. */
   tell() {
-    const { own: { silhouette }, project, marks, task } = this;
+    const { own: { silhouette }, project, task } = this;
     const busy = alive(task);
     const unread = !project.silhouette || (project.second && !project.second.silhouette);
     this.find.disabled = Boolean(unread || this.searching);
     this.both.update();
-    this.back.disabled = !marks.strokes.length;
-    this.again.disabled = !marks.undone.length;
+    this.back.disabled = !this.states.can(-1);
+    this.again.disabled = !this.states.can(1);
     this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
     this.paint();
     const told = JSON.stringify([
@@ -332,7 +402,7 @@ class PicturePage {
         this.said,
         busy && h("p", { class: "soft" }, "Reading it again …"),
         error,
-        notes(silhouette, this.controls.grow),
+        findings(silhouette, (thicken) => this.controls.take({ thicken })),
       );
     } else {put(
         this.unread,
@@ -386,35 +456,4 @@ class PicturePage {
       check();
     });
   }
-}
-
-/** What there is to say of a silhouette; `grow` makes thin parts thicker. */
-function notes({ doubts, notes: said, left_out: others = [] }, grow) {
-  const out = others.length;
-  return h(
-    "ul",
-    { class: "notes stack" },
-    doubts.map((text) =>
-      h(
-        "li",
-        { class: "notice stack" },
-        sentence(text),
-        text.includes("(Thin parts)") &&
-          button("Make thin parts thicker", () => grow(text.includes("thread") ? 0.1 : 0.04), {
-            kind: "quiet",
-          }),
-      )
-    ),
-    out > 0 &&
-      h(
-        "li",
-        {},
-        h("span", { class: "swatch" }),
-        `${number(out, "part is", "parts are")} left out: a tile is one piece. `,
-        out < MANY
-          ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
-          : "A busy photograph? Draw round the head first: choose “Add” and the lasso. Then “Remove” what is too much.",
-      ),
-    said.length > 0 && h("li", {}, noted(said)),
-  );
 }
