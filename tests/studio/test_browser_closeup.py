@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import pytest
+import shapely
 
 from orbiflow.studio.tile_files import tile_folder
 from orbiflow.tiles import certify, read_result
@@ -203,6 +204,29 @@ def test_a_check_shows_how_far_it_is_and_can_be_stopped(page, studio, searched: 
     page.wait_for_selector(f"{BADGE}[data-kind=refused]")
     assert page.get_by_role("button", name="Stop").count() == 0
     page.wrong.clear()  # a refusal is noted, and a stream that ends
+
+
+def test_the_inside_is_pulled_and_the_outline_stays(closeup, studio, searched: str, tile) -> None:
+    page, first = closeup, tile["id"]
+    choose(page, "Pull")
+    page.get_by_role("radio", name="The inside").check()
+    assert not page.get_by_label("The outline gives way").is_checked()
+    box = page.locator(CANVAS).bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 12, y + 8, steps=3)
+    page.mouse.up()
+    second = proved(page, first)
+    views = [studio.client.get(f"projects/{searched}/tiles/{k}").json() for k in (first, second)]
+    one, other = (shapely.Polygon(view["polygon"]) for view in views)
+    assert one.symmetric_difference(other).area < 1e-4 * one.area
+    inner = [view["map"]["images"] for view in views]
+    assert inner[0] != inner[1]
+    page.get_by_role("radio", name="The outline", exact=True).check()
+    page.get_by_role("button", name="Put it back").click()
+    assert proved(page, second) == first
+    studio.client.patch(f"projects/{searched}", json={"view": {"closeup": {}}})
 
 
 def test_notes_of_the_tile_and_of_its_search_are_shown(page, searched: str, tile) -> None:

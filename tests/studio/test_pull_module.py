@@ -15,10 +15,11 @@ from scipy.sparse import csr_matrix
 
 from bent_tiles import bent_tile
 from orbiflow.arrays import Array
-from orbiflow.errors import CertificationError
+from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.studio.pulled_tiles import pulled, space_json
 from orbiflow.tiles import EscherTile
 from outlines import bent_squirrel
+from studio.test_pulled_tiles import squirrel as mapped_squirrel
 
 CLOSEUP = Path(__file__).parents[2] / "src/orbiflow/studio/static/js/closeup"
 PULL = """
@@ -255,3 +256,52 @@ console.log(JSON.stringify({
     left, right = (line[part, 0] for part in told["parts"])
     assert left.max() < 0.4 < 0.6 < right.min()
     assert len(left) + len(right) > 30
+
+
+INSIDE = """
+import { Puller } from "MODULES/pull.js";
+const { space, at, by, gives } = JSON.parse((await import("node:fs")).readFileSync(0));
+const puller = new Puller(space);
+const size = Math.sqrt(puller.area);
+puller.grabInside(at, 0.4 * size, { gives });
+const from = puller.held();
+const goal = [from[0] + by[0] * size, from[1] + by[1] * size];
+let now = { left: 1, stopped: false };
+for (let k = 0; k < 60 && now.left > 2e-5; k += 1) now = puller.follow(goal);
+console.log(JSON.stringify({
+  parameters: puller.parameters(), inside: puller.insides(), polygon: [...puller.polygon()],
+  from, held: puller.held(), goal, size, stopped: now.stopped,
+}));
+"""
+
+
+@pytest.mark.parametrize("gives", [False, True])
+def test_the_inside_is_pulled_and_the_server_carries_the_picture_there(gives: bool) -> None:
+    tile = mapped_squirrel("IH4")
+    space = space_json(tile)
+    assert tile.bending is not None
+    assert tile.frame is not None
+    eye = np.asarray(space["body"]["points"])[len(space["polygon"]) :].mean(axis=0)
+    given = {"space": space, "at": eye.tolist(), "by": [0.06, 0.04], "gives": gives}
+    told = run_in_node(INSIDE, given)
+    moved = np.subtract(told["held"], told["from"])
+    assert np.hypot(*moved) > 0.03 * told["size"]
+    still = np.abs(np.array(told["polygon"]).reshape(-1, 2) - space["polygon"]).max()
+    assert bool(still > 1e-6 * told["size"]) is gives
+    found = pulled(tile, told["parameters"], inside=told["inside"])
+    assert found.certificate.valid
+    assert found.no_map == ""
+    before, after = tile.bending, found.bending
+    assert after is not None
+    assert found.frame is not None
+    rest = before.inverse(tile.frame.to_normal(told["from"]))
+    there = found.frame.to_input(after.forward(rest))
+    assert np.hypot(*(there - told["held"])) < 0.35 * np.hypot(*moved)
+    # what is too far is not followed there
+    far = run_in_node(INSIDE, {**given, "by": [3.0, 0.0]})
+    assert far["stopped"]
+    assert pulled(tile, far["parameters"], inside=far["inside"]).certificate.valid
+    with pytest.raises(CertificationError, match="folded"):
+        pulled(tile, told["parameters"], inside=np.roll(told["inside"], 2).tolist())
+    with pytest.raises(OrbiflowError, match="inside"):
+        pulled(tile, told["parameters"], inside=told["inside"][:-2])

@@ -49,9 +49,11 @@ SAME_POINT_DISTANCE = 1e-7  # in the tile's size: vertices of figures this near 
 QUICK_SHARPENINGS = 4  # tries to unfold the inside after one step of a pull
 MOST_STEPS = 32  # in which the inside follows a pull
 Way = Callable[[float], Array]  # the polygon of a figure at a share of the way, 0 to 1
+Move = Callable[[Array], Array]  # where points go
 Told = Callable[[float], object]
 PULLED = ("its outline was pulled by hand",)
 CROSSED = "the outline crosses itself there, so tiles would overlap: pull it less far"
+FOLDED = "the inside would be folded there: pull it less far"
 OTHER_SIZE = "the tile has become much too small or too large: pull it less far"
 
 
@@ -200,10 +202,14 @@ def _sparse(matrix: Array) -> dict[str, Any]:
     }
 
 
-def pulled(tile: EscherTile, parameters: Any, told: Told = lambda _: None) -> EscherTile:
+def pulled(
+    tile: EscherTile, parameters: Any, told: Told = lambda _: None, inside: Sequence[float] = ()
+) -> EscherTile:
     """Return the certified tile for parameters of its `PullSpace`, with the maps carried on.
 
-    `told` hears the share of the way on which the inside has followed, and may raise to end it.
+    With `inside`, the coordinates x, y of each free point of the body of `space_json`, what lies on the
+    tile follows these. `told` hears the share of the way on which the inside has followed; it may raise
+    to end it.
 
     Raises:
         OrbiflowError: for parameters that are not of this tile's space.
@@ -222,8 +228,10 @@ def pulled(tile: EscherTile, parameters: Any, told: Told = lambda _: None) -> Es
     def on_the_way(share: float) -> Array:
         return space.polygon(space.start + share * (given - space.start))
 
+    move = _inner_move(space, given, inside) if len(inside) else None
+
     if not tile.parts:
-        found = _figure(tile, whole, on_the_way, COMPARED_POINTS, told)
+        found = _figure(tile, whole, on_the_way, COMPARED_POINTS, told, move)
     else:
         parts = list[Any]()
         for part, ring, kept in zip(tile.parts, space.rings, space.kept, strict=True):
@@ -232,7 +240,8 @@ def pulled(tile: EscherTile, parameters: Any, told: Told = lambda _: None) -> Es
             own = Tile(back(points[ring]), whole.group.conjugate(*back), corners=corners)
             count = COMPARED_POINTS // len(tile.parts)
             way = partial(_own_ring, on_the_way, ring, back)
-            figure = _figure(before, own, way, count, told)
+            inner = None if move is None else partial(_moved_in, part.place, move)
+            figure = _figure(before, own, way, count, told, inner)
             parts.append(part._replace(figure=figure))
         found = EscherTile(
             whole,
@@ -263,13 +272,46 @@ def _check(space: PullSpace, parameters: Array) -> None:
         raise CertificationError(CROSSED)
 
 
+def _inner_move(space: PullSpace, parameters: Array, inside: Sequence[float]) -> Move:
+    """Return the map that moves points of the figures as the body with these free points moves."""
+    body = _body(space)
+    rest, sides = np.array(body["points"]), np.array(body["sides"], dtype=int).reshape(-1, 2)
+    shares, polygon = np.array(body["shares"])[:, None], space.polygon(parameters)
+    start, end = (polygon[sides[:, k]] for k in (0, 1))
+    tied = np.concatenate([polygon, (1 - shares) * start + shares * end])
+    free = as_array(inside, "the inside of a pulled tile", (2 * (len(rest) - len(tied)),))
+    try:
+        moved = np.concatenate([tied, free.reshape(-1, 2)])
+        return Bending(rest, moved, np.array(body["triangles"])).forward
+    except OrbiflowError:
+        raise CertificationError(FOLDED) from None
+
+
+def _moved_in(place: Any, move: Move, points: Array) -> Array:
+    """Return points of a figure, in its own coordinates, as they are moved on the tile."""
+    return place.inverse(move(place(points)))
+
+
 def _own_ring(way: Way, ring: Integers, back: Callable[[Array], Array], share: float) -> Array:
     """Return the ring of a figure, in its own coordinates, a share of the way."""
     return back(way(share)[ring])
 
 
-def _carried(bending: Bending, frame: Frame, way: Way, told: Told) -> Bending:
-    """Return the map to a polygon that moved on a way, in as few steps as it follows without folds."""
+def _carried(
+    bending: Bending, frame: Frame, way: Way, told: Told, move: Move | None = None
+) -> Bending:
+    """Return the map to a polygon that moved on a way, in as few steps as it follows without folds.
+
+    With `move` its inside goes where that says, at once.
+    """
+    if move is not None:
+        told(0.0)
+        before, after = (frame.to_normal(way(share)) for share in (0.0, 1.0))
+
+        def inner(points: Array) -> Array:
+            return frame.to_normal(move(frame.to_input(points)))
+
+        return carried_on(bending, before, after, inner=inner)
 
     def follow(own: Bending, start: float, end: float, steps: int) -> Bending:
         told(start)
@@ -285,7 +327,9 @@ def _carried(bending: Bending, frame: Frame, way: Way, told: Told) -> Bending:
     return follow(bending, 0.0, 1.0, 1)
 
 
-def _figure(before: EscherTile, tile: Tile, way: Way, count: int, told: Told) -> EscherTile:
+def _figure(
+    before: EscherTile, tile: Tile, way: Way, count: int, told: Told, move: Move | None = None
+) -> EscherTile:
     """Return a figure that was pulled to `tile` on a way, with its map and likeness carried on.
 
     It is compared with its silhouette at so many points.
@@ -307,7 +351,7 @@ def _figure(before: EscherTile, tile: Tile, way: Way, count: int, told: Told) ->
     if bending is None or frame is None:
         return found.changed(no_map=before.no_map or "its run left no map")
     try:
-        bending = _carried(bending, frame, way, told)
+        bending = _carried(bending, frame, way, told, move)
     except OrbiflowError as error:
         return found.changed(map_source=TileMap(frame=frame), no_map=str(error))
     rest, images = _outlines(bending, count)

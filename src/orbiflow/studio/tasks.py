@@ -269,6 +269,7 @@ def pull(
     job: Job,
     tile: int,
     parameters: tuple[float, ...],
+    inside: tuple[float, ...] = (),
     *,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
@@ -278,6 +279,7 @@ def pull(
     Args:
         tile: The number of the tile that was pulled.
         parameters: Where it was pulled to, in the space that `studio space` wrote.
+        inside: Where the free points of its body were pulled to, if these were.
     """
     from orbiflow.studio.pulled_tiles import pulled, space_json
     from orbiflow.tiles import read_result
@@ -287,7 +289,7 @@ def pull(
         on_event(Progress(share, "checking"))
 
     told(0.0)
-    found = pulled(read_result(tile_folder(job.project, tile)), parameters, told)
+    found = pulled(read_result(tile_folder(job.project, tile)), parameters, told, inside)
     number, stage = tile_number(job.task, 0), STAGES[-1]
     put_tile(job.project, number, stage, found, on_event, origin_of_pulled(job.project, tile))
     if place := best_stage(job.project, number):  # at hand when it is pulled again

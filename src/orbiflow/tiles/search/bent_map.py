@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -188,12 +189,17 @@ def divided(mesh: Mesh, at: Array, images: Array) -> tuple[Mesh, Array]:
 
 
 def carried_on(
-    bending: Bending, before: Array, after: Array, sharpenings: int | None = None
+    bending: Bending,
+    before: Array,
+    after: Array,
+    sharpenings: int | None = None,
+    inner: Callable[[Array], Array] | None = None,
 ) -> Bending:
     """Return a map to a tile `before` (N, 2), composed with the move of its vertices to `after` (N, 2).
 
-    All are in normal form; the polygons may be clockwise. The inside follows harmonically and is
-    untangled, for so many `sharpenings` at most; an `OrbiflowError` if it cannot follow without folds.
+    All are in normal form; the polygons may be clockwise. The inside follows harmonically, or goes
+    where `inner` says, and is untangled, with so many `sharpenings` at most. Raises an `OrbiflowError`
+    if it cannot follow without folds.
     """
     first = border(bending.triangles)
     order = np.concatenate([first, np.setdiff1d(np.arange(len(bending.rest)), first)])
@@ -211,8 +217,11 @@ def carried_on(
     mesh, images = divided(mesh, _unknown(mesh, at), images)
     along = np.interp((shares(mesh) - offset) % mesh.size, numbers, knots)
     steps = [np.interp(along, places, np.append(step, step[0])) for step in (new - old).T]
-    images = images + harmonic(mesh, np.stack(steps, axis=-1))
-    return Bending(mesh.points, unfolded(mesh, images, sharpenings), mesh.triangles)
+    moved = images + harmonic(mesh, np.stack(steps, axis=-1))
+    if inner is not None:
+        fixed = mesh.size + len(mesh.sides)
+        moved[fixed:] = inner(images[fixed:])
+    return Bending(mesh.points, unfolded(mesh, moved, sharpenings), mesh.triangles)
 
 
 TILE_POINTS, SILHOUETTE_POINTS = 240, 480  # points along the two outlines that are matched

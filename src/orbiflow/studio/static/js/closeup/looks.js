@@ -248,18 +248,31 @@ export function signPanel(elements, look, change, light) {
 /**
  * How a point is pulled.
  *
- * @param {{ reach: number, lattice: boolean }} pull
+ * @param {{ what: string, reach: number, lattice: boolean, gives: boolean }} pull
  * @param {(what: object) => void} change
  * @param {() => void} back
+ * @param {boolean} hasInside whether something lies inside that can be pulled
  */
-export function pullPanel(pull, change, back) {
+export function pullPanel(pull, change, back, hasInside) {
+  if (!hasInside) pull.what = "outline";
+  const inside = pull.what === "inside";
   return h(
     "div",
     { class: "stack" },
+    hasInside &&
+      choice(
+        "What to pull",
+        [["outline", "The outline"], ["inside", "The inside"]],
+        pull.what,
+        (what) => change({ what }),
+        { unseen: true },
+      ),
     h(
       "p",
       { class: "soft" },
-      "Take hold of any point of the outline and pull. All copies follow, so there is never a gap.",
+      inside
+        ? "Take hold of an eye, a fin or anything inside and pull. The tile stays a tile."
+        : "Take hold of any point of the outline and pull. All copies follow, so there is never a gap.",
     ),
     slider("How far the pull reaches", {
       min: 0.1,
@@ -270,8 +283,9 @@ export function pullPanel(pull, change, back) {
         v,
       ) => (v < 0.3 ? "a little" : v < 0.8 ? "a part" : v < 1.5 ? "most of it" : "all of it"),
     }, (reach) => change({ reach })),
+    inside && check("The outline gives way", pull.gives, (gives) => change({ gives })),
     check("The grid may change, too", pull.lattice, (lattice) => change({ lattice })),
-    h(
+    !inside && h(
       "p",
       { class: "small soft by-keys" },
       "By keyboard: click the picture or go to it with ",

@@ -47,7 +47,7 @@ class Closeup {
     const kept = project.view?.closeup ?? {};
     this.look = { ...lookOf(project, about), share: 1 };
     this.keepLook = keeper(api, project);
-    this.pull = { reach: 0.5, lattice: true, ...kept.pull };
+    this.pull = { what: "outline", reach: 0.5, lattice: true, gives: false, ...kept.pull };
     this.penSettings = { ...PEN, ...kept.pen };
     this.mode = kept.mode ?? "look";
     this.lit = null;
@@ -121,7 +121,7 @@ class Closeup {
       tool: () => this.tool,
     });
     this.pulling = new Pulling(this.stage, this.pull, {
-      released: (parameters) => this.#released(parameters),
+      released: (parameters, inside) => this.#released(parameters, inside),
       said: (text) => this.say(text),
       changed: (now) => this.#pulledTo(now),
     });
@@ -234,7 +234,8 @@ class Closeup {
 
   #panels() {
     const { look, view, about } = this;
-    const [hands, keys] = HELP[this.mode];
+    const inside = this.mode === "pull" && this.pull.what === "inside";
+    const [hands, keys] = HELP[inside ? "draw" : this.mode];
     put(this.help, hands, h("span", { class: "by-keys" }, ` Keys: ${keys}`));
     const needed = 1 + Math.max(...view.colours.table.flat(2));
     const change = (what) => this.#change(what);
@@ -253,11 +254,17 @@ class Closeup {
     } else if (this.mode === "pull") {
       put(
         this.panel,
-        pullPanel(this.pull, (what) => {
-          Object.assign(this.pull, what);
-          this.keep();
-          this.stage.redraw();
-        }, () => this.#restore()),
+        pullPanel(
+          this.pull,
+          (what) => {
+            Object.assign(this.pull, what);
+            this.keep();
+            this.stage.redraw();
+            if ("what" in what) this.#panels();
+          },
+          () => this.#restore(),
+          this.figures.every(({ map }) => map),
+        ),
       );
     } else {
       put(
@@ -390,12 +397,15 @@ class Closeup {
     }
   }
 
-  async #released(parameters) {
+  async #released(parameters, inside) {
     const before = this.view;
     this.tell("checking", "Checking …");
     this.#checking();
     try {
-      const card = await this.api.post(`${this.home}/tiles/${before.id}/pulled`, { parameters });
+      const card = await this.api.post(`${this.home}/tiles/${before.id}/pulled`, {
+        parameters,
+        inside,
+      });
       if (this.closed) return;
       this.past.did({ tile: [before.id, card.id] });
       await this.open(card.id, { quiet: true });

@@ -9,17 +9,18 @@
  */
 
 import { measured } from "../tiling.js";
+import { everyPoint, weigh } from "./body.js";
 import { crosses } from "./crossing.js";
-import { dot, multiply, multiplyBack, sparse } from "./sparse.js";
+import { dot, multiply, multiplyBack } from "./sparse.js";
 
 const GRAB = 600; // strength of the spring to the pointer; that of a triangle is about one
 const GRIP = 0.3; // width of the hand, in reaches
 const HOLD = 4; // of those beyond the reach
 const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
-const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
 const AFTER = [1, 2, 0, 1]; // corners of a triangle after corner 0, 1, 2
 const STRIDE = 0.04; // of a hand that is followed, in sizes of the tile
 const SLACK = 1.02; // times the way from rest that must be free as well, so that sides do not touch
+const FLATTEST = 0.05; // of a triangle's area, which is left of it at least where the inside is pulled
 const HALVINGS = 6; // by which the last good place is found
 const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
 
@@ -43,8 +44,12 @@ export class Puller {
     this.area = 0;
     this.middle = [0, 0];
     this.#measure(space.rings.map((ring) => ring.map((k) => space.polygon[k])));
-    this.points = this.#everyPoint(space);
-    this.#weigh();
+    const { points, tied } = everyPoint(space, this.middle, this.group);
+    const { cotangents, laplacian } = weigh(this.triangles, this.rest, this.area);
+    this.points = points;
+    this.tied = tied;
+    this.cotangents = cotangents;
+    this.laplacian = laplacian;
     this.#findOrbits();
     const columns = this.points.cols;
     this.z = new Float64Array(columns);
@@ -61,6 +66,7 @@ export class Puller {
     this.y = new Float64Array(2 * this.size);
     this.hold = new Float64Array(this.size);
     this.pin = null;
+    this.inside = false; // whether what is held lies inside
   }
 
   /** The mean area of the figures, and the middle of the first. */
@@ -68,84 +74,6 @@ export class Puller {
     const all = polygons.map(measured);
     this.area = all.reduce((sum, { area }) => sum + area / all.length, 0);
     this.middle = [all[0].x, all[0].y];
-  }
-
-  /** Every point of the body as rows of one matrix; the group moves about the middle of the tile. */
-  #everyPoint(space) {
-    const { body, cols } = space;
-    const own = sparse(space, cols);
-    const rows = [];
-    for (let i = 0; i < space.rows; i += 1) {
-      const row = new Map();
-      for (let k = own.start[i]; k < own.start[i + 1]; k += 1) row.set(own.at[k], own.value[k]);
-      // p -> M p + b is M (p - middle) + middle + b', so that M does not shift what is far from 0
-      this.maps.forEach((map, m) => {
-        const by = [0, 1].map((j) => map[j][0] * this.middle[0] + map[j][1] * this.middle[1]);
-        const [u, v] = [cols - 2, cols - 1].map((column) => row.get(column) ?? 0);
-        const shift = u * by[0] + v * by[1];
-        if (shift) row.set(this.group + m, (row.get(this.group + m) ?? 0) - shift);
-      });
-      rows.push(row);
-    }
-    body.sides.forEach(([from, to], k) => {
-      const share = body.shares[k];
-      for (const j of [0, 1]) {
-        const row = new Map();
-        for (const [vertex, part] of [[from, 1 - share], [to, share]]) {
-          for (const [column, value] of rows[2 * vertex + j]) {
-            row.set(column, (row.get(column) ?? 0) + part * value);
-          }
-        }
-        rows.push(row);
-      }
-    });
-    const tied = rows.length;
-    for (let i = tied; i < 2 * this.size; i += 1) rows.push(new Map([[cols + i - tied, 1]]));
-    this.tied = tied;
-    const indptr = [0];
-    rows.forEach((row) => indptr.push(indptr.at(-1) + row.size));
-    return sparse(
-      {
-        indptr,
-        indices: rows.flatMap((row) => [...row.keys()]),
-        values: rows.flatMap((row) => [...row.values()]),
-      },
-      cols + 2 * this.size - tied,
-    );
-  }
-
-  /** The cotangent of each corner of each triangle, and the Laplacian that they make. */
-  #weigh() {
-    const { triangles, rest, size } = this;
-    this.cotangents = new Float64Array(triangles.length);
-    const near = Array.from({ length: size }, () => new Map());
-    for (let t = 0; t < triangles.length; t += 3) {
-      const corners = [triangles[t], triangles[t + 1], triangles[t + 2]];
-      const cot = corners.map((a, k) => {
-        const [b, c] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
-        const [ux, uy] = [rest[2 * b] - rest[2 * a], rest[2 * b + 1] - rest[2 * a + 1]];
-        const [vx, vy] = [rest[2 * c] - rest[2 * a], rest[2 * c + 1] - rest[2 * a + 1]];
-        return (ux * vx + uy * vy) / Math.max(Math.abs(ux * vy - uy * vx), 1e-12 * this.area);
-      });
-      const share = 0.5 * Math.min(1, STEEPEST / Math.max(...cot.map(Math.abs)));
-      corners.forEach((_, k) => {
-        const [b, c] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
-        this.cotangents[t + k] = share * cot[k]; // of the side opposite of corner k
-        for (const [i, j, sign] of [[b, c, -1], [c, b, -1], [b, b, 1], [c, c, 1]]) {
-          near[i].set(j, (near[i].get(j) ?? 0) + sign * share * cot[k]);
-        }
-      });
-    }
-    const indptr = [0];
-    near.forEach((row) => indptr.push(indptr.at(-1) + row.size));
-    this.laplacian = sparse(
-      {
-        indptr,
-        indices: near.flatMap((row) => [...row.keys()]),
-        values: near.flatMap((row) => [...row.values()]),
-      },
-      size,
-    );
   }
 
   /** Which vertices are images of one free vertex: they move together. */
@@ -184,6 +112,7 @@ export class Puller {
   grab(vertex, share, reach, { lattice = true, figure = 0 } = {}) {
     const ring = this.rings[figure];
     this.ahead = null;
+    this.inside = false;
     this.pin = {
       vertex: ring[vertex],
       next: ring[(vertex + 1) % ring.length],
@@ -195,6 +124,36 @@ export class Puller {
     this.free.fill(1);
     if (!lattice) this.free.fill(0, this.group, this.parametersCount);
     this.#holdBeyond(reach);
+    this.#measureDiagonal();
+  }
+
+  /**
+   * Take hold of the inside at a place of the tile. The outline stays where it is, or `gives` way; `lattice` as
+   * above.
+   */
+  grabInside([x, y], reach, { gives = false, lattice = true } = {}) {
+    const { rest, size } = this;
+    this.ahead = null;
+    this.inside = true;
+    const apart = Array.from(
+      { length: size },
+      (_, i) => Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y),
+    );
+    const width = Math.max(GRIP * reach, 1.5 * Math.min(...apart));
+    const near = apart.map((far, i) => [i, Math.exp(-3 * (far / width) ** 2)])
+      .filter(([, own]) => own > 0.05);
+    const total = near.reduce((sum, [, own]) => sum + own, 0);
+    this.pin = { parts: near.map(([i, own]) => [i, own / total]), target: null };
+    this.pin.target = this.held();
+    this.free.fill(1);
+    this.free.fill(
+      0,
+      gives ? (lattice ? this.parametersCount : this.group) : 0,
+      this.parametersCount,
+    );
+    apart.forEach((far, i) => {
+      this.hold[i] = LEAST_HOLD + HOLD * Math.min(1, far / reach) ** 4;
+    });
     this.#measureDiagonal();
   }
 
@@ -243,6 +202,7 @@ export class Puller {
    * @returns {Point}
    */
   grip() {
+    if (this.inside) return this.held();
     const { vertex, next, share } = this.pin;
     const at = this.#pointsOf(2 * vertex, 2 * vertex + 2).concat(
       this.#pointsOf(2 * next, 2 * next + 2),
@@ -413,7 +373,22 @@ export class Puller {
     const here = this.polygon();
     const farther = here.map((value, k) => this.rest[k] + SLACK * (value - this.rest[k]));
     const along = (points, ring) => ring.flatMap((k) => [points[2 * k], points[2 * k + 1]]);
+    if (this.inside && this.#isFolded()) return true;
     return this.simple.some((ring) => crosses(along(here, ring)) || crosses(along(farther, ring)));
+  }
+
+  /** Whether a triangle of the body is turned over, or nearly. */
+  #isFolded() {
+    const { triangles, rest } = this;
+    const x = this.body();
+    const size = (at, k) => {
+      const [a, b, c] = [2 * triangles[k], 2 * triangles[k + 1], 2 * triangles[k + 2]];
+      return (at[b] - at[a]) * (at[c + 1] - at[a + 1]) - (at[b + 1] - at[a + 1]) * (at[c] - at[a]);
+    };
+    for (let k = 0; k < triangles.length; k += 3) {
+      if (size(x, k) < FLATTEST * size(rest, k)) return true;
+    }
+    return false;
   }
 
   #solve(steps) {
@@ -457,9 +432,9 @@ export class Puller {
     return this.rings.map((ring) => ring.map((k) => [points[2 * k], points[2 * k + 1]]));
   }
 
-  /** How far the outline is from where it rests, at most, in sizes of the tile. */
+  /** How far anything is from where it rests, at most, in sizes of the tile. */
   moved() {
-    return this.polygon().reduce(
+    return this.body().reduce(
       (most, value, k) => Math.max(most, Math.abs(value - this.rest[k])),
       0,
     ) / Math.sqrt(this.area);
@@ -490,5 +465,10 @@ export class Puller {
     const found = Array.from(this.z.subarray(0, this.parametersCount));
     found.splice(-2, 2, ...this.placement().shift);
     return found;
+  }
+
+  /** The points inside, x0, y0, x1, y1 ..., if these are what was pulled. */
+  insides() {
+    return this.inside ? Array.from(this.z.subarray(this.parametersCount)) : [];
   }
 }

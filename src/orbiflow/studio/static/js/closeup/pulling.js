@@ -13,7 +13,7 @@ const [FREE, STOPPED] = ["#0b6b66", "#8a5a00"]; // the point in hand
 const KEY_STEP = 6; // pixels that a key moves a point
 
 export class Pulling {
-  /** `on`: {released(parameters), said(text), changed()}; `settings`: {reach, lattice}. */
+  /** `on`: {released(parameters, inside), said(text), changed()}; `settings`: {what, reach, lattice, gives}. */
   constructor(stage, settings, on) {
     this.stage = stage;
     this.settings = settings;
@@ -39,12 +39,25 @@ export class Pulling {
 
   down(place, event) {
     if (!this.ready) return false;
+    if (this.settings.what === "inside") return this.#downInside(place);
     const found = this.stage.outlineAt(place, event.pointerType === "touch" ? FINGER : GRIP);
     if (!found) return false;
     this.#take(found);
     const [x, y] = this.puller.held();
     const own = moved(inverse(this.stage.matrixOf(found.copy)), place);
     this.hand.offset = [x - own[0], y - own[1]];
+    this.aim = place;
+    this.#follow();
+    return true;
+  }
+
+  #downInside(place) {
+    const found = this.stage.copyAt(place);
+    if (!found) return false;
+    const { reach, gives, lattice } = this.settings;
+    this.puller.grabInside(found.at, reach * this.size, { gives, lattice });
+    const [x, y] = this.puller.held();
+    this.hand = { copy: found.copy, offset: [x - found.at[0], y - found.at[1]] };
     this.aim = place;
     this.#follow();
     return true;
@@ -69,8 +82,9 @@ export class Pulling {
   }
 
   hover(place) {
-    const found = (this.ready && this.stage.outlineAt(place, GRIP)) || null;
-    this.stage.canvas.style.cursor = found ? "grab" : "";
+    const inside = this.settings.what === "inside";
+    const found = (this.ready && !inside && this.stage.outlineAt(place, GRIP)) || null;
+    this.stage.canvas.style.cursor = found || inside ? "grab" : "";
     if (found || this.near) this.stage.redraw();
     this.near = found;
   }
@@ -102,7 +116,7 @@ export class Pulling {
       return;
     }
     this.waiting = true;
-    this.on.released(this.puller.parameters());
+    this.on.released(this.puller.parameters(), this.puller.insides());
   }
 
   /** Let the outline go after the pointer, frame by frame. */
