@@ -239,6 +239,8 @@ class FourierField(InvariantField):
         batch: The size S of a stack of independent fields, or None for one field.
         smoothness: The power s >= 0; the parameter of frequency kappa is multiplied by
             (1 + |kappa|^2 vol^(2/d))^(-s / 2), which makes descent in the parameters Sobolev descent.
+        divergence_free: Whether to take only fields without divergence, whose flows keep volumes up to
+            the error of their steps (`Flow.forward_and_log_det` tells it).
         dtype, device: The dtype and the device of the parameters.
 
     Shapes:
@@ -250,9 +252,12 @@ class FourierField(InvariantField):
     >>> field = FourierField(wallpaper_group("p4"), 5)
     >>> field.size
     60
+    >>> FourierField(wallpaper_group("p4"), 5, divergence_free=True).size
+    30
     """
 
     stackable = True
+    can_be_divergence_free = True
 
     @cached_property
     def _orders(self) -> tuple[int, ...]:

@@ -137,8 +137,14 @@ def _orthonormal_columns(projector: Array) -> Array:
 
 
 @cached_by_basis(maxsize=64)  # a flow of many segments shares one basis
-def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> InvariantBasis:
-    """Build the basis orbit by orbit: the range of the mean over coset representatives."""
+def invariant_basis(
+    group: CrystallographicGroup, max_frequency: int, divergence_free: bool = False
+) -> InvariantBasis:
+    """Build the basis orbit by orbit: the range of the mean over coset representatives.
+
+    A field has no divergence if each coefficient is at a right angle to its frequency (design point
+    24). The projection onto these commutes with the group, which turns both alike.
+    """
     d = group.dim
     frequencies = frequency_set(group, max_frequency)
     targets, blocks = _action(group, frequencies)
@@ -157,6 +163,13 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
         projector /= group.order
         if not frequencies[orbit[0]].any():
             projector[:, d:] = projector[:, :, :, d:] = 0.0
+        waves = frequencies[orbit] @ group.inverse_lattice
+        if divergence_free and waves.any():
+            across = (
+                np.eye(d) - waves[:, :, None] * waves[:, None] / (waves**2).sum(1)[:, None, None]
+            )
+            both = np.einsum("mij,mkjnl->mkinl", across, projector.reshape(m, 2, d, m, 2 * d))
+            projector = both.reshape(projector.shape)
         basis = _orthonormal_columns(projector.reshape(2 * d * m, 2 * d * m))
         row, column = np.nonzero(np.abs(basis) > 1e-14)
         place: Array = orbit[row // (2 * d)] * 2 * d + row % (2 * d)
@@ -186,6 +199,7 @@ class InvariantField(nn.Module, ABC):
     scale: Tensor
     frame: Tensor
     stackable = False  # whether the parameters may be those of a stack
+    can_be_divergence_free = False  # whether its coefficients are those of waves
 
     def __init__(
         self,
@@ -194,15 +208,21 @@ class InvariantField(nn.Module, ABC):
         *,
         batch: int | None = None,
         smoothness: float = 0.0,
+        divergence_free: bool = False,
         dtype: torch.dtype = torch.float64,
         device: torch.device | str | None = None,
     ) -> None:
         super().__init__()
+        if divergence_free and not self.can_be_divergence_free:
+            raise OrbiflowError(
+                f"a {type(self).__name__} cannot be without divergence; take a FourierField"
+            )
         if batch is not None and not self.stackable:
             raise OrbiflowError(f"a {type(self).__name__} cannot be a stack; leave batch out")
         self.group = checked_group(group)
         self.smoothness = smoothness
-        self.basis: InvariantBasis = invariant_basis(group, max_frequency)
+        self.divergence_free = bool(divergence_free)
+        self.basis: InvariantBasis = invariant_basis(group, max_frequency, self.divergence_free)
         self.max_frequency = int(max_frequency)
         self.size = self.basis.size
         shape = (self.size,) if batch is None else (batch, self.size)
@@ -277,7 +297,8 @@ class InvariantField(nn.Module, ABC):
 
     def _fill_buffers(self) -> None:
         own = self.parameters_
-        key = self.max_frequency, self.smoothness, own.dtype, own.device, self.layout
+        which = self.max_frequency, self.divergence_free
+        key = *which, self.smoothness, own.dtype, own.device, self.layout
         for name, tensor in _constants(self.group, *key).items():
             self.register_buffer(name, tensor, persistent=False)
 
@@ -296,12 +317,13 @@ class InvariantField(nn.Module, ABC):
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,
+    divergence_free: bool,
     smoothness: float,
     dtype: torch.dtype,
     device: torch.device,
     layout: Callable[..., tuple[Array, Array, Array]],
 ) -> dict[str, Tensor]:
-    basis = invariant_basis(group, max_frequency)
+    basis = invariant_basis(group, max_frequency, divergence_free)
     rows, columns, values = layout(group, basis)
     size = group.cell_volume ** (1 / group.dim)  # makes the factors free of the unit of length
     scale = (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)

@@ -256,7 +256,7 @@ class SplineField(InvariantField):
     Args:
         group: A group with a rectangular lattice in one to three dimensions, whose linear parts
             permute and flip the axes.
-        max_frequency, smoothness, dtype, device: See `FourierField`.
+        max_frequency, smoothness, dtype, device: See `FourierField`. Without divergence there is none.
 
     Shapes:
         `parameters_`: (P,). Points (..., d).

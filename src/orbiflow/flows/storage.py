@@ -74,6 +74,7 @@ class Writer:
             "group": self._group(field.group),
             "max_frequency": field.max_frequency,
             "smoothness": float(field.smoothness),
+            "divergence_free": field.divergence_free,
             "batch": len(own) if own.dim() == 2 else None,
             "parameters": own.shape[-1],
             "dtype": _dtype(own),
@@ -131,6 +132,8 @@ class Reader:
             "smoothness": as_number(header["smoothness"], "smoothness", -1e6, 1e6),
             "dtype": DTYPES[header["dtype"]],
         }
+        if header["divergence_free"] is True:
+            options["divergence_free"] = True
         if batch is not None:
             options["batch"] = batch
         return SERIES[header["kind"]](group, frequency, **options)
