@@ -144,7 +144,7 @@ def _drawn(call: Call, folder: Path, hear: Sink, cancel: Cancel) -> bytes:
     """Return a picture of what a call would write, small."""
     settings, makes = call.arguments["settings"], call.operation.name
     if makes == "animate":
-        from orbiflow.tiles.motion import still
+        from orbiflow.tiles import still
 
         return still(call.arguments["result"], settings, SHOWN_PROGRESS, LIVE_SIDE_PIXELS)
     out = folder / PREVIEW

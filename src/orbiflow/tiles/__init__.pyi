@@ -71,6 +71,7 @@ from .motifs.carried import with_map as with_map
 from .motifs.page_pictures import page_picture as page_picture
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animation as animation
+from .motion.writers import still as still
 from .operations import animate as animate
 from .operations import art as art
 from .operations import export as export
