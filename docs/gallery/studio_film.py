@@ -24,7 +24,7 @@ import orbiflow
 from studio_pictures import IMAGES, PATIENCE, TALL, keep, make_pictures
 from studio_screen import BACK, EYE, Film, centre, in_window, outline_in_window
 
-ANIMAL = Path(orbiflow.__file__).parent / "studio" / "animals" / "turtle.png"
+ANIMAL = Path(orbiflow.__file__).parent / "studio" / "animals" / "turtle.svg"
 FILMED: ViewportSize = {"width": 1080, "height": 675}
 
 DROP = """async ([bytes, name]) => {
@@ -68,7 +68,7 @@ def bring_picture(film: Film) -> None:
     film.pointer = (1050.0, 640.0)
     film.go(*centre(page, ".drop"), frames=9)
     film.carried = None
-    page.evaluate(DROP, [list(ANIMAL.read_bytes()), "turtle.png"])
+    page.evaluate(DROP, [list(ANIMAL.read_bytes()), "turtle.svg"])
     page.wait_for_selector("canvas.reading[aria-busy=false]")
     project = page.url.split("/")[-2]
     quick = {"view": {"search": {"effort": "fast"}}}

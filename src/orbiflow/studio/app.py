@@ -107,7 +107,7 @@ async def about(here: Studio) -> dict[str, Any]:
         "version": __version__,
         "limits": {"bytes": limits.upload, "pixels": MAX_PIXELS, "projects": limits.projects},
         "animals": [
-            {"name": name, "title": title, "picture": f"/api/animals/{name}.png"}
+            {"name": name, "title": title, "picture": f"/api/animals/{animal_file(name).name}"}
             for name, title in ANIMALS.items()
         ],
         "palettes": [
@@ -124,10 +124,10 @@ def _shades(own: Palette) -> list[list[tuple[str, ...]]]:
     return [[both[: len(both) // 2] for both in every], [both[len(both) // 2 :] for both in every]]
 
 
-@routes("GET", "/animals/{name}.png")
-async def animal(name: str) -> FileResponse:
+@routes("GET", "/animals/{file}")
+async def animal(file: str) -> FileResponse:
     """Return the picture of an animal."""
-    return FileResponse(animal_file(name))
+    return FileResponse(animal_file(file.partition(".")[0]))
 
 
 @routes("GET", "/operations/{name}/schema")

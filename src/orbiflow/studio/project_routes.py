@@ -203,10 +203,10 @@ async def animal(request: Request, project: str, here: Studio, number: int = 0) 
     """Take one of the bundled animals."""
     name = str((await body_object(request)).get("name"))
     end = _end(here, project, number)
-    content = animal_file(name).read_bytes()
-    file = here.store.home(project) / f"input{end}.png"
-    file.write_bytes(content)
-    return await _new_input(here, project, f"{ANIMALS[name]}.png", file, number)
+    own = animal_file(name)
+    file = here.store.home(project) / f"input{end}{own.suffix}"
+    file.write_bytes(own.read_bytes())
+    return await _new_input(here, project, f"{ANIMALS[name]}{own.suffix}", file, number)
 
 
 @routes("POST", "/projects/{project}/second")
@@ -459,4 +459,5 @@ def animal_file(name: str) -> Path:
     """Return the picture of an animal."""
     if name not in ANIMALS:
         raise Missing(f"there is no such animal; there are {', '.join(ANIMALS)}")
-    return FOLDER / f"{name}.png"
+    drawing = FOLDER / f"{name}.svg"
+    return drawing if drawing.is_file() else drawing.with_suffix(".png")
