@@ -85,6 +85,24 @@ def test_all_that_can_be_made_is_shown_small(
     assert 200 < max(image_of(preview(client, address, operation, **settings)).size) <= 1200
 
 
+def test_a_drawing_is_on_what_is_printed_in_3d(client: Client, address: str) -> None:
+    with_it, without = (
+        np.asarray(image_of(preview(client, address, "solid", kind="stamp", drawing=own)))
+        for own in (True, False)
+    )
+    assert with_it.shape != without.shape or (with_it != without).any()
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_mp4_is_offered_where_it_can_be_made(
+    client: Client, monkeypatch: pytest.MonkeyPatch, there: bool
+) -> None:
+    monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/ffmpeg" if there else None)
+    schema = client.get("/api/operations/animate/schema").json()
+    assert ("mp4" in json.dumps(schema["properties"]["format"])) is there
+    assert "gif" in json.dumps(schema["properties"]["format"])
+
+
 def test_what_cannot_be_made_is_refused_beside_its_setting(client: Client, address: str) -> None:
     answer = preview(client, address, "export", tile_size="99999mm")
     assert (answer.status_code, answer.json()["setting"]) == (422, "tile_size")

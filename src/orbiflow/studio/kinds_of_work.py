@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Mapping
 from contextlib import suppress
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -50,7 +52,7 @@ class Kind:
 TAKE_SETTINGS = ("tile", "picture", "drawing", "called")
 """Settings of a take-away besides those of its operation."""
 
-WITH_DRAWING = ("export", "art")
+WITH_DRAWING = ("export", "art", "solid")
 """What shows the drawing on a tile."""
 
 READS = ("read", "read second")
@@ -96,10 +98,10 @@ def own_fields(operation: Operation) -> list[Field]:
 
 
 def own_schema(operation: Operation) -> dict[str, Any]:
-    """Return the JSON Schema of what a browser may set of an operation."""
+    """Return the JSON Schema of what a browser may set of an operation, and this machine can make."""
     properties = {
         entry.name: {
-            **entry.schema,
+            **deepcopy(entry.schema),
             "x-group": entry.group,
             "x-default": entry.default_text,
             "x-only-with": {
@@ -111,6 +113,9 @@ def own_schema(operation: Operation) -> dict[str, Any]:
         }
         for entry in own_fields(operation)
     }
+    if operation.name == "animate" and shutil.which("ffmpeg") is None:
+        for kind in properties["format"].get("anyOf", [properties["format"]]):
+            kind["enum"] = [name for name in kind.get("enum", ()) if name != "mp4"]
     return {**operation.schema, "properties": properties, "required": []}
 
 

@@ -26,6 +26,7 @@ from orbiflow.tiles import (
     TileVariations,
     arc_lengths,
     border,
+    carried_anew,
     carried_on,
     complex_points,
     divided_tile,
@@ -47,7 +48,9 @@ NEGLIGIBLE_ENTRY = 1e-12  # entry of the space's matrix that is nothing but roun
 AREA_BOUNDS = (0.05, 20.0)  # area of a pulled tile, and of its lattice's cell, in those of before
 SAME_POINT_DISTANCE = 1e-7  # in the tile's size: vertices of figures this near to others are these
 QUICK_SHARPENINGS = 4  # tries to unfold the inside after one step of a pull
-MOST_STEPS = 32  # in which the inside follows a pull
+SHARPENINGS = 10  # where that fails, of other triangles
+LAST_RESORT_SHARE = 0.5  # of the work, which is told when they are tried
+MOST_STEPS = 4  # in which the inside follows a pull
 Way = Callable[[float], Array]  # the polygon of a figure at a share of the way, 0 to 1
 Move = Callable[[Array], Array]  # where points go
 Told = Callable[[float], object]
@@ -324,7 +327,12 @@ def _carried(
         middle = (start + end) / 2
         return follow(follow(own, start, middle, 2 * steps), middle, end, 2 * steps)
 
-    return follow(bending, 0.0, 1.0, 1)
+    try:
+        return follow(bending, 0.0, 1.0, 1)
+    except OrbiflowError:
+        told(LAST_RESORT_SHARE)
+        before, after = (frame.to_normal(way(share)) for share in (0.0, 1.0))
+        return carried_anew(bending, before, after, SHARPENINGS)
 
 
 def _figure(

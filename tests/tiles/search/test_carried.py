@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, signed_area
-from orbiflow.tiles.search.bent_map import map_of_bent, onto_polygon
+from orbiflow.tiles.search.bent_map import carried_anew, map_of_bent, onto_polygon
 from orbiflow.tiles.silhouette import triangulate, unfolded
 from orbiflow.tiles.silhouette.bending import MAX_POINTS
 from outlines import BentTile, animal, bent_squirrel, disc
@@ -206,3 +206,21 @@ def test_what_is_no_map_is_refused(case: str) -> None:
     rest, images, triangles, message = BAD[case]
     with pytest.raises(OrbiflowError, match=message):
         Bending(rest, images, triangles)
+
+
+@pytest.mark.parametrize(("name", "mirrored"), CASES)
+def test_with_triangles_of_its_own_a_map_is_carried_to_where_the_outline_goes(
+    name: str, mirrored: bool
+) -> None:
+    case, known = bending(name, mirrored)
+    ring = case.tile.polygon
+    size = np.ptp(ring, axis=0).max()
+    shear = np.array([[1.0, 0.4], [0.0, 1.2]])
+    found = carried_anew(known, ring, ring @ shear.T, 10)
+    points = points_in(outline(case), 800)
+    # what is affine is followed, but for where chords cut the silhouette's outline off
+    apart = np.hypot(*(found.forward(points) - known.forward(points) @ shear.T).T)
+    assert np.median(apart) < 0.02 * size
+    pieces = shapely.polygons(found.images[found.triangles])
+    tile = shapely.Polygon(ring @ shear.T)
+    assert abs(shapely.union_all(np.asarray(pieces)).symmetric_difference(tile).area) < 1e-9

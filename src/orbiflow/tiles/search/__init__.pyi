@@ -1,3 +1,4 @@
+from .bent_map import carried_anew as carried_anew
 from .bent_map import carried_on as carried_on
 from .bent_map import matched as matched
 from .candidates import Candidates as Candidates

@@ -224,6 +224,29 @@ def carried_on(
     return Bending(mesh.points, unfolded(mesh, moved, sharpenings), mesh.triangles)
 
 
+def carried_anew(bending: Bending, before: Array, after: Array, sharpenings: int) -> Bending:
+    """Return what `carried_on` does, with triangles of its own, where the map's own would fold.
+
+    The outline of the silhouette is followed between the new points by straight lines.
+    """
+    way = -1 if signed_area(after) < 0 else 1
+    old, new = before[::way], after[::way]
+    mesh = triangulate(new)
+    places = shares(mesh)
+    side, part = np.divmod(places, 1.0)
+    numbers, part = side.astype(np.int64) % len(old), part[:, None]
+    outline = (1 - part) * old[numbers] + part * old[(numbers + 1) % len(old)]
+    back = mesh.points + harmonic(mesh, outline - mesh.points[: len(places)])
+    rest = bending.inverse(np.concatenate([outline, back[len(places) :]]))
+    for start in (
+        rest,
+        mesh.points + harmonic(mesh, rest[: len(places)] - mesh.points[: len(places)]),
+    ):
+        with contextlib.suppress(OrbiflowError):
+            return Bending(unfolded(mesh, start, sharpenings), mesh.points, mesh.triangles)
+    raise OrbiflowError("what lies on the tile cannot follow there without folds")
+
+
 TILE_POINTS, SILHOUETTE_POINTS = 240, 480  # points along the two outlines that are matched
 MAX_STEP_POINTS = 12  # most points of the silhouette that one step along the tile passes
 UNEVEN_COST = 2e-3  # cost of a step that is not the usual two points, in areas a point squared

@@ -12,7 +12,8 @@ import { isMade, madeBefore, picture, words } from "./made.js";
 import { Preview } from "./preview.js";
 import { trueSize } from "./truesize.js";
 
-const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
+/** What each can be laid on. */
+const ON = { drawing: ["export", "art", "solid"], picture: ["export", "art"] };
 const NEVER = [
   "tile",
   "result",
@@ -239,7 +240,7 @@ class TakeawayPage {
         } own colours`,
         this.look.art,
       ),
-    ].filter((own) => own && DRAWN.includes(kind));
+    ].filter((own) => own && ON[own.name].includes(kind));
   }
 
   /** What is chosen here of the look holds everywhere. */
@@ -256,20 +257,27 @@ class TakeawayPage {
   }
 
   /** The picture is laid on what shows its colours, as the look says; else if that is wished, where it can be. */
-  fitPicture() {
-    const { box } = this.layers.find(({ name }) => name === "picture") ?? {};
+  fitLayers() {
+    const [drawing, picture] = ["drawing", "picture"].map((own) =>
+      this.layers.find(({ name }) => name === own)?.box
+    );
+    const may = (own, can) => {
+      own.disabled = own.parentElement.hidden = !can;
+    };
+    if (drawing) may(drawing, this.form.now("kind") !== "cutter"); // which is open inside
+    const box = picture;
     const [purpose, format] = ["purpose", "format"].map((name) => this.form.now(name));
     const suits = !COLOURLESS.includes(purpose);
     if (!box) return;
     if (suits !== this.suits) box.checked = suits && this.look.art;
     this.suits = suits;
     const holds = purpose !== "plotter" && !["dxf", "json"].includes(format);
-    box.disabled = box.parentElement.hidden = !holds && this.project.input?.type !== "svg";
+    may(box, holds || this.project.input?.type === "svg");
   }
 
   /** Show the size at once; what was made before is no longer what is asked for. */
   changed() {
-    this.fitPicture();
+    this.fitLayers();
     const size = lengthIn(this.form.now("tile_size"));
     this.real.hidden = !(size && KINDS[this.kind].solid);
     if (!this.real.hidden) this.size.show(size, this.form.now("warn_neck"));

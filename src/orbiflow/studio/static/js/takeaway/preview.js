@@ -6,7 +6,8 @@ const PATIENCE = 1500; // ms after which a drawing that is no longer wanted is g
 const SLOW = 400; // ms after which it is said that one is being drawn
 
 const SAYS = {
-  animate: "One moment of the animation. It moves once it is made.",
+  animate:
+    "One moment of the animation, which shows tiles in plain colours: what you drew and your picture are not in it.",
   solid: "Small and coarse; it is made in full.",
 };
 
