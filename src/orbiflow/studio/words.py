@@ -34,11 +34,13 @@ LABELS = {
 """What the pages call settings whose names say too little."""
 
 ON_THE_PAGE = {
+    "(alpha threshold ": "(opacity from ",
+    "(threshold ": "(edge at ",
     "with smoothing 0.01": "with a little smoothing",
     "say so with missing codes, and leave their rows out with drop missing; or make": "make",
     "give the way angles are counted": "choose under “How angles are counted”:",
 }
-"""What messages say of options, once these are named, and what the page has for them."""
+"""What messages say of options and levels, once these are named, and what the page has for them."""
 
 
 def page_words(text: str) -> str:

@@ -15,7 +15,7 @@ from shapely.geometry import Polygon
 
 from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
 from orbiflow.tiles.geometry import centroid, orient, polygons_in, signed_area
 from orbiflow.tiles.silhouette import readers  # read when a file is
 from orbiflow.tiles.silhouette.outlines import (
@@ -322,7 +322,10 @@ class Target(Reading):
         shape = rounded(own, share * length)
         if shape.is_empty:
             raise OrbiflowError(
-                f"{self.source}: smooth {share:g} leaves nothing of the silhouette; choose less"
+                Advice(
+                    literal(f"{self.source}: ")
+                    + f"{{smooth}} {share:g} leaves nothing of the silhouette; choose less"
+                )
             )
         went = Polygon(self.outline).difference(shape)
         width = share * length
