@@ -1,6 +1,6 @@
 /** The projects on the first page: go on with one, rename it, duplicate it, or delete it and take that back. */
 
-import { button, dialog, h, icon, put, trying } from "../dom.js";
+import { button, dialog, h, icon, put, toast, trying } from "../dom.js";
 import { ago, number } from "../words.js";
 
 const PAGES = { density: "d", solid: "s" }; // of projects that are no tiles
@@ -104,6 +104,7 @@ export class Projects {
 
   /** Go by the project's file, which has all but what was taken away of it. */
   duplicate({ id, name }) {
+    toast(`Copying “${name}” …`);
     return this.after(async () => {
       const answer = await fetch(`api/projects/${id}/file`);
       if (!answer.ok) throw new Error("The project cannot be copied now. Reload the page.");
