@@ -400,7 +400,7 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, scheme) -> None:
 
 
 def test_pages_are_light() -> None:
-    assert sum(file.stat().st_size for file in STATIC.rglob("*") if file.is_file()) < 380_000
+    assert sum(file.stat().st_size for file in STATIC.rglob("*") if file.is_file()) < 400_000
 
 
 def test_a_project_file_opens_again(page, studio: RunningStudio, tmp_path) -> None:

@@ -399,7 +399,8 @@ async def live_preview(request: Request, project: str, tile: int, here: Studio) 
     flat = {name: call.flat[name] for name in ("makes", "settings", "picture", "drawing")}
     if given.get("instead"):
         await run_in_threadpool(here.queue.forget, project, "preview")
-    task = await here.done(project, "preview", {**flat, "tile": tile})
+    size = {"side": given["side"]} if "side" in given else {}
+    task = await here.done(project, "preview", {**flat, **size, "tile": tile})
     here.store.delete_task(task["id"])
     if task["state"] != "done":
         raise OrbiflowError(task["error"] or "another preview has taken the place of this one")

@@ -8,7 +8,7 @@ import shutil
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
@@ -24,6 +24,7 @@ from orbiflow.runtime import (
     make_folder,
     operation,
 )
+from orbiflow.settings import Range
 from orbiflow.studio.kinds_of_work import WITH_DRAWING, file_name, making_call
 from orbiflow.studio.settings import Job
 from orbiflow.studio.tile_files import tile_folder
@@ -75,7 +76,6 @@ PREVIEW = "preview.png"
 SCRATCH = ".drawn"  # a folder for what is written on the way
 MAX_DRAWN_BYTES = 30_000_000  # bytes of a solid that is drawn
 PREVIEW_SIDE_PIXELS = 1000.0  # pixels of a preview's longer side
-LIVE_SIDE_PIXELS = 800.0  # of one that follows every setting
 LEAST_TILE_PIXELS = 8.1  # of a tile, below which no picture of it can be made
 SHOWN_PROGRESS = 0.7  # share of an animation at which it is shown
 
@@ -99,6 +99,7 @@ def preview(
     settings: str = "{}",
     picture: bool = False,
     drawing: str = "",
+    side: Annotated[int, Range(100, 2000)] = 800,
     *,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
@@ -109,6 +110,7 @@ def preview(
 
     Args:
         makes: As for `studio take`, like the others.
+        side: The pixels of the picture's longer side, where it can be chosen.
     """
     del on_event
     folder = make_folder(export_folder(job.project, job.task))
@@ -124,7 +126,7 @@ def preview(
         if drawing and makes in WITH_DRAWING:
             result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
         call = making_call(makes, given, result, **files)
-        image = _drawn(call, folder, hear, cancel)
+        image = _drawn(call, folder, side, hear, cancel)
         return Outcome({"image": base64.b64encode(image).decode(), "notes": notes})
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -140,19 +142,19 @@ def _small_pictures(home: Path, result: Path) -> dict[str, Any]:
     return found
 
 
-def _drawn(call: Call, folder: Path, hear: Sink, cancel: Cancel) -> bytes:
-    """Return a picture of what a call would write, small."""
+def _drawn(call: Call, folder: Path, side: float, hear: Sink, cancel: Cancel) -> bytes:
+    """Return a picture of what a call would write, its longer side of so many pixels."""
     settings, makes = call.arguments["settings"], call.operation.name
     if makes == "animate":
         from orbiflow.tiles import still
 
-        return still(call.arguments["result"], settings, SHOWN_PROGRESS, LIVE_SIDE_PIXELS)
+        return still(call.arguments["result"], settings, SHOWN_PROGRESS, side)
     out = folder / PREVIEW
     # what holds no pixels refuses pictures
     if makes == "solid" or settings.file_format in ("dxf", "json"):
         out = out.with_suffix(f".{settings.file_format}")
     else:
-        settings = _small(settings, LIVE_SIDE_PIXELS)
+        settings = _small(settings, side)
     arguments = {**call.arguments, "settings": settings, "out": out}
     done: Any = call.operation.function(**arguments, on_event=hear, cancel=cancel)
     if makes == "solid":
@@ -162,7 +164,7 @@ def _drawn(call: Call, folder: Path, hear: Sink, cancel: Cancel) -> bytes:
     else:
         from orbiflow.tiles import write_scene
 
-        drawn = write_scene(done.scenes[0], "png", dpi=_small_dpi(settings, LIVE_SIDE_PIXELS))
+        drawn = write_scene(done.scenes[0], "png", dpi=_small_dpi(settings, side))
         return bytes(drawn) if isinstance(drawn, bytes) else b""
     return (out if out.suffix == ".png" else folder / PREVIEW).read_bytes()
 

@@ -181,7 +181,7 @@ export class Pulling {
 
   /** Arrows choose a point, shift and arrows move it; Enter lets go, Escape springs back. */
   key(event) {
-    if (!this.ready) return false;
+    if (!this.ready || (this.settings.what === "inside" && !this.hand)) return false;
     const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     const way = ways[event.key];
     if (way && event.shiftKey) {

@@ -3,12 +3,12 @@
 import { h, put } from "../dom.js";
 
 const PATIENCE = 1500; // ms after which a drawing that is no longer wanted is given up
+const SIDES = [480, 1000]; // pixels: soon, then in detail
 const SLOW = 400; // ms after which it is said that one is being drawn
 
 const SAYS = {
   animate:
     "One moment of the animation, which shows tiles in plain colours: what you drew and your picture are not in it.",
-  solid: "Small and coarse; it is made in full.",
 };
 
 export class Preview {
@@ -41,21 +41,23 @@ export class Preview {
     if (!this.running || late) this.#draw(late);
   }
 
-  async #draw(instead) {
+  async #draw(instead, detail = 0) {
     const [running, asked] = [new AbortController(), this.wanted];
     this.running = running;
+    this.again = false;
     this.began = performance.now();
     const slow = setTimeout(() => this.image.setAttribute("aria-busy", "true"), SLOW);
     const { operation, settings } = JSON.parse(asked);
     try {
-      const found = await this.api.post(`${this.place}/preview`, { operation, settings, instead }, {
-        signal: running.signal,
-      });
+      const body = { operation, settings, instead, side: SIDES[detail] };
+      const { signal } = running;
+      const found = await this.api.post(`${this.place}/preview`, body, { signal });
       if (running !== this.running) return;
       const src = `data:image/png;base64,${found.image}`;
       put(this.image, h("img", { src, alt: `What will be made: ${this.title}` }));
       this.says.textContent = SAYS[operation] ?? "";
       this.told(null, found.notes);
+      this.again = !detail && operation !== "solid";
     } catch (error) {
       if (running !== this.running || error.name === "AbortError") return;
       if (asked === this.wanted) this.told(error, []);
@@ -65,6 +67,7 @@ export class Preview {
         this.image.removeAttribute("aria-busy");
         this.running = null;
         if (asked !== this.wanted) this.#draw(false);
+        else if (this.again) this.#draw(false, 1);
       }
     }
   }
