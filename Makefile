@@ -25,7 +25,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/pyright --pythonpath $(BIN)/python --threads 2
 	$(BIN)/deno fmt --check --quiet
 	$(BIN)/deno lint --quiet
-	$(BIN)/deno check --quiet src/orbiflow/studio/static/js
+	$(BIN)/deno check --quiet src/orbiflow/studio/static/js src/orbiflow/tiles/write
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/field.py --quick

@@ -9,7 +9,15 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.drawing import cell_ring
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
-from orbiflow.tiles import EscherTile, Rating, border, colouring, narrowest_neck
+from orbiflow.tiles import (
+    EscherTile,
+    Rating,
+    border,
+    colouring,
+    narrowest_neck,
+    polygon_json,
+    tiling_json,
+)
 
 
 def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
@@ -23,8 +31,9 @@ def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
         number: Its number in the studio.
         stage: How far its search is: sketch, better, final.
     """
-    rating, aspects = tile.rating or Rating(1), tile.tiling.aspects
-    colours = colouring(tile.tiling)
+    rating = tile.rating or Rating(1)
+    shown = tiling_json(tile.tiling, colouring(tile.tiling), y_down=tile.y_down)
+    shown["group"]["name"] = tile.group_name
     card = {
         "id": number,
         "class_name": tile.isohedral_class,
@@ -35,24 +44,10 @@ def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
         "arrangement": tile.arrangement,
         "certified": tile.certificate.valid,
         "parent": None,
+        **shown,
         **_outline(tile.tile.polygon),
-        "y_down": tile.y_down,
-        "group": {
-            "name": tile.group_name,
-            "lattice": tile.tile.group.lattice.tolist(),
-            "cosets": [
-                {"linear": coset.linear.tolist(), "translation": coset.translation.tolist()}
-                for coset in (tile.tile.group.cosets[k] for k in aspects.cosets)
-            ],
-        },
-        "colours": {
-            "sublattice": list(colours.sublattice),
-            "table": colours.table.tolist(),
-            "shares": list(colours.shares),
-        },
     }
     if tile.parts:
-        card["group"]["figures"] = aspects.prototiles.tolist()
         card["figures"] = [
             {
                 "name": part.figure.name,
@@ -66,9 +61,7 @@ def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
 
 def _outline(ring: Array) -> dict[str, Any]:
     """Return a polygon with as many digits as show, and the ends of its neck."""
-    size = float(abs(ring).max()) or 1.0
-    polygon = (np.round(ring / size, 6) * size).tolist()
-    return {"polygon": polygon, "neck": narrowest_neck(ring).ends.tolist()}
+    return {"polygon": polygon_json(ring), "neck": narrowest_neck(ring).ends.tolist()}
 
 
 def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:

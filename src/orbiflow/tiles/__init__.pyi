@@ -76,6 +76,8 @@ from .operations import animate as animate
 from .operations import art as art
 from .operations import export as export
 from .operations import solid as solid
+from .page.endless import polygon_json as polygon_json
+from .page.endless import tiling_json as tiling_json
 from .page.page import Page as Page
 from .page.scene import Curve as Curve
 from .page.scene import Layer as Layer

@@ -27,7 +27,7 @@ from orbiflow.units import PAGES
         ({"stroke": 5}, "stroke must be a colour .*got 5"),
         ({"palette": 5}, "palette must be a palette's name, .*got 5"),
         ({"bed": (100.0, -1.0)}, "bed: entry 2: must be above 0"),
-        ({"format": "bmp"}, "format must be svg, pdf, dxf, png or json, got 'bmp'"),
+        ({"format": "bmp"}, "format must be svg, pdf, dxf, png, json or html, got 'bmp'"),
         ({"cut": "half"}, "cut must be none, skeleton, pieces, jigsaw or template"),
         ({"cut": "pieces", "copies": 0}, "copies must be .*at least 1"),
         ({"copies": 3}, "copies applies only to cut pieces, not to none"),

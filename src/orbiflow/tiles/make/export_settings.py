@@ -34,10 +34,12 @@ FINE = 0.01  # in mm: a step of a machine
 WRAPPED = ("mug", "phone")  # pages that things are wrapped in, and so without an edge
 PRINTER_EDGE = 5.0  # width in mm of the page's edge that printers at home leave empty
 
-Purpose = Literal["laser", "print", "paper", "web", "plotter", "template", "colouring", "stickers"]
+Purpose = Literal[
+    "laser", "print", "paper", "web", "plotter", "template", "colouring", "stickers", "share"
+]
 """What an export is for, by which many settings go."""
 
-COLOURED = ("print", "paper", "web", "stickers")  # what shows drawings in their colours
+COLOURED = ("print", "paper", "web", "stickers", "share")  # what shows drawings in their colours
 PRINTED = ("print", "paper", "template", "colouring", "stickers")  # what is a PDF unless told
 
 
@@ -180,6 +182,13 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
                 f"{{tolerance}} of {self.tolerance:g} mm would lose the shape of a tile of "
                 f"{self.tile_size:g} mm; choose at most {self.tile_size / 20:g} mm"
             )
+        if self.file_format == "html" and (self.cut != "none" or not self.filled):
+            raise SettingError(
+                "{format} html is a page with all tiles in their colours, which none can cut; choose "
+                "another format"
+            )
+        if self.file_format == "html" and self.bed is not None:
+            raise SettingError("{format} html has no edge; leave {bed} out")
         if self.outline == 0 and self.cut != "none":
             raise SettingError(f"{{outline}} none leaves {{cut}} {self.cut} without a line")
         has_palette = self.purpose == "stickers" or (self.cut == "none" and self.filled)
@@ -197,6 +206,8 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
     @property
     def usual_format(self) -> str:
         """What suits the purpose, else svg."""
+        if self.purpose == "share":
+            return "html"
         return "pdf" if self.purpose in PRINTED else "svg"
 
     @property
@@ -232,6 +243,7 @@ PURPOSES: Mapping[str, Mapping[str, Any]] = {
     "plotter": {**_LINES, "stroke": "#000000", "outline": 0.3},
     "print": {"clip": True},
     "web": {"clip": True},
+    "share": {"clip": True},
     "template": {**_SHEET, "cut": "template"},
     "stickers": {
         "cut": "pieces",

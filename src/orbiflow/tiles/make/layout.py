@@ -18,6 +18,7 @@ from orbiflow.tiles.make.offsets import offset_ring
 from orbiflow.tiles.page import (
     USUAL_WIDTH,
     Box,
+    Endless,
     Layer,
     Motif,
     Outline,
@@ -142,6 +143,9 @@ def tiling_scene(layout: Layout) -> Scene:
         chosen, motifs = palette(settings.palette), layout.motifs
         line = settings.stroke or chosen.outline
     width = USUAL_WIDTH if settings.outline is None else settings.outline
+    tint, whole = settings.tint * layout.has_picture, None
+    if chosen is not None:
+        whole = Endless.of_page(page, chosen, motifs, tint=tint, line=width)
     return page.scene(
         chosen,
         Style(None, line, width),
@@ -149,7 +153,8 @@ def tiling_scene(layout: Layout) -> Scene:
         clipped=settings.clip,
         seam=SEAM if motifs else None,
         motifs=motifs,
-        tint=settings.tint * layout.has_picture,
+        tint=tint,
         prototiles=layout.prototiles,
         tiles=layout.placed_tiles,
+        endless=whole,
     )

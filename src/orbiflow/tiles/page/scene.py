@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.page.endless import Endless
 
 Booleans = NDArray[np.bool_]
 
@@ -274,6 +277,7 @@ class Scene:
     facts: dict[str, Any] = field(default_factory=dict)  # for the JSON file, such as the class
     told: tuple[str, ...] = ()  # what the user should know of how it was made
     motifs: dict[str, Motif] = field(default_factory=dict)  # drawings by name, for `Uses`
+    endless: Endless | None = None  # the whole tiling, if it is shown in colours
 
     @property
     def clip(self) -> Box:

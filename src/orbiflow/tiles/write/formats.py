@@ -19,6 +19,7 @@ WRITERS: dict[str, str] = {
     "dxf": "orbiflow.tiles.write.dxf:write_dxf",
     "png": "orbiflow.tiles.write.png:write_png",
     "json": "orbiflow.tiles.write.json:write_json",
+    "html": "orbiflow.tiles.write.html:write_html",
 }
 """The module and function that write a scene in each format, which is the ending of its files.
 

@@ -2,6 +2,7 @@
 
 import { laidOn } from "./texture.js";
 import { inverse, moved } from "./tiling.js";
+import { Skin } from "./tinted.js";
 
 const MOST = 1400; // pixels along a side
 const PAD = 4; // pixels around a figure
@@ -101,40 +102,6 @@ export function between({ map, place = [1, 0, 0, 1, 0, 0] }, share) {
     return [u + share * (x - u), v + share * (y - v)];
   };
   return { ...map, images: map.images.map(there) };
-}
-
-/** A picture of what lies on a figure; where there is a picture below, each copy tints it by its colour. */
-class Skin {
-  /**
-   * @param {HTMLCanvasElement} canvas
-   * @param {Matrix} matrix its pixels to the tile
-   * @param {number} tint from 0 to 1: the colour's share
-   */
-  constructor(canvas, matrix, tint) {
-    this.canvas = canvas;
-    this.matrix = matrix;
-    this.tint = tint;
-    this.tinted = new Map();
-  }
-
-  /** @param {string} colour */
-  in(colour) {
-    if (!this.tint) return this.canvas;
-    if (!this.tinted.has(colour)) {
-      const made = document.createElement("canvas");
-      Object.assign(made, { width: this.canvas.width, height: this.canvas.height });
-      const context = made.getContext("2d");
-      context.drawImage(this.canvas, 0, 0);
-      context.globalCompositeOperation = "multiply";
-      context.globalAlpha = this.tint;
-      context.fillStyle = colour;
-      context.fillRect(0, 0, made.width, made.height);
-      Object.assign(context, { globalCompositeOperation: "destination-in", globalAlpha: 1 });
-      context.drawImage(this.canvas, 0, 0);
-      this.tinted.set(colour, made);
-    }
-    return this.tinted.get(colour);
-  }
 }
 
 /**

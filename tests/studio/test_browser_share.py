@@ -1,0 +1,227 @@
+"""What is shared of a tile, in a real browser: the page without an end, opened from a disk."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from artworks import EYE, size_of, squirrel
+from exported import tile_of
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    CLASSES,
+    ISOHEDRAL_TYPES,
+    ExportSettings,
+    Tiling,
+    colouring,
+    export,
+    tiling_json,
+)
+from orbiflow.tiles.write import write_scene
+from studio_checks import serious_issues
+
+MOST_BYTES = 60_000  # of a page beside its pictures
+WIDE, HIGH = 700, 500
+COPIES = """async ([tiles, width, height]) => {
+  const { Camera, Tiling } = await import("/js/tiling.js");
+  return tiles.map((tile) => {
+    const tiling = new Tiling(tile);
+    const camera = Camera.fit(tiling, width, height, 6);
+    return tiling.copies(camera, width, height).map(({ matrix, colour, figure }) =>
+      [matrix, colour, figure]);
+  });
+}"""
+
+
+def placed(ring: Any, matrix: Any) -> shapely.Polygon:
+    """Return where a canvas matrix takes a polygon."""
+    a, b, c, d, e, f = matrix
+    return shapely.Polygon(np.asarray(ring) @ np.array([[a, b], [c, d]]) + (e, f))
+
+
+def check_colours(
+    found: list[shapely.Polygon], colours: Sequence[Any], width: int, height: int
+) -> None:
+    """Assert that tiles cover a canvas once, and that those that share an edge differ in colour."""
+    window = shapely.box(0, 0, width, height)
+    assert shapely.union_all(found, grid_size=1e-6).area >= 0.999 * window.area
+    inside = shapely.intersection(found, window)
+    assert shapely.area(inside).sum() == pytest.approx(window.area, rel=2e-3)
+    shared = 0
+    for k, j in shapely.STRtree(found).query(found, "dwithin", 0.05).T.tolist():
+        if k < j and (found[k].buffer(0.05) & found[j].buffer(0.05)).area > 0.5:
+            shared += 1
+            assert colours[k] != colours[j]
+    assert shared > 20
+
+
+def test_every_type_is_coloured_as_in_the_library(page: Any) -> None:
+    tilings = [Tiling(own.group(), [own.template()]) for own in ISOHEDRAL_TYPES.values()]
+    told = [tiling_json(own, colouring(own), y_down=True) for own in tilings]
+    page.goto("/")
+    shown = page.evaluate(COPIES, [told, WIDE, HIGH])
+    assert len(shown) == 81
+    for own, tile, copies in zip(tilings, told, shown, strict=True):
+        found = [placed(tile["polygon"], matrix) for matrix, _, _ in copies]
+        colours = [colour for _, colour, _ in copies]
+        check_colours(found, colours, WIDE, HIGH)
+        assert set(colours) == set(range(colouring(own).count))
+
+
+@pytest.fixture(name="alone")
+def alone_fixture(browser: Any) -> Iterator[Any]:
+    """A page in a browser without a network, on which nothing may go wrong."""
+    context = browser.new_context(offline=True, viewport={"width": 900, "height": 640})
+    own, wrong = context.new_page(), list[str]()
+    own.on("pageerror", lambda error: wrong.append(str(error)))
+    own.on("console", lambda said: said.type == "error" and wrong.append(said.text))
+    own.on(
+        "request",
+        lambda asked: asked.url.startswith(("file:", "data:", "blob:")) or wrong.append(asked.url),
+    )
+    yield own
+    context.close()
+    assert wrong == []
+
+
+def opened(page: Any, file: Path) -> None:
+    page.goto(file.as_uri())
+    page.wait_for_selector("#colours input")
+    page.wait_for_timeout(50)
+
+
+def drawing(page: Any) -> tuple[list[shapely.Polygon], list[str]]:
+    """Return the tiles, and the colour of each, of the SVG that the page saves."""
+    with page.expect_download() as waited:
+        page.click("#svg")
+    text = waited.value.path().read_text("utf-8")
+    symbols = dict(re.findall(r'<g id="(\w+)"><polygon points="([^"]+)"', text))
+    fills = dict(re.findall(r'<g id="(\w+)"><polygon [^>]*?fill="(#\w+)"', text))
+    rings = {name: [p.split(",") for p in own.split()] for name, own in symbols.items()}
+    uses = re.findall(r'<use href="#(\w+)" transform="matrix\(([^)]+)\)"', text)
+    found = [
+        placed(np.array(rings[name], dtype=float), [float(v) for v in m.split()])
+        for name, m in uses
+    ]
+    return found, [fills[name] for name, _ in uses]
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_page_of_each_class_opens_from_a_disk(alone: Any, tmp_path: Path, name: str) -> None:
+    out = tmp_path / "tile.html"
+    export(tile_of(name), out, ExportSettings(purpose="share"))
+    assert out.stat().st_size < MOST_BYTES
+    opened(alone, out)
+    check_colours(*drawing(alone), 900, 640)
+
+
+def test_page_is_moved_far_coloured_anew_and_turned(alone: Any, tmp_path: Path) -> None:
+    out = tmp_path / "tile.html"
+    export(tile_of("IH4"), out)
+    opened(alone, out)
+    before = drawing(alone)
+    alone.locator("#view").focus()
+    for _ in range(120):
+        alone.keyboard.press("ArrowLeft")
+    alone.locator("#turn").fill("30")
+    alone.mouse.move(300, 300)
+    alone.mouse.wheel(0, 300)
+    alone.click("#order")
+    after = drawing(alone)
+    check_colours(*after, 900, 640)
+    assert set(after[1]) != set(before[1])
+    alone.locator("#colours input").first.fill("#ff0000")
+    assert "#ff0000" in drawing(alone)[1]
+    alone.click("#again")
+    assert drawing(alone)[1] == before[1]
+    serious_issues(alone)
+
+
+def test_picture_and_eyes_are_in_the_file_and_can_be_hidden(alone: Any, tmp_path: Path) -> None:
+    tile, picture, out = squirrel("IH4"), tmp_path / "picture.png", tmp_path / "tile.html"
+    Image.new("RGB", size_of(tile), "#d02020").save(picture)
+    export(tile, out, ExportSettings(tint=0.0, outline=0, eyes=(EYE,)), picture=picture)
+    text = out.read_text("utf-8")
+    pictures = re.findall(r"data:image/webp;base64,[^\"]+", text)
+    assert len(pictures) == 1
+    assert len(text) - sum(map(len, pictures)) < MOST_BYTES
+    opened(alone, out)
+    assert reddish(alone) > 0.9
+    alone.uncheck("#skin")
+    alone.wait_for_timeout(60)
+    assert reddish(alone) == 0
+
+
+def reddish(page: Any) -> float:
+    """Return the share of the canvas that is as red as the picture."""
+    return page.locator("#view").evaluate("""(canvas) => {
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      let count = 0;
+      for (let k = 0; k < data.length; k += 4) {
+        count += Math.abs(data[k] - 0xd0) < 20 && data[k + 1] < 60 && data[k + 2] < 60;
+      }
+      return (4 * count) / data.length;
+    }""")
+
+
+def test_pinch_zooms_and_a_finger_moves(alone: Any, tmp_path: Path) -> None:
+    out = tmp_path / "tile.html"
+    export(tile_of("IH4"), out)
+    opened(alone, out)
+    first = len(drawing(alone)[0])
+    alone.evaluate("""() => {
+      const canvas = document.getElementById("view");
+      canvas.setPointerCapture = () => {};
+      const touch = (kind, pointerId, clientX, clientY) => canvas.dispatchEvent(
+        new PointerEvent(kind, { pointerId, clientX, clientY, pointerType: "touch" }));
+      touch("pointerdown", 1, 300, 300);
+      touch("pointerdown", 2, 340, 300);
+      touch("pointermove", 2, 500, 300);
+      touch("pointerup", 1, 300, 300);
+      touch("pointerup", 2, 500, 300);
+    }""")
+    assert len(drawing(alone)[0]) < first / 4
+
+
+def test_what_users_wrote_is_escaped(alone: Any, tmp_path: Path) -> None:
+    evil = "</script><script>console.log('evil')</script><b>&"
+    tile = tile_of("IH4")
+    out = tmp_path / "tile.html"
+    made = export(tile, out)
+    scene = replace(made.scenes[0], title=evil)
+    out.write_text(str(write_scene(scene, "html")), "utf-8")
+    opened(alone, out)
+    assert alone.title() == evil
+    assert alone.locator("b").count() == 0
+    drawing(alone)
+
+
+def test_prints_the_tiling_alone(browser: Any, tmp_path: Path) -> None:
+    pdfium = pytest.importorskip("pypdfium2")
+    out = tmp_path / "tile.html"
+    export(tile_of("IH4"), out, ExportSettings(palette="delft"))
+    context = browser.new_context(viewport={"width": 900, "height": 640})
+    page = context.new_page()
+    opened(page, out)
+    document = pdfium.PdfDocument(page.pdf(format="A4"))
+    context.close()
+    assert len(document) == 1
+    assert document[0].get_textpage().get_text_bounded().strip() == ""  # no controls
+    pixels = np.asarray(document[0].render(scale=0.5).to_pil().convert("RGB"))
+    inner = pixels[20:-40, 20:-20].reshape(-1, 3)
+    assert (inner.min(axis=1) > 250).mean() < 0.02  # all of the sheet is filled
+
+
+def test_lines_alone_are_no_page(tmp_path: Path) -> None:
+    with pytest.raises(OrbiflowError, match="html is a page with all tiles"):
+        export(tile_of("IH4"), tmp_path / "cut.html", ExportSettings(cut="pieces"))
+    with pytest.raises(OrbiflowError, match="has no edge"):
+        export(tile_of("IH4"), tmp_path / "cut.html", ExportSettings(bed=(100, 100)))
