@@ -57,6 +57,15 @@ def test_about(client: Client) -> None:
     assert set(about["palettes"][0]) == {"name", "colours", "shades", "outline", "paper"}
 
 
+def test_an_eye_that_is_a_hole_is_something_to_see(client: Client) -> None:
+    address, fish = new_project(client), "M10 50Q40 10 80 50L95 35V65L80 50Q40 90 10 50Z"
+    for eye, coloured in (("", False), ("M30 40h8v8h-8z", True)):
+        drawing = f'<path fill-rule="evenodd" d="{fish}{eye}"/>'
+        svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">{drawing}</svg>'
+        done(client, client.put(f"{address}/input?name=fish.svg", content=svg.encode()))
+        assert client.get(address).json()["silhouette"]["coloured"] is coloured
+
+
 @pytest.mark.parametrize("name", ["turtle", "frog", "barbet"])
 def test_an_animal_that_was_drawn_is_one_shape_with_something_in_it(
     client: Client, name: str

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFilter
 
 from orbiflow.drawing import png_bytes
 from orbiflow.errors import InputFileError
@@ -31,7 +31,8 @@ from orbiflow.tiles import (
 BACKDROP_SIDE_PIXELS = 1200  # pixels of the backdrop's longer side
 SAMPLED_PIXELS = 400  # along a side, where it is asked for colours
 MIN_CONTRAST = 48  # of 255, of a colour that is another one
-MIN_COLOURED_SHARE = 0.01  # of a silhouette: more than its soft edge has
+EDGE_PIXELS = 7  # of these, twice as wide as what an outline's soft edge takes, and one
+MIN_COLOURED_SHARE = 0.005  # of a silhouette without its edge: an eye
 SUPERSAMPLING = 3  # along each side of a pixel of what is drawn
 ABOUT_PARTS = ("kept the largest", "filled ")  # how notes on parts and holes begin
 PAPER, INK = (255, 255, 255), (70, 78, 92)
@@ -162,18 +163,16 @@ def _mended(target: Target, file: Path, size: tuple[int, int]) -> Target:
 
 def _is_coloured(picture: Image.Image, ring: list[list[float]]) -> bool:
     """Whether a picture has several colours inside of a ring, such as eyes and lines."""
-    small = picture.convert("RGBA").resize(
-        (SAMPLED_PIXELS, SAMPLED_PIXELS), Image.Resampling.NEAREST
-    )
+    size = SAMPLED_PIXELS, SAMPLED_PIXELS
+    small = picture.convert("RGBA").resize(size, Image.Resampling.NEAREST)
     shares = np.array(ring) / picture.size * SAMPLED_PIXELS
-    inside = Image.new("1", small.size)
-    ImageDraw.Draw(inside).polygon(list(map(tuple, shares.tolist())), fill=1)
-    colours = np.asarray(small, dtype=float)[np.asarray(inside)]
-    colours = colours[colours[:, 3] > 127, :3]
-    if not len(colours):
-        return False
+    inside = Image.new("L", size)
+    ImageDraw.Draw(inside).polygon(list(map(tuple, shares.tolist())), fill=255)
+    inside = inside.filter(ImageFilter.MinFilter(EDGE_PIXELS))  # without the soft edge
+    laid = Image.alpha_composite(Image.new("RGBA", size, (*PAPER, 255)), small)  # holes are eyes
+    colours = np.asarray(laid, dtype=float)[np.asarray(inside) > 0]
     others = np.abs(colours - np.median(colours, axis=0)).max(axis=1) > MIN_CONTRAST
-    return bool(others.mean() > MIN_COLOURED_SHARE)
+    return bool(others.sum() > MIN_COLOURED_SHARE * len(others))
 
 
 def _shown(target: Target, picture: Image.Image) -> dict[str, Any]:
