@@ -36,6 +36,25 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     done = orbiflow("density", "region", "-m", "part", "--mass", "0.5", "-o", "r.json")
     assert done.status == 2
     assert "of angles alone, not of real columns" in done.err
+    done = orbiflow("density", "score", "rows.csv", "-m", "fit", "--given", "phi", "-o", "g.csv")
+    assert done.status == 0, done.err
+    joint, given = (
+        np.loadtxt(name, delimiter=",", skiprows=1, usecols=3) for name in ("s.csv", "g.csv")
+    )
+    alone = orbiflow("density", "marginal", "-m", "fit", "--columns", "phi", "-o", "phi")
+    assert alone.status == 0
+    done = orbiflow("density", "score", "rows.csv", "-m", "phi", "-o", "p.csv")
+    assert done.status == 0, done.err
+    less = np.loadtxt("p.csv", delimiter=",", skiprows=1, usecols=3)
+    assert np.allclose(joint - less, given, atol=1e-6)
+    done = orbiflow(
+        "density", "trend", "-m", "fit", "--of", "length", "--along", "phi", "-n", 9, "-o", "t.csv"
+    )
+    assert done.status == 0, done.err
+    table = np.loadtxt("t.csv", delimiter=",", skiprows=1)
+    assert table.shape == (9, 7)
+    assert (table[:, 2] < table[:, 1]).all()
+    assert Path("t.png").read_bytes()[:4] == b"\x89PNG"
     cv = ["--components", "kernels", "--folds", 3, "-o", "cv"]
     done = orbiflow("density", "cv", "rows.csv", *how, *cv)
     assert done.status == 0, done.err

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_instance, as_tensor, as_whole, refusal
+from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
@@ -34,6 +34,7 @@ from orbiflow.density.fitting import (
     weighed,
 )
 from orbiflow.density.inference import (
+    FittedFigures,
     at_observed,
     axes_named,
     chart_of_rows,
@@ -43,7 +44,7 @@ from orbiflow.density.inference import (
     given_named,
     marginal,
 )
-from orbiflow.density.models import Density, Estimate, flow_obstacle, log_density_gradient
+from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
 from orbiflow.density.spaces import MixedTorus, QuotientSpace, Space, check_measure, space_for
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
@@ -77,7 +78,7 @@ def _signature() -> inspect.Signature:
     )
 
 
-class DensityEstimator:
+class DensityEstimator(FittedFigures):
     """Exact, normalised density of angles, directions, axes or Klein-bottle coordinates.
 
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
@@ -298,38 +299,6 @@ class DensityEstimator:
         count = as_whole(n_samples, "n_samples", 1)
         generator = torch.Generator().manual_seed(seed_of(random_state))
         return self.space_.from_chart(density.sample((count,), generator))
-
-    def mean(self) -> Array:
-        """The mean direction of each angle and the mean of each real column, or of directions: (k,).
-
-        Raises `OrbiflowError` before `fit`, and on spaces whose points have no mean (`Density.mean`).
-        """
-        return self._fitted().space.from_chart(self.density_.mean[None])[0]
-
-    def mode(self) -> Array:
-        """The data (k,) at which the density in natural measure is highest, as far as was found."""
-        return self._fitted().space.from_chart(self.density_.mode[None])[0]
-
-    def cdf(self, X: ArrayLike) -> Array:
-        """The masses (N,) up to data (N, 1) of the only column, from half a turn before 0 on.
-
-        A real column begins at minus infinity. Of several columns take `marginal` first.
-        """
-        return self._fitted().cdf(self._chart(self._checked(X))).numpy()
-
-    def quantile(self, masses: ArrayLike) -> Array:
-        """The values (N,) of the only column up to which there are these masses (N,), from 0 to 1."""
-        points = self._fitted().icdf(as_tensor(masses, "masses").reshape(-1))
-        return self.space_.from_chart(points)[:, 0]
-
-    def entropy(self, *, measure: str = "natural") -> Estimate:
-        """-E[log p] in nats with its standard error, the same every time."""
-        return self._fitted().estimated_entropy(measure=measure)
-
-    def kl_divergence(self, other: DensityEstimator | Density) -> Estimate:
-        """E[log p - log q] in nats, of another density q from this one, with its standard error."""
-        density = other._fitted() if isinstance(other, DensityEstimator) else other
-        return self._fitted().divergence(as_instance(density, Density, "other"))
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The constructor's arguments, by name."""

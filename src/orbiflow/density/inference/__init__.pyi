@@ -8,5 +8,8 @@ from .angles import observed_rows as observed_rows
 from .doubts import data_doubts as data_doubts
 from .doubts import data_unit as data_unit
 from .doubts import given_doubts as given_doubts
+from .fitted import FittedFigures as FittedFigures
 from .partial import conditional as conditional
 from .partial import marginal as marginal
+from .trends import Trend as Trend
+from .trends import trend as trend

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -29,6 +30,9 @@ class ScoreSettings(Settings, group="Scores"):
     measure: Literal["natural", "square", "uniform"] = "natural"
     """What the density is per. Natural: the data's own units, or steradians. Uniform: relative to
     chance."""
+
+    given: Annotated[tuple[str, ...], DefaultText("none")] = ()
+    """Columns that are known: the log density of the others where these are, p(others | given)."""
 
     region: bool = False
     """Add a column hdr: the mass of the smallest region of highest density that holds the row."""
@@ -63,13 +67,16 @@ def score(
     """
     check_table_name(out)
     may_lack = reading.missing == "marginalise"
+    for name in ("region", "gradient") if settings.given else ():
+        if getattr(settings, name):
+            raise SettingError(f"{{{name}}} is of whole rows, not of {{given}} ones; leave one out")
     for name in ("region", "gradient") if may_lack else ():
         if getattr(settings, name):
             raise SettingError(
                 f"{{{name}}} requires complete rows; leave it out, or {{missing}} marginalise"
             )
 
-    from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
+    from orbiflow.density.operations.saved import axes_of, check_fits, model_at, with_columns_of
 
     runtime.check_output_file(out, data, model)
     with runtime.one_thread():
@@ -79,7 +86,11 @@ def score(
         rows = tables.read_rows(data, read, on_event, model_space=density.space.name)
         check_fits(data, rows.table, density, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)
-        columns, mean, over, notes = score_rows(density, rows, settings, progress, may_lack)
+        names = [*rows.table.columns]
+        known = axes_of(settings.given, names, on_event) if settings.given else ()
+        if len(known) == len(names):
+            raise SettingError("{given} names all columns: nothing is left to have a density")
+        columns, mean, over, notes = score_rows(density, rows, settings, progress, may_lack, known)
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
     table = tables.append_columns(rows.table, data, columns)
@@ -104,8 +115,11 @@ def score_rows(
     settings: ScoreSettings,
     progress: fitting.Progress,
     may_lack: bool,
+    given: Sequence[int] = (),
 ) -> tuple[dict[str, Array], float, str, list[str]]:
     """Return columns (N,) to add to the table, log densities first, and what is known of them.
+
+    Where columns are `given`, by their numbers from 0, they are log densities of the others.
 
     These are the weighted mean log density, in nats, of the rows that lack nothing, which rows they are
     in words, and notes.
@@ -119,6 +133,9 @@ def score_rows(
     name = "log_prob" if whole.all() else "log_prob_marginal"
     notes: list[str] = []
     columns = {name: _log_densities(density, points, settings, progress)}
+    if given:
+        of_given = _log_densities(density, _only(points, given), settings, progress)
+        columns, name = {"log_prob_given": columns[name] - of_given}, "log_prob_given"
     if settings.gradient:
         columns |= _gradients(density, rows, progress)
     if settings.region:
@@ -132,6 +149,13 @@ def score_rows(
         notes.append(_missing_note(known, name))
     over = f"{len(whole)} rows" if whole.all() else f"the {whole.sum()} whole rows"
     return columns, mean_of_whole(columns[name], rows.weights, whole), over, notes
+
+
+def _only(points: Tensor, given: Sequence[int]) -> Tensor:
+    """Return points (N, d) that lack all but some columns."""
+    some = points.new_full(points.shape, math.nan)
+    some[:, list(given)] = points[:, list(given)]
+    return some
 
 
 def _log_densities(
@@ -368,3 +392,97 @@ def _angle(text: str) -> tuple[str, float]:
         raise SettingError(
             f"{{given}} must be angles such as psi=-45, got {literal(repr(text))}"
         ) from None
+
+
+class TrendSettings(Settings, group="Trend"):
+    """At which values a trend is found, and what its intervals hold."""
+
+    start: Annotated[float | None, DefaultText("where 2 % of the density lie below")] = None
+    """The first value."""
+
+    end: Annotated[float | None, DefaultText("where 2 % lie above; of an angle a whole turn")] = (
+        None
+    )
+    """The last value."""
+
+    count: Annotated[int, Range(2, 1000), Option("-n")] = 41
+    """Number of values."""
+
+    levels: tuple[float, ...] = (0.5, 0.9)
+    """What the intervals hold."""
+
+
+@runtime.operation("density trend")
+def trend(
+    settings: TrendSettings = TrendSettings(),
+    *,
+    model: Model,
+    of: str,
+    along: str,
+    out: Out = Path("trend.csv"),
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
+    """Find how one column goes with another: its mean and intervals at each of many values.
+
+    Writes a table and, beside it, a picture of the same name.
+
+    Args:
+        model: Folder that `orbiflow density fit` wrote, of angles or of angles beside real columns.
+        of: The column whose mean is found.
+        along: The column that is known.
+        out: The table.
+    """
+    check_table_name(out)
+
+    import numpy as np
+
+    from orbiflow.density import inference, pictures
+    from orbiflow.density.operations.saved import axes_of, model_at, names_of
+    from orbiflow.drawing import Sheet
+
+    runtime.check_output_file(out, model)
+    with runtime.one_thread():
+        density, extra = model_at(model)
+        names = names_of(density, extra)
+        first, second = axes_of([of, along], names, on_event)
+        at = _values(density, second, settings)
+        progress = runtime.progress_events(on_event, cancel)
+        found = inference.trend(
+            density, first, second, at, levels=settings.levels,
+            tick=lambda share: progress(0.9 * share, "finding conditional densities"),
+        )  # fmt: skip
+        space = inference.check_torus(density.space, "trends").of_axes([first, second])
+        called = names[first], names[second]
+        picture = pictures.trend_picture(found, space, called, Sheet.screen())
+    heads = [called[1], called[0]]
+    for level in found.levels:
+        heads += [f"{called[0]}_low_{100 * level:g}", f"{called[0]}_high_{100 * level:g}"]
+    bands = np.stack([found.low, found.high], axis=2).reshape(len(at), -1)
+    rows = np.column_stack([found.at, found.mean, bands, found.log_density])
+    drawn = out.with_suffix(".png")
+    write_file(out, tables.to_csv([*heads, "log_density"], rows), on_event)
+    words = f"the mean of {called[0]} at {len(at)} values of {called[1]}; written to {out}"
+    write_file(drawn, picture.file(), on_event, words)
+    return runtime.Outcome({"file": str(out), "picture": str(drawn), "rows": len(at)})
+
+
+def _values(density: models.Density, axis: int, settings: TrendSettings) -> Array:
+    """Return the values (n,) of a column at which a trend is found."""
+    import numpy as np
+    import torch
+
+    from orbiflow.density import inference
+
+    space = inference.check_torus(density.space, "trends")
+    period = space.period_of(axis)
+    low, high = -period / 2, period / 2
+    if not period:
+        alone = inference.marginal(density, [axis])
+        masses = torch.tensor([0.02, 0.98], dtype=torch.float64)
+        low, high = alone.space.from_chart(alone.icdf(masses))[:, 0].tolist()
+    low = low if settings.start is None else settings.start
+    high = high if settings.end is None else settings.end
+    if not low < high:
+        raise SettingError(f"{{end}} must be above {{start}}, got {low:g} to {high:g}")
+    return np.linspace(low, high, settings.count)

@@ -29,3 +29,4 @@ from .surfaces import density_page as density_page
 from .surfaces import immersion as immersion
 from .surfaces import surface_data as surface_data
 from .surfaces import viewpoint as viewpoint
+from .trends import trend_picture as trend_picture

@@ -1,0 +1,72 @@
+"""Figures of a fitted density in the data's own columns and units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.arguments import as_instance, as_tensor
+from orbiflow.arrays import Array
+from orbiflow.density.inference.angles import axes_named
+from orbiflow.density.inference.trends import Trend, trend
+from orbiflow.density.models import Density, Estimate
+from orbiflow.density.spaces import Space
+
+
+class FittedFigures:
+    """What an estimator tells of its density beside log densities and samples."""
+
+    space_: Space
+    _fitted: Callable[[], Density]
+    _chart: Callable[[Array], Tensor]
+    _checked: Callable[[ArrayLike], Array]
+    _column_names: Callable[[], list[str]]
+
+    def mean(self) -> Array:
+        """The mean direction of each angle and the mean of each real column, or of directions: (k,).
+
+        Raises `OrbiflowError` before `fit`, and on spaces whose points have no mean (`Density.mean`).
+        """
+        return self.space_.from_chart(self._fitted().mean[None])[0]
+
+    def mode(self) -> Array:
+        """The data (k,) at which the density in natural measure is highest, as far as was found."""
+        return self.space_.from_chart(self._fitted().mode[None])[0]
+
+    def cdf(self, X: ArrayLike) -> Array:
+        """The masses (N,) up to data (N, 1) of the only column, from half a turn before 0 on.
+
+        A real column begins at minus infinity. Of several columns take `marginal` first.
+        """
+        return self._fitted().cdf(self._chart(self._checked(X))).numpy()
+
+    def quantile(self, masses: ArrayLike) -> Array:
+        """The values (N,) of the only column up to which there are these masses (N,), from 0 to 1."""
+        points = self._fitted().icdf(as_tensor(masses, "masses").reshape(-1))
+        return self.space_.from_chart(points)[:, 0]
+
+    def entropy(self, *, measure: str = "natural") -> Estimate:
+        """-E[log p] in nats with its standard error, the same every time."""
+        return self._fitted().estimated_entropy(measure=measure)
+
+    def kl_divergence(self, other: FittedFigures | Density) -> Estimate:
+        """E[log p - log q] in nats, of another density q from this one, with its standard error."""
+        density = other._fitted() if isinstance(other, FittedFigures) else other
+        return self._fitted().divergence(as_instance(density, Density, "other"))
+
+    def trend(
+        self,
+        of: str | int,
+        along: str | int,
+        at: ArrayLike,
+        *,
+        levels: Sequence[float] = (0.5, 0.9),
+    ) -> Trend:
+        """How one column goes with another: means and intervals at values (n,) of `along`.
+
+        Columns are names or numbers from 0; see `orbiflow.density.inference.trend`.
+        """
+        first, second = axes_named([of, along], self._column_names())
+        return trend(self._fitted(), first, second, at, levels=levels)

@@ -1,0 +1,114 @@
+"""How one column of a torus goes with another: its mean and intervals, at each of many values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.arguments import as_array, as_number
+from orbiflow.arrays import Array
+from orbiflow.density.inference.angles import check_torus
+from orbiflow.density.models import Density
+from orbiflow.density.spaces import Torus
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import one_thread
+
+CELLS = 720
+"""Cells of the circle of the column whose mean is found: half a degree each."""
+
+TOGETHER = 8
+"""Values whose conditional densities are found at a time."""
+
+LEVELS = (0.5, 0.9)
+"""The masses of the intervals."""
+
+MOST_VALUES = 1000
+
+
+class Trend(NamedTuple):
+    """The mean of a column, and central intervals about it, where another column has some values.
+
+    - `at`: Those values (n,), in the data's unit.
+    - `mean`: The mean direction, or the mean of a real column, (n,).
+    - `low`, `high`: The ends (n, L) of intervals of the masses `levels`. Of an angle they are
+      counted from the direction opposite to the mean, and not beyond half a turn from it.
+    - `log_density`: The log density (n,) of the values in natural measure: how many data speak there.
+    """
+
+    at: Array
+    mean: Array
+    low: Array
+    high: Array
+    levels: tuple[float, ...]
+    log_density: Array
+
+
+@one_thread()
+@torch.no_grad()
+def trend(
+    density: Density,
+    of: int,
+    along: int,
+    at: ArrayLike,
+    *,
+    levels: Sequence[float] = LEVELS,
+    tick: Callable[[float], None] = lambda _share: None,
+) -> Trend:
+    """Return the mean and intervals of one column where another one is known, whatever the rest is.
+
+    They are those of the conditional densities, by the joint density of both on `CELLS` cells.
+
+    Args:
+        density: A density of two columns or more on a torus, some of which may be real.
+        of, along: The numbers of both columns, from 0.
+        at: Values (n,) of `along`, in the data's unit.
+        levels: The masses of the intervals, between 0 and 1.
+        tick: A function that is called with the share of the work done.
+
+    Raises `OrbiflowError` for other spaces, columns and values.
+    """
+    torus = check_torus(density.space, "trends")
+    values = as_array(at, "at", ("n",))
+    masses = tuple(as_number(level, "levels") for level in levels)
+    if not 0 < len(values) <= MOST_VALUES or not all(0 < mass < 1 for mass in masses):
+        raise OrbiflowError(f"a trend has 1 to {MOST_VALUES} values and masses between 0 and 1")
+    if of == along:
+        raise OrbiflowError("a trend is of one column along another one")
+    turns = torus.turns(along, torch.tensor(values))[:, None]
+    own, other = torus.of_axes([of]), torus.of_axes([along])
+    logs = density.log_marginal(turns, [along]) - other.log_area(turns)
+    cells = (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
+    rows = list[tuple[float, Array]]()
+    for part in torch.split(turns, TOGETHER):
+        both = torch.cat([cells.repeat(len(part), 1), part.repeat_interleave(CELLS, 0)], dim=1)
+        found = density.log_marginal(both, [of, along]).reshape(-1, CELLS)
+        rows += [_about_mean(own, weights, masses) for weights in torch.softmax(found, dim=1)]
+        tick(len(rows) / len(turns))
+    mean, ends = np.array([row[0] for row in rows]), np.stack([row[1] for row in rows])
+    return Trend(values, mean, ends[:, 0], ends[:, 1], masses, logs.numpy())
+
+
+def _about_mean(space: Torus, weights: Tensor, masses: Sequence[float]) -> tuple[float, Array]:
+    """Return the mean of a column and the lower and upper ends (2, L) of intervals, in its unit.
+
+    `weights` (CELLS,) are masses of even cells of its circle.
+    """
+    turns = (torch.arange(CELLS, dtype=torch.float64) + 0.5) / CELLS
+    tails = np.array([[(1 - m) / 2 for m in masses], [(1 + m) / 2 for m in masses]])
+    period = space.period_of(0)
+    if not period:
+        values = space.from_chart(turns[:, None])[:, 0]
+        below = np.cumsum(weights.numpy()) - weights.numpy() / 2
+        return float(weights.numpy() @ values), np.interp(tails, below, values)
+    angle = 2 * np.pi * turns
+    mean = float(torch.atan2(weights @ angle.sin(), weights @ angle.cos())) / (2 * np.pi)
+    away = ((turns - mean + 0.5) % 1 - 0.5).numpy()
+    order = np.argsort(away)
+    mass = weights.numpy()[order]
+    ends = np.interp(tails, np.cumsum(mass) - mass / 2, away[order])
+    return mean * period, (mean + ends) * period
