@@ -78,10 +78,9 @@ def search(
     """Search for tiles of a project's silhouettes, and write each as soon as it is found."""
     from orbiflow.studio.silhouette_file import has_second
 
-    if has_second(job.project):
-        return _search_pairs(job, settings, on_event, cancel)
+    find_tiles = _search_pairs if has_second(job.project) else _search_single
     with one_blas_thread():  # tiles are measured and written here, beside processes that search
-        return _search_single(job, settings, on_event, cancel)
+        return find_tiles(job, settings, on_event, cancel)
 
 
 def _search_single(job: Job, settings: SearchChoice, on_event: Sink, cancel: Cancel) -> Outcome:
