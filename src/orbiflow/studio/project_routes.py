@@ -402,6 +402,8 @@ async def live_preview(request: Request, project: str, tile: int, here: Studio) 
     size = {"side": given["side"]} if "side" in given else {}
     task = await here.done(project, "preview", {**flat, **size, "tile": tile})
     here.store.delete_task(task["id"])
+    # of one that was ended there may be something left
+    shutil.rmtree(export_folder(here.store.home(project), task["id"]), ignore_errors=True)
     if task["state"] != "done":
         raise OrbiflowError(task["error"] or "another preview has taken the place of this one")
     return task["result"]
