@@ -26,6 +26,7 @@ from orbiflow.tiles import (
     tiling_json,
 )
 from orbiflow.tiles.write import write_scene
+from studio.browser import RunningStudio
 from studio_checks import serious_issues
 
 MOST_BYTES = 60_000  # of a page beside its pictures
@@ -225,3 +226,57 @@ def test_lines_alone_are_no_page(tmp_path: Path) -> None:
         export(tile_of("IH4"), tmp_path / "cut.html", ExportSettings(cut="pieces"))
     with pytest.raises(OrbiflowError, match="has no edge"):
         export(tile_of("IH4"), tmp_path / "cut.html", ExportSettings(bed=(100, 100)))
+
+
+GRANTED = ["clipboard-read", "clipboard-write"]
+
+
+@pytest.fixture(name="taking")
+def taking_fixture(page: Any, studio: RunningStudio, searched: str) -> Any:
+    """The page where a tile is taken away."""
+    page.context.grant_permissions(GRANTED)
+    page.goto(f"/#/p/{searched}/take/{studio.project(searched)['tiles'][0]['id']}")
+    page.wait_for_selector(".share")
+    return page
+
+
+def clipboard(page: Any) -> str:
+    return page.evaluate("navigator.clipboard.readText()")
+
+
+def test_copied_link_opens_the_tile_in_a_studio(
+    taking: Any, studio: RunningStudio, searched: str
+) -> None:
+    taking.get_by_role("button", name="Copy link").click()
+    taking.get_by_text("The link is copied").wait_for()
+    link = clipboard(taking)
+    assert link.startswith(f"{studio.address}/#/open/")
+    taking.goto("about:blank")
+    taking.goto(link)
+    taking.wait_for_url("**/t/*")
+    taking.wait_for_selector(".closeup-canvas")
+    opened = taking.url.split("/p/")[1].split("/")[0]
+    assert opened != searched
+    given, got = (studio.project(own)["tiles"][0] for own in (searched, opened))
+    assert got["certified"]
+    assert np.allclose(got["polygon"], given["polygon"], atol=1e-4)
+    studio.client.delete(f"projects/{opened}").raise_for_status()
+
+
+def test_damaged_link_is_said_in_words(page: Any) -> None:
+    page.goto("/#/open/abcd")
+    page.get_by_text("The link is damaged or cut off").wait_for()
+    page.wrong.clear()  # the refusal is what is wanted
+
+
+def test_drawing_is_copied_and_printed(taking: Any) -> None:
+    taking.get_by_role("button", name="Copy as SVG").click()
+    taking.get_by_text("The drawing is copied").wait_for()
+    text = clipboard(taking)
+    assert text.startswith("<svg ")
+    assert text.count("<use ") > 20
+    pdfium = pytest.importorskip("pypdfium2")
+    document = pdfium.PdfDocument(taking.pdf(format="A4"))
+    assert len(document) == 1
+    assert document[0].get_textpage().get_text_bounded().strip() == ""
+    assert taking.locator(".share").is_visible()

@@ -6,6 +6,7 @@ import json
 import re
 import secrets
 import shutil
+from collections.abc import Awaitable, Callable
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -22,10 +23,11 @@ from orbiflow.studio.guard import Refused
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
 from orbiflow.studio.routes import Routes, Studio, body_object, save_body
+from orbiflow.studio.share_link import link_text, write_linked
 from orbiflow.studio.store import Missing
 from orbiflow.studio.taking import PREVIEW, export_folder
 from orbiflow.studio.tasks import SPACE
-from orbiflow.studio.tile_files import VIEW, best_stage, tile_number
+from orbiflow.studio.tile_files import VIEW, best_stage, tile_folder, tile_number
 from orbiflow.studio.words import (
     MASKS,
     NAMES,
@@ -72,9 +74,25 @@ async def create(request: Request, here: Studio) -> dict[str, Any]:
 @routes("POST", "/projects/open")
 async def open_file(request: Request, here: Studio) -> dict[str, Any]:
     """Make a project of a file, once a task has taken up what is in it; of no other file."""
+    return await _opened(here, lambda out: save_body(request, out))
+
+
+@routes("POST", "/projects/shared")
+async def open_link(request: Request, here: Studio) -> dict[str, Any]:
+    """Make a project of the tile that a link carries, as of a file."""
+    text = (await body_object(request)).get("text")
+
+    async def write(out: Path) -> None:
+        write_linked(text if isinstance(text, str) else "", out)
+
+    return await _opened(here, write)
+
+
+async def _opened(here: Studio, write: Callable[[Path], Awaitable[Any]]) -> dict[str, Any]:
+    """Return a new project of what `write` puts into a project's file."""
     made = here.store.create("tile", "Opened project", here.limits.projects)
     try:
-        await save_body(request, here.store.home(made) / f"opened{ENDING}")
+        await write(here.store.home(made) / f"opened{ENDING}")
         task = await here.done(made, "open", {})
         if task["state"] in ("failed", "cancelled"):
             reason = task["error"] or "opening was cancelled; open the file again"
@@ -83,6 +101,14 @@ async def open_file(request: Request, here: Studio) -> dict[str, Any]:
         here.store.delete(made)
         raise
     return shown_project(here.store, here.store.project(made))
+
+
+@routes("GET", "/projects/{project}/tiles/{tile}/link")
+def link(project: str, tile: int, here: Studio) -> dict[str, Any]:
+    """Return the text by which a link opens a tile in any studio."""
+    own = here.store.project(project)
+    result = tile_folder(here.store.home(project), tile)
+    return {"text": link_text(result, own["name"], (own["view"] or {}).get("look"))}
 
 
 @routes("GET", "/projects/{project}/file")

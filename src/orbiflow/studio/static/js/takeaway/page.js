@@ -10,6 +10,7 @@ import { alive, sentence } from "../words.js";
 import { COLOURLESS, colours, KINDS, lengthIn } from "./kinds.js";
 import { isMade, madeBefore, picture, words } from "./made.js";
 import { Preview } from "./preview.js";
+import { share } from "./share.js";
 import { trueSize } from "./truesize.js";
 
 /** What each can be laid on. */
@@ -90,6 +91,10 @@ class TakeawayPage {
     this.before = h("div");
     this.earlier = section("earlier", "earlier", "Made before", this.before);
     this.wishes = h("div", { class: "stack" });
+    this.shared = share(this.api, this.project, () => {
+      const { card, view, look, pictures, about } = this;
+      return { card, view, look, pictures, palette: paletteOf(look, about) };
+    });
     this.make = button("Make it", () => trying(() => this.press()), { kind: "primary big" });
     /** @type {[string, string, any][]} */
     const kindChoices = Object.entries(KINDS).map(([key, { title, image }]) => [key, title, image]);
@@ -116,6 +121,7 @@ class TakeawayPage {
             this.wishes,
             h("div", { class: "go" }, this.make),
           ),
+          this.shared.root,
           section(
             "panel whole",
             "whole",
@@ -154,6 +160,7 @@ class TakeawayPage {
     this.off.forEach((stop) => stop());
     this.watch.disconnect();
     this.live.close();
+    this.shared.close();
   }
 
   /** What the preview has to say: why it cannot be made, or what is to be known of it. */
