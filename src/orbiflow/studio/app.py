@@ -24,7 +24,7 @@ from orbiflow.drawing import PALETTES, Palette
 from orbiflow.errors import OrbiflowError, advice_of
 from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
-from orbiflow.studio import density_routes, project_routes, solid_routes
+from orbiflow.studio import density_routes, project_routes, shapes, solid_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema, presets
@@ -77,7 +77,8 @@ def create_app(
         await asyncio.to_thread(queue.close)
         store.close()
 
-    every = [*routes, *density_routes.routes, *solid_routes.routes, *project_routes.routes]
+    topics = (density_routes, solid_routes, project_routes, shapes)
+    every = [*routes, *(own for topic in topics for own in topic.routes)]
     pages = StaticFiles(directory=STATIC, html=True)
     kinds = (Refused, OrbiflowError, HTTPException, Exception)
     app = Starlette(

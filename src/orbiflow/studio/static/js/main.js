@@ -17,6 +17,7 @@ const ROUTES = [
   [/^p\/([\w-]+)$/, () => import("./search/page.js"), "tiles"],
   [/^p\/([\w-]+)\/t\/(\d+)$/, () => import("./closeup/page.js"), "closeup"],
   [/^p\/([\w-]+)\/take\/(\d+)$/, () => import("./takeaway/page.js"), "take"],
+  [/^shapes$/, () => import("./shapes/page.js")],
   [/^open\/[\w-]+$/, () => import("./takeaway/opened.js")],
   [/^d\/([\w-]+)$/, () => import("./density/page.js")],
   [/^s\/([\w-]+)(?:\/t\/(\d+))?$/, () => import("./solid/page.js")],

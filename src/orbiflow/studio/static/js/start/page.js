@@ -8,6 +8,7 @@ import { sample } from "./sample.js";
 
 const MESH_WORDS =
   "Drop a 3D mesh: STL, OBJ, PLY, 3MF, glTF. We bend it until copies of it fill space.";
+const SHAPE_WORDS = "Begin with a tile, and pull it into an animal by hand.";
 const TABLE_WORDS = "Angles, directions or axes in a table: see where they crowd.";
 const FILE_WORDS = "Go on with what you saved, here or elsewhere.";
 
@@ -54,6 +55,7 @@ export async function show(root, page) {
       "section",
       { class: "others" },
       other("A solid instead of a picture", "solid", () => bring.mesh.click(), MESH_WORDS),
+      other("A shape that fits", "pencil", () => page.navigate("shapes"), SHAPE_WORDS),
       other("Numbers instead of animals", "arrow", () => bring.count(), TABLE_WORDS),
       other("Open a project file", "open", () => bring.saved.click(), FILE_WORDS),
     ),

@@ -1,0 +1,82 @@
+"""Shapes that fit by themselves, to begin with: one of each isohedral type, as a link that opens it."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from orbiflow.studio.routes import Routes, Studio
+from orbiflow.studio.share_link import link_text
+from orbiflow.tiles import (
+    CLASSES,
+    ISOHEDRAL_TYPES,
+    EscherTile,
+    IsohedralClass,
+    Tile,
+    TileVariations,
+    arrangement,
+    colouring,
+    divided_tile,
+    save_tiles,
+    tiling_json,
+)
+
+SIZE = 100.0  # square root of a shape's area, in the units of its project
+POINTS = 72  # about how many points an outline has
+WAVE = 0.62  # length of the waves by which it is bent, in its size
+BENDS = (0.11, 0.08, 0.055, 0.03, 0.015)  # their heights, the largest that leaves a tile
+routes = Routes()
+
+
+def shape_tile(kind: IsohedralClass) -> EscherTile:
+    """Return a certified tile of a class: its template, with edges that are bent as far as they may be.
+
+    Straight ones would not show how the copies lie: many templates are the same hexagon.
+    """
+    given = Tile(kind.template(), kind.group(), kind.name)
+    scale = SIZE / float(np.sqrt(abs(given.signed_area)))
+    given = given.transformed(scale * np.eye(2), np.zeros(2))
+    plain = EscherTile(given, name=kind.name)
+    space = TileVariations(divided_tile(given, POINTS))
+    x, y = (space.first.polygon - given.center).T * 2 * np.pi / (WAVE * SIZE)
+    waves = SIZE * np.stack(
+        [np.sin(y + 0.7) + np.sin(x + y), np.cos(x - 0.4) - np.sin(x - y)], axis=1
+    )
+    step = np.linalg.lstsq(space.matrix, waves.ravel(), rcond=None)[0]
+    for height in BENDS:
+        bent = space.tile(space.start + height * step, same_area=False)
+        if shapely.Polygon(bent.polygon).is_valid:
+            found = EscherTile(bent, name=kind.name)
+            if found.certificate.valid:
+                return found
+    return plain
+
+
+@lru_cache(maxsize=128)
+def shape(name: str) -> dict[str, Any]:
+    """Return what is shown of a type: its tiling, how its tiles lie, and the text of its link."""
+    kind = ISOHEDRAL_TYPES[name]
+    tile = shape_tile(kind)
+    with tempfile.TemporaryDirectory() as folder:
+        text = link_text(save_tiles([tile], Path(folder) / "tile"), f"Shape {name[2:]}", None)
+    return {
+        "name": name,
+        "group_name": kind.group_name,
+        "symmetry": kind.stabiliser_name,
+        "arrangement": arrangement(tile.tiling),
+        "text": text,
+        **tiling_json(tile.tiling, colouring(tile.tiling), y_down=False),
+    }
+
+
+@routes("GET", "/shapes")
+def shapes(here: Studio, every: int = 0) -> list[dict[str, Any]]:
+    """Return the nine classes in which every shape of tile occurs, or the other types."""
+    del here
+    names = [name for name in ISOHEDRAL_TYPES if name not in CLASSES] if every else list(CLASSES)
+    return [shape(name) for name in names]

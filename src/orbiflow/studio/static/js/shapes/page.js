@@ -1,0 +1,72 @@
+/** Begin with a shape that fits: all isohedral types as small tilings, each a link that opens it. */
+
+import { h, put, style, trying } from "../dom.js";
+import { lookOf, paletteOf } from "../look.js";
+import { paintCard } from "../tiling.js";
+import { capital } from "../words.js";
+
+/** What a shape keeps of its own symmetry, however its edges are pulled. */
+const symmetryWords = (name) =>
+  name === "C1"
+    ? "no symmetry of its own"
+    : name[0] === "C"
+    ? "looks the same when it is turned"
+    : "its halves mirror each other";
+
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
+export async function show(root, { api, about }) {
+  await style("start");
+  const palette = paletteOf(lookOf(/** @type {any} */ ({ view: {} }), about), about);
+  /** @type {Map<Element, any>} */
+  const shown = new Map();
+  const watch = new ResizeObserver((seen) =>
+    seen.forEach(({ target }) => {
+      const canvas = /** @type {HTMLCanvasElement} */ (target);
+      if (canvas.clientWidth) paintCard(canvas, shown.get(canvas), palette, { across: 4 });
+    })
+  );
+  const card = (own) => {
+    const canvas = h("canvas", { "aria-hidden": "true" });
+    shown.set(canvas, own);
+    watch.observe(canvas);
+    return h(
+      "li",
+      {},
+      h(
+        "a",
+        { href: `#/open/${own.text}`, "data-shape": own.name },
+        canvas,
+        h("span", { class: "shape-words" }, capital(own.arrangement)),
+        h("span", { class: "soft small" }, symmetryWords(own.symmetry)),
+        h("span", { class: "soft small" }, `${own.name} · ${own.group_name}`),
+      ),
+    );
+  };
+  const list = (shapes) => h("ul", { class: "shapes" }, shapes.map(card));
+  const others = h("div");
+  const more = h(
+    "details",
+    {
+      ontoggle: () =>
+        others.firstChild ||
+        trying(async () => put(others, list(await api.get("shapes?every=1")))),
+    },
+    h("summary", {}, "All other types"),
+    others,
+  );
+  put(
+    root,
+    h("h1", { tabindex: "-1" }, "Begin with a shape that fits"),
+    h(
+      "p",
+      { class: "lead soft" },
+      "Copies of each of these fill the plane. Choose one, then Pull: drag its edges and corners, and all copies follow. Draw an animal into it, and take it away.",
+    ),
+    list(await api.get("shapes")),
+    more,
+  );
+  return () => watch.disconnect();
+}

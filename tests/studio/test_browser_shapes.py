@@ -1,0 +1,66 @@
+"""Begin with a shape that fits: each type is shown, opens as a certified tile, and is pulled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orbiflow.errors import CertificationError
+from orbiflow.studio.pulled_tiles import PullSpace, pulled
+from orbiflow.studio.shapes import shape_tile
+from orbiflow.tiles import CLASSES, ISOHEDRAL_TYPES, EscherTile, IsohedralClass
+from studio.browser import RunningStudio
+from studio_checks import serious_issues
+
+PULL = np.array([0.2, 0.35])  # in units of which a shape has a hundred
+VERTICES = (3, 7, 11, 23)
+RIGID: tuple[str, ...] = ()
+"""Types of which all edges are mirrors, so that only their size and proportions can change."""
+
+
+@pytest.mark.parametrize("kind", ISOHEDRAL_TYPES.values(), ids=list(ISOHEDRAL_TYPES))
+def test_shape_of_each_type_is_a_tile_that_can_be_pulled(kind: IsohedralClass) -> None:
+    tile = shape_tile(kind)
+    assert tile.certificate.valid
+    space = PullSpace(tile)
+    moved = [after for vertex in VERTICES if (after := nudged(tile, space, vertex)) > 0.1]
+    assert bool(moved) == (kind.name not in RIGID)
+
+
+def nudged(tile: EscherTile, space: PullSpace, vertex: int) -> float:
+    """Return how far a tile's outline moves, certified, when a vertex is pulled; 0 if it cannot."""
+    rows = space.matrix[2 * vertex : 2 * vertex + 2]
+    step = np.linalg.pinv(rows) @ PULL
+    try:
+        found = pulled(tile, space.start + step)
+    except CertificationError:
+        return 0.0
+    assert found.certificate.valid
+    return float(abs(found.tile.polygon - space.first.polygon).max())
+
+
+def test_shape_is_chosen_and_opened(page: Any, studio: RunningStudio) -> None:
+    page.goto("/")
+    page.get_by_role("button", name="A shape that fits").click()
+    page.wait_for_selector(".shapes a")
+    assert page.locator(".shapes a").count() == len(CLASSES)
+    serious_issues(page)
+    page.get_by_text("All other types").click()
+    page.wait_for_selector("[data-shape=IH93]")
+    assert page.locator(".shapes a").count() == len(ISOHEDRAL_TYPES)
+    page.locator("[data-shape=IH4]").click()
+    page.wait_for_url("**/t/*")
+    page.wait_for_selector(".closeup-canvas")
+    own = page.url.split("/p/")[1].split("/")[0]
+    first = studio.project(own)["tiles"][0]
+    assert first["class_name"] == "IH4"
+    page.get_by_role("radio", name="Pull", exact=True).check()
+    page.wait_for_selector("[data-ready=pull]")
+    page.locator(".closeup-canvas").focus()
+    for key in ("ArrowRight", "Shift+ArrowUp", "Shift+ArrowUp", "Shift+ArrowUp", "Enter"):
+        page.keyboard.press(key)
+    page.wait_for_url(lambda url: not url.endswith(f"/{first['id']}"))
+    assert len(studio.project(own)["tiles"]) == 2
+    studio.client.delete(f"projects/{own}").raise_for_status()
