@@ -186,6 +186,7 @@ def start_empty(on: Visit) -> None:
 def start_many(on: Visit) -> None:
     own = {"kind": "tile", "name": "Night monkey", "changed": 0, "thumb": None, "busy": False}
     on.answer("**/api/projects", body=[{**own, "id": f"{k}", "tiles": k} for k in range(1000)])
+    on.answer("**/api/projects/*", body={**own, "id": "1", "tiles": []})
     on.goto("", ".project")
 
 

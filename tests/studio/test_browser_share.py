@@ -280,3 +280,22 @@ def test_drawing_is_copied_and_printed(taking: Any) -> None:
     assert len(document) == 1
     assert document[0].get_textpage().get_text_bounded().strip() == ""
     assert taking.locator(".share").is_visible()
+
+
+def test_first_page_shows_the_best_tile_of_each_project(
+    page: Any, studio: RunningStudio, searched: str
+) -> None:
+    best = studio.project(searched)["tiles"][0]["id"]
+    page.goto("/")
+    canvas = page.locator(f"a[href='#/p/{searched}'] canvas[data-tile='{best}']")
+    canvas.wait_for()
+    colours = canvas.evaluate("""(canvas) => {
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const seen = new Map();
+      for (let k = 0; k < data.length; k += 4) {
+        const key = data.slice(k, k + 3).join();
+        seen.set(key, (seen.get(key) ?? 0) + 1);
+      }
+      return [...seen.values()].filter((count) => count > data.length / 80).length;
+    }""")
+    assert colours >= 3

@@ -2,6 +2,7 @@
 
 import { button, dialog, h, icon, put, toast, trying } from "../dom.js";
 import { ago, number } from "../words.js";
+import { thumb as tilingOf } from "./thumb.js";
 
 const PAGES = { density: "d", solid: "s" }; // of projects that are no tiles
 const SOME = 10; // projects that are shown at first
@@ -64,7 +65,7 @@ export class Projects {
     const whole = () => {
       put(
         place,
-        link(own),
+        link(this.api, own),
         h(
           "div",
           { class: "row" },
@@ -114,7 +115,7 @@ export class Projects {
   }
 }
 
-function link({ id, kind, name, thumb, tiles, busy, changed }) {
+function link(api, { id, kind, name, thumb, tiles, busy, changed }) {
   const path = PAGES[kind] ? `${PAGES[kind]}/${id}` : tiles || busy ? `p/${id}` : `p/${id}/picture`;
   const empty = { density: "a table", solid: "a mesh", tile: "no tiles yet" };
   const facts = [
@@ -127,7 +128,11 @@ function link({ id, kind, name, thumb, tiles, busy, changed }) {
     h(
       "span",
       { class: "thumb" },
-      thumb ? h("img", { src: thumb, alt: "", loading: "lazy" }) : icon("picture"),
+      kind === "tile" && tiles
+        ? tilingOf(api, id)
+        : thumb
+        ? h("img", { src: thumb, alt: "", loading: "lazy" })
+        : icon("picture"),
     ),
     h("span", { class: "project-name" }, name),
     h("span", { class: "soft small" }, facts.join(" · ")),
