@@ -399,8 +399,15 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, scheme) -> None:
     assert serious_issues(page) == []
 
 
-def test_pages_are_light() -> None:
-    assert sum(file.stat().st_size for file in STATIC.rglob("*") if file.is_file()) < 400_000
+def test_pages_are_light(studio: RunningStudio) -> None:
+    """What a browser fetches of all pages together."""
+    total = 0
+    for file in filter(Path.is_file, STATIC.rglob("*")):
+        where = f"{studio.address}/{file.relative_to(STATIC).as_posix()}"
+        with studio.client.stream("GET", where, headers={"Accept-Encoding": "gzip"}) as answer:
+            assert answer.status_code == 200
+            total += len(b"".join(answer.iter_raw()))
+    assert total < 165_000
 
 
 def test_a_project_file_opens_again(page, studio: RunningStudio, tmp_path) -> None:

@@ -69,7 +69,7 @@ def score(
     may_lack = reading.missing == "marginalise"
     for name in ("region", "gradient") if settings.given else ():
         if getattr(settings, name):
-            raise SettingError(f"{{{name}}} is of whole rows, not of {{given}} ones; leave one out")
+            raise SettingError(f"{{{name}}} requires complete rows; leave it out, or {{given}}")
     for name in ("region", "gradient") if may_lack else ():
         if getattr(settings, name):
             raise SettingError(
