@@ -49,7 +49,7 @@ def on_circles(data: Data, space: str) -> tuple[Data, float]:
 
 def spline_flow(train: Data, held: Data, seed: int, device: str) -> Any:
     """A neural circular spline flow, trained until `held` grows no likelier."""
-    import zuko
+    import zuko  # pyright: ignore[reportMissingImports]
 
     torch.manual_seed(seed)
     flow: Any = zuko.flows.NCSF(train.shape[1], transforms=TRANSFORMS, hidden_features=HIDDEN).to(
