@@ -123,3 +123,17 @@ def test_it_can_be_mapped_over_points(pair: DensityEstimator) -> None:
         own = points.clone().requires_grad_()
         (wanted,) = torch.autograd.grad(density.log_prob(own).sum(), own)
         assert torch.allclose(slopes, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("library", ["pandas", "polars"])
+def test_samples_may_be_frames(pair: DensityEstimator, library: str) -> None:
+    module = pytest.importorskip(library)
+    rows = pair.sample(5, random_state=0)
+    frame = pair.set_output(transform=library).sample(5, random_state=0)
+    assert isinstance(frame, module.DataFrame)
+    assert list(frame.columns) == ["angle1", "angle2"]
+    assert np.array_equal(np.asarray(frame), rows)
+    assert pair.set_output(transform=None) is pair
+    assert isinstance(pair.set_output(transform="default").sample(2), np.ndarray)
+    with pytest.raises(OrbiflowError, match="transform must be"):
+        pair.set_output(transform="excel")

@@ -13,12 +13,14 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_instance, as_whole, refusal
+from orbiflow.arguments import as_choice, as_instance, as_whole, refusal
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
+    OUTPUTS,
     check_columns,
     data_of,
+    frame_of,
     is_angular,
     require_values,
     unit_of,
@@ -284,8 +286,8 @@ class DensityEstimator(FittedFigures):
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
 
-    def sample(self, n_samples: int = 1, random_state: RandomState = None) -> Array:
-        """New data (n_samples, k) in the space's own units.
+    def sample(self, n_samples: int = 1, random_state: RandomState = None) -> Any:
+        """New data (n_samples, k) in the space's own units: an array, or what `set_output` asked for.
 
         Args:
             random_state: as scikit-learn has it. None: other points at every call, from NumPy's
@@ -298,7 +300,17 @@ class DensityEstimator(FittedFigures):
         density = self._fitted()
         count = as_whole(n_samples, "n_samples", 1)
         generator = torch.Generator().manual_seed(seed_of(random_state))
-        return self.space_.from_chart(density.sample((count,), generator))
+        rows = self.space_.from_chart(density.sample((count,), generator))
+        return frame_of(rows, self._column_names(), getattr(self, "output_", "default"))
+
+    def set_output(self, *, transform: str | None = None) -> Self:
+        """Choose what `sample` returns: "default", an array, or a frame of "pandas" or "polars".
+
+        None changes nothing, as in scikit-learn.
+        """
+        if transform is not None:
+            self.output_ = as_choice(transform, OUTPUTS, "transform")
+        return self
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The constructor's arguments, by name."""

@@ -20,8 +20,10 @@ from .doubts import codes_among as codes_among
 from .doubts import is_identifier as is_identifier
 from .doubts import place_doubts as place_doubts
 from .doubts import refuse_codes as refuse_codes
+from .frames import OUTPUTS as OUTPUTS
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
+from .frames import frame_of as frame_of
 from .frames import require_values as require_values
 from .strikes import DIP_DIRECTION as DIP_DIRECTION
 from .strikes import data_of as data_of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import numbers
 from collections.abc import Mapping, Sequence
@@ -158,3 +159,19 @@ def require_values(values: Array, names: Sequence[str] | None) -> None:
         raise OrbiflowError(
             f"column{'s' * several} {', '.join(own)} {have} no value in any row; leave {them} out"
         )
+
+
+OUTPUTS = ("default", "pandas", "polars")
+"""What rows can be returned as."""
+
+
+def frame_of(rows: Array, names: Sequence[str], output: str) -> Any:
+    """Return rows (N, k) as they are, or as a frame of pandas or polars with these names."""
+    if output == "default":
+        return rows
+    try:
+        made = importlib.import_module(output)
+    except ImportError as error:
+        raise OrbiflowError(f"{output} is not installed: install it, or ask for arrays") from error
+    columns = {name: rows[:, k] for k, name in enumerate(names)}
+    return made.DataFrame(columns)
