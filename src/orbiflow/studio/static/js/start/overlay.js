@@ -11,6 +11,7 @@ export const COLOURS = {
   rub: "#777777",
 };
 const EDGE = [[4, "#ffffff"], [2, "#0b6b66"]];
+const BOLD_EDGE = [[7, "#ffffff"], [4, "#00a878"]]; // it has to show among a picture's own colours
 const BRUSH = [[3, "#ffffff"], [1.5, "#1d1c1a"]];
 
 /** Stroke a path, or what was begun, once for each pair of a width in pixels of the screen and a colour. */
@@ -40,10 +41,12 @@ export function paintSilhouette(context, picture, silhouette, pixel) {
   context.drawImage(picture, 0, 0, width, height);
   context.fillStyle = "rgb(255 255 255 / 72%)";
   context.fill(rest, "evenodd");
-  context.fillStyle = `rgb(15 143 134 / ${coloured ? 12 : 55}%)`;
-  context.fill(outline);
+  if (!coloured) { // what is black and white is tinted, what has colours keeps them
+    context.fillStyle = "rgb(15 143 134 / 55%)";
+    context.fill(outline);
+  }
   context.lineJoin = "round";
-  lines(context, EDGE, pixel, outline);
+  lines(context, coloured ? BOLD_EDGE : EDGE, pixel, outline);
   context.setLineDash([5 * pixel, 4 * pixel]);
   others.forEach((other) => lines(context, [[2, COLOURS.remove]], pixel, pathOf(other)));
   context.setLineDash([]);
