@@ -209,9 +209,12 @@ def test_how_long_a_search_takes_is_chosen_beside_its_button(page, studio: Runni
 
 
 def test_tiles_of_an_opened_project_are_counted_though_none_were_searched(
-    page, studio: RunningStudio, searched
+    page, studio: RunningStudio
 ) -> None:
-    saved = studio.client.get(f"projects/{searched}/file").content
+    own = studio.with_picture()
+    studio.search(own, "IH4", "IH5")
+    studio.found(own)
+    saved = studio.client.get(f"projects/{own}/file").content
     opened = studio.client.post("projects/open", content=saved).json()["id"]
     page.goto(f"/#/p/{opened}")
     page.wait_for_selector(CARD)
@@ -265,7 +268,10 @@ def test_pulled_versions_of_a_tile_are_on_its_card(page, studio: RunningStudio) 
     assert page.locator(CARD).count() == 1
 
 
-def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio, searched) -> None:
+def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio) -> None:
+    searched = studio.with_picture()
+    studio.search(searched, "IH4")
+    studio.found(searched)
     small_searches(page, "IH4")
     page.goto(f"/#/p/{searched}")
     page.wait_for_selector(CARD)

@@ -1,4 +1,4 @@
-"""Shapes that fit by themselves, to begin with: one of each isohedral type, as a link that opens it."""
+"""Shapes that fit by themselves, to begin with: one of each isohedral type, and a link to open it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from orbiflow.studio.routes import Routes, Studio
 from orbiflow.studio.share_link import link_text
 from orbiflow.tiles import (
-    CLASSES,
     ISOHEDRAL_TYPES,
     EscherTile,
     IsohedralClass,
@@ -30,7 +28,6 @@ SIZE = 100.0  # square root of a shape's area, in the units of its project
 POINTS = 72  # about how many points an outline has
 WAVE = 0.62  # length of the waves by which it is bent, in its size
 BENDS = (0.11, 0.08, 0.055, 0.03, 0.015)  # their heights, the largest that leaves a tile
-routes = Routes()
 
 
 def shape_tile(kind: IsohedralClass) -> EscherTile:
@@ -72,11 +69,3 @@ def shape(name: str) -> dict[str, Any]:
         "text": text,
         **tiling_json(tile.tiling, colouring(tile.tiling), y_down=False),
     }
-
-
-@routes("GET", "/shapes")
-def shapes(here: Studio, every: int = 0) -> list[dict[str, Any]]:
-    """Return the nine classes in which every shape of tile occurs, or the other types."""
-    del here
-    names = [name for name in ISOHEDRAL_TYPES if name not in CLASSES] if every else list(CLASSES)
-    return [shape(name) for name in names]

@@ -14,8 +14,6 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import is_object
 from orbiflow.studio.project_file import FORMAT, PROJECT
@@ -73,6 +71,8 @@ def _short(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: own if key == "group" else _short(own) for key, own in value.items()}
     if isinstance(value, list) and value and isinstance(value[0], list):
+        import numpy as np
+
         points = np.asarray(value, dtype=np.float64)
         size = float(abs(points).max()) or 1.0
         return np.round(points, DIGITS - 1 - int(np.floor(np.log10(size)))).tolist()

@@ -72,7 +72,7 @@ class MixedTorus(Torus):
 
     >>> space = MixedTorus([None, (10.0, 2.0)], unit="degrees")
     >>> space.to_chart([[90.0, 12.0]]).numpy().round(4).tolist()
-    [[0.25, 0.8131]]
+    [[0.25, 0.813]]
     >>> space.from_chart(torch.tensor([[0.25, 0.5]])).tolist()
     [[90.0, 10.0]]
     """
