@@ -58,7 +58,7 @@ def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_
     reach(page, "What is it for?", "Poster")
     reach(page, "Kind of file", "SVG")
     reach(page, "Make it")
-    page.wait_for_selector(".preview img")
+    page.get_by_role("link", name=re.compile("^beast")).first.wait_for()
     page.focus("h1")
     with page.expect_download() as caught:
         reach(page, "beast")
