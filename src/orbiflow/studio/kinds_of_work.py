@@ -154,10 +154,6 @@ def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: 
     try:
         return made.call({"result": result, **settings, **files})
     except SettingError as error:
-        # the pages' colours are those of their look, also where nothing is filled
-        if "palette" in settings and error.template.startswith("{palette} has no effect"):
-            uncoloured = {name: value for name, value in settings.items() if name != "palette"}
-            return making_call(makes, uncoloured, result, **files)
         raise RefusedSetting(setting_words(error, made), error.about) from error
 
 

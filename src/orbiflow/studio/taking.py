@@ -6,6 +6,7 @@ import base64
 import json
 import shutil
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
@@ -121,10 +122,8 @@ def preview(
             notes.append(event.text)
 
     try:
-        given, result = json.loads(settings), tile_folder(job.project, tile)
-        files = _small_pictures(job.project, result) if picture else {}
-        if drawing and makes in WITH_DRAWING:
-            result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
+        pictures = _small_pictures if picture else None
+        result, files, given = _asked(job, makes, tile, settings, pictures, drawing, folder)
         call = making_call(makes, given, result, **files)
         image = _drawn(call, folder, side, hear, cancel)
         return Outcome({"image": base64.b64encode(image).decode(), "notes": notes})
@@ -205,10 +204,8 @@ def take(
         called: The name of the project, with which that of the file begins.
     """
     folder = make_folder(export_folder(job.project, job.task))
-    given, result = json.loads(settings), tile_folder(job.project, tile)
-    files = _pictures(job.project, result) if picture else {}
-    if drawing and makes in WITH_DRAWING:
-        result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
+    pictures = _pictures if picture else None
+    result, files, given = _asked(job, makes, tile, settings, pictures, drawing, folder)
     name = file_name(makes, given, result, called)
     call = making_call(makes, given, result, out=folder / name, **files)
     done = call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
@@ -227,6 +224,23 @@ def take(
             "made": time.time(),
         }
     )
+
+
+def _asked(
+    job: Job,
+    makes: str,
+    tile: int,
+    settings: str,
+    pictures: Callable[[Path, Path], dict[str, Any]] | None,
+    drawing: str,
+    folder: Path,
+) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    """Return the tile's folder, the files that go onto it and the settings that a browser wants."""
+    given, result = json.loads(settings), tile_folder(job.project, tile)
+    files = {} if pictures is None else pictures(job.project, result)
+    if drawing and makes in WITH_DRAWING:
+        return with_drawing(drawing, result, files, given, folder / SCRATCH)
+    return result, files, given
 
 
 def _pictures(home: Path, result: Path) -> dict[str, Any]:

@@ -151,7 +151,7 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
         !controls.has(other) || [allowed].flat().includes(now(other))
       );
       const never = Object.entries(words[name]?.not ?? {}).some(([other, values]) =>
-        controls.has(other) && values.includes(now(other))
+        controls.has(other) && (values.call ? values(now) : values.includes(now(other)))
       );
       controls.get(name).root.hidden = !applies || never;
     }

@@ -105,7 +105,7 @@ export const KINDS = {
         title: "Colours",
         not: {
           purpose: COLOURLESS,
-          cut: ["skeleton", "jigsaw", "template"],
+          cut: (now) => now("cut") !== "none" && now("purpose") !== "stickers",
           filled: [false],
         },
       },
