@@ -26,9 +26,9 @@ from orbiflow.density.cross_validation.splits import (
     fits_of,
     held_out,
     splits_of,
-    uniform_logs,
 )
 from orbiflow.density.data import is_angular
+from orbiflow.density.inference import uniform_logs
 from orbiflow.density.pictures import space_title
 from orbiflow.density.tables import TableRows, append_columns, linear_among
 from orbiflow.drawing import rendered
@@ -113,7 +113,7 @@ class CvOverview:
             "components": asked.settings,
             "rows": len(rows.table.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
-            "uniform": float(uniform_logs(rows).mean()),
+            "uniform": float(uniform_logs(rows.space, rows.table.values).mean()),
             "fits": {
                 "all": len(self.fits),
                 "done": states.count("done"),
@@ -269,7 +269,7 @@ def cv_page(
         rows=rows,
         place=space_title(rows.space),
         groups=None if rows.labels is None else len(np.unique(rows.labels)),
-        uniform=float(uniform_logs(rows).mean()),
+        uniform=float(uniform_logs(rows.space, rows.table.values).mean()),
         made=made,
         why=comparison,
         waiting=waiting,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,8 +18,7 @@ from orbiflow.density import comparing
 from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
-from orbiflow.density.inference import at_observed, chart_of_rows
-from orbiflow.density.models import UniformDensity
+from orbiflow.density.inference import chart_of_rows, uniform_logs
 from orbiflow.density.spaces import MixedTorus, Space, space_for
 from orbiflow.density.tables import TableRows, angle_unit, linear_among, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
@@ -212,17 +210,8 @@ def held_out(
         found = _read(folder / entry.name / SCORES, held)
         scores[settings.index(fit.setting), fit.split - 1, held] = found
     if UNIFORM in settings:
-        scores[settings.index(UNIFORM)] = uniform_logs(rows)
+        scores[settings.index(UNIFORM)] = uniform_logs(rows.space, rows.table.values).numpy()
     return HeldOut(tuple(settings), scores)
-
-
-def uniform_logs(rows: CvRows) -> Array:
-    """Return the log density (N,) in natural measure of the uniform distribution at each row."""
-    may_lack = rows.space.is_torus
-    points = chart_of_rows(rows.space, rows.table.values, may_lack=may_lack)
-    if math.isfinite(rows.space.volume):  # the same where something is missing
-        return np.full(len(points), -math.log(rows.space.volume))
-    return at_observed(UniformDensity(rows.space), points, measure="natural").numpy()
 
 
 def _read(path: Path, held: NDArray[np.int64]) -> Array:

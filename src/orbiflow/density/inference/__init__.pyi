@@ -5,6 +5,7 @@ from .angles import check_torus as check_torus
 from .angles import given_named as given_named
 from .angles import log_prob_observed as log_prob_observed
 from .angles import observed_rows as observed_rows
+from .angles import uniform_logs as uniform_logs
 from .doubts import data_doubts as data_doubts
 from .doubts import data_unit as data_unit
 from .doubts import given_doubts as given_doubts

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_number, as_tensor, as_whole, is_a
-from orbiflow.density.models import Density
+from orbiflow.density.models import Density, UniformDensity
 from orbiflow.density.spaces import CHART, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
@@ -147,3 +149,15 @@ def chart_of_rows(space: Space, data: ArrayLike, *, may_lack: bool) -> Tensor:
     rows = observed_rows(data, "data", torus)
     turns = [torus.turns(axis, column) for axis, column in enumerate(rows.mT)]
     return torus.project(torch.stack(turns, dim=1))
+
+
+def uniform_logs(space: Space, data: ArrayLike) -> Tensor:
+    """Return log densities (N,) in natural measure of the uniform distribution at data (N, k).
+
+    Of rows that lack angles they are those of whole ones; beside real columns, of what the rows have.
+    """
+    table = np.asarray(data, dtype=np.float64)
+    if math.isfinite(space.volume):
+        return torch.full((len(table),), -math.log(space.volume), dtype=torch.float64)
+    points = chart_of_rows(space, table, may_lack=True)
+    return at_observed(UniformDensity(space), points, measure="natural")

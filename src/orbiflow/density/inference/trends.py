@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.inference.angles import check_torus
+from orbiflow.density.inference.angles import at_observed, check_torus
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Torus
 from orbiflow.errors import OrbiflowError
@@ -80,8 +80,9 @@ def trend(
     if of == along:
         raise OrbiflowError("a trend is of one column along another one")
     turns = torus.turns(along, torch.tensor(values))[:, None]
-    own, other = torus.of_axes([of]), torus.of_axes([along])
-    logs = density.log_marginal(turns, [along]) - other.log_area(turns)
+    own, alone = torus.of_axes([of]), turns.new_full((len(turns), torus.dim), torch.nan)
+    alone[:, along] = turns[:, 0]
+    logs = at_observed(density, alone, measure="natural")
     cells = (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
     rows = list[tuple[float, Array]]()
     for part in torch.split(turns, TOGETHER):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 import warnings
 from collections.abc import Mapping
@@ -178,15 +177,8 @@ def _mean_score(estimator: DensityEstimator, values: Array, weights: Array | Non
 
 def uniform_score(estimator: DensityEstimator, values: Array, weights: Array | None) -> float:
     """Return the mean log density in natural measure of the uniform distribution at rows (N, k)."""
-    space = estimator.space_
-    if math.isfinite(space.volume):
-        return -math.log(space.volume)
-    may_lack = estimator.missing == "marginalise"
-    points = inference.chart_of_rows(space, values, may_lack=may_lack)
-    uniform = models.UniformDensity(space)
-    counted = fitting.weighed(
-        inference.at_observed(uniform, points, measure="natural")[:, None], weights
-    )
+    logs = inference.uniform_logs(estimator.space_, values)
+    counted = fitting.weighed(logs[:, None], weights)
     return fitting.mean_of(counted.points[:, 0], counted.weights)
 
 

@@ -183,7 +183,7 @@ class _Shown:
         dots = self.points if settings.dots else None
         draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
         makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
-        if self.flows and self.space.has_square and not real_spans(self.space):
+        if self.flows and self.space.is_surface:
             makers["flow"] = partial(figures.flow_picture, density, settings)
         if data is not None or settings.samples is not None:
             draw = partial(figures.samples_picture, density, data, samples, settings)

@@ -40,13 +40,14 @@ def trend_picture(
     figure = sheet.figure(SHAPE * width + sheet.em * (below + above))
     axes = frames.axes_at(figure, sheet.em * left, sheet.em * below, width, SHAPE * width)
     turns = space.period_of(0)
+    shifts = (-turns, 0.0, turns) if turns else (0.0,)
     for level in range(len(found.levels) - 1, -1, -1):
         low, high = found.low[:, level], found.high[:, level]
-        for shift in (-turns, 0.0, turns) if turns else (0.0,):
+        for shift in shifts:
             axes.fill_between(
                 found.at, low + shift, high + shift, color=BAND, alpha=0.22, linewidth=0
             )
-    for shift in (-turns, 0.0, turns) if turns else (0.0,):
+    for shift in shifts:
         for piece in _pieces(found.mean, turns):
             axes.plot(
                 found.at[piece],

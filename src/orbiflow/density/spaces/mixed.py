@@ -125,9 +125,6 @@ class MixedTorus(Torus):
         rest = 1 - _share(turns - turns.detach().floor()) ** 2
         return (8 / 3 * self._scale.to(points)).log() - 2.5 * rest.clamp_min(LEAST_REST).log()
 
-    def log_uniform(self, points: Tensor) -> Tensor:
-        return -self.log_area(points)
-
     def log_density_factor(self, points: Tensor, measure: str) -> Tensor:
         none = torch.zeros_like(points[..., 0])
         return none if measure == "uniform" else super().log_density_factor(points, measure)

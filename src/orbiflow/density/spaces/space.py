@@ -178,10 +178,6 @@ class Space(ABC):
         """Return the logarithm of natural area over chart area (...,) at points (..., d)."""
         return torch.full_like(points[..., 0], math.log(self.volume))
 
-    def log_uniform(self, points: Tensor) -> Tensor:
-        """Return the log density (...,) in natural measure of the uniform distribution at points."""
-        return torch.full_like(points[..., 0], -math.log(self.volume))
-
     @property
     @abstractmethod
     def volume(self) -> float:
