@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import queue
 import threading
 from collections.abc import AsyncIterator, Iterator
@@ -12,9 +13,12 @@ from typing import Any, cast
 
 import httpx
 
+from bent_tiles import bent_tile
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Call, CallProcess, Cancel, Event, Failed, Finished
 from orbiflow.studio import Limits, Store, WorkQueue, create_app
+from orbiflow.studio.tile_files import put_tile, tile_number
+from orbiflow.tiles import EscherTile
 
 SQUARE = b"[[0, 0], [80, 0], [80, 60], [40, 90], [0, 60]]"
 
@@ -198,3 +202,16 @@ def worked(client: Client, own: str, operation: str, **settings: Any) -> dict[st
 def new_project(client: Client) -> str:
     """Return the address of a new project."""
     return f"/api/projects/{client.post('/api/projects', json={}).json()['id']}"
+
+
+def house_tile(client: Client) -> str:
+    """The address of a tile of a new project, which no search has found."""
+    project = new_project(client)
+    done(client, client.put(f"{project}/input?name=house.json", content=SQUARE))
+    store, name = client.studio.store, project.split("/")[-1]
+    number = tile_number(900, 0)
+    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
+    put_tile(store.home(name), number, "final", tile, lambda _: None)
+    folder = store.home(name) / "tiles" / str(number) / "final"
+    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
+    return f"{project}/tiles/{number}"

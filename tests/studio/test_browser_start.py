@@ -410,6 +410,7 @@ def test_pages_are_light(studio: RunningStudio) -> None:
             assert answer.status_code == 200
             total += len(b"".join(answer.iter_raw()))
     assert total < 165_000
+    assert sum(file.stat().st_size for file in STATIC.rglob("*") if file.is_file()) < 415_000
 
 
 def test_a_project_file_opens_again(page, studio: RunningStudio, tmp_path) -> None:

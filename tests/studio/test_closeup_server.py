@@ -13,7 +13,7 @@ import shapely
 from bent_tiles import bent_tile
 from exported import dxf_lines
 from orbiflow.studio.taking import with_drawing
-from orbiflow.studio.tile_files import put_tile, tile_folder, tile_number
+from orbiflow.studio.tile_files import tile_folder
 from orbiflow.tiles import (
     EscherTile,
     ExportSettings,
@@ -24,21 +24,13 @@ from orbiflow.tiles import (
     scenes,
 )
 from orbiflow.tiles.make import laid_out
-from studio.served import SQUARE, Client, done, new_project
+from studio.served import Client, done, house_tile
 
 
 @pytest.fixture(scope="module")
 def address(client: Client) -> str:
     """The address of a tile of a project."""
-    project = new_project(client)
-    done(client, client.put(f"{project}/input?name=house.json", content=SQUARE))
-    store, name = client.studio.store, project.split("/")[-1]
-    number = tile_number(900, 0)
-    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
-    put_tile(store.home(name), number, "final", tile, lambda _: None)
-    folder = store.home(name) / "tiles" / str(number) / "final"
-    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
-    return f"{project}/tiles/{number}"
+    return house_tile(client)
 
 
 def pulled_by(client: Client, address: str, size: float) -> Any:

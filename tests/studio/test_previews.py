@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bent_tiles import bent_tile
-from orbiflow.studio.tile_files import put_tile, tile_number
-from orbiflow.tiles import EscherTile
-from studio.served import SQUARE, Client, done, new_project
+from studio.served import Client, done, house_tile
 
 STROKE = {"colour": "#d02030", "width": 1.5, "points": [[0.0, 0.0], [4.0, 2.0]]}
 
@@ -22,16 +19,10 @@ STROKE = {"colour": "#d02030", "width": 1.5, "points": [[0.0, 0.0], [4.0, 2.0]]}
 @pytest.fixture(scope="module")
 def address(client: Client) -> str:
     """The address of a tile of a project that was drawn on."""
-    project = new_project(client)
-    done(client, client.put(f"{project}/input?name=house.json", content=SQUARE))
-    store, name = client.studio.store, project.split("/")[-1]
-    number = tile_number(900, 0)
-    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
-    put_tile(store.home(name), number, "final", tile, lambda _: None)
-    folder = store.home(name) / "tiles" / str(number) / "final"
-    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
+    tile = house_tile(client)
+    project = tile.partition("/tiles/")[0]
     client.patch(project, json={"view": {"drawing": {"strokes": [STROKE], "eyes": []}}})
-    return f"{project}/tiles/{number}"
+    return tile
 
 
 def preview(client: Client, address: str, operation: str, **settings: Any) -> Any:

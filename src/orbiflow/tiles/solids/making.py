@@ -60,7 +60,7 @@ class Solid(Outcome):
 
     @property
     def size(self) -> Array:
-        """Width, depth and height (3,) in mm of the largest plate."""
+        """Width, depth and height (3,) in mm that hold each of the plates."""
         boxes = np.array([body.bounding_box() for body in self.parts.values()])
         return boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)
 
