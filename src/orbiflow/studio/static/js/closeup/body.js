@@ -1,6 +1,6 @@
 /** The body of a tile that is pulled: how its points hang on the unknowns, and how stiff it is. */
 
-import { sparse } from "./sparse.js";
+import { sparse, sparseOf } from "./sparse.js";
 
 const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
 
@@ -36,17 +36,7 @@ export function everyPoint(space, middle, group) {
   });
   const tied = rows.length;
   for (let i = tied; i < 2 * size; i += 1) rows.push(new Map([[cols + i - tied, 1]]));
-  const indptr = [0];
-  rows.forEach((row) => indptr.push(indptr.at(-1) + row.size));
-  const points = sparse(
-    {
-      indptr,
-      indices: rows.flatMap((row) => [...row.keys()]),
-      values: rows.flatMap((row) => [...row.values()]),
-    },
-    cols + 2 * size - tied,
-  );
-  return { points, tied };
+  return { points: sparseOf(rows, cols + 2 * size - tied), tied };
 }
 
 /** The cotangent of each corner of each triangle, and the Laplacian that they make. */
@@ -71,15 +61,5 @@ export function weigh(triangles, rest, area) {
       }
     });
   }
-  const indptr = [0];
-  near.forEach((row) => indptr.push(indptr.at(-1) + row.size));
-  const laplacian = sparse(
-    {
-      indptr,
-      indices: near.flatMap((row) => [...row.keys()]),
-      values: near.flatMap((row) => [...row.values()]),
-    },
-    size,
-  );
-  return { cotangents, laplacian };
+  return { cotangents, laplacian: sparseOf(near, size) };
 }

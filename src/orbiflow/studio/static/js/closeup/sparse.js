@@ -18,6 +18,20 @@ export function sparse({ indptr, indices, values }, cols) {
 }
 
 /**
+ * The same from rows that map a column to its value.
+ *
+ * @param {Map<number, number>[]} rows
+ * @param {number} cols
+ */
+export function sparseOf(rows, cols) {
+  const indptr = [0];
+  rows.forEach((row) => indptr.push(indptr.at(-1) + row.size));
+  const indices = rows.flatMap((row) => [...row.keys()]);
+  const values = rows.flatMap((row) => [...row.values()]);
+  return sparse({ indptr, indices, values }, cols);
+}
+
+/**
  * out = matrix x, as many rows as fit
  *
  * @param {Sparse} matrix
