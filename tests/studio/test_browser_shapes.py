@@ -63,4 +63,5 @@ def test_shape_is_chosen_and_opened(page: Any, studio: RunningStudio) -> None:
         page.keyboard.press(key)
     page.wait_for_url(lambda url: not url.endswith(f"/{first['id']}"))
     assert len(studio.project(own)["tiles"]) == 2
+    page.wait_for_selector("[data-ready=pull]")  # nothing is still asked of what goes now
     studio.client.delete(f"projects/{own}").raise_for_status()

@@ -260,6 +260,7 @@ def test_copied_link_opens_the_tile_in_a_studio(
     given, got = (studio.project(own)["tiles"][0] for own in (searched, opened))
     assert got["certified"]
     assert np.allclose(got["polygon"], given["polygon"], atol=1e-4)
+    taking.goto("about:blank")  # nothing is still asked of what goes now
     studio.client.delete(f"projects/{opened}").raise_for_status()
 
 

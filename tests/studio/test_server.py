@@ -163,8 +163,10 @@ def test_reading_can_be_set_and_a_new_picture_begins_anew(client: Client) -> Non
     assert client.put(f"{address}/reading", json={"smooth": 0.01}).status_code == 422
     done(client, client.put(f"{address}/input?name=a.json", content=SQUARE))
     assert client.put(f"{address}/reading", json={"smooth": 7}).status_code == 422
+    backdrop = client.get(address).json()["silhouette"]["backdrop"]
     done(client, client.put(f"{address}/reading", json={"threshold": None, "smooth": 0.1}))
     found = client.get(address).json()
+    assert found["silhouette"]["backdrop"] == backdrop  # what stays is not loaded again
     usual = {"threshold": None, "invert": None, "thicken": 0.0}
     assert found["reading"] == {**usual, "smooth": 0.1}
     assert len(found["silhouette"]["outline"]) > 10

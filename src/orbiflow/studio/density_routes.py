@@ -27,7 +27,7 @@ from orbiflow.studio.density_tasks import (
     map_file,
 )
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.routes import Routes, Studio, body_object, save_body
+from orbiflow.studio.routes import Routes, Studio, body_object, save_body, whole
 from orbiflow.studio.words import NAMES, plain_name
 
 EXAMPLES = {
@@ -126,8 +126,7 @@ async def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[
 
 def _document(file: Path) -> Response:
     """Return a file of JSON, or null if nobody has drawn it yet."""
-    drawn = file.is_file()
-    return FileResponse(file, media_type="application/json") if drawn else JSONResponse(None)
+    return whole(file) if file.is_file() else JSONResponse(None)
 
 
 def _report(fit: Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any
 from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, StreamingResponse
+from starlette.responses import FileResponse, Response, StreamingResponse
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import naming_extras
@@ -22,7 +22,7 @@ from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
-from orbiflow.studio.routes import Routes, Studio, body_object, save_body
+from orbiflow.studio.routes import Routes, Studio, body_object, save_body, whole
 from orbiflow.studio.share_link import link_text, write_linked
 from orbiflow.studio.store import Missing
 from orbiflow.studio.taking import PREVIEW, export_folder
@@ -354,14 +354,14 @@ async def _mask_changed(here: Studio, project: str, mask: str, number: int) -> d
 
 
 @routes("GET", "/projects/{project}/{picture}.png")
-async def get_picture(project: str, picture: str, here: Studio) -> FileResponse:
+def get_picture(project: str, picture: str, here: Studio) -> Response:
     """Return a backdrop, or what was painted over it."""
     here.store.project(project)
     file = here.store.home(project) / f"{picture}.png"
     known = {f"{name}{end}" for end in OF_PICTURE for name in (*MASKS, "backdrop")}
-    if picture not in known or not file.exists():
+    if picture not in known:
         raise Refused(404, "there is no such picture (any more)")
-    return FileResponse(file)
+    return whole(file, "image/png")
 
 
 SANDBOX = {"content-security-policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'"}
@@ -377,9 +377,9 @@ def stage_of(here: Studio, project: str, tile: int) -> Path:
 
 
 @routes("GET", "/projects/{project}/tiles/{tile}")
-async def view(project: str, tile: int, here: Studio) -> FileResponse:
+def view(project: str, tile: int, here: Studio) -> Response:
     """Return what the page of a tile shows."""
-    return FileResponse(stage_of(here, project, tile) / VIEW, media_type="application/json")
+    return whole(stage_of(here, project, tile) / VIEW)
 
 
 @routes("DELETE", "/projects/{project}/tiles/{tile}")
@@ -391,14 +391,14 @@ async def delete_tile(project: str, tile: int, here: Studio) -> dict[str, Any]:
 
 
 @routes("GET", "/projects/{project}/tiles/{tile}/space")
-async def space(project: str, tile: int, here: Studio) -> FileResponse:
+async def space(project: str, tile: int, here: Studio) -> Response:
     """Return the space in which a tile is pulled."""
     file = stage_of(here, project, tile) / SPACE
     if not file.is_file():
         task = await here.done(project, "space", {"tile": tile})
         if task["state"] != "done":
             raise OrbiflowError("the tile cannot be made ready to be pulled; reload the page")
-    return FileResponse(file, media_type="application/json")
+    return whole(file)
 
 
 @routes("POST", "/projects/{project}/tiles/{tile}/pulled")
@@ -463,9 +463,9 @@ async def download(task: int, name: str, here: Studio) -> FileResponse:
 
 
 @routes("GET", "/takeaways/{task}/preview.png")
-async def preview(task: int, here: Studio) -> FileResponse:
+def preview(task: int, here: Studio) -> Response:
     """Return a picture of what a task has made."""
-    return FileResponse(_made(here, task, PREVIEW), headers=SANDBOX)
+    return whole(_made(here, task, PREVIEW), "image/png", **SANDBOX)
 
 
 FOLDER = Path(__file__).parent / "animals"

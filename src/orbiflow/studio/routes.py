@@ -110,6 +110,14 @@ class Studio:
         return self.store.task(task)
 
 
+def whole(file: Path, kind: str = "application/json", **headers: str) -> Response:
+    """Answer with a file of a project as it is now: it may be replaced or deleted at any moment."""
+    try:
+        return Response(file.read_bytes(), media_type=kind, headers=headers)
+    except FileNotFoundError:
+        raise Refused(404, "this is no longer here; reload the page") from None
+
+
 async def body_object(request: Request) -> dict[str, Any]:
     """Return the JSON object that a request brings."""
     try:

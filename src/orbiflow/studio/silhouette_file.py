@@ -65,7 +65,10 @@ def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 
     picture = _picture(target, content)
     end = OF_PICTURE[number]
     mended = reading.shaped(_mended(target, home / f"mend{end}.png", picture.size))
-    write_atomic(home / f"backdrop{end}.png", png_bytes(picture))
+    backdrop, drawn = home / f"backdrop{end}.png", png_bytes(picture)
+    # one that stays is not loaded again by the page
+    if not backdrop.is_file() or backdrop.read_bytes() != drawn:
+        write_atomic(backdrop, drawn)
     document = {"shown": _shown(mended, picture), "target": _stored(mended)}
     write_json(silhouette_file(home, number), document)
     return mended

@@ -191,7 +191,9 @@ class PicturePage {
     if (silhouette && silhouette.backdrop !== this.shown) {
       const image = new Image();
       image.src = silhouette.backdrop;
-      await trying(() => image.decode());
+      const loaded = await image.decode().then(() => true, () => false);
+      if (silhouette !== this.own.silhouette) return; // there is a newer one, or none
+      if (!loaded) return toast("The picture cannot be loaded: reload the page", { bad: true });
       [this.picture, this.shown] = [image, silhouette.backdrop];
       if (this.marks.width !== silhouette.width || this.marks.height !== silhouette.height) {
         await this.fit(silhouette);
