@@ -33,6 +33,7 @@ WORK = {
     "studio search": "orbiflow.studio.tasks:search",
     "studio space": "orbiflow.studio.tasks:space",
     "studio pull": "orbiflow.studio.tasks:pull",
+    "studio class": "orbiflow.studio.tasks:lay_in_class",
     "studio take": "orbiflow.studio.taking:take",
     "studio preview": "orbiflow.studio.taking:preview",
     "studio table": "orbiflow.studio.density_tasks:table",

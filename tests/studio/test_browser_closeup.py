@@ -169,7 +169,7 @@ def test_by_keyboard_and_too_far_stops_at_the_last_tile(closeup, tile) -> None:
 def test_a_refusal_springs_back_is_said_once_and_makes_way(closeup, tile) -> None:
     page, why = closeup, "the tile has become much too small or too large"
     page.clock.install()
-    page.route("**/pulled", lambda route: route.fulfill(status=422, json={"error": why}))
+    page.route("**/by-hand/pull", lambda route: route.fulfill(status=422, json={"error": why}))
     choose(page, "Pull")
     before = picture(page)
     pulled(page, 26.0, 14.0)
@@ -191,7 +191,7 @@ def test_a_check_shows_how_far_it_is_and_can_be_stopped(page, studio, searched: 
         "**/events?after*", lambda r: r.fulfill(content_type="text/event-stream", body=event)
     )
     held, stopped = list[Any](), list[str]()
-    page.route("**/pulled", lambda route: held.append(route))
+    page.route("**/by-hand/pull", lambda route: held.append(route))
     page.route("**/tasks/999/cancel", lambda r: stopped.append(r.request.url) or r.fulfill(json={}))
     page.goto(f"/#/p/{searched}/t/{tile['id']}")
     page.wait_for_selector(f"{BADGE}[data-kind=proved]")

@@ -247,7 +247,7 @@ def test_pulled_versions_of_a_tile_are_on_its_card(page, studio: RunningStudio) 
 
     def pull(tile: int) -> int:
         start = studio.client.get(f"projects/{own}/tiles/{tile}/space").json()["start"]
-        pulled = f"projects/{own}/tiles/{tile}/pulled"
+        pulled = f"projects/{own}/tiles/{tile}/by-hand/pull"
         return studio.client.post(pulled, json={"parameters": start}).json()["id"]
 
     second = pull(first)

@@ -63,5 +63,11 @@ def test_shape_is_chosen_and_opened(page: Any, studio: RunningStudio) -> None:
         page.keyboard.press(key)
     page.wait_for_url(lambda url: not url.endswith(f"/{first['id']}"))
     assert len(studio.project(own)["tiles"]) == 2
+    pulled_url = page.url
+    page.get_by_role("button", name="Lay the copies another way").click()
+    page.locator(".shapes button", has_text="IH5 ·").click()
+    page.wait_for_url(lambda url: url != pulled_url)
+    last = int(page.url.rsplit("/", 1)[1])
+    assert {card["id"]: card["class_name"] for card in studio.project(own)["tiles"]}[last] == "IH5"
     page.wait_for_selector("[data-ready=pull]")  # nothing is still asked of what goes now
     studio.client.delete(f"projects/{own}").raise_for_status()

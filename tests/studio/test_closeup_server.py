@@ -38,7 +38,7 @@ def pulled_by(client: Client, address: str, size: float) -> Any:
     space = client.get(f"{address}/space").json()
     parameters = list(space["start"])
     parameters[0] += size
-    return client.post(f"{address}/pulled", json={"parameters": parameters})
+    return client.post(f"{address}/by-hand/pull", json={"parameters": parameters})
 
 
 def test_a_pulled_tile_is_certified_and_can_be_pulled_again(client: Client, address: str) -> None:
@@ -63,9 +63,29 @@ def test_what_cannot_be_is_refused_in_plain_words(
     if parameters is None:
         answer = pulled_by(client, address, 500.0)
     else:
-        answer = client.post(f"{address}/pulled", json={"parameters": parameters})
+        answer = client.post(f"{address}/by-hand/pull", json={"parameters": parameters})
     assert answer.status_code in (400, 422)
     assert what in answer.json()["error"]
+
+
+@pytest.mark.parametrize(("name", "near"), [("IH4", 0.97), ("IH5", 0.8), ("IH6", 0.8)])
+def test_a_tile_is_laid_in_another_class(
+    client: Client, address: str, name: str, near: float
+) -> None:
+    card = client.post(f"{address}/by-hand/class", json={"name": name}).json()
+    project, number = address.split("/tiles/")
+    assert (card["class_name"], card["parent"], card["certified"]) == (name, int(number), True)
+    before, after = (
+        shapely.Polygon(client.get(f"{own}").json()["polygon"])
+        for own in (address, f"{project}/tiles/{card['id']}")
+    )
+    assert before.intersection(after).area > near * before.union(after).area
+
+
+def test_there_are_no_other_classes(client: Client, address: str) -> None:
+    answer = client.post(f"{address}/by-hand/class", json={"name": "IH99"})
+    assert (answer.status_code, "IH99" in answer.json()["error"]) == (422, True)
+    assert client.post(f"{address}/by-hand/wish", json={}).status_code == 404
 
 
 def test_no_tile_no_space(client: Client, address: str) -> None:

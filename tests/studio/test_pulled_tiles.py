@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.studio.other_classes import in_class
 from orbiflow.studio.pulled_tiles import PullSpace, pulled, space_json
 from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
 from orbiflow.studio.tile_view import elements_json, tile_view
@@ -23,6 +24,7 @@ from orbiflow.tiles import (
     Frame,
     Tile,
     TileMap,
+    border,
     export,
     read_over,
     read_result,
@@ -69,6 +71,20 @@ def test_a_pull_tells_how_far_it_is_and_can_be_ended() -> None:
 
     with pytest.raises(Ended):
         pulled(tile, given, end)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH5"])
+@pytest.mark.parametrize("y_down", [False, True])
+def test_what_lies_on_a_tile_comes_along_to_another_class(name: str, y_down: bool) -> None:
+    tile, heard = squirrel("IH4", y_down=y_down), list[float]()
+    found = in_class(tile, name, heard.append)
+    assert (found.isohedral_class, found.certificate.valid) == (name, True)
+    assert found.bending is not None
+    assert found.frame is not None
+    ring = found.frame.to_input(found.bending.images)[border(found.bending.triangles)]
+    outline = shapely.Polygon(found.tile.polygon)
+    assert shapely.Polygon(ring).symmetric_difference(outline).area < 1e-6 * outline.area
+    assert heard == sorted(heard)
 
 
 def test_notes_of_a_tile_are_told_once() -> None:

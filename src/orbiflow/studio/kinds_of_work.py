@@ -64,6 +64,7 @@ KINDS = {
     "search": Kind("studio search"),
     "space": Kind("studio space", "quick"),
     "pull": Kind("studio pull", "quick"),
+    "class": Kind("studio class", "quick"),
     "preview": Kind("studio preview", "quick"),
     "export": Kind("studio take", makes="export"),
     "art": Kind("studio take", makes="art"),

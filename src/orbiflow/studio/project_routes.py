@@ -401,12 +401,16 @@ async def space(project: str, tile: int, here: Studio) -> Response:
     return whole(file)
 
 
-@routes("POST", "/projects/{project}/tiles/{tile}/pulled")
-async def pulled(request: Request, project: str, tile: int, here: Studio) -> dict[str, Any]:
-    """Make a tile of one that was pulled, and return its card."""
+@routes("POST", "/projects/{project}/tiles/{tile}/by-hand/{way}")
+async def by_hand(
+    request: Request, project: str, tile: int, way: str, here: Studio
+) -> dict[str, Any]:
+    """Make a tile of one that was pulled, or is laid in another class, and return its card."""
+    if way not in ("pull", "class"):
+        raise Refused(404, "there is nothing here; go back to the start page")
     given = await body_object(request)
     stage_of(here, project, tile)
-    task = await here.done(project, "pull", {**given, "tile": tile})
+    task = await here.done(project, way, {**given, "tile": tile})
     if task["state"] != "done":
         raise OrbiflowError(task["error"] or "the change was cancelled; pull again")
     return here.store.card(project, tile_number(task["id"], 0))

@@ -54,7 +54,7 @@ MOST_STEPS = 4  # in which the inside follows a pull
 Way = Callable[[float], Array]  # the polygon of a figure at a share of the way, 0 to 1
 Move = Callable[[Array], Array]  # where points go
 Told = Callable[[float], object]
-PULLED = ("its outline was pulled by hand",)
+PULLED = "its outline was pulled by hand"
 CROSSED = "the outline crosses itself there, so tiles would overlap: pull it less far"
 FOLDED = "the inside would be folded there: pull it less far"
 OTHER_SIZE = "the tile has become much too small or too large: pull it less far"
@@ -234,7 +234,7 @@ def pulled(
     move = _inner_move(space, given, inside) if len(inside) else None
 
     if not tile.parts:
-        found = _figure(tile, whole, on_the_way, COMPARED_POINTS, told, move)
+        found = moved_figure(tile, whole, on_the_way, COMPARED_POINTS, told, move)
     else:
         parts = list[Any]()
         for part, ring, kept in zip(tile.parts, space.rings, space.kept, strict=True):
@@ -244,7 +244,7 @@ def pulled(
             count = COMPARED_POINTS // len(tile.parts)
             way = partial(_own_ring, on_the_way, ring, back)
             inner = None if move is None else partial(_moved_in, part.place, move)
-            figure = _figure(before, own, way, count, told, inner)
+            figure = moved_figure(before, own, way, count, told, inner)
             parts.append(part._replace(figure=figure))
         found = EscherTile(
             whole,
@@ -252,7 +252,7 @@ def pulled(
             y_down=tile.y_down,
             silhouette=tile.silhouette,
             no_map=tile.no_map,
-            notes=PULLED,
+            notes=(PULLED,),
             parts=tuple(parts),
         )
         if all(part.figure.rating for part in found.parts):
@@ -335,12 +335,18 @@ def _carried(
         return carried_anew(bending, before, after, SHARPENINGS)
 
 
-def _figure(
-    before: EscherTile, tile: Tile, way: Way, count: int, told: Told, move: Move | None = None
+def moved_figure(
+    before: EscherTile,
+    tile: Tile,
+    way: Way,
+    count: int,
+    told: Told,
+    move: Move | None = None,
+    note: str = PULLED,
 ) -> EscherTile:
-    """Return a figure that was pulled to `tile` on a way, with its map and likeness carried on.
+    """Return a figure that moved to `tile` on a way, with its map and likeness carried on.
 
-    It is compared with its silhouette at so many points.
+    It is compared with its silhouette at so many points; `note` says what was done by hand.
     """
     likeness = Likeness(min_neck=before.likeness.min_neck, thinnest=narrowest_neck(tile.polygon))
     found = EscherTile(
@@ -348,7 +354,7 @@ def _figure(
         name=before.name,
         y_down=before.y_down,
         silhouette=before.silhouette,
-        notes=PULLED,
+        notes=(note,),
         likeness=likeness,
     )
     if before.bending is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -280,7 +281,42 @@ def pull(
         parameters: Where it was pulled to, in the space that `studio space` wrote.
         inside: Where the free points of its body were pulled to, if these were.
     """
-    from orbiflow.studio.pulled_tiles import pulled, space_json
+    from orbiflow.studio.pulled_tiles import pulled
+
+    def move(own: EscherTile, told: Callable[[float], None]) -> EscherTile:
+        return pulled(own, parameters, told, inside)
+
+    return _by_hand(job, tile, move, on_event, cancel)
+
+
+@operation("studio class")
+def lay_in_class(
+    job: Job, tile: int, name: str, *, on_event: Sink = ignore, cancel: Cancel = NEVER
+) -> Outcome:
+    """Write the tile of another class that is most like a tile, as one of its own.
+
+    Args:
+        tile: The number of the tile that it is to be like.
+        name: The isohedral class.
+    """
+    from orbiflow.studio.other_classes import in_class
+
+    def move(own: EscherTile, told: Callable[[float], None]) -> EscherTile:
+        with one_blas_thread():
+            return in_class(own, name, told)
+
+    return _by_hand(job, tile, move, on_event, cancel)
+
+
+def _by_hand(
+    job: Job,
+    tile: int,
+    move: Callable[[EscherTile, Callable[[float], None]], EscherTile],
+    on_event: Sink,
+    cancel: Cancel,
+) -> Outcome:
+    """Write what a function makes of a tile, which is told how to tell the share of its work."""
+    from orbiflow.studio.pulled_tiles import space_json
     from orbiflow.tiles import read_result
 
     def told(share: float) -> None:
@@ -288,7 +324,7 @@ def pull(
         on_event(Progress(share, "checking"))
 
     told(0.0)
-    found = pulled(read_result(tile_folder(job.project, tile)), parameters, told, inside)
+    found = move(read_result(tile_folder(job.project, tile)), told)
     number, stage = tile_number(job.task, 0), STAGES[-1]
     put_tile(job.project, number, stage, found, on_event, origin_of_pulled(job.project, tile))
     if place := best_stage(job.project, number):  # at hand when it is pulled again

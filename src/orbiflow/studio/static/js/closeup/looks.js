@@ -252,8 +252,9 @@ export function signPanel(elements, look, change, light) {
  * @param {(what: object) => void} change
  * @param {() => void} back
  * @param {boolean} hasInside whether something lies inside that can be pulled
+ * @param {false | (() => void)} lay what lays the copies another way, if it can
  */
-export function pullPanel(pull, change, back, hasInside) {
+export function pullPanel(pull, change, back, hasInside, lay) {
   if (!hasInside) pull.what = "outline";
   const inside = pull.what === "inside";
   return h(
@@ -298,6 +299,7 @@ export function pullPanel(pull, change, back, hasInside) {
       h("kbd", {}, "Shift"),
       " and arrows.",
     ),
+    lay && button("Lay the copies another way …", lay),
     button("Put it back", back, { kind: "quiet" }),
   );
 }

@@ -1,8 +1,9 @@
 /** The close-up of one tile: look, pull, draw. */
 
 import { client } from "../api.js";
-import { button, choice, h, newest, notes, put, style, toast, trying } from "../dom.js";
+import { button, choice, dialog, h, newest, notes, put, style, toast, trying } from "../dom.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
+import { shapeCards } from "../shapes/page.js";
 import { backdropOf } from "../skin.js";
 import { figuresOf } from "../tiling.js";
 import { alive, capital, named } from "../words.js";
@@ -121,7 +122,7 @@ class Closeup {
       tool: () => this.tool,
     });
     this.pulling = new Pulling(this.stage, this.pull, {
-      released: (parameters, inside) => this.#released(parameters, inside),
+      released: (parameters, inside) => this.#byHand("pull", { parameters, inside }),
       said: (text) => this.say(text),
       changed: (now) => this.#pulledTo(now),
     });
@@ -264,6 +265,7 @@ class Closeup {
           },
           () => this.#restore(),
           this.figures.every(({ map }) => map),
+          this.figures.length === 1 && (() => trying(() => this.#lay())),
         ),
       );
     } else {
@@ -374,7 +376,9 @@ class Closeup {
   /** How far the check of a pulled tile is; it can be stopped. */
   #checking() {
     const { badge, project } = this;
-    this.checked = project.tasks.find((own) => own.operation === "pull" && alive(own));
+    this.checked = project.tasks.find((own) =>
+      ["pull", "class"].includes(own.operation) && alive(own)
+    );
     this.stop.hidden = !this.checked || badge.dataset.kind !== "checking";
     if (!this.stop.hidden) this.tell("checking", `Checking … ${percent(this.checked.share)}`);
   }
@@ -397,15 +401,39 @@ class Closeup {
     }
   }
 
-  async #released(parameters, inside) {
+  /** Lay the copies as those of another class do, with the tile that is most like this one. */
+  async #lay() {
+    const shapes = await this.api.get("shapes");
+    const { list, close } = shapeCards(this.about);
+    const name = await dialog("Lay the copies another way", (done) =>
+      h(
+        "div",
+        { class: "stack" },
+        h("p", { class: "soft" }, "The outline stays as near to what it is as it can."),
+        list(shapes, (own, parts) =>
+          h("button", {
+            type: "button",
+            disabled: own.name === this.view.class_name,
+            onclick: () => done(own.name),
+          }, parts)),
+      ));
+    close();
+    if (name) this.#byHand("class", { name });
+  }
+
+  /**
+   * Make a tile of this one by hand, and show it once it is proved.
+   *
+   * @param {"pull" | "class"} way
+   * @param {object} settings
+   */
+  async #byHand(way, settings) {
     const before = this.view;
     this.tell("checking", "Checking …");
     this.#checking();
     try {
-      const card = await this.api.post(`${this.home}/tiles/${before.id}/pulled`, {
-        parameters,
-        inside,
-      });
+      const place = `${this.home}/tiles/${before.id}/by-hand/${way}`;
+      const card = await this.api.post(place, settings);
       if (this.closed) return;
       this.past.did({ tile: [before.id, card.id] });
       await this.open(card.id, { quiet: true });

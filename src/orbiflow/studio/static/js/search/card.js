@@ -122,7 +122,7 @@ export function cardView(project, actions) {
     stars.setAttribute("aria-label", starWords(card));
     word.textContent = card.stars && !card.figures ? capital(card.word) : "";
     lies.textContent = capital(card.arrangement);
-    name.textContent = card.parent ? `${card.class_name}, pulled` : card.class_name;
+    name.textContent = card.parent ? `${card.class_name}, by hand` : card.class_name;
     const old = isOutdated(card, project);
     root.classList.toggle("old", old);
     stage.textContent = old

@@ -14,11 +14,11 @@ const symmetryWords = (name) =>
     : "its halves mirror each other";
 
 /**
- * @param {HTMLElement} root
- * @param {Page} page
+ * What shows shapes: `list(shapes, link)` has a card for each, made by `link(shape, parts)`.
+ *
+ * @param {any} about
  */
-export async function show(root, { api, about }) {
-  await style("start");
+export function shapeCards(about) {
   const palette = paletteOf(lookOf(/** @type {any} */ ({ view: {} }), about), about);
   /** @type {Map<Element, any>} */
   const shown = new Map();
@@ -28,24 +28,36 @@ export async function show(root, { api, about }) {
       if (canvas.clientWidth) paintCard(canvas, shown.get(canvas), palette, { across: 4 });
     })
   );
-  const card = (own) => {
+  const card = (own, link) => {
     const canvas = h("canvas", { "aria-hidden": "true" });
     shown.set(canvas, own);
     watch.observe(canvas);
-    return h(
-      "li",
-      {},
-      h(
-        "a",
-        { href: `#/open/${own.text}`, "data-shape": own.name },
-        canvas,
-        h("span", { class: "shape-words" }, capital(own.arrangement)),
-        h("span", { class: "soft small" }, symmetryWords(own.symmetry)),
-        h("span", { class: "soft small" }, `${own.name} · ${own.group_name}`),
-      ),
-    );
+    const parts = [
+      canvas,
+      h("span", { class: "shape-words" }, capital(own.arrangement)),
+      h("span", { class: "soft small" }, symmetryWords(own.symmetry)),
+      h("span", { class: "soft small" }, `${own.name} · ${own.group_name}`),
+    ];
+    return h("li", {}, link(own, parts));
   };
-  const list = (shapes) => h("ul", { class: "shapes" }, shapes.map(card));
+  return {
+    list: (shapes, link) => h("ul", { class: "shapes" }, shapes.map((own) => card(own, link))),
+    close: () => watch.disconnect(),
+  };
+}
+
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
+export async function show(root, { api, about }) {
+  await style("start");
+  const cards = shapeCards(about);
+  const list = (shapes) =>
+    cards.list(
+      shapes,
+      (own, parts) => h("a", { href: `#/open/${own.text}`, "data-shape": own.name }, parts),
+    );
   const others = h("div");
   const more = h(
     "details",
@@ -68,5 +80,5 @@ export async function show(root, { api, about }) {
     list(await api.get("shapes")),
     more,
   );
-  return () => watch.disconnect();
+  return cards.close;
 }
