@@ -52,7 +52,7 @@ class Kind:
 TAKE_SETTINGS = ("tile", "picture", "drawing", "called")
 """Settings of a take-away besides those of its operation."""
 
-WITH_DRAWING = ("export", "art", "solid")
+WITH_DRAWING = ("export", "art", "solid", "animate")
 """What shows the drawing on a tile."""
 
 READS = ("read", "read second")

@@ -147,7 +147,8 @@ def _drawn(call: Call, folder: Path, side: float, hear: Sink, cancel: Cancel) ->
     if makes == "animate":
         from orbiflow.tiles import still
 
-        return still(call.arguments["result"], settings, SHOWN_PROGRESS, side)
+        pictures = [call.arguments.get(f"{prefix}picture") for prefix in PREFIXES]
+        return still(call.arguments["result"], settings, SHOWN_PROGRESS, side, pictures)
     out = folder / PREVIEW
     # what holds no pixels refuses pictures
     if makes == "solid" or settings.file_format in ("dxf", "json"):

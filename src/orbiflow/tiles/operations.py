@@ -24,7 +24,16 @@ from orbiflow.runtime import (
     operation,
     write_atomic,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, InMemory, Option, Parsed, Positional
+from orbiflow.settings import (
+    DefaultText,
+    Ending,
+    Hidden,
+    InMemory,
+    Option,
+    Parsed,
+    Positional,
+    SettingError,
+)
 from orbiflow.tiles.make import ArtSettings, ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings, class_names
@@ -403,6 +412,8 @@ def animate(
     *,
     tile: Which = None,
     force: bool = False,
+    picture: Path | None = None,
+    second_picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -415,27 +426,38 @@ def animate(
         out: The file: .gif, .svg, or .mp4, which needs ffmpeg.
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
+        picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
+        second_picture: One over the second silhouette, of a tile of two figures.
 
     Raises:
-        OrbiflowError: As `export` raises it.
+        InputFileError: If the picture cannot be read.
+        OrbiflowError: As `export` raises it, and for a picture in an SVG.
     """
     settings = settings.for_file(out)
+    if settings.file_format == "svg" and (picture or second_picture):
+        raise SettingError(
+            "an animated SVG shows tiles in plain colours; leave out {picture}, or choose a .gif or "
+            ".mp4"
+        )
 
     from orbiflow.drawing import palette
     from orbiflow.tiles import motion
     from orbiflow.tiles.page import shades
     from orbiflow.tiles.tilings import colouring
 
-    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}")
+    pictures = picture, second_picture
+    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", *pictures)
+    given, overs = motion.dressed(given, settings, pictures)
     known = colouring(given.tiling)
-    for note in shades(palette(settings.palette), known).shortage(known.count):
+    said = [note for over in overs for note in over.notes]
+    for note in (*said, *shades(palette(settings.palette), known).shortage(known.count)):
         on_event(Note(note))
 
     def told(share: float) -> None:
         cancel.check()
         on_event(Progress(share, "drawing"))
 
-    content = motion.animation(given, settings, force=force, told=told)
+    content = motion.animation(given, settings, *overs, force=force, told=told)
     cancel.check()
     write_atomic(out, content)
     width, height = (round(side * settings.pixels) for side in settings.page)

@@ -25,7 +25,7 @@ from orbiflow.drawing import palette
 from orbiflow.tiles import CLASSES, ArtSettings, Artwork, Over, artwork, render_artwork
 from orbiflow.tiles.make import art_scene
 from orbiflow.tiles.motifs import picture_paint
-from orbiflow.tiles.motifs.carried import _places
+from orbiflow.tiles.motifs.carried import carried_places
 from orbiflow.tiles.motifs.raster import NOWHERE, region_sides, runs
 from orbiflow.tiles.silhouette import triangulate
 
@@ -119,7 +119,9 @@ def test_the_map_onto_the_raster_has_no_fold() -> None:
     tile = squirrel("IH6")
     art = artwork(tile, PAGE, Over(flat(tile, "white")))
     grid = picture_paint(art.pictures[0], art.tile, art.density(0), art.page.count).grid
-    places = _places(tile, grid)
+    bending, frame = tile.require_map()
+    images, rest = frame.to_input(bending.images), frame.to_input(bending.rest)
+    places = carried_places(grid, images, rest, bending.triangles)
     whole = np.asarray(binary_erosion(grid.inside(tile.tile.polygon), iterations=2), dtype=bool)
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
     turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]

@@ -19,6 +19,7 @@ from PIL import Image, ImageSequence
 
 from orbiflow.drawing import palette
 from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.settings import SettingError
 from orbiflow.tiles import (
     AnimationSettings,
     EscherTile,
@@ -28,10 +29,12 @@ from orbiflow.tiles import (
     animate,
     animation,
     as_tile,
+    border,
     escherize_class,
 )
+from orbiflow.tiles.motifs import Over, Picture
 from orbiflow.tiles.motion.kinds import BendingWay, eased, frames, motion
-from orbiflow.tiles.motion.writers import frame_scene
+from orbiflow.tiles.motion.writers import frame_image, frame_scene
 from orbiflow.tiles.write import scene_image
 from swirled_tiles import is_sound, swirled, swirled_tile
 
@@ -135,7 +138,7 @@ def test_colours_of_neighbours_differ_throughout(name: str) -> None:
     settings: dict[str, Any] = {"area": "200x134px"}
     moving = motion(as_tile(swirled_tile(name, 3, 0.1)), AnimationSettings(**settings))
     for share in (0.0, 0.5, 1.0):
-        shown = [(shapely.Polygon(ring), colour) for ring, colour, _ in moving.rings(share)]
+        shown = [(shapely.Polygon(own.ring), own.colour) for own in moving.seen(share)]
         size = shown[0][0].area ** 0.5
         beside = 0
         for (one, own), (other, its) in itertools.combinations(shown, 2):
@@ -164,14 +167,71 @@ def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:
     bending = bent.bending
     assert bending is not None
     way = BendingWay(bending)
-    assert np.abs(way.at(0.0) - bending.rest[way.ring]).max() < 1e-9
-    assert np.abs(way.at(1.0) - bending.images[way.ring]).max() < 1e-9
+    assert np.abs(way.at(0.0) - bending.rest).max() < 1e-9
+    assert np.abs(way.at(1.0) - bending.images).max() < 1e-9
     whole = motion(bent, AnimationSettings(kind="bend", **{**SMALL, "area": "200x134px"}))
     ring = whole.outlines(1.0)[0] @ whole.places(1.0).linear[0].T + whole.places(1.0).offset[0]
     assert ring.min() > 0
     assert whole.grown(0.0).tolist()[0] == 1
     assert whole.grown(0.0)[1:].max() == 0
     assert whole.grown(1.0).min() == 1
+
+
+@pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
+@pytest.mark.parametrize("share", [0.2, 0.45, 0.8, 1.0])
+def test_what_lies_on_the_tiles_goes_where_their_bodies_go(
+    bent: EscherTile, kind: Any, share: float
+) -> None:
+    low, high = bent.covered.low, bent.covered.high
+    shades = np.stack(np.meshgrid(*[np.linspace(0, 255, 64)] * 2), axis=-1)
+    image = np.dstack([shades, np.full((64, 64), 128.0), np.full((64, 64), 255.0)])
+    over = Over(Picture(Image.fromarray(image.astype(np.uint8), "RGBA"), bent.covered))
+    page: Any = {"area": "360x240px", "tile_size": "120px", "outline": "none"}
+    chosen = AnimationSettings(kind=kind, **page)
+    moving = motion(bent, chosen, over)
+    assert moving.dress is not None
+    bending, frame = bent.require_map()
+    inner = np.setdiff1d(np.arange(len(bending.rest)), border(bending.triangles))
+    shares = (frame.to_input(bending.rest[inner]) - low) / (high - low)
+    expected = np.column_stack([255 * shares, np.full(len(inner), 128.0)])
+    drawn = np.asarray(frame_image(moving, moving.palette(chosen), share)).astype(float)
+    body = moving.bodies(share)[0][inner]
+    every = (own for own in moving.seen(share) if own.whole)  # which lie above those that grow
+    copy = min(every, key=lambda own: np.linalg.norm(own.offset - np.array(moving.page.size) / 2))
+    x, y = (body @ copy.linear.T + copy.offset).T
+    shown = (x > 0) & (x < drawn.shape[1]) & (y > 0) & (y < drawn.shape[0])
+    seen = drawn[y[shown].astype(int), x[shown].astype(int)]
+    apart = np.abs(seen - expected[shown]).max(axis=1)
+    assert shown.sum() > 5
+    assert np.quantile(apart, 0.9) < 12
+
+
+def test_frames_with_a_picture_are_full_and_of_one_palette(bent: EscherTile) -> None:
+    over = Over(Picture(Image.new("RGBA", (16, 16), (200, 30, 60, 255)), bent.covered))
+    plain = palette("lagoon")._replace(paper="#ff00ff")
+    for share in (0.0, 0.3, 1.0):
+        frame = frame_image(motion(bent, AnimationSettings(), over), plain, share)
+        assert (np.abs(np.asarray(frame).astype(int) - (255, 0, 255)).max(axis=-1) > 40).all()
+    content = animation(bent, AnimationSettings(kind="grow", eyes=((150, 60, 8),), **SMALL), over)
+    assert isinstance(content, bytes)
+    shown = [
+        np.asarray(one.convert("RGB")).astype(int)
+        for one in ImageSequence.Iterator(Image.open(io.BytesIO(content)))
+    ]
+    red = [(np.abs(one - (200, 30, 60)).max(axis=-1) < 12).mean() for one in shown]
+    assert red[0] > 0.02
+    assert max(red) > 0.3
+
+
+def test_an_animated_svg_says_that_it_has_no_pictures(bent: EscherTile, tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match="plain colours"):
+        AnimationSettings(format="svg", eyes=((150, 60),))
+    picture = tmp_path / "own.png"
+    Image.new("RGB", (10, 10)).save(picture)
+    with pytest.raises(SettingError, match="plain colours"):
+        animate(bent, tmp_path / "out.svg", picture=picture)
+    with pytest.raises(SettingError, match="two figures"):
+        animate(bent, tmp_path / "out.gif", second_picture=picture)
 
 
 def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None:

@@ -259,7 +259,7 @@ def test_every_frame_of_a_morph_is_a_tiling(kind: str) -> None:
     moving = motion(pair(), AnimationSettings(kind=kind, area="300x200px"))  # pyright: ignore[reportArgumentType]
     window = shapely.box(60, 40, 240, 160)
     for progress in (0.0, 0.4, 1.0) if kind == "morph" else (1.0,):
-        rings = [shapely.Polygon(ring) for ring, _, _ in moving.rings(progress)]
+        rings = [shapely.Polygon(own.ring) for own in moving.seen(progress)]
         assert all(ring.is_valid for ring in rings)
         covered = sum(ring.intersection(window).area for ring in rings)
         assert covered == pytest.approx(window.area, rel=1e-4)

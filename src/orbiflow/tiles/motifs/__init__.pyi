@@ -1,5 +1,6 @@
 from .carried import Over as Over
 from .carried import Picture as Picture
+from .carried import carried_places as carried_places
 from .carried import carried_raster as carried_raster
 from .carried import drawn_motif as drawn_motif
 from .carried import paint_motif as paint_motif
@@ -9,6 +10,7 @@ from .carried import read_overs as read_overs
 from .carried import require_figures as require_figures
 from .carried import with_map as with_map
 from .page_pictures import page_picture as page_picture
+from .raster import MARGIN as MARGIN
 from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid
 from .raster import Paint as Paint

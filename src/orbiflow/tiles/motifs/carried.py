@@ -16,7 +16,7 @@ from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_path
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, png_bytes
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError
 from orbiflow.tiles import search
@@ -152,7 +152,9 @@ def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Arr
     Returns colours (height, width, 3) times their opacity, and the opacity (height, width).
     """
     small = picture.reduced(1 / grid.density)
-    places = _places(tile, grid)
+    bending, frame = tile.require_map()
+    images, rest = frame.to_input(bending.images), frame.to_input(bending.rest)
+    places = carried_places(grid, images, rest, bending.triangles)
     straight = np.asarray(small.image, dtype=np.float32) / 255
     straight[..., :3] *= straight[..., 3:]
     straight = _spread(straight, small.covered.shares(tile.silhouette_outline) * small.image.size)
@@ -182,12 +184,12 @@ def _spread(colours: Array, outline: Array) -> Array:
     return colours[rows, columns]
 
 
-def _places(tile: EscherTile, grid: Grid) -> Array:
-    """Return the point (height, width, 2) that is carried to each texel; any, outside the tile."""
-    bending, frame = tile.require_map()
-    images = grid.texels(frame.to_input(bending.images))
-    rest = frame.to_input(bending.rest)
-    triangles = bending.triangles
+def carried_places(grid: Grid, images: Array, rest: Array, triangles: Integers) -> Array:
+    """Return the point (height, width, 2) that is carried to each texel; any, outside the triangles.
+
+    Triangles (T, 3) of points `rest` (V, 2) are carried to those of `images` (V, 2), of a grid's units.
+    """
+    images = grid.texels(images)
     found = runs(region_sides(images, triangles), 0, grid.height, grid.width)
     linear = triangle_sides(rest, triangles) @ np.linalg.inv(triangle_sides(images, triangles))
     first = triangles[:, 0]

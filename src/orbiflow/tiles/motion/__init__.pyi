@@ -1,3 +1,4 @@
 from .settings import AnimationSettings as AnimationSettings
+from .skins import dressed as dressed
 from .writers import animation as animation
 from .writers import still as still

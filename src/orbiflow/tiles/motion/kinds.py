@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -16,8 +16,10 @@ from orbiflow.arrays import Array, Integers, Window
 from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import Place, border, triangle_sides
+from orbiflow.tiles.motifs import Over
 from orbiflow.tiles.motion.morph import Morph, OwnFrame
 from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.motion.skins import Body, Dress
 from orbiflow.tiles.page import Page, Style, edge_margin, tiling_size
 from orbiflow.tiles.silhouette import Bending
 from orbiflow.tiles.tile import EscherTile
@@ -27,6 +29,17 @@ from orbiflow.tiles.tilings import ASPECT, Copies, Tiling, copies_meeting, defau
 class Places(NamedTuple):
     """The places of M copies of an outline, in pixels: a point p lies at linear[m] p + offset[m]."""
 
+    linear: Array
+    offset: Array
+
+
+class Seen(NamedTuple):
+    """A copy that is seen in a frame: its points p lie at `linear` p + `offset`, in pixels."""
+
+    ring: Array  # (N, 2)
+    kind: int  # its prototile
+    colour: int  # the number of its colour
+    whole: bool  # whether it has grown
     linear: Array
     offset: Array
 
@@ -48,6 +61,9 @@ class Motion:
     keys: tuple[float, ...]  # progress between which the outline moves in nearly straight lines
     what: str  # the motion in words, for titles
     line: Style = NO_LINE  # of outlines
+    # of each prototile: the points of what bends of it, at a progress, as outlines are
+    bodies: Callable[[float], list[Array]] = lambda _: []
+    dress: Dress | None = None  # what lies on the tiles
 
     def palette(self, settings: AnimationSettings) -> Palette:
         """Return the colours of the copies."""
@@ -58,16 +74,14 @@ class Motion:
         start, end = self.births.T
         return eased(np.clip((progress - start) / (end - start), 0, 1))
 
-    def rings(self, progress: float) -> Iterator[tuple[Array, int, bool]]:
-        """Yield every visible copy (N, 2), the number of its colour, and whether it is whole."""
+    def seen(self, progress: float) -> Iterator[Seen]:
+        """Yield every visible copy: those that grow, and above them the whole ones."""
         outlines, (linear, offset) = self.outlines(progress), self.places(progress)
         size = self.grown(progress)
-        for k in np.flatnonzero(size > 0):
-            yield (
-                size[k] * outlines[self.kinds[k]] @ linear[k].T + offset[k],
-                int(self.colours[k]),
-                size[k] == 1,
-            )
+        for k in (*np.flatnonzero((size > 0) & (size < 1)), *np.flatnonzero(size == 1)):
+            kind, by = int(self.kinds[k]), size[k] * linear[k]
+            ring, whole = outlines[kind] @ by.T + offset[k], bool(size[k] == 1)
+            yield Seen(ring, kind, int(self.colours[k]), whole, by, offset[k])
 
 
 OUTLINE = 0.0016  # width of outlines, as a share of the page's, where none is given
@@ -80,18 +94,27 @@ BEND = 0.45
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-def motion(given: EscherTile, settings: AnimationSettings) -> Motion:
-    """Return what moves, in pixels, before it is a file."""
+def motion(given: EscherTile, settings: AnimationSettings, *overs: Over) -> Motion:
+    """Return what moves, in pixels, before it is a file.
+
+    `overs` are what lies over the silhouette of each of the tile's figures.
+    """
     settings = settings.in_pixels()
     page, chosen = _page(given, settings), palette(settings.palette)
+    dress = None
+    if any(over.picture or over.drawing for over in overs) or settings.draws:
+        places = [page.place.after(part.place) for part in given.figures]
+        count = max(page.count, 2)  # the tile that is alone at first has the second
+        dress = Dress.of(given, settings, overs, places, page.palette(chosen), count)
+    bodies = () if dress is None else dress.bodies
     kinds: dict[str, Callable[[], Motion]] = {
-        "morph": lambda: morph(given, page, steady=settings.format == "svg"),
-        "grow": lambda: grow(given, page),
+        "morph": lambda: morph(given, page, bodies, steady=settings.format == "svg"),
+        "grow": lambda: grow(given, page, bodies),
         "bend": lambda: bend(given, page),
     }
     width = max(1.0, OUTLINE * page.size[0]) if settings.outline is None else settings.outline
     line = Style(None, chosen.outline, width) if width else NO_LINE
-    return replace(kinds[settings.kind](), line=line)
+    return replace(kinds[settings.kind](), line=line, dress=dress)
 
 
 def _page(given: EscherTile, settings: AnimationSettings) -> Page:
@@ -111,15 +134,26 @@ def _window(page: Page, linear: Array) -> Window:
     return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
 
 
-def morph(given: EscherTile, page: Page, *, steady: bool = False) -> Motion:
+def morph(
+    given: EscherTile, page: Page, bodies: Sequence[Body] = (), *, steady: bool = False
+) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
     It is a tiling throughout; if `steady`, the tile's lattice is there from the start.
     """
     tile, middle = given.tile, np.array(page.size) / 2
-    way = Morph(OwnFrame.of(tile), [part.prototile.polygon for part in given.parts])
+    parts = [part.prototile.polygon for part in given.parts]
+    inner = [
+        part.place(body.points) for part, body in zip(given.figures, bodies, strict=bool(bodies))
+    ]
+    way = Morph(OwnFrame.of(tile), [*parts, *inner])
+    every = lru_cache(maxsize=2)(way.rings)  # of a frame, for its outlines and its bodies
+
+    def rings(progress: float) -> list[Array]:
+        return every(progress)[: len(parts)] if parts else [way.at(progress).points]
+
     end = way.end
-    group, own = end.kind.group(), Tiling(end.kind.group(), way.rings(1.0))
+    group, own = end.kind.group(), Tiling(end.kind.group(), rings(1.0))
     center = np.linalg.solve(end.linear, given.tiling.center - end.offset)
 
     def linear(progress: float) -> Array:
@@ -133,7 +167,10 @@ def morph(given: EscherTile, page: Page, *, steady: bool = False) -> Motion:
         return Places(turned[copies.cosets], shifts @ by.T + middle)
 
     def outlines(progress: float) -> list[Array]:
-        return [(ring - center) @ linear(progress).T for ring in way.rings(progress)]
+        return [(ring - center) @ linear(progress).T for ring in rings(progress)]
+
+    def moved_bodies(progress: float) -> list[Array]:
+        return [(own - center) @ linear(progress).T for own in every(progress)[len(parts) :]]
 
     copies = _seen(own, center, linear, outlines, places, page)
     still = places(1.0, copies)
@@ -146,12 +183,17 @@ def morph(given: EscherTile, page: Page, *, steady: bool = False) -> Motion:
         np.tile(ALWAYS, (len(copies), 1)),
         (0.0, 1.0) if way.weights is None and steady else tuple(np.linspace(0, 1, 17).tolist()),
         f"A tiling with straight edges becomes the tiling of {tile.isohedral_class}",
+        bodies=moved_bodies,
     )
 
 
-def grow(given: EscherTile, page: Page) -> Motion:
+def grow(given: EscherTile, page: Page, bodies: Sequence[Body] = ()) -> Motion:
     """Return one tile, with all of its figures, and the tiling growing around it, nearest first."""
     outlines = [own.polygon - own.center for own in page.tiling.prototiles]
+    still = [
+        page.place.after(part.place)(body.points) - own.center
+        for own, part, body in zip(page.tiling.prototiles, given.figures, bodies, strict=False)
+    ]
     places, kinds, colours = _still_places(page)
     return Motion(
         page,
@@ -162,12 +204,13 @@ def grow(given: EscherTile, page: Page) -> Motion:
         _births(places, 0.0, len(outlines)),
         (0.0, 1.0),
         f"The tiling of {given.isohedral_class or 'a tile'} grows around one tile",
+        bodies=lambda _: still,
     )
 
 
 def bend(given: EscherTile, page: Page) -> Motion:
     """Return each silhouette bending into its figure, and then the tiling growing around them."""
-    ways: list[Callable[[float], Array]] = []
+    ways, borders = list[Callable[[float], Array]](), list[Integers]()
     for part, prototile in zip(given.figures, page.tiling.prototiles, strict=True):
         bending, frame = part.figure.bending, part.figure.frame
         if bending is None or frame is None:
@@ -177,17 +220,24 @@ def bend(given: EscherTile, page: Page) -> Motion:
             )
         place = page.place.after(part.place).after(Place(frame.linear, frame.offset))
         ways.append(partial(_bent, BendingWay(bending), place, prototile.center))
+        borders.append(border(bending.triangles))
     places, kinds, colours = _still_places(page)
     silhouettes = "silhouettes bend" if given.parts else "silhouette bends"
+
+    @lru_cache(maxsize=2)  # of a frame, for its outlines and its bodies
+    def bodies(progress: float) -> list[Array]:
+        return [way(min(1.0, progress / BEND)) for way in ways]
+
     return Motion(
         page,
-        lambda progress: [way(min(1.0, progress / BEND)) for way in ways],
+        lambda progress: [own[ring] for own, ring in zip(bodies(progress), borders, strict=True)],
         lambda _: places,
         kinds,
         colours,
         _births(places, BEND, len(ways)),
         (*np.linspace(0, BEND, 13).tolist(), 1.0),
         f"The {silhouettes} into a tile of {given.isohedral_class}, and its tiling grows",
+        bodies=bodies,
     )
 
 
@@ -261,7 +311,6 @@ class BendingWay:
     def __init__(self, bending: Bending) -> None:
         self.rest, self.images = bending.rest, bending.images
         triangles = bending.triangles
-        self.ring = border(triangles)
         sides, moved = (triangle_sides(points, triangles) for points in (self.rest, self.images))
         inverse = np.linalg.inv(sides)
         linear = moved @ inverse
@@ -286,7 +335,7 @@ class BendingWay:
         self._solver = splu(csc_array(matrix + anchor))
 
     def at(self, share: float) -> Array:
-        """Return the outline (n, 2) at 0 (as it is) to 1 (the tile), in the target's normal form."""
+        """Return the points (n, 2) at 0 (as they are) to 1 (the tile), in the target's normal form."""
         turned = _rotations(share * self._angle)
         linear = turned @ ((1 - share) * np.eye(2) + share * self._stretch)
         pull = self._gradient @ np.swapaxes(linear, 1, 2)
@@ -294,7 +343,7 @@ class BendingWay:
         np.add.at(right, self._triangles, pull)
         points = self._solver.solve(right)
         middle = (1 - share) * self.rest.mean(axis=0) + share * self.images.mean(axis=0)
-        return (points - points.mean(axis=0) + middle)[self.ring]
+        return points - points.mean(axis=0) + middle
 
 
 def _rotations(angles: Array) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from orbiflow.settings import DefaultText, Hidden, OnlyWith, Option, Range, SettingError, Unit
+from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import PageSettings
 from orbiflow.units import PageArea, PageLength
 
@@ -13,7 +14,7 @@ MOST_FRAMES = 2400  # the largest number of pictures of a GIF or video
 SIDES = 64, 8000  # the least and the largest side of a picture in pixels
 
 
-class AnimationSettings(PageSettings, group="Animation"):
+class AnimationSettings(PageSettings, MotifSettings, TintSettings, group="Animation"):
     """How a tile is animated.
 
     >>> AnimationSettings(kind="grow", area="square").page
@@ -45,6 +46,11 @@ class AnimationSettings(PageSettings, group="Animation"):
         OnlyWith(kind=("bend", "grow"), because="a morph fills the page"),
     ] = True
 
+    @property
+    def draws(self) -> bool:
+        """Whether something is drawn on the tiles."""
+        return bool(self.strokes or self.eyes or self.second_eyes)
+
     def defaults(self) -> Mapping[str, Any]:
         return {**super().defaults(), "area": "800x534px"}
 
@@ -58,6 +64,11 @@ class AnimationSettings(PageSettings, group="Animation"):
             )
         if self.format == "mp4" and any(side % 2 for side in sides):
             raise SettingError(f"{{area}} is {what}: choose even sides, which videos need")
+        if self.format == "svg" and self.draws:
+            raise SettingError(
+                "an animated SVG shows tiles in plain colours; leave out {strokes} and {eyes}, or "
+                "choose a .gif or .mp4"
+            )
         if self.format not in ("svg", None) and self.seconds * self.fps > MOST_FRAMES:
             raise SettingError(
                 f"{{seconds}} {self.seconds:g} at {{fps}} {self.fps:g} make more than {MOST_FRAMES} "

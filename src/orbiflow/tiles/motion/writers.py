@@ -19,12 +19,16 @@ from PIL import Image
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, limited, png_bytes
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.motifs import Over
 from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Motion, Places, eased, frames, motion
 from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.motion.skins import dressed, lay_skin
 from orbiflow.tiles.page import Curve, Layer, Part, Scene, Style, rectangle, symbol_of
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import TileSource
-from orbiflow.tiles.write import Numbers, scene_image
+from orbiflow.tiles.write import Numbers, Sheet, painted, scene_image, shape_of
+
+GIF_COLOURS = 128  # of all frames of a GIF that shows pictures
 
 ProgressCall = Callable[[float], None]
 """What is called with the share of the work that is done."""
@@ -33,38 +37,82 @@ ProgressCall = Callable[[float], None]
 def animation(
     tile: TileSource,
     settings: AnimationSettings | None = None,
-    *,
+    *overs: Over,
     force: bool = False,
     told: ProgressCall = lambda _: None,
 ) -> bytes | str:
-    """Return the content of the file; `told` hears the share of the work done. Raises as `animate`."""
+    """Return the content of the file; `told` hears the share of the work done. Raises as `animate`.
+
+    `overs` are what lies over the silhouette of each of the tile's figures, as `read_over` returns it.
+    """
     settings, given = (settings or AnimationSettings()).for_file(None), as_tile(tile)
     if settings.format == "mp4":
         require_ffmpeg()  # before the work
     given.require_certified(force=force, otherwise="so it is not animated; {force} animates it")
-    made = motion(given, settings)
+    made = motion(given, settings, *overs)
     told(0.0)
     named = replace(made, what=f"{given.name}: {made.what}")
     return WRITERS[settings.file_format](named, settings, told)
 
 
 def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
-    """Return one frame as a scene in pixels: growing tiles, and above them the whole ones."""
-    page, rings = motion.page, list(motion.rings(progress))
+    """Return one frame as a scene in pixels, in plain colours: growing tiles below the whole ones."""
+    page, seen = motion.page, list(motion.seen(progress))
     parts = [Part((rectangle(page.box),), Style(chosen.paper))]
-    growing = [[own] for own in rings if not own[2]]
-    for layer in (*growing, [own for own in rings if own[2]]):
-        curves = [Curve.polyline(ring, closed=True) for ring, _, _ in layer]
-        fills = (Style(chosen.fill(colour)) for _, colour, _ in layer)
+    growing = [[own] for own in seen if not own.whole]
+    for layer in (*growing, [own for own in seen if own.whole]):
+        curves = [Curve.polyline(own.ring, closed=True) for own in layer]
+        fills = (Style(chosen.fill(own.colour)) for own in layer)
         parts += [Part((curve,), fill) for curve, fill in zip(curves, fills, strict=True)]
         parts += [Part((curve,), motion.line) for curve in curves if motion.line.width]
     return Scene(*page.size, (Layer("frame", "tiles", Style(), tuple(parts)),))
 
 
-def still(tile: TileSource, settings: AnimationSettings, progress: float, side: float) -> bytes:
+def frame_image(motion: Motion, chosen: Palette, progress: float) -> Image.Image:
+    """Return one frame, with what lies on its tiles."""
+    if motion.dress is None:
+        return scene_image(frame_scene(motion, chosen, progress))
+    width, height = map(round, motion.page.size)
+    picture = Image.new("RGB", (width, height), chosen.paper)
+    bodies = zip(motion.dress.skins, motion.bodies(progress), strict=True)
+    worn, outlines = [skin.bent(body) for skin, body in bodies], list[Array]()
+    for own in motion.seen(progress):
+        skins, grid = worn[own.kind]
+        lay_skin(picture, skins[own.colour], grid, own.linear, own.offset)
+        if own.whole:
+            outlines.append(own.ring)
+        else:
+            _draw_outlines(picture, [own.ring], motion.line)
+    _draw_outlines(picture, outlines, motion.line)
+    return picture
+
+
+def _draw_outlines(picture: Image.Image, rings: Sequence[Array], line: Style) -> None:
+    """Draw outlines on a picture, or on the part of it where they are."""
+    if not rings or not line.width:
+        return
+    every = np.concatenate(rings)
+    low = np.floor(every.min(axis=0) - line.width).astype(int).clip(0, picture.size)
+    high = np.ceil(every.max(axis=0) + line.width).astype(int).clip(0, picture.size)
+    if (high <= low).any():
+        return
+    curves = (Curve.polyline(ring - low, closed=True) for ring in rings)
+    shapes = tuple(shape_of(Part((curve,), line)) for curve in curves)
+    drawn = painted([Sheet(shapes)], (int(high[0] - low[0]), int(high[1] - low[1])))
+    picture.paste(drawn, (int(low[0]), int(low[1])), drawn)
+
+
+def still(
+    tile: TileSource,
+    settings: AnimationSettings,
+    progress: float,
+    side: float,
+    pictures: Sequence[Path | None] = (),
+) -> bytes:
     """Return one frame of an animation as a PNG, its longer side at most so many pixels."""
-    made = motion(as_tile(tile), settings.for_file(None))
-    image = scene_image(frame_scene(made, made.palette(settings), progress))
+    given, overs = dressed(as_tile(tile), settings, pictures)
+    made = motion(given, settings.for_file(None), *overs)
+    image = frame_image(made, made.palette(settings), progress)
     image.thumbnail((side, side))
     return png_bytes(image)
 
@@ -72,10 +120,7 @@ def still(tile: TileSource, settings: AnimationSettings, progress: float, side: 
 def write_gif(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
     """Return a GIF that repeats for ever, with one palette for all frames."""
     chosen, loop = motion.palette(settings), frames(settings.seconds, settings.fps)
-    fills = [chosen.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
-    colours = (chosen.paper, *fills, chosen.outline)
-    # few mixed colours, each of which costs bytes in every frame
-    shown = list(_shown(motion, chosen, loop, told, lambda image: limited(image, colours, 3)))
+    shown = list(_shown(motion, chosen, loop, told, _limiting(motion, chosen)))
     # a GIF counts in hundredths of a second
     ends = [round(100 * end) for end in accumulate(seconds for _, seconds in loop)]
     lasting = np.maximum(np.diff([0, *ends]), 2) * 10
@@ -83,6 +128,22 @@ def write_gif(motion: Motion, settings: AnimationSettings, told: ProgressCall) -
     how = {"duration": lasting.tolist(), "loop": 0, "disposal": 1, "optimize": False}
     shown[0].save(buffer, "GIF", save_all=True, append_images=shown[1:], **how)
     return buffer.getvalue()
+
+
+def _limiting(motion: Motion, chosen: Palette) -> Callable[[Image.Image], Image.Image]:
+    """Return a function that gives frames the same palette of 256 colours at most."""
+    if motion.dress is None:
+        # few mixed colours, each of which costs bytes in every frame
+        fills = [chosen.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
+        colours = (chosen.paper, *fills, chosen.outline)
+        return lambda image: limited(image, colours, 3)
+    ends = [frame_image(motion, chosen, progress) for progress in (0.0, 1.0)]
+    width, height = ends[0].size
+    both = Image.new("RGB", (width, 2 * height))
+    for number, image in enumerate(ends):
+        both.paste(image, (0, number * height))
+    chart = both.quantize(GIF_COLOURS)
+    return lambda image: image.quantize(palette=chart, dither=Image.Dither.NONE)
 
 
 def require_ffmpeg() -> str:
@@ -131,7 +192,7 @@ def _shown(
     count = len(dict(loop))
     for progress, _ in loop:
         if progress not in known:
-            known[progress] = made(scene_image(frame_scene(motion, chosen, progress)))
+            known[progress] = made(frame_image(motion, chosen, progress))
             told(len(known) / count)
         yield known[progress]
 

@@ -14,7 +14,10 @@ import { share } from "./share.js";
 import { trueSize } from "./truesize.js";
 
 /** What each can be laid on. */
-const ON = { drawing: ["export", "art", "solid"], picture: ["export", "art"] };
+const ON = {
+  drawing: ["export", "art", "solid", "animate"],
+  picture: ["export", "art", "animate"],
+};
 const NEVER = [
   "tile",
   "result",
@@ -271,15 +274,18 @@ class TakeawayPage {
     const may = (own, can) => {
       own.disabled = own.parentElement.hidden = !can;
     };
-    if (drawing) may(drawing, this.form.now("kind") !== "cutter"); // which is open inside
+    const [purpose, format, kind] = ["purpose", "format", "kind"].map((name) =>
+      this.form.now(name)
+    );
+    const plain = this.kind === "animate" && format === "svg"; // moves in plain colours
+    if (drawing) may(drawing, !plain && kind !== "cutter"); // which is open inside
     const box = picture;
-    const [purpose, format] = ["purpose", "format"].map((name) => this.form.now(name));
     const suits = !COLOURLESS.includes(purpose);
     if (!box) return;
     if (suits !== this.suits) box.checked = suits && this.look.art;
     this.suits = suits;
     const holds = purpose !== "plotter" && !["dxf", "json"].includes(format);
-    may(box, holds || this.project.input?.type === "svg");
+    may(box, !plain && (holds || this.project.input?.type === "svg"));
   }
 
   /** Show the size at once; what was made before is no longer what is asked for. */

@@ -6,10 +6,7 @@ const PATIENCE = 1500; // ms after which a drawing that is no longer wanted is g
 const SIDES = [480, 1000]; // pixels: soon, then in detail
 const SLOW = 400; // ms after which it is said that one is being drawn
 
-const SAYS = {
-  animate:
-    "One moment of the animation, which shows tiles in plain colours: what you drew and your picture are not in it.",
-};
+const SAYS = { animate: "One moment of the animation." };
 
 export class Preview {
   /**
