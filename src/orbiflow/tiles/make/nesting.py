@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from operator import attrgetter
+from typing import Any
 
 import numpy as np
 import shapely
@@ -206,18 +207,30 @@ ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 def dense_arrangements(tiling: Tiling, ring: Array, gap: float) -> list[Arrangement]:
     """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first."""
+    group = tiling.group
+    own = group.lattice, group.linear_parts, group.translations
+    shapes = tuple(part.shape for part in (*own, ring))
+    return list(_dense(shapes, tuple(part.tobytes() for part in (*own, ring)), gap))
+
+
+@lru_cache(maxsize=8)  # a preview asks again for each setting that changes
+def _dense(
+    shapes: tuple[Any, ...], parts: tuple[bytes, ...], gap: float
+) -> tuple[Arrangement, ...]:
+    *own, ring = (
+        np.frombuffer(part).reshape(shape) for part, shape in zip(parts, shapes, strict=True)
+    )
     rng = np.random.default_rng(0)
     coarse = _simplified(ring, gap)
-    group = tiling.group
-    own = Arrangement(group.lattice, group.linear_parts, group.translations)
-    starts = [own, *raster_starts(coarse, gap)]
+    starts = [Arrangement(*own), *raster_starts(coarse, gap)]
     tight = sorted((tightened(start, coarse, gap) for start in starts), key=attrgetter("cell_area"))
     clear = [found for found in tight if found.clear(ring, gap)]
     improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]
     best = sorted((*improved, *clear), key=attrgetter("cell_area"))[:KEPT]
     # the coarse ring holds the fine one, so there is a little room left
     exact = (tightened(found, ring, gap) for found in best)
-    return sorted((found for found in exact if found.clear(ring, gap)), key=attrgetter("cell_area"))
+    kept = (found for found in exact if found.clear(ring, gap))
+    return tuple(sorted(kept, key=attrgetter("cell_area")))
 
 
 def _simplified(ring: Array, gap: float) -> Array:

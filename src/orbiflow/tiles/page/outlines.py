@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +32,12 @@ def fitted(points: Array, tolerance: float) -> Curve:
     >>> len(arc.pieces)
     1
     """
+    return _fitted(points.shape, np.asarray(points, dtype=np.float64).tobytes(), tolerance)
+
+
+@lru_cache(maxsize=512)  # a preview asks again for each setting that changes
+def _fitted(shape: tuple[int, ...], content: bytes, tolerance: float) -> Curve:
+    points = np.frombuffer(content).reshape(shape)
     corners = [0, *(np.flatnonzero(_is_corner(turning(points))) + 1), len(points) - 1]
     found: list[tuple[Array, bool]] = []
     for first, last in pairwise(corners):
