@@ -23,6 +23,7 @@ TILES += [
     "pictures",
     "motifs",
     "make",
+    "worlds",
     "solids",
 ]
 TILES += ["motion", "run_folder"]

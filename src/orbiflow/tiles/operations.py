@@ -45,8 +45,9 @@ if TYPE_CHECKING:
     from orbiflow.tiles.search import SearchResult
     from orbiflow.tiles.solids import Solid
     from orbiflow.tiles.tile import EscherTile, TileSource
+    from orbiflow.tiles.worlds import WorldArt
 else:  # what annotations mean when they are read, without heavy imports
-    Artwork = Exported = Solid = Outcome
+    Artwork = Exported = Solid = WorldArt = Outcome
     TileSource = Annotated[
         Any, InMemory("the folder of a run, its result.json, or a tile's folder")
     ]
@@ -310,7 +311,7 @@ def art(
     second_picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
-) -> Artwork:
+) -> Artwork | WorldArt:
     """Carry a picture of the silhouette onto its tile and repeat it over the plane.
 
     Without a picture tiles are coloured by a palette, and lines can be engraved in them.
@@ -339,10 +340,19 @@ def art(
     on_event(Progress(0.0, "laying out"))
     given = motifs.with_map(given)
     motifs.require_figures(given, settings, 1 + (second_picture is not None))
-    made = make.artwork(given, settings, *motifs.read_overs(pictures, given))
+    overs = motifs.read_overs(pictures, given)
+    if settings.world is not None:
+        from orbiflow.tiles import worlds
+
+        made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs, cancel=cancel)
+        content = worlds.world_file(made, settings.file_format)
+    else:
+        made = make.artwork(given, settings, *overs)
+        cancel.check()
+        on_event(Progress(0.2, "drawing"))
+        content = make.art_file(made, settings.file_format, cancel=cancel)
     cancel.check()
-    on_event(Progress(0.2, "drawing"))
-    write_atomic(out, make.art_file(made, settings.file_format, cancel=cancel))
+    write_atomic(out, content)
     done = made.written(out)
     _tell(on_event, (*made.notes, done.words), out)
     return done

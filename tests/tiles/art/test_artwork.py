@@ -121,7 +121,7 @@ def test_the_map_onto_the_raster_has_no_fold() -> None:
     grid = picture_paint(art.pictures[0], art.tile, art.density(0), art.page.count).grid
     bending, frame = tile.require_map()
     images, rest = frame.to_input(bending.images), frame.to_input(bending.rest)
-    places = carried_places(grid, images, rest, bending.triangles)
+    places, _ = carried_places(grid, images, rest, bending.triangles)
     whole = np.asarray(binary_erosion(grid.inside(tile.tile.polygon), iterations=2), dtype=bool)
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
     turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from orbiflow.drawing import PaletteName
+from orbiflow.errors import OrbiflowError
 from orbiflow.settings import (
     DefaultText,
     Hidden,
     NotWith,
     OnlyWith,
     Option,
+    Parsed,
     Range,
     SettingError,
     Unit,
@@ -20,9 +22,48 @@ from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import PageSettings
 from orbiflow.units import LineWidth, PageArea, PageLength
 
+MOST_ORDER, MOST_ARMS = 12, 60  # of a centre of rotation, and steps along a lattice vector
 MOST_PIXELS = 100_000_000  # the largest number of pixels of a picture
 LONGEST = 30_000  # the longest side of a picture in pixels
 SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
+
+
+World = Literal["sphere", "disc", "half-plane", "band", "spiral"]
+COPIES = {"12": (2, 3, 3), "24": (2, 3, 4), "60": (2, 3, 5)}
+
+
+def order_numbers(text: str) -> tuple[int, ...]:
+    """Return the orders of three centres of rotation.
+
+    >>> order_numbers("60"), order_numbers("3, 3,4")
+    ((2, 3, 5), (3, 3, 4))
+    """
+    if text.strip() in COPIES:
+        return COPIES[text.strip()]
+    return _whole_numbers(
+        text, 3, "three whole numbers from 2 to 12, such as 2,3,5, or 12, 24 or 60"
+    )
+
+
+def arm_numbers(text: str) -> tuple[int, ...]:
+    """Return the steps of a spiral along two lattice vectors."""
+    return _whole_numbers(text, 2, "two whole numbers, such as 3,5")
+
+
+def _whole_numbers(text: str, count: int, what: str) -> tuple[int, ...]:
+    try:
+        found = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) != count:
+        raise OrbiflowError(f"{text!a:.60} is not {what}")
+    return found
+
+
+Orders: TypeAlias = Annotated[
+    tuple[int, int, int], Parsed(order_numbers, "three orders or a number of copies", "ORDERS")
+]
+Arms: TypeAlias = Annotated[tuple[int, int], Parsed(arm_numbers, "two whole numbers", "M,N")]
 
 
 class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
@@ -62,16 +103,42 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     )
     """How much that cell may be stretched to be a rectangle; 0.02 is 2 %."""
 
+    world: Annotated[World | None, NotWith("repeat", because="a cell repeats in the plane")] = None
+    """Carry the tiling to another world: a sphere; the hyperbolic plane as a disc, a half-plane or a
+    band; a spiral. All but the spiral need copies turned by thirds, quarters or sixths."""
+
+    order: Annotated[
+        Orders | None,
+        OnlyWith(world=("sphere", "disc", "half-plane", "band")),
+        DefaultText("what bends the tile least"),
+    ] = None
+    """How many copies meet at the three centres of rotation, such as 2,3,5 or 3,3,4; or the number of
+    copies on a sphere: 12, 24 or 60."""
+
+    arms: Annotated[
+        Arms | None, OnlyWith(world=("spiral",)), DefaultText("about nine tiles around")
+    ] = None
+    """Of a spiral: the steps along both lattice vectors that make one turn."""
+
     samples: Annotated[int, Range(1, 8), Hidden()] = 3
     """Number of samples along each side of a pixel."""
 
     def defaults(self) -> Mapping[str, Any]:
-        return {**super().defaults(), "area": "3000x2000px"}
+        square = self.world in ("sphere", "disc", "spiral")
+        return {**super().defaults(), "area": "2400x2400px" if square else "3000x2000px"}
 
     def check(self) -> None:
         super().check()
         width, height = self.page
         check_size(width * self.pixels, height * self.pixels)
+        if self.order is not None and not 2 <= min(self.order) <= max(self.order) <= MOST_ORDER:
+            raise SettingError(f"{{order}} has whole numbers from 2 to {MOST_ORDER}")
+        if self.arms is not None and (max(map(abs, self.arms)) > MOST_ARMS or not any(self.arms)):
+            raise SettingError(f"{{arms}} has whole numbers up to {MOST_ARMS}, not both 0")
+        if self.world is not None and (self.tile_size is not None or not self.clip):
+            raise SettingError(
+                "in another {world} each copy has its own size; leave out {tile_size} and {clip}"
+            )
         if self.tile_size is not None and self.tile_size * self.pixels < SMALLEST_TILE - 1e-9:
             raise SettingError(
                 f"a tile of {self.tile_size * self.pixels:.1f} pixels shows nothing ({{tile_size}}); "

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import scipy
 import shapely
+from numpy.typing import NDArray
 from PIL import Image
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
@@ -154,7 +155,7 @@ def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Arr
     small = picture.reduced(1 / grid.density)
     bending, frame = tile.require_map()
     images, rest = frame.to_input(bending.images), frame.to_input(bending.rest)
-    places = carried_places(grid, images, rest, bending.triangles)
+    places, _ = carried_places(grid, images, rest, bending.triangles)
     straight = np.asarray(small.image, dtype=np.float32) / 255
     straight[..., :3] *= straight[..., 3:]
     straight = _spread(straight, small.covered.shares(tile.silhouette_outline) * small.image.size)
@@ -184,8 +185,10 @@ def _spread(colours: Array, outline: Array) -> Array:
     return colours[rows, columns]
 
 
-def carried_places(grid: Grid, images: Array, rest: Array, triangles: Integers) -> Array:
-    """Return the point (height, width, 2) that is carried to each texel; any, outside the triangles.
+def carried_places(
+    grid: Grid, images: Array, rest: Array, triangles: Integers
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the point (height, width, 2) that is carried to each texel, and which texels have one.
 
     Triangles (T, 3) of points `rest` (V, 2) are carried to those of `images` (V, 2), of a grid's units.
     """
@@ -202,7 +205,8 @@ def carried_places(grid: Grid, images: Array, rest: Array, triangles: Integers) 
         [found.spread(start[:, k]) + found.spread(linear[own, k, 0]) * columns for k in (0, 1)],
         axis=-1,
     )
-    return places.reshape(grid.height, grid.width, 2)
+    held = found.spread(found.label >= 0)
+    return places.reshape(grid.height, grid.width, 2), held.reshape(grid.height, grid.width)
 
 
 # Greatest distance of flattened curves from the drawing's, in sizes of the silhouette

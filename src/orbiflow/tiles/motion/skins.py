@@ -13,7 +13,7 @@ from PIL import Image
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette
-from orbiflow.tiles.geometry import Place, border
+from orbiflow.tiles.geometry import Place
 from orbiflow.tiles.motifs import (
     MARGIN,
     Grid,
@@ -56,7 +56,6 @@ class Skin:
     def __init__(self, body: Body, grid: Grid, colours: Array) -> None:
         self._triangles, self._colours = body.triangles, colours
         self._places = grid.texels(body.points)
-        self._ring = border(body.triangles)
         self._at, self._bent = np.zeros((0, 2)), list[Image.Image]()
         self._grid = grid
 
@@ -69,8 +68,7 @@ class Skin:
 
     def _drawn(self, body: Array) -> list[Image.Image]:
         grid = self._grid
-        inside = grid.inside(body[self._ring])
-        places = carried_places(grid, body, self._places, self._triangles)
+        places, inside = carried_places(grid, body, self._places, self._triangles)
         if not inside.any():
             return [Image.new("RGBA", (grid.width, grid.height))] * len(self._colours)
         # colours go on a little beyond the outline, so that none is mixed with nothing there

@@ -234,8 +234,16 @@ def _draw_shape(band: Image.Image, shape: Shape, top: int, table: Mapping[str, C
     """Draw a shape on a band."""
     rings = [fine_places(ring, top) for ring in shape.rings]
     lines = [fine_places(line, top) for line in shape.lines]
-    opaque = shape.opacity >= 1
-    canvas = band if opaque else Image.new("RGBA", band.size)
+    canvas, corner = band, (0, 0)
+    if shape.opacity < 1:  # drawn apart, where it is
+        every, width = np.concatenate([*rings, *lines]), shape.style.width * FINER + 1
+        low = np.floor(every.min(axis=0) - width).astype(int).clip(0, band.size)
+        high = np.ceil(every.max(axis=0) + width).astype(int).clip(0, band.size)
+        if (high <= low).any():
+            return
+        corner = (int(low[0]), int(low[1]))
+        canvas = Image.new("RGBA", (int(high[0] - low[0]), int(high[1] - low[1])))
+        rings, lines = [ring - low for ring in rings], [line - low for line in lines]
     pen = ImageDraw.Draw(canvas)
     if shape.style.fill and rings:
         _fill(canvas, pen, rings, _colour(shape.style.fill, table))
@@ -243,9 +251,9 @@ def _draw_shape(band: Image.Image, shape: Shape, top: int, table: Mapping[str, C
         colour = _colour(shape.style.stroke, table)
         for line in lines:
             draw_line(pen, line, shape.style.width * FINER, colour)
-    if not opaque:
+    if canvas is not band:
         canvas.putalpha(canvas.getchannel("A").point(lambda alpha: alpha * shape.opacity))
-        band.alpha_composite(canvas)
+        band.alpha_composite(canvas, corner)
 
 
 def _fill(

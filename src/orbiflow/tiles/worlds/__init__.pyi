@@ -1,0 +1,11 @@
+from .sheet import World as World
+from .sheet import world_scene as world_scene
+from .unfolding import Unfolding as Unfolding
+from .unfolding import unfolded as unfolded
+from .views import View as View
+from .world_art import WorldArt as WorldArt
+from .world_art import world_artwork as world_artwork
+from .world_art import world_file as world_file
+from .world_art import world_of as world_of
+from .world_copies import colours as colours
+from .world_copies import copies as copies

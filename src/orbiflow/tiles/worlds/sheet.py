@@ -1,0 +1,343 @@
+"""A page with a tile's copies in another world: outlines in curves, drawings, pictures of pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from PIL import Image
+
+from orbiflow.arrays import Array, Integers
+from orbiflow.drawing import Palette, png_bytes
+from orbiflow.runtime import Cancel
+from orbiflow.tiles.geometry import Place, doubled_areas, orient, polygons_in
+from orbiflow.tiles.motifs import Grid, bilinear, carried_places
+from orbiflow.tiles.page import (
+    INK,
+    Curve,
+    Layer,
+    Motif,
+    Part,
+    Raster,
+    Scene,
+    Style,
+    boundary,
+    outline,
+)
+from orbiflow.tiles.silhouette import triangulate
+from orbiflow.tiles.tilings import Tiling
+from orbiflow.tiles.worlds.views import View
+
+Booleans = NDArray[np.bool_]
+
+TOLERANCE = 0.02  # mm of curves from the outlines
+SHARE_OF_TILE = 1 / 4000  # the least tolerance of an outline, in sizes of the tile
+LEVELS = 6  # of detail, each four times as coarse as the one before
+PIECES = 14  # of a curve's length, at least, in a copy of which all is seen
+LEAST_COPY = 0.8  # mm of the smallest copies
+LEAST_DRAWN = 3.0  # mm of copies that carry their drawing
+DETAIL_SIZES, DETAIL_STEPS = (
+    (10.0, 40.0),
+    (14.0, 30.0, 60.0),
+)  # mm of copies, and steps along a tile
+LEAST_SHOWN = 0.25  # mm of what is drawn
+SEAM = 0.08  # mm of hairlines between filled copies
+LINE = 1 / 150  # of a copy's size: the width of its outline
+WIDEST_LINE = 0.4  # mm
+TEXELS_PER_PIXEL = 1.5
+FLATTEST = 1e-3  # twice the area in pixels of triangles that are seen
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Copies of a tile in a world, as a page shows them.
+
+    - `tiling`: The plane's tiling.
+    - `vectors`: What takes points (N, 2) of its first tile to vectors (N, 3).
+    - `motions`: Those (M, 3, 3) to all copies.
+    - `colours`: The number of the colour (M,) of each.
+    - `view`: How they are seen.
+    """
+
+    tiling: Tiling
+    vectors: Callable[[Array], Array]
+    motions: Array
+    colours: Integers
+    view: View
+
+    @cached_property
+    def size(self) -> float:
+        """The tile's size in the plane, the square root of its area."""
+        return float(np.sqrt(self.tiling.tile_area))
+
+    def places(self, vectors: Array, copies: Integers) -> Array:
+        """Return where vectors (N, 3) of the first tile are in copies (M,): places (M, N, 2) in mm."""
+        moved = np.einsum("mij,nj->mni", self.motions[copies], vectors)
+        return self.view.places(moved)
+
+    @cached_property
+    def _rings(self) -> list[Array]:
+        """The polygon's vectors of each prototile, few of them."""
+        return [
+            self.vectors(own.polygon[:: max(1, len(own.polygon) // 60)])
+            for own in self.tiling.prototiles
+        ]
+
+    @cached_property
+    def sizes(self) -> Array:
+        """The longer side in mm (M,) of the box around each copy."""
+        every = np.concatenate(self._rings)
+        places = self.places(every, np.arange(len(self.motions)))
+        return np.ptp(places, axis=1).max(axis=1)
+
+    @cached_property
+    def faces(self) -> Booleans:
+        """Which copies (M,) are seen: not those that are all on the far side of a sphere."""
+        every = np.concatenate(self._rings)
+        behind = self.view.behind(np.einsum("mij,nj->mni", self.motions, every))
+        return np.logical_not(behind.all(axis=1))
+
+    def outlines(self, kind: int) -> Iterator[tuple[int, Curve]]:
+        """Yield each copy that is seen and the outline of a prototile in it, within `TOLERANCE`."""
+        levels = np.clip(
+            np.floor(
+                np.log(TOLERANCE / (SHARE_OF_TILE * np.maximum(self.sizes, 1e-12))) / np.log(4)
+            ),
+            0,
+            LEVELS - 1,
+        ).astype(int)
+        for level in np.unique(levels):
+            fine = SHARE_OF_TILE * self.size * 4.0 ** float(level)
+            curve = outline(self.tiling, fine).closed[kind]
+            mine = np.flatnonzero((levels == level) & self.faces)
+            pieces = _divided(curve, self.size / PIECES if level < 2 else self.size)
+            shares = np.linspace(0, 1, 4)[:, None, None]
+            points = _bezier(pieces, shares).swapaxes(0, 1)  # (n, 4, 2)
+            vectors = self.vectors(points.reshape(-1, 2))
+            for k, places in zip(mine.tolist(), self.places(vectors, mine), strict=True):
+                yield k, _through(places.reshape(-1, 4, 2))
+
+    def drawn(self, motif: Motif, kind: int) -> Iterator[tuple[int, Part]]:
+        """Yield the parts of a motif, which lies on a prototile, in each copy that is large enough."""
+        tile = shapely.Polygon(self.tiling.prototiles[kind].polygon)
+        within = [own for part in motif.parts if (own := _cut(part, tile, self.size)) is not None]
+        seen = np.flatnonzero((self.sizes > LEAST_DRAWN) & self.faces)
+        levels = np.digitize(self.sizes[seen], DETAIL_SIZES)
+        for level in np.unique(levels).tolist():
+            copies = seen[levels == level]
+            scale = float(self.sizes[copies].max()) / self.size
+            step, least = self.size / DETAIL_STEPS[level], LEAST_SHOWN / scale
+            for part in within:
+                lines = [_stepped(own, step) for own in part.curves if _reach(own) > least]
+                if not lines:
+                    continue
+                closed = [own.closed for own in part.curves if _reach(own) > least]
+                ends = np.cumsum([len(line) for line in lines])[:-1]
+                every = self.places(self.vectors(np.concatenate(lines)), copies)
+                for k, places in zip(copies.tolist(), every, strict=True):
+                    pieces = zip(np.split(places, ends), closed, strict=True)
+                    curves = tuple(Curve.polyline(own, closed=shut) for own, shut in pieces)
+                    width = part.style.width * float(self.sizes[k]) / self.size
+                    style = part.style._replace(width=width)
+                    yield k, part._replace(curves=curves, style=style)
+
+
+def _reach(curve: Curve) -> float:
+    low, high = curve.bounds()
+    return float(np.max(high - low))
+
+
+def _stepped(curve: Curve, step: float) -> Array:
+    """Return points along a curve that are no farther apart than a step, few where it is straight."""
+    points = curve.flattened(step / 20)
+    line = shapely.LinearRing(points) if curve.closed else shapely.LineString(points)
+    simple = shapely.segmentize(shapely.simplify(line, step / 20), step)
+    found = shapely.get_coordinates(simple)
+    return found[:-1] if curve.closed else found
+
+
+def _cut(part: Part, tile: shapely.Polygon, size: float) -> Part | None:
+    """Return what of a part lies within a tile; None for nothing."""
+    lines = [own.flattened(SHARE_OF_TILE * size) for own in part.curves]
+    filled = part.style.fill is not None and all(own.closed for own in part.curves)
+    curves = list[Curve]()
+    if filled:
+        region = shapely.Polygon()
+        for points in lines:  # holes run the other way: as a whole, by turns
+            if len(points) > 2:
+                own = shapely.make_valid(shapely.Polygon(points))
+                region = shapely.symmetric_difference(region, own)
+        for polygon in polygons_in(shapely.intersection(region, tile)):
+            curves += boundary(polygon)
+    else:
+        for points, own in zip(lines, part.curves, strict=True):
+            ends = np.concatenate([points, points[:1]]) if own.closed else points
+            if len(ends) < 2:
+                continue
+            inside = shapely.intersection(shapely.LineString(ends), tile)
+            for piece in shapely.get_parts(shapely.line_merge(inside)):
+                if piece.geom_type == "LineString":
+                    curves.append(Curve.polyline(shapely.get_coordinates(piece)))
+    return part._replace(curves=tuple(curves)) if curves else None
+
+
+def _bezier(pieces: Array, shares: Array) -> Array:
+    """Return points (S, n, 2) of pieces (n, 4, 2) at shares (S, 1, 1)."""
+    t, u = shares, 1 - shares
+    a, b, c, d = (pieces[:, k] for k in range(4))
+    return u**3 * a + 3 * u**2 * t * b + 3 * u * t**2 * c + t**3 * d
+
+
+def _divided(curve: Curve, longest: float) -> Array:
+    """Return the pieces (n, 4, 2) of a curve, the longer ones divided."""
+    found = list[Array]()
+    for piece in curve.pieces:
+        length = float(np.linalg.norm(np.diff(piece, axis=0), axis=1).sum())
+        count = max(1, int(np.ceil(length / longest)))
+        for k in range(count):
+            found.append(_part(piece, k / count, (k + 1) / count))
+    return np.stack(found)
+
+
+def _part(piece: Array, start: float, end: float) -> Array:
+    """Return a part of a cubic piece (4, 2)."""
+    points = _bezier(piece[None], np.linspace(start, end, 4)[:, None, None])[:, 0]
+    return _through(points[None]).pieces[0]
+
+
+def _through(points: Array) -> Curve:
+    """Return the closed curve of cubics through points (n, 4, 2) at the shares 0, 1/3, 2/3 and 1."""
+    a, b, c, d = (points[:, k] for k in range(4))
+    one, two = (-5 * a + 18 * b - 9 * c + 2 * d) / 6, (2 * a - 9 * b + 18 * c - 5 * d) / 6
+    return Curve(np.stack([a, one, two, d], axis=1), np.zeros(len(a), dtype=bool), closed=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Painting:
+    """What lies on a prototile: a raster in each colour, as `Paint.coloured` returns it.
+
+    `place` takes the raster's units to the tiling's.
+    """
+
+    grid: Grid
+    colours: Array
+    place: Place
+
+
+def pictured(
+    world: World, paintings: Sequence[Painting], pixels: float, cancel: Cancel | None = None
+) -> Raster:
+    """Return a picture of pixels of all copies with what is painted on them; nothing around them."""
+    cancel = cancel or Cancel()
+    width, height = (round(side * pixels) for side in world.view.size)
+    picture = Image.new("RGBA", (width, height))
+    levels = np.digitize(world.sizes, DETAIL_SIZES)
+    for own, painting in zip(world.tiling.prototiles, paintings, strict=True):
+        back = painting.place.inverse
+        for level in np.unique(levels[world.faces]).tolist():
+            step = 3 * world.size / DETAIL_STEPS[level]
+            rough = shapely.simplify(shapely.Polygon(own.polygon), step / 10)
+            mesh = triangulate(
+                orient(shapely.get_coordinates(rough)[:-1], counter_clockwise=True), step
+            )
+            texels, vectors = painting.grid.texels(back(mesh.points)), world.vectors(mesh.points)
+            for k in np.flatnonzero((levels == level) & world.faces).tolist():
+                cancel.check()
+                places = world.places(vectors, np.array([k]))[0] * pixels
+                colours = painting.colours[world.colours[k]]
+                _lay(picture, places, texels, mesh.triangles, colours)
+    return Raster(png_bytes(picture), (width, height), np.eye(2) / pixels, np.zeros(2))
+
+
+def _lay(
+    picture: Image.Image, places: Array, texels: Array, triangles: Integers, colours: Array
+) -> None:
+    """Lay a raster on a picture, its triangles at other places, in pixels."""
+    low = np.floor(places.min(axis=0) - 1).clip(0, picture.size)
+    high = np.ceil(places.max(axis=0) + 1).clip(0, picture.size)
+    if not np.isfinite(places).all() or (high - low < 1).any():
+        return
+    width, height = (high - low).astype(int).tolist()
+    grid = Grid(low, 1.0, width, height)
+    areas = doubled_areas(places, triangles)
+    sound = (
+        areas * np.sign(np.median(areas)) > FLATTEST
+    )  # not at the edge of a sphere, or behind it
+    if not sound.any():
+        return
+    at, mask = carried_places(grid, places, texels, triangles[sound])
+    pixels = np.zeros((height, width, 4), dtype=np.uint8)
+    pixels[mask, :3] = (bilinear(colours, at[mask].astype(np.float32)) * 255 + 0.5).clip(0, 255)
+    pixels[..., 3] = 255 * mask
+    own = Image.fromarray(pixels, "RGBA")
+    picture.paste(own, (int(low[0]), int(low[1])), own)
+
+
+def world_scene(
+    world: World,
+    chosen: Palette,
+    motifs: Sequence[Motif] = (),
+    paintings: Sequence[Painting] = (),
+    *,
+    pixels: float,
+    line: float | None = None,
+    title: str = "",
+    notes: tuple[str, ...] = (),
+    cancel: Cancel | None = None,
+) -> Scene:
+    """Return a page of a world: fills, pictures of pixels, drawings, and outlines above all."""
+    kinds = range(len(world.tiling.prototiles))
+    outlines = [dict(world.outlines(kind)) for kind in kinds]
+    paper = Curve.polyline(
+        [[0, 0], [world.view.size[0], 0], [*world.view.size], [0, world.view.size[1]]], closed=True
+    )
+    layers = [Layer("paper", "paper", Style(chosen.paper), (paper,))]
+    plain = not paintings and not any(motif.parts for motif in motifs)
+    widths = {k: _width(world, k, line) for own in outlines for k in own}
+    for colour in sorted(set(world.colours.tolist())):
+        fill, name = chosen.fill(colour), f"colour {colour + 1}"
+        mine = [k for k in np.flatnonzero(world.colours == colour).tolist() if k in widths]
+        for width in sorted({widths[k] for k in mine}) if plain and line != 0 else [0.0]:
+            style = Style(fill, chosen.outline, width) if width else Style(fill, fill, SEAM)
+            kept = [k for k in mine if not width or widths[k] == width]
+            curves = tuple(own[k] for own in outlines for k in kept)
+            layers.append(Layer(name, "tiles", style, curves, clipped=True))
+    if paintings:
+        layers.append(
+            Layer("pictures", "drawing", Style(), (pictured(world, paintings, pixels, cancel),))
+        )
+    for kind, motif in enumerate(motifs):
+        if motif.parts:
+            parts = sorted(world.drawn(motif, kind), key=lambda one: one[0])
+            layers.append(
+                Layer(
+                    "drawing",
+                    "drawing",
+                    Style(),
+                    tuple(_inked(part, chosen, int(world.colours[k])) for k, part in parts),
+                    clipped=True,
+                )
+            )
+    for width in sorted(set(widths.values())) if line != 0 and not plain else []:
+        style = Style(None, chosen.outline, width)
+        curves = tuple(curve for own in outlines for k, curve in own.items() if widths[k] == width)
+        layers.append(Layer("outlines", "tiles", style, curves, clipped=True))
+    if world.view.border is not None:
+        style = Style(None, chosen.outline, line or WIDEST_LINE)
+        layers.append(Layer("edge", "tiles", style, (world.view.border,)))
+    return Scene(*world.view.size, tuple(layers), title=title, notes=notes)
+
+
+def _width(world: World, copy: int, line: float | None) -> float:
+    """Return the width in mm of a copy's outline, one of a few."""
+    given = min(WIDEST_LINE, LINE * float(world.sizes[copy])) if line is None else line
+    return max(0.01, float(f"{given:.1g}"))
+
+
+def _inked(part: Part, chosen: Palette, colour: int) -> Part:
+    fill, stroke = (chosen.ink(colour) if own == INK else own for own in part.style[:2])
+    return part._replace(style=part.style._replace(fill=fill, stroke=stroke))

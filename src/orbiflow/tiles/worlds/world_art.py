@@ -1,0 +1,174 @@
+"""Artwork of a tile in another world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orbiflow import __version__
+from orbiflow.arrays import Array
+from orbiflow.drawing import palette
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Outcome
+from orbiflow.tiles.make import ArtSettings
+from orbiflow.tiles.motifs import Over, drawn_motif, picture_paint, require_figures, with_map
+from orbiflow.tiles.page import Scene, shades
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tilings import colouring
+from orbiflow.tiles.worlds.schwarz import Orders, curvature, undone
+from orbiflow.tiles.worlds.sheet import LEAST_COPY, TEXELS_PER_PIXEL, Painting, World, world_scene
+from orbiflow.tiles.worlds.spiral import spiral
+from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded
+from orbiflow.tiles.worlds.views import View
+from orbiflow.tiles.worlds.world_copies import colours, copies
+from orbiflow.tiles.write import write_png, write_svg
+
+MOST_COPIES = 20_000
+TEXTURE = 6_000_000  # texels of a painting at most
+USUAL: dict[tuple[str, int], Orders] = {
+    ("p3", 1): (2, 3, 3),
+    ("p4", 1): (2, 3, 4),
+    ("p6", 1): (2, 3, 5),
+    ("p3", -1): (3, 3, 4),
+    ("p4", -1): (2, 4, 5),
+    ("p6", -1): (2, 3, 7),
+}
+"""The orders of the sphere, 1, and of the disc, -1, that bend the tiles of a group least."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WorldArt(Outcome):
+    """A picture of a tile's copies in another world.
+
+    - `world`: The copies, and how they are seen.
+    - `scene`: The page.
+    - `notes`: What the user should know.
+    """
+
+    tile: EscherTile
+    settings: ArtSettings
+    world: World
+    scene: Scene
+    notes: tuple[str, ...]
+
+    def written(self, out: Path) -> WorldArt:
+        """Return what came of writing it to a file, with its facts as JSON has them."""
+        facts = {"file": str(out), "tiles": len(self.world.motions), "world": self.settings.world}
+        return replace(self, summary={**facts, "class": self.tile.isohedral_class})
+
+    @property
+    def words(self) -> str:
+        """What was written, in a sentence."""
+        copies, name = len(self.world.motions), self.tile.isohedral_class or "a tile"
+        return f"written {self.summary['file']}: {copies} copies of {name}, {self.settings.world}"
+
+
+def world_artwork(
+    source: TileSource, settings: ArtSettings, *overs: Over | None, cancel: Cancel | None = None
+) -> WorldArt:
+    """Return a picture of a tile in the world that settings name; arguments as of `artwork`.
+
+    Raises:
+        OrbiflowError: As `artwork`, and if the tile's group has no pattern in that world.
+    """
+    tile = with_map(source)
+    require_figures(tile, settings, len(overs))
+    world, notes = world_of(tile, settings)
+    chosen, known = (
+        palette(settings.palette),
+        [over or Over() for over, _ in zip_longest(overs, tile.figures)],
+    )
+    chosen = shades(chosen, colouring(tile.tiling))
+    count = int(world.colours.max()) + 1
+    motifs, paintings = list[Any](), list[Painting]()
+    tint = settings.tint * any(over.picture or over.drawing for over in known)
+    for number, (over, part) in enumerate(zip(known, tile.figures, strict=True)):
+        if over.picture is not None:
+            part.figure.require_map()
+        motif = drawn_motif(part.figure, settings.of_figure(number), chosen, over.drawing)
+        motifs.append(motif.moved(*part.place))
+        notes += [*part.figure.notes, *over.notes]
+        if any(own.picture for own in known):
+            scale = float(world.sizes.max()) / world.size * settings.pixels * TEXELS_PER_PIXEL
+            scale = min(scale, float(np.sqrt(TEXTURE / max(count, 1))) / world.size)
+            paint = picture_paint(over.picture, part.figure, scale * part.place.scale, count)
+            moved = paint.grid
+            paintings.append(Painting(moved, paint.coloured(chosen, count, tint), part.place))
+    notes += chosen.shortage(count)
+    name = tile.isohedral_class or "a tile"
+    scene = world_scene(
+        world,
+        chosen,
+        motifs,
+        paintings,
+        pixels=settings.pixels,
+        line=settings.outline,
+        title=tile.name,
+        notes=(f"Artwork of {name} in another world, made with orbiflow {__version__}.",),
+        cancel=cancel,
+    )
+    said = tuple(dict.fromkeys(notes))
+    return WorldArt(tile=tile, settings=settings, world=world, scene=scene, notes=said)
+
+
+def world_file(art: WorldArt, format: str) -> bytes | str:
+    """Return the content of a file in a format, svg or png."""
+    return write_svg(art.scene) if format == "svg" else write_png(art.scene, dpi=art.settings.dpi)
+
+
+def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]:
+    """Return the copies of a tile in the world that settings name, and what the user should know."""
+    flip = np.diag([1.0, -1.0 if tile.y_down else 1.0])  # a world's pictures have y upwards
+    tiling = tile.tiling.transformed(flip, np.zeros(2))
+    if settings.world == "spiral":
+        return spiral(tile.tiling, tiling, flip, settings)
+    sign = 1 if settings.world == "sphere" else -1
+    orders = settings.order or USUAL.get((tiling.group.name or "", sign), (2, 3, 5))
+    if curvature(orders) != sign:
+        where = "the sphere" if sign > 0 else "the hyperbolic plane"
+        raise OrbiflowError(
+            f"the orders {', '.join(map(str, orders))} are not of {where}; it has "
+            + (
+                "2,3,3, 2,3,4, 2,3,5 and 2,2,n"
+                if sign > 0
+                else "larger ones, such as 3,3,4 or 2,3,7"
+            )
+        )
+    found = unfolded(tiling, orders)
+    view = View(settings.world or "disc", settings.page, _facing(found, settings))
+    ring = found.vectors(found.ring[:: max(1, len(found.ring) // 30)])
+
+    def shown(motions: Array) -> Any:
+        if sign > 0:
+            return np.ones(len(motions), dtype=bool)
+        places = view.places(np.einsum("mij,nj->mni", motions, ring))
+        low, high = places.min(axis=1), places.max(axis=1)
+        inside = (high > 0).all(axis=1) & (low < view.size).all(axis=1)
+        return inside & ((high - low).max(axis=1) > LEAST_COPY) & np.isfinite(high).all(axis=1)
+
+    motions = copies(found, shown, MOST_COPIES)
+    numbers, _ = colours(found, motions)
+    if settings.colour == "one":
+        numbers = 0 * numbers
+    world = World(tile.tiling, lambda points: found.vectors(points @ flip), motions, numbers, view)
+    turned = ", ".join(map(str, found.triangle.curved))
+    return world, [f"{len(motions)} copies meet at centres of the orders {turned}"]
+
+
+def _facing(found: Unfolding, settings: ArtSettings) -> Array:
+    """Return the motion that brings what is to be in the middle there, turned as asked."""
+    angle = np.radians(settings.rotate)
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    if found.sign < 0:
+        middle = int(np.argmax(found.triangle.curved))
+        return turn @ undone(found.triangle.frames[middle], found.sign)
+    ahead = found.middle
+    right = np.cross([0.0, 1.0, 0.0], ahead)
+    right = right / np.linalg.norm(right)
+    return turn @ np.stack([right, np.cross(ahead, right), ahead])

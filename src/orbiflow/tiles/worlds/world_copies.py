@@ -1,0 +1,146 @@
+"""The copies of a tile in another world, and their colours."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.arrays import Array, Integers
+from orbiflow.tiles.worlds.unfolding import Unfolding
+
+Booleans = NDArray[np.bool_]
+
+SAME = 1e-5  # of a vector's length: middles of copies that are one
+MOST_COLOURS = 6  # that a colouring by the group has
+LONGEST_WORD = 8  # of rotations by which a neighbour is reached
+
+
+def copies(unfolding: Unfolding, shown: Callable[[Array], Booleans], most: int) -> Array:
+    """Return the motions (M, 3, 3) to the tile's copies, itself first, then from one to the next.
+
+    Those that are not `shown`, of motions (E, 3, 3), end the way; there are `most` at most.
+    """
+    near, middle = unfolding.neighbours, unfolding.middle
+    found, known, ahead = [np.eye(3)], {_key(middle)}, deque([np.eye(3)])
+    while ahead and len(found) < most:
+        motions = ahead.popleft() @ near
+        keys = [_key(place) for place in motions @ middle]
+        fresh = [k for k, key in enumerate(keys) if key not in known]
+        known.update(keys[k] for k in fresh)
+        if fresh:
+            kept = motions[fresh][shown(motions[fresh])]
+            found += [*kept]
+            ahead += [*kept]
+    return np.stack(found)[:most]
+
+
+def _key(vector: Array) -> tuple[int, ...]:
+    """Return what tells a middle from others: they are apart by more than its rounding."""
+    unit = vector / np.linalg.norm(vector) if abs(vector[2]) > 1e3 else vector
+    return tuple(np.rint(unit / SAME / 100).astype(np.int64).tolist())
+
+
+def colours(unfolding: Unfolding, motions: Array) -> tuple[Integers, int]:
+    """Return the colour (M,) of each copy, and their number: neighbours differ.
+
+    The world's group permutes the colours if a small number allows that; else each copy has the first
+    colour that its neighbours leave.
+    """
+    found = _by_group(unfolding, motions)
+    if found is not None:
+        return found
+    middles = motions @ unfolding.middle
+    index = {_key(place): k for k, place in enumerate(middles)}
+    numbers = np.full(len(motions), -1)
+    for k, motion in enumerate(motions):
+        beside = {
+            index.get(_key(place), -1) for place in motion @ unfolding.neighbours @ unfolding.middle
+        }
+        taken = {int(numbers[j]) for j in beside if j >= 0}
+        numbers[k] = next(c for c in range(len(taken) + 1) if c not in taken)
+    return numbers, int(numbers.max()) + 1
+
+
+def _by_group(unfolding: Unfolding, motions: Array) -> tuple[Integers, int] | None:
+    p, q, r = unfolding.triangle.curved
+    mirrors = unfolding.triangle.mirrors
+    # rotations about the first two corners; side k is opposite to corner k
+    turns = (mirrors[1] @ mirrors[2], mirrors[2] @ mirrors[0])
+    words = _words(turns, [*unfolding.neighbours], unfolding.middle)
+    if words is None:
+        return None
+    for count in range(2, MOST_COLOURS + 1):
+        every = [np.array(own) for own in permutations(range(count))]
+        one = [own for own in every if _is_one(own, p)]
+        two = [own for own in every if _is_one(own, q)]
+        for a, b in product(one, two):
+            if not _is_one(a[b], r):
+                continue
+            letters = (a, b, np.argsort(a), np.argsort(b))
+            if all(_moved(word, letters)[0] != 0 for word in words):
+                return _spread(unfolding, motions, [_moved(word, letters) for word in words])
+    return None
+
+
+def _is_one(own: Integers, power: int) -> bool:
+    found = np.arange(len(own))
+    for _ in range(power):
+        found = own[found]
+    return bool((found == np.arange(len(own))).all())
+
+
+def _moved(word: tuple[int, ...], letters: tuple[Integers, ...]) -> Integers:
+    """Return the permutation of a word, whose last letter acts first."""
+    found = np.arange(len(letters[0]))
+    for letter in reversed(word):
+        found = letters[letter][found]
+    return found
+
+
+def _words(
+    turns: tuple[Array, Array], goals: list[Array], middle: Array
+) -> list[tuple[int, ...]] | None:
+    """Return goals as words of two rotations, 0 and 1, and their inverses, 2 and 3."""
+    letters = [*turns, *(np.linalg.inv(own) for own in turns)]
+    left, found = (
+        {_key(goal @ middle): k for k, goal in enumerate(goals)},
+        dict[int, tuple[int, ...]](),
+    )
+    known, level = {_key(middle)}, [((), np.eye(3))]
+    for _ in range(LONGEST_WORD):
+        fresh = list[tuple[tuple[int, ...], Array]]()
+        for word, motion in level:
+            for number, letter in enumerate(letters):
+                moved = motion @ letter
+                if (key := _key(moved @ middle)) in known:
+                    continue
+                known.add(key)
+                own = (*word, number)
+                fresh.append((own, moved))
+                if key in left:
+                    found[left[key]] = own
+        if len(found) == len(goals):
+            return [found[k] for k in range(len(goals))]
+        level = fresh
+    return None
+
+
+def _spread(unfolding: Unfolding, motions: Array, moves: list[Integers]) -> tuple[Integers, int]:
+    """Return the colour of each copy: that to which its motion takes the first one."""
+    middle, near = unfolding.middle, unfolding.neighbours
+    index = {_key(place): k for k, place in enumerate(motions @ middle)}
+    of = {index[_key(middle)]: np.arange(len(moves[0]))}
+    ahead = deque(of)
+    while ahead:
+        k = ahead.popleft()
+        for place, move in zip(motions[k] @ near @ middle, moves, strict=True):
+            j = index.get(_key(place))
+            if j is not None and j not in of:
+                of[j] = of[k][move]
+                ahead.append(j)
+    numbers = np.array([int(of[k][0]) if k in of else 0 for k in range(len(motions))])
+    return numbers, len(moves[0])

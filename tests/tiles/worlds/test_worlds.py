@@ -1,0 +1,254 @@
+"""Other worlds: maps agree with mpmath, edges match, copies cover, pages are as asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+from scipy.spatial import KDTree
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import palette
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import ArtSettings, EscherTile, art
+from orbiflow.tiles.geometry import orient, signed_area
+from orbiflow.tiles.worlds import Unfolding, colours, copies, unfolded, world_of, world_scene
+from orbiflow.tiles.worlds.schwarz import TriangleMap, curvature, disc_of, form, triangle_map
+from orbiflow.tiles.worlds.sheet import TOLERANCE
+from swirled_tiles import is_sound, swirled_tile
+
+FLAT = [(3, 3, 3), (4, 4, 2), (4, 2, 4), (2, 4, 4), (6, 3, 2), (3, 2, 6), (2, 6, 3)]
+flats = st.sampled_from(FLAT)
+curveds: Any = st.tuples(*[st.integers(2, 7)] * 3).filter(curvature)
+shares = st.lists(st.floats(0.01, 1), min_size=3, max_size=3)
+CLASSES = {"IH7": "p3", "IH28": "p4", "IH21": "p6"}
+tiles = st.builds(
+    swirled_tile, st.sampled_from(list(CLASSES)), st.integers(0, 999), st.floats(0.0, 0.4)
+).filter(is_sound)
+SPHERES = {(2, 3, 3): 12, (2, 3, 4): 24, (2, 3, 5): 60, (2, 2, 5): 10}
+
+
+def inside(triangle: TriangleMap, weights: Any) -> complex:
+    return complex(np.dot(weights, triangle.vertices) / sum(weights))
+
+
+@settings(max_examples=30)
+@given(flats, curveds, st.complex_numbers(min_magnitude=0.05, max_magnitude=4))
+def test_the_map_is_a_quotient_of_hypergeometric_functions(
+    flat: Any, curved: Any, w: complex
+) -> None:
+    assume(w.imag > 0.05)
+    assume(abs(w - 1) > 0.05)
+    mpmath.mp.dps = 30
+    a, b = (mpmath.mpf(own) for own in flat[:2])
+    root = mpmath.mpc(w) ** (1 / a)
+    above = mpmath.mpc(0, 1) ** (
+        1 / a
+    )  # not past the second vertex, where the integrand is infinite
+    z = a * mpmath.quad(lambda x: (1 - x**a) ** (1 / b - 1), [0, above, root])
+    p, q, r = (1 / mpmath.mpf(own) for own in curved)
+
+    def s(x: Any) -> Any:
+        e, f, g = (1 + p - q - r) / 2, (1 + p - q + r) / 2, 1 + p
+        upper = mpmath.hyp2f1(e, f, g, x)
+        return mpmath.mpc(x) ** p * upper / mpmath.hyp2f1(e - g + 1, f - g + 1, 2 - g, x)
+
+    side = (mpmath.cos(mpmath.pi * r) + mpmath.cos(mpmath.pi * p) * mpmath.cos(mpmath.pi * q)) / (
+        mpmath.sin(mpmath.pi * p) * mpmath.sin(mpmath.pi * q)
+    )
+    end = mpmath.sqrt(abs((1 - side) / (1 + side)))  # where the second vertex is
+    expected = complex(s(w) / s(1) * end)
+    found = disc_of(triangle_map(flat, curved).forward(np.array([complex(z)])))[0]
+    assert abs(found - expected) < 1e-12 * max(1, abs(expected))
+
+
+@settings(max_examples=40)
+@given(flats, curveds, shares)
+def test_the_inverse_leads_back_and_sides_are_mirrors(flat: Any, curved: Any, own: Any) -> None:
+    triangle = triangle_map(flat, curved)
+    z = np.array([inside(triangle, own), *triangle.vertices])
+    there = triangle.forward(z)
+    size = abs(triangle.vertices[1])
+    apart = np.abs(triangle.inverse(there) - z)
+    assert apart[0] < 1e-9 * size
+    assert apart[1:].max() < 1e-4 * size  # a root enlarges the vertices' rounding
+    assert np.abs(there[1:] - triangle.corners).max() < 1e-9 * np.abs(triangle.corners).max()
+    big = np.abs(triangle.corners).max() ** 2
+    for k in range(3):
+        one, two = triangle.mirrors[(k + 1) % 3], triangle.mirrors[(k + 2) % 3]
+        turned = np.linalg.matrix_power(one @ two, curved[k])
+        assert np.abs(turned - np.eye(3)).max() < 1e-10 * big
+        on_side = (1 - own[0]) * triangle.vertices[(k + 1) % 3] + own[0] * triangle.vertices[k - 1]
+        image = triangle.forward(np.array([on_side]))[0]
+        assert np.abs(triangle.mirrors[k] @ image - image).max() < 1e-11 * big
+
+
+def world(tile: Any, orders: Any) -> Unfolding:
+    return unfolded(EscherTile(tile).tiling, orders)
+
+
+def area(found: Unfolding) -> float:
+    """The area of the polygon with straight sides through the outline's vertices."""
+    ring = found.vectors(found.ring)
+    one, two = ring, np.roll(ring, -1, axis=0)
+    apex, diagonal = found.middle, form(found.sign)
+    volume = np.linalg.det(np.stack([np.broadcast_to(apex, one.shape), one, two], axis=1))
+    dots = [(a * diagonal * b).sum(axis=-1) for a, b in ((apex, one), (one, two), (two, apex))]
+    # the angle's excess, or what it lacks: tan of half the area
+    return float(abs(2 * np.arctan2(volume, 1 + found.sign * sum(dots)).sum()))
+
+
+@settings(max_examples=12)
+@given(tiles, st.sampled_from([*SPHERES, (3, 3, 4), (2, 4, 5), (2, 3, 7), (4, 4, 4)]))
+def test_edges_match_and_areas_add_up(tile: Any, orders: Any) -> None:
+    found = world(tile, orders)
+    ring, diagonal = found.vectors(found.ring), form(found.sign)
+    big = np.abs(ring).max() ** 2
+    assert np.abs((ring * diagonal * ring).sum(axis=1) - found.sign).max() < 1e-11 * big
+    around = np.einsum("eij,nj->eni", found.neighbours, ring).reshape(-1, 3)
+    apart, _ = KDTree(around).query(ring)
+    assert apart.max() < 1e-9 * big
+    p, q, r = (1 / own for own in orders)
+    assert area(found) == pytest.approx(2 * np.pi * abs(p + q + r - 1), rel=1e-8)
+    if found.sign > 0:
+        assert (
+            len(copies(found, lambda motions: np.ones(len(motions), bool), 200)) == SPHERES[orders]
+        )
+
+
+@settings(max_examples=8)
+@given(tiles, st.sampled_from([(2, 3, 3), (2, 3, 4), (2, 3, 5), (3, 3, 4), (2, 3, 7)]))
+def test_neighbours_have_other_colours(tile: Any, orders: Any) -> None:
+    found = world(tile, orders)
+    motions = copies(found, lambda own: (own @ found.middle)[:, 2] < 30, 400)
+    numbers, count = colours(found, motions)
+    assert set(numbers.tolist()) <= set(range(count))
+    middles = motions @ found.middle
+    near, tree = (
+        np.einsum("mij,ejk,k->mei", motions, found.neighbours, found.middle),
+        KDTree(middles),
+    )
+    far, index = tree.query(near)
+    beside = far < 1e-6 * np.linalg.norm(near, axis=-1)
+    assert beside.any()
+    own = np.broadcast_to(numbers[:, None], index.shape)
+    assert (numbers[index[beside]] != own[beside]).all()
+
+
+@settings(max_examples=4)
+@given(tiles, st.sampled_from([(2, 3, 3), (2, 3, 4), (2, 3, 5)]), st.integers(0, 99))
+def test_copies_cover_the_sphere_once(tile: Any, orders: Any, seed: int) -> None:
+    found = world(tile, orders)
+    motions = copies(found, lambda own: np.ones(len(own), bool), 200)
+    ways = np.random.default_rng(seed).normal(size=(3000, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    polygon, place = seen_from_middle(found)
+    count, doubtful = np.zeros(len(ways), int), np.zeros(len(ways), bool)
+    for motion in motions:
+        local = place(ways @ motion)  # the inverse of a rotation is its transpose
+        count += shapely.contains_xy(polygon, local.real, local.imag)
+        at = shapely.points(local.real, local.imag)
+        doubtful |= shapely.distance(at, polygon.exterior) < 1e-3 * (1 + np.abs(local))
+    assert (~doubtful).mean() > 0.7
+    assert (count[~doubtful] == 1).all()
+
+
+def seen_from_middle(found: Unfolding) -> tuple[shapely.Polygon, Any]:
+    """The tile in a stereographic picture about its middle, and what takes directions there."""
+    ahead = found.middle
+    right = np.cross(ahead, [0.3, 0.8, 0.1])
+    right = right / np.linalg.norm(right)
+    turn = np.stack([right, np.cross(ahead, right), ahead])
+
+    def place(vectors: Array) -> Any:
+        return disc_of(vectors @ turn.T)
+
+    ring = np.concatenate(
+        [
+            (1 - t) * found.ring + t * np.roll(found.ring, -1, axis=0)
+            for t in np.linspace(0, 1, 6, endpoint=False)
+        ]
+    ).reshape(6, -1, 2)
+    seen = place(found.vectors(ring.swapaxes(0, 1).reshape(-1, 2)))
+    return shapely.Polygon(np.column_stack([seen.real, seen.imag])), place
+
+
+def escher(name: str) -> EscherTile:
+    return EscherTile(swirled_tile(name, 3, 0.1))
+
+
+@pytest.mark.parametrize("model", ["sphere", "disc", "half-plane", "band", "spiral"])
+@pytest.mark.parametrize("y_down", [False, True])
+def test_pages_are_full_and_not_mirrored(model: Any, y_down: bool) -> None:
+    given_tile = EscherTile(swirled_tile("IH28", 3, 0.2), y_down=y_down)
+    chosen = ArtSettings(world=model, area=(60.0, 60.0), dpi=100)
+    found, notes = world_of(given_tile, chosen)
+    assert notes
+    ring = orient(given_tile.tile.polygon, counter_clockwise=True)
+    first = found.places(found.vectors(ring), np.arange(1))[0]
+    assert (signed_area(first) > 0) == y_down  # as on a page of the plane, whose y points down
+    scene = world_scene(found, palette("lagoon")._replace(paper="#ff00ff"), pixels=4)
+    shown = [
+        own for layer in scene.layers for own in layer.items if layer.name.startswith("colour")
+    ]
+    rings = [shapely.make_valid(shapely.Polygon(own.flattened(0.01))) for own in shown]
+    covered = shapely.union_all(rings, grid_size=1e-4)
+    seen = (
+        shapely.Point(30, 30).buffer(15)
+        if model != "spiral"
+        else (shapely.Point(30, 30).buffer(25).difference(shapely.Point(30, 30).buffer(6)))
+    )
+    assert seen.difference(covered).area < 0.003 * seen.area
+    within = sum(shapely.area(shapely.intersection(own, seen)) for own in rings)
+    assert within == pytest.approx(seen.area, rel=0.01)
+
+
+def test_curves_keep_their_tolerance() -> None:
+    found, _ = world_of(escher("IH21"), ArtSettings(world="disc", area=(150.0, 150.0)))
+    polygon = found.tiling.prototiles[0].polygon
+    fine = np.concatenate([polygon, (polygon + np.roll(polygon, -1, axis=0)) / 2])
+    vectors = found.vectors(fine)
+    for k, curve in list(found.outlines(0))[:40]:
+        true = found.places(vectors, np.array([k]))[0]
+        line = shapely.LinearRing(curve.flattened(TOLERANCE / 10))
+        assert shapely.distance(shapely.points(true), line).max() < 3 * TOLERANCE
+
+
+def test_artwork_of_another_world_is_written(tmp_path: Path) -> None:
+    done = art(escher("IH7"), tmp_path / "a.svg", ArtSettings(format="svg", world="disc"))
+    assert (tmp_path / "a.svg").read_text().startswith("<?xml")
+    assert done.summary["tiles"] > 100
+    art(escher("IH7"), tmp_path / "b.png", ArtSettings(world="sphere", order=(2, 3, 5), dpi=50))
+    picture = np.asarray(Image.open(tmp_path / "b.png").convert("RGB")).astype(int)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 3
+
+
+@pytest.mark.parametrize(
+    ("name", "given_settings", "what"),
+    [
+        ("IH4", {"world": "sphere"}, "thirds, quarters or sixths"),
+        ("IH7", {"world": "sphere", "order": (2, 3, 7)}, "not of the sphere"),
+        ("IH7", {"world": "disc", "order": (2, 3, 5)}, "not of the hyperbolic plane"),
+        ("IH7", {"world": "disc", "order": (3, 3, 3)}, "not of the hyperbolic plane"),
+    ],
+)
+def test_what_has_no_such_world_says_why(
+    name: str, given_settings: Any, what: str, tmp_path: Path
+) -> None:
+    with pytest.raises(OrbiflowError, match=what):
+        art(escher(name), tmp_path / "a.png", ArtSettings(**given_settings))
+
+
+def test_settings_of_worlds_are_checked() -> None:
+    for wrong in ({"order": (1, 3, 5)}, {"tile_size": 20.0}, {"clip": False}):
+        with pytest.raises(OrbiflowError):
+            ArtSettings(world="disc", **wrong)
+    with pytest.raises(OrbiflowError):
+        ArtSettings(world="spiral", arms=(0, 0))
