@@ -112,8 +112,8 @@ def test_edges_match_and_areas_add_up(tile: Any, orders: Any) -> None:
     ring, diagonal = found.vectors(found.ring), form(found.sign)
     big = np.abs(ring).max() ** 2
     assert np.abs((ring * diagonal * ring).sum(axis=1) - found.sign).max() < 1e-11 * big
-    around = np.einsum("eij,nj->eni", found.neighbours, ring).reshape(-1, 3)
-    apart, _ = KDTree(around).query(ring)
+    around: Any = np.einsum("eij,nj->eni", found.neighbours, ring).reshape(-1, 3)
+    apart = np.asarray(KDTree(around).query(ring)[0])
     assert apart.max() < 1e-9 * big
     p, q, r = (1 / own for own in orders)
     assert area(found) == pytest.approx(2 * np.pi * abs(p + q + r - 1), rel=1e-8)
@@ -135,7 +135,7 @@ def test_neighbours_have_other_colours(tile: Any, orders: Any) -> None:
         np.einsum("mij,ejk,k->mei", motions, found.neighbours, found.middle),
         KDTree(middles),
     )
-    far, index = tree.query(near)
+    far, index = map(np.asarray, tree.query(near))
     beside = far < 1e-6 * np.linalg.norm(near, axis=-1)
     assert beside.any()
     own = np.broadcast_to(numbers[:, None], index.shape)
@@ -195,7 +195,7 @@ def test_pages_are_full_and_not_mirrored(model: Any, y_down: bool) -> None:
     first = found.places(found.vectors(ring), np.arange(1))[0]
     assert (signed_area(first) > 0) == y_down  # as on a page of the plane, whose y points down
     scene = world_scene(found, palette("lagoon")._replace(paper="#ff00ff"), pixels=4)
-    shown = [
+    shown: list[Any] = [
         own for layer in scene.layers for own in layer.items if layer.name.startswith("colour")
     ]
     rings = [shapely.make_valid(shapely.Polygon(own.flattened(0.01))) for own in shown]
@@ -247,7 +247,8 @@ def test_what_has_no_such_world_says_why(
 
 
 def test_settings_of_worlds_are_checked() -> None:
-    for wrong in ({"order": (1, 3, 5)}, {"tile_size": 20.0}, {"clip": False}):
+    every: Any = ({"order": (1, 3, 5)}, {"tile_size": 20.0}, {"clip": False})
+    for wrong in every:
         with pytest.raises(OrbiflowError):
             ArtSettings(world="disc", **wrong)
     with pytest.raises(OrbiflowError):

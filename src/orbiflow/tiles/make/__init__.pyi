@@ -4,6 +4,7 @@ from .art import art_scene as art_scene
 from .art import artwork as artwork
 from .art import render_artwork as render_artwork
 from .art_settings import ArtSettings as ArtSettings
+from .art_settings import Orders as Orders
 from .drawings import dark_parts as dark_parts
 from .export_settings import ExportSettings as ExportSettings
 from .exporting import MAKERS as MAKERS

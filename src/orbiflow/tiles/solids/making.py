@@ -19,8 +19,9 @@ from orbiflow.tiles.likeness import narrowest_slit
 from orbiflow.tiles.make import ExportSettings, dark_parts, fit_words, laid_out, place_on
 from orbiflow.tiles.page import Motif
 from orbiflow.tiles.result_file import as_tile
+from orbiflow.tiles.solids.ball import ball_of
 from orbiflow.tiles.solids.plates import Plate, plates_of
-from orbiflow.tiles.solids.settings import SolidSettings
+from orbiflow.tiles.solids.settings import BALLS, SolidSettings
 from orbiflow.tiles.solids.shapes import Plan
 from orbiflow.tiles.tile import EscherTile, TileSource
 
@@ -137,6 +138,10 @@ def make_solid(
     title = f"{settings.kind} of {given.name} in mm, made with orbiflow {__version__}"
     if not certificate.valid:
         title = f"NOT CERTIFIED: {title}"
+    if settings.kind in BALLS:
+        bodies, notes = ball_of(given, settings)
+        own = {"kind": settings.kind, "tile": given, "title": title, "notes": notes}
+        return Solid(plates=(bodies,), **own)
     pictures = picture, second_picture
     placed, notes = laid_out(given, _page(settings), pictures)
     drawings = placed.motifs or (Motif(),) * len(given.figures)

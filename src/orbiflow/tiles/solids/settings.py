@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from orbiflow.settings import DefaultText, FileSettings, OnlyWith, Range, SettingError, Unit
+from orbiflow.tiles.make import Orders
 from orbiflow.tiles.motifs import MotifSettings
 from orbiflow.units import LONGEST_SIDE, Length, LengthOrZero, PageSize
 
@@ -14,7 +15,10 @@ WITH_DRAWING = ("tile", "stamp", "mould", "puzzle")
 FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break
 _CUTTER, _MOULD, _PUZZLE = (OnlyWith(kind=name) for name in ("cutter", "mould", "puzzle"))
 
-_WALLED = OnlyWith(kind=("cutter", "stamp", "mould", "puzzle"))
+BALLS = ("ball", "ball-piece", "lamp")
+FLAT_KINDS = ("tile", "cutter", "stamp", "mould", "puzzle")
+_ROUND = OnlyWith(kind=BALLS)
+_WALLED = OnlyWith(kind=("cutter", "stamp", "mould", "puzzle", "ball-piece", "lamp"))
 
 
 class SolidSettings(MotifSettings, FileSettings, group="Solid"):
@@ -24,28 +28,44 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     1.2
     """
 
-    kind: Literal["tile", "cutter", "stamp", "mould", "puzzle"] = "tile"
-    """A tile; a cookie cutter; a stamp; a mould to cast tiles in; a puzzle of tiles in a tray."""
+    kind: Literal["tile", "cutter", "stamp", "mould", "puzzle", "ball", "ball-piece", "lamp"] = (
+        "tile"
+    )
+    """A tile; a cookie cutter; a stamp; a mould to cast tiles in; a puzzle of tiles in a tray; a ball
+    with grooves between tiles, one of the pieces of a ball, or a lamp of their edges alone."""
 
     format: Annotated[Literal["stl", "3mf"] | None, DefaultText("stl; for a puzzle 3mf")] = None
     """Format of the file. In a 3MF each part of a puzzle is an object of its own."""
 
-    tile_size: Annotated[Length, DefaultText("50 mm; cutter 80, puzzle 40 mm")] = 50.0
+    tile_size: Annotated[
+        Length, OnlyWith(kind=FLAT_KINDS), DefaultText("50 mm; cutter 80, puzzle 40 mm")
+    ] = 50.0
     """Longer side of the tile's smallest rectangle."""
 
-    height: Annotated[Length, DefaultText("4 mm; cutter 13, stamp 3, mould 8 mm")] = 4.0
+    diameter: Annotated[Length, _ROUND] = 80.0
+    """Diameter of a ball or a lamp."""
+
+    order: Annotated[Orders | None, _ROUND, DefaultText("what bends the tile least")] = None
+    """How many tiles meet at the centres of rotation, 2,3,3, 2,3,4 or 2,3,5; or 12, 24 or 60 tiles."""
+
+    height: Annotated[
+        Length, OnlyWith(kind=FLAT_KINDS), DefaultText("4 mm; cutter 13, stamp 3, mould 8 mm")
+    ] = 4.0
     """Height of a tile or piece; of a cutter above its rim; of a stamp's base; depth of a mould."""
 
     clearance: Annotated[
-        LengthOrZero, OnlyWith(kind=("tile", "mould", "puzzle")), DefaultText("0.2 mm; mould 0 mm")
+        LengthOrZero,
+        OnlyWith(kind=("tile", "mould", "puzzle", "ball-piece")),
+        DefaultText("0.2 mm; mould 0 mm"),
     ] = 0.2
     """Gap between tiles put together; with 0 a mould's mouth is the tile."""
 
     chamfer: Annotated[LengthOrZero, OnlyWith(kind=("tile", "puzzle"))] = 0.5
     """Bevel of the upper edge."""
 
-    wall: Annotated[Length, _WALLED, DefaultText("4 mm; cutter 1.2, stamp 1 mm")] = 4.0
-    """Thickness of the wall of a cutter, mould or tray; width of a stamp's border."""
+    wall: Annotated[Length, _WALLED, DefaultText("4 mm; cutter 1.2, stamp 1, lamp 3 mm")] = 4.0
+    """Thickness of the wall of a cutter, mould, tray, ball of pieces or lamp; width of a stamp's border
+    and of a lamp's bands."""
 
     blade: Annotated[Length, _CUTTER] = 0.6
     """Thickness of a cutter's wall at its cutting edge; it thins over the last third."""
@@ -57,9 +77,12 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     """Thickness of the floor of a mould or tray, and of a cutter's rim."""
 
     relief: Annotated[
-        Length, OnlyWith(kind=WITH_DRAWING), DefaultText("0.6 mm; stamp, mould 1.2 mm")
+        Length,
+        OnlyWith(kind=(*WITH_DRAWING, "ball")),
+        DefaultText("0.6 mm; stamp, mould 1.2, ball 1 mm"),
     ] = 0.6
-    """How far lines stand out of a stamp or of a mould's floor, or are sunk in a tile or a piece."""
+    """How far lines stand out of a stamp or of a mould's floor, or are sunk in a tile or a piece; the
+    depth of the grooves of a ball."""
 
     draft: Annotated[float, Range(0, 45), Unit("degrees"), _MOULD] = 5.0
     """Slope of a mould's walls, so that casts come out."""
@@ -93,6 +116,8 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
         own = {**vars(self), **{k: v for k, v in values.items() if k not in self.fields_given}}
         slope = own["height"] * self.slope if self.kind == "mould" else own["chamfer"]
         bevelled = 0.0 if self.kind in ("cutter", "stamp") else 2 * slope + own["clearance"]
+        if self.kind in BALLS:
+            return values
         least = max(self.nozzle, bevelled, FRAGILE.get(self.kind, 0.0))
         return {**values, "warn_neck": min(least, LONGEST_SIDE)}
 
@@ -111,11 +136,14 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
         super().check()
         for name in ("engrave", "strokes", "eyes"):
             if getattr(self, name) and self.kind not in WITH_DRAWING:
-                raise SettingError(f"{{{name}}} has no place on a cutter")
+                raise SettingError(f"{{{name}}} has no place on a {self.kind}")
         inside = {"tile": ("chamfer", "relief"), "mould": ("relief",)}
         for part in inside.get("tile" if self.kind == "puzzle" else self.kind, ()):
             if getattr(self, part) > self.height:
                 raise SettingError(f"{{{part}}} must be at most {{height}}, {self.height:g} mm")
+        for part in ("relief",) if self.kind == "ball" else ("wall",) if self.kind in BALLS else ():
+            if getattr(self, part) > self.diameter / 4:
+                raise SettingError(f"{{{part}}} must be at most a quarter of {{diameter}}")
         if self.kind == "cutter" and not self.blade <= self.wall <= self.foot:
             raise SettingError("{blade} must be at most {wall}, and {wall} at most {foot}")
         if self.kind == "puzzle" and not self.clearance:
@@ -134,5 +162,8 @@ KINDS: Mapping[str, Mapping[str, Any]] = {
     "stamp": {"height": 3.0, "wall": 1.0, "relief": 1.2},
     "mould": {"height": 8.0, "relief": 1.2, "clearance": 0.0},
     "puzzle": {"tile_size": 40.0},
+    "ball": {"relief": 1.0},
+    "ball-piece": {},
+    "lamp": {"wall": 3.0},
 }
 """What each kind is usually made with; settings that are given go before."""

@@ -2,6 +2,7 @@ from .sheet import World as World
 from .sheet import world_scene as world_scene
 from .unfolding import Unfolding as Unfolding
 from .unfolding import unfolded as unfolded
+from .unfolding import usual_orders as usual_orders
 from .views import View as View
 from .world_art import WorldArt as WorldArt
 from .world_art import world_artwork as world_artwork

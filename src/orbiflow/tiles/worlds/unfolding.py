@@ -28,6 +28,16 @@ from orbiflow.tiles.worlds.schwarz import Orders, TriangleMap, curvature, triang
 FLAT: dict[str, Orders] = {"p3": (3, 3, 3), "p4": (4, 4, 2), "p6": (6, 3, 2)}
 """The orders of the rotation centres of groups whose pattern goes to other worlds."""
 
+USUAL: dict[tuple[str, int], Orders] = {
+    ("p3", 1): (2, 3, 3),
+    ("p4", 1): (2, 3, 4),
+    ("p6", 1): (2, 3, 5),
+    ("p3", -1): (3, 3, 4),
+    ("p4", -1): (2, 4, 5),
+    ("p6", -1): (2, 3, 7),
+}
+"""The orders of the sphere, 1, and of the disc, -1, that bend the tiles of a group least."""
+
 NEAR = 1e-7  # of a lattice vector: places that are one
 ON_SIDE = 1e-12  # of a triangle's size, within which a point lies in it
 MOST_STEPS = 400  # triangles that the way to a point of a tile passes
@@ -269,6 +279,11 @@ class Unfolding:
         weights = shapely.area(shapely.polygons(self.mesh.points[self.mesh.triangles]))
         mean = np.average(logs, weights=weights)
         return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
+
+
+def usual_orders(group: CrystallographicGroup, sign: int) -> Orders:
+    """Return the orders of a sphere, 1, or a disc, -1, for a group's tiles."""
+    return USUAL.get((group.name or "", sign), (2, 3, 5))
 
 
 def unfolded(tiling: Tiling, orders: Orders) -> Unfolding:

@@ -19,25 +19,16 @@ from orbiflow.tiles.motifs import Over, drawn_motif, picture_paint, require_figu
 from orbiflow.tiles.page import Scene, shades
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import colouring
-from orbiflow.tiles.worlds.schwarz import Orders, curvature, undone
+from orbiflow.tiles.worlds.schwarz import curvature, undone
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, TEXELS_PER_PIXEL, Painting, World, world_scene
 from orbiflow.tiles.worlds.spiral import spiral
-from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded
+from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded, usual_orders
 from orbiflow.tiles.worlds.views import View
 from orbiflow.tiles.worlds.world_copies import colours, copies
 from orbiflow.tiles.write import write_png, write_svg
 
 MOST_COPIES = 20_000
 TEXTURE = 6_000_000  # texels of a painting at most
-USUAL: dict[tuple[str, int], Orders] = {
-    ("p3", 1): (2, 3, 3),
-    ("p4", 1): (2, 3, 4),
-    ("p6", 1): (2, 3, 5),
-    ("p3", -1): (3, 3, 4),
-    ("p4", -1): (2, 4, 5),
-    ("p6", -1): (2, 3, 7),
-}
-"""The orders of the sphere, 1, and of the disc, -1, that bend the tiles of a group least."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -127,7 +118,7 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
     if settings.world == "spiral":
         return spiral(tile.tiling, tiling, flip, settings)
     sign = 1 if settings.world == "sphere" else -1
-    orders = settings.order or USUAL.get((tiling.group.name or "", sign), (2, 3, 5))
+    orders = settings.order or usual_orders(tiling.group, sign)
     if curvature(orders) != sign:
         where = "the sphere" if sign > 0 else "the hyperbolic plane"
         raise OrbiflowError(

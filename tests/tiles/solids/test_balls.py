@@ -1,0 +1,82 @@
+"""Balls, their pieces and lamps: closed, of the right size, and the pieces are the ball."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import EscherTile, SolidSettings, make_solid, solid
+from orbiflow.tiles.worlds import copies, unfolded
+from swirled_tiles import is_sound, swirled_tile
+
+COUNTS = {(2, 3, 3): 12, (2, 3, 4): 24, (2, 3, 5): 60}
+tiles = st.builds(
+    swirled_tile, st.sampled_from(["IH7", "IH28", "IH21"]), st.integers(0, 999), st.floats(0.0, 0.2)
+).filter(is_sound)
+
+
+@settings(max_examples=4)
+@given(tiles, st.sampled_from(list(COUNTS)))
+def test_balls_and_lamps_are_closed(tile: Any, order: Any) -> None:
+    given_tile = EscherTile(tile)
+    ball = make_solid(given_tile, SolidSettings(kind="ball", order=order, diameter=90.0))
+    (body,) = ball.parts.values()
+    whole = 4 / 3 * np.pi * 45.0**3
+    assert body.status().name == "NoError"
+    assert 0.85 * whole < body.volume() < whole
+    assert body.genus() == 0
+    assert body.bounding_box()[2] == pytest.approx(0, abs=1e-3)
+    lamp = make_solid(given_tile, SolidSettings(kind="lamp", order=order, diameter=90.0, wall=2.0))
+    (open_body,) = lamp.parts.values()
+    assert open_body.genus() >= COUNTS[order] - 1  # an opening for each tile, at least
+    assert 0 < open_body.volume() < 4 * np.pi * 45.0**2 * 2.0
+
+
+@settings(max_examples=3)
+@given(tiles, st.sampled_from([(2, 3, 3), (2, 3, 4)]))
+def test_the_pieces_of_a_ball_are_the_ball(tile: Any, order: Any) -> None:
+    given_tile = EscherTile(tile)
+    chosen = SolidSettings(kind="ball-piece", order=order, diameter=60.0, wall=5.0, clearance=0.0)
+    made = make_solid(given_tile, chosen)
+    assert str(COUNTS[order]) in made.notes[-1]
+    (piece,) = made.parts.values()
+    shell = 4 / 3 * np.pi * (30.0**3 - 25.0**3)
+    assert piece.volume() * COUNTS[order] == pytest.approx(shell, rel=0.01)
+    loose = make_solid(given_tile, chosen.replace(clearance=0.4))
+    assert next(iter(loose.parts.values())).volume() < piece.volume()
+    found = unfolded(given_tile.tiling, order)
+    up = found.middle  # as `_piece` turns it
+    right = np.cross(up, [0.3, 0.8, 0.1])
+    right = right / np.linalg.norm(right)
+    frame = np.stack([right, np.cross(up, right), up])
+    lowest = 30.0 - piece.bounding_box()[5]
+    placed = piece.translate((0, 0, lowest))
+    every = [
+        placed.transform(np.column_stack([motion @ frame.T, np.zeros(3)]))
+        for motion in copies(found, lambda own: np.ones(len(own), bool), 100)
+    ]
+    union = Manifold.batch_boolean(every, OpType.Add)
+    assert union.volume() == pytest.approx(shell, rel=0.01)
+    apart = sum(own.volume() for own in every) - union.volume()
+    assert apart < 0.004 * shell
+
+
+def test_what_makes_no_ball_says_why(tmp_path: Path) -> None:
+    with pytest.raises(OrbiflowError, match="thirds, quarters or sixths"):
+        make_solid(EscherTile(swirled_tile("IH4", 3, 0.1)), SolidSettings(kind="ball"))
+    tile = EscherTile(swirled_tile("IH28", 3, 0.1))
+    with pytest.raises(OrbiflowError, match="not of a sphere"):
+        make_solid(tile, SolidSettings(kind="ball", order=(2, 3, 7)))
+    with pytest.raises(OrbiflowError, match="quarter of"):
+        SolidSettings(kind="lamp", wall=30.0)
+    with pytest.raises(OrbiflowError, match="diameter"):
+        SolidSettings(kind="tile", diameter=30.0)
+    solid(tile, tmp_path / "lamp.3mf", SolidSettings(kind="lamp", format="3mf"))
+    assert (tmp_path / "lamp.3mf").exists()
