@@ -23,10 +23,11 @@ TILES += [
     "pictures",
     "motifs",
     "make",
+    "motion",
     "worlds",
     "solids",
 ]
-TILES += ["motion", "run_folder"]
+TILES += ["run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
     "estimator",

@@ -341,7 +341,7 @@ def art(
     given = motifs.with_map(given)
     motifs.require_figures(given, settings, 1 + (second_picture is not None))
     overs = motifs.read_overs(pictures, given)
-    if settings.world is not None:
+    if settings.world or settings.metamorphosis:
         from orbiflow.tiles import worlds
 
         made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs, cancel=cancel)

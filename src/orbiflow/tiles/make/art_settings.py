@@ -120,6 +120,13 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     ] = None
     """Of a spiral: the steps along both lattice vectors that make one turn."""
 
+    metamorphosis: Annotated[
+        Literal["right", "down", "middle"] | None,
+        NotWith("repeat", "world", because="it fills a sheet of the plane"),
+    ] = None
+    """Let the class's polygons become the tile: from left to right, from top to bottom, or from the
+    edges to the middle of the page."""
+
     samples: Annotated[int, Range(1, 8), Hidden()] = 3
     """Number of samples along each side of a pixel."""
 

@@ -70,6 +70,11 @@ class World:
     view: View
 
     @cached_property
+    def fade(self) -> Array:
+        """How much (M,) of what lies on it a copy shows, 0 to 1."""
+        return np.ones(len(self.motions))
+
+    @cached_property
     def size(self) -> float:
         """The tile's size in the plane, the square root of its area."""
         return float(np.sqrt(self.tiling.tile_area))
@@ -125,7 +130,7 @@ class World:
         """Yield the parts of a motif, which lies on a prototile, in each copy that is large enough."""
         tile = shapely.Polygon(self.tiling.prototiles[kind].polygon)
         within = [own for part in motif.parts if (own := _cut(part, tile, self.size)) is not None]
-        seen = np.flatnonzero((self.sizes > LEAST_DRAWN) & self.faces)
+        seen = np.flatnonzero((self.sizes > LEAST_DRAWN) & self.faces & (self.fade > 0))
         levels = np.digitize(self.sizes[seen], DETAIL_SIZES)
         for level in np.unique(levels).tolist():
             copies = seen[levels == level]
@@ -143,7 +148,8 @@ class World:
                     curves = tuple(Curve.polyline(own, closed=shut) for own, shut in pieces)
                     width = part.style.width * float(self.sizes[k]) / self.size
                     style = part.style._replace(width=width)
-                    yield k, part._replace(curves=curves, style=style)
+                    seen_as = part.opacity * float(self.fade[k])
+                    yield k, part._replace(curves=curves, style=style, opacity=seen_as)
 
 
 def _reach(curve: Curve) -> float:
@@ -249,12 +255,17 @@ def pictured(
                 cancel.check()
                 places = world.places(vectors, np.array([k]))[0] * pixels
                 colours = painting.colours[world.colours[k]]
-                _lay(picture, places, texels, mesh.triangles, colours)
+                _lay(picture, places, texels, mesh.triangles, colours, float(world.fade[k]))
     return Raster(png_bytes(picture), (width, height), np.eye(2) / pixels, np.zeros(2))
 
 
 def _lay(
-    picture: Image.Image, places: Array, texels: Array, triangles: Integers, colours: Array
+    picture: Image.Image,
+    places: Array,
+    texels: Array,
+    triangles: Integers,
+    colours: Array,
+    opacity: float,
 ) -> None:
     """Lay a raster on a picture, its triangles at other places, in pixels."""
     low = np.floor(places.min(axis=0) - 1).clip(0, picture.size)
@@ -272,7 +283,7 @@ def _lay(
     at, mask = carried_places(grid, places, texels, triangles[sound])
     pixels = np.zeros((height, width, 4), dtype=np.uint8)
     pixels[mask, :3] = (bilinear(colours, at[mask].astype(np.float32)) * 255 + 0.5).clip(0, 255)
-    pixels[..., 3] = 255 * mask
+    pixels[..., 3] = round(255 * opacity) * mask
     own = Image.fromarray(pixels, "RGBA")
     picture.paste(own, (int(low[0]), int(low[1])), own)
 

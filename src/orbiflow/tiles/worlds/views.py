@@ -11,7 +11,7 @@ from orbiflow.arrays import Array
 from orbiflow.tiles.page import Curve
 from orbiflow.tiles.worlds.schwarz import disc_of
 
-Model = Literal["sphere", "disc", "half-plane", "band", "spiral"]
+Model = Literal["sphere", "disc", "half-plane", "band", "spiral", "sheet"]
 
 EDGE = 0.02  # of the page's shorter side, around a sphere or a disc
 HEIGHT = 0.08  # of the page's height, at which the middle of a half-plane lies

@@ -19,6 +19,7 @@ from orbiflow.tiles.motifs import Over, drawn_motif, picture_paint, require_figu
 from orbiflow.tiles.page import Scene, shades
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import colouring
+from orbiflow.tiles.worlds.metamorphosis import metamorphosis
 from orbiflow.tiles.worlds.schwarz import curvature, undone
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, TEXELS_PER_PIXEL, Painting, World, world_scene
 from orbiflow.tiles.worlds.spiral import spiral
@@ -48,14 +49,19 @@ class WorldArt(Outcome):
 
     def written(self, out: Path) -> WorldArt:
         """Return what came of writing it to a file, with its facts as JSON has them."""
-        facts = {"file": str(out), "tiles": len(self.world.motions), "world": self.settings.world}
+        facts = {"file": str(out), "tiles": len(self.world.motions), "world": self.called}
         return replace(self, summary={**facts, "class": self.tile.isohedral_class})
+
+    @property
+    def called(self) -> str:
+        """What it is a picture of."""
+        return self.settings.world or "metamorphosis"
 
     @property
     def words(self) -> str:
         """What was written, in a sentence."""
         copies, name = len(self.world.motions), self.tile.isohedral_class or "a tile"
-        return f"written {self.summary['file']}: {copies} copies of {name}, {self.settings.world}"
+        return f"written {self.summary['file']}: {copies} copies of {name}, {self.called}"
 
 
 def world_artwork(
@@ -99,7 +105,7 @@ def world_artwork(
         pixels=settings.pixels,
         line=settings.outline,
         title=tile.name,
-        notes=(f"Artwork of {name} in another world, made with orbiflow {__version__}.",),
+        notes=(f"Artwork of {name}, made with orbiflow {__version__}.",),
         cancel=cancel,
     )
     said = tuple(dict.fromkeys(notes))
@@ -113,6 +119,8 @@ def world_file(art: WorldArt, format: str) -> bytes | str:
 
 def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]:
     """Return the copies of a tile in the world that settings name, and what the user should know."""
+    if settings.metamorphosis is not None:
+        return metamorphosis(tile, settings)
     flip = np.diag([1.0, -1.0 if tile.y_down else 1.0])  # a world's pictures have y upwards
     tiling = tile.tiling.transformed(flip, np.zeros(2))
     if settings.world == "spiral":

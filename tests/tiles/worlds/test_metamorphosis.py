@@ -1,0 +1,77 @@
+"""A sheet on which polygons become tiles: full, without overlaps, one curve along each edge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+from scipy.spatial import KDTree
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import CLASSES, ArtSettings, EscherTile, art, isohedral_class
+from orbiflow.tiles.worlds import world_of
+from orbiflow.tiles.worlds.metamorphosis import Metamorphosis
+from swirled_tiles import is_sound, swirled_tile
+
+tiles = st.builds(
+    swirled_tile, st.sampled_from(list(CLASSES)), st.integers(0, 999), st.floats(0.05, 0.25)
+).filter(is_sound)
+
+
+@settings(max_examples=8)
+@given(tiles, st.sampled_from(["right", "down", "middle"]))
+def test_nothing_gaps_or_overlaps(tile: Any, goes: Any) -> None:
+    chosen = ArtSettings(metamorphosis=goes, area=(150.0, 100.0))
+    found, _ = world_of(EscherTile(tile), chosen)
+    assert isinstance(found, Metamorphosis)
+    rings = [curve.flattened(1.0) for _, curve in found.outlines(0)]
+    polygons = [shapely.Polygon(ring) for ring in rings]
+    assume(found.is_sound)  # else it says so
+    sheet = shapely.box(0, 0, 150, 100)
+    inside = [shapely.intersection(own, sheet) for own in polygons]
+    assert shapely.union_all(inside).area == pytest.approx(sheet.area, rel=1e-9)
+    assert sum(own.area for own in inside) == pytest.approx(sheet.area, rel=1e-9)
+    # every vertex on the sheet is a vertex of a neighbour, too
+    points = np.concatenate(rings)
+    owner = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+    within = ((points > 2) & (points < (148, 98))).all(axis=1)
+    near: Any = KDTree(points).query_ball_point(points[within], 1e-6)
+    assert all(len({int(owner[j]) for j in own}) > 1 for own in near)
+
+
+def test_one_end_is_polygons_and_the_other_the_tile() -> None:
+    tile = swirled_tile("IH4", 7, 0.15)
+    found, _ = world_of(
+        EscherTile(tile), ArtSettings(metamorphosis="right", area=(300.0, 60.0), tile_size=16.0)
+    )
+    assert isinstance(found, Metamorphosis)
+    corners = len(isohedral_class("IH4").template())
+    straight = whole = 0
+    for _, curve in found.outlines(0):
+        ring = curve.flattened(1.0)
+        if ring[:, 0].max() < 0.12 * 300:
+            hull = shapely.Polygon(ring).simplify(0.05)
+            straight += len(shapely.get_coordinates(hull)) - 1 <= corners + 1
+        if ring[:, 0].min() > 0.88 * 300:
+            area = shapely.Polygon(ring).area
+            whole += abs(area - found.page.tiling.tile_area) < 1e-6 * area
+    assert straight > 0
+    assert whole > 0
+
+
+def test_drawings_appear_on_the_way(tmp_path: Path) -> None:
+    tile = EscherTile(swirled_tile("IH4", 7, 0.15))
+    chosen = ArtSettings(metamorphosis="right", area=(120.0, 60.0), dpi=100, engrave=True)
+    done = art(tile, tmp_path / "a.png", chosen)
+    assert done.summary["world"] == "metamorphosis"
+    picture = np.asarray(Image.open(tmp_path / "a.png").convert("L")).astype(float)
+    left, right = np.array_split(picture, 2, axis=1)
+    assert np.abs(np.diff(right)).mean() > 1.3 * np.abs(np.diff(left)).mean()
+    with pytest.raises(OrbiflowError, match="exclude each other"):
+        ArtSettings(metamorphosis="right", world="disc")
