@@ -301,7 +301,10 @@ def export(
 def art(
     result: TileSource,
     out: Annotated[
-        Path | None, Option("-o"), Ending(".png", ".svg"), DefaultText("a PNG named after the tile")
+        Path | None,
+        Option("-o"),
+        Ending(".html", ".png", ".svg"),
+        DefaultText("a PNG named after the tile"),
     ] = None,
     settings: ArtSettings = ArtSettings(),
     *,
@@ -318,7 +321,7 @@ def art(
 
     Args:
         result: A search's folder, its result.json, or the folder of a tile in it.
-        out: The file, .png or .svg.
+        out: The file, .png or .svg; a sphere or a disc also .html, to be turned by hand.
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.

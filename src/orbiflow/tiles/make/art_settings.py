@@ -73,8 +73,8 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     (152.4, 101.6)
     """
 
-    format: Annotated[Literal["png", "svg"] | None, Hidden()] = None
-    """Format of the file. Default: its ending, or png."""
+    format: Annotated[Literal["png", "svg", "html"] | None, Hidden()] = None
+    """Format of the file. Default: its ending, or png. A sphere or a disc as html is turned by hand."""
 
     area: Annotated[
         PageArea | None,
@@ -138,6 +138,10 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
         super().check()
         width, height = self.page
         check_size(width * self.pixels, height * self.pixels)
+        if self.format == "html" and self.world not in ("sphere", "disc"):
+            raise SettingError(
+                "a web page shows a sphere or a disc: give {world}, or a .png or .svg file"
+            )
         if self.order is not None and not 2 <= min(self.order) <= max(self.order) <= MOST_ORDER:
             raise SettingError(f"{{order}} has whole numbers from 2 to {MOST_ORDER}")
         if self.arms is not None and (max(map(abs, self.arms)) > MOST_ARMS or not any(self.arms)):

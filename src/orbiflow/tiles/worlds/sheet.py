@@ -30,6 +30,7 @@ from orbiflow.tiles.page import (
 )
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tilings import Tiling
+from orbiflow.tiles.worlds.unfolding import Unfolding
 from orbiflow.tiles.worlds.views import View
 
 Booleans = NDArray[np.bool_]
@@ -61,6 +62,7 @@ class World:
     - `motions`: Those (M, 3, 3) to all copies.
     - `colours`: The number of the colour (M,) of each.
     - `view`: How they are seen.
+    - `unfolding`: Of a sphere or the hyperbolic plane, what its copies are found by.
     """
 
     tiling: Tiling
@@ -68,6 +70,7 @@ class World:
     motions: Array
     colours: Integers
     view: View
+    unfolding: Unfolding | None = None
 
     @cached_property
     def fade(self) -> Array:
@@ -128,8 +131,7 @@ class World:
 
     def drawn(self, motif: Motif, kind: int) -> Iterator[tuple[int, Part]]:
         """Yield the parts of a motif, which lies on a prototile, in each copy that is large enough."""
-        tile = shapely.Polygon(self.tiling.prototiles[kind].polygon)
-        within = [own for part in motif.parts if (own := _cut(part, tile, self.size)) is not None]
+        within = cut_motif(motif, self.tiling.prototiles[kind].polygon, self.size)
         seen = np.flatnonzero((self.sizes > LEAST_DRAWN) & self.faces & (self.fade > 0))
         levels = np.digitize(self.sizes[seen], DETAIL_SIZES)
         for level in np.unique(levels).tolist():
@@ -137,7 +139,7 @@ class World:
             scale = float(self.sizes[copies].max()) / self.size
             step, least = self.size / DETAIL_STEPS[level], LEAST_SHOWN / scale
             for part in within:
-                lines = [_stepped(own, step) for own in part.curves if _reach(own) > least]
+                lines = [stepped(own, step) for own in part.curves if _reach(own) > least]
                 if not lines:
                     continue
                 closed = [own.closed for own in part.curves if _reach(own) > least]
@@ -157,13 +159,19 @@ def _reach(curve: Curve) -> float:
     return float(np.max(high - low))
 
 
-def _stepped(curve: Curve, step: float) -> Array:
+def stepped(curve: Curve, step: float) -> Array:
     """Return points along a curve that are no farther apart than a step, few where it is straight."""
     points = curve.flattened(step / 20)
     line = shapely.LinearRing(points) if curve.closed else shapely.LineString(points)
     simple = shapely.segmentize(shapely.simplify(line, step / 20), step)
     found = shapely.get_coordinates(simple)
     return found[:-1] if curve.closed else found
+
+
+def cut_motif(motif: Motif, ring: Array, size: float) -> list[Part]:
+    """Return what of a motif's parts lies within a ring (N, 2) of this size."""
+    tile = shapely.Polygon(ring)
+    return [own for part in motif.parts if (own := _cut(part, tile, size)) is not None]
 
 
 def _cut(part: Part, tile: shapely.Polygon, size: float) -> Part | None:

@@ -11,18 +11,19 @@ import numpy as np
 
 from orbiflow import __version__
 from orbiflow.arrays import Array
-from orbiflow.drawing import palette
+from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Outcome
 from orbiflow.tiles.make import ArtSettings
 from orbiflow.tiles.motifs import Over, drawn_motif, picture_paint, require_figures, with_map
-from orbiflow.tiles.page import Scene, shades
+from orbiflow.tiles.page import Motif, Scene, shades
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import colouring
 from orbiflow.tiles.worlds.metamorphosis import metamorphosis
 from orbiflow.tiles.worlds.schwarz import curvature, undone
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, TEXELS_PER_PIXEL, Painting, World, world_scene
 from orbiflow.tiles.worlds.spiral import spiral
+from orbiflow.tiles.worlds.turning import turning_page
 from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded, usual_orders
 from orbiflow.tiles.worlds.views import View
 from orbiflow.tiles.worlds.world_copies import colours, copies
@@ -38,6 +39,8 @@ class WorldArt(Outcome):
 
     - `world`: The copies, and how they are seen.
     - `scene`: The page.
+    - `palette`: Its colours.
+    - `motifs`: What is drawn on each figure, in the tile's units.
     - `notes`: What the user should know.
     """
 
@@ -45,6 +48,8 @@ class WorldArt(Outcome):
     settings: ArtSettings
     world: World
     scene: Scene
+    palette: Palette
+    motifs: tuple[Motif, ...]
     notes: tuple[str, ...]
 
     def written(self, out: Path) -> WorldArt:
@@ -75,11 +80,8 @@ def world_artwork(
     tile = with_map(source)
     require_figures(tile, settings, len(overs))
     world, notes = world_of(tile, settings)
-    chosen, known = (
-        palette(settings.palette),
-        [over or Over() for over, _ in zip_longest(overs, tile.figures)],
-    )
-    chosen = shades(chosen, colouring(tile.tiling))
+    known = [over or Over() for over, _ in zip_longest(overs, tile.figures)]
+    chosen = shades(palette(settings.palette), colouring(tile.tiling))
     count = int(world.colours.max()) + 1
     motifs, paintings = list[Any](), list[Painting]()
     tint = settings.tint * any(over.picture or over.drawing for over in known)
@@ -89,7 +91,9 @@ def world_artwork(
         motif = drawn_motif(part.figure, settings.of_figure(number), chosen, over.drawing)
         motifs.append(motif.moved(*part.place))
         notes += [*part.figure.notes, *over.notes]
-        if any(own.picture for own in known):
+        if settings.format == "html" and over.picture is not None:
+            notes.append("a page to turn has drawings in SVG, but no pictures of pixels")
+        elif any(own.picture for own in known):
             scale = float(world.sizes.max()) / world.size * settings.pixels * TEXELS_PER_PIXEL
             scale = min(scale, float(np.sqrt(TEXTURE / max(count, 1))) / world.size)
             paint = picture_paint(over.picture, part.figure, scale * part.place.scale, count)
@@ -109,11 +113,14 @@ def world_artwork(
         cancel=cancel,
     )
     said = tuple(dict.fromkeys(notes))
-    return WorldArt(tile=tile, settings=settings, world=world, scene=scene, notes=said)
+    own = {"world": world, "scene": scene, "palette": chosen, "motifs": tuple(motifs)}
+    return WorldArt(tile=tile, settings=settings, notes=said, **own)
 
 
 def world_file(art: WorldArt, format: str) -> bytes | str:
-    """Return the content of a file in a format, svg or png."""
+    """Return the content of a file in a format, svg, png, or html for a page to turn it."""
+    if format == "html" and art.world.unfolding is not None:
+        return turning_page(art.world, art.palette, art.motifs, art.tile.name)
     return write_svg(art.scene) if format == "svg" else write_png(art.scene, dpi=art.settings.dpi)
 
 
@@ -153,7 +160,9 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
     numbers, _ = colours(found, motions)
     if settings.colour == "one":
         numbers = 0 * numbers
-    world = World(tile.tiling, lambda points: found.vectors(points @ flip), motions, numbers, view)
+    world = World(
+        tile.tiling, lambda points: found.vectors(points @ flip), motions, numbers, view, found
+    )
     turned = ", ".join(map(str, found.triangle.curved))
     return world, [f"{len(motions)} copies meet at centres of the orders {turned}"]
 

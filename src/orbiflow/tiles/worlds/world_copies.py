@@ -15,7 +15,11 @@ from orbiflow.tiles.worlds.unfolding import Unfolding
 Booleans = NDArray[np.bool_]
 
 SAME = 1e-5  # of a vector's length: middles of copies that are one
-MOST_COLOURS = 6  # that a colouring by the group has
+FEW_COLOURS, MOST_COLOURS = (
+    6,
+    7,
+)  # that a colouring by the group has on a page, and if it must be one
+MOST_PAIRS = 150_000  # of permutations that are tried
 LONGEST_WORD = 8  # of rotations by which a neighbour is reached
 
 
@@ -66,6 +70,16 @@ def colours(unfolding: Unfolding, motions: Array) -> tuple[Integers, int]:
 
 
 def _by_group(unfolding: Unfolding, motions: Array) -> tuple[Integers, int] | None:
+    moves = colour_moves(unfolding)
+    return None if moves is None else _spread(unfolding, motions, moves)
+
+
+def colour_moves(unfolding: Unfolding, most: int = FEW_COLOURS) -> list[Integers] | None:
+    """Return for each neighbour the permutation of the colours that its motion makes.
+
+    A copy's neighbour k has the colours of the copy in the order `moves[k]`; the first is its own.
+    None if no number of colours up to `most` does.
+    """
     p, q, r = unfolding.triangle.curved
     mirrors = unfolding.triangle.mirrors
     # rotations about the first two corners; side k is opposite to corner k
@@ -73,16 +87,19 @@ def _by_group(unfolding: Unfolding, motions: Array) -> tuple[Integers, int] | No
     words = _words(turns, [*unfolding.neighbours], unfolding.middle)
     if words is None:
         return None
-    for count in range(2, MOST_COLOURS + 1):
+    for count in range(2, most + 1):
         every = [np.array(own) for own in permutations(range(count))]
         one = [own for own in every if _is_one(own, p)]
         two = [own for own in every if _is_one(own, q)]
+        if len(one) * len(two) > MOST_PAIRS:
+            return None
         for a, b in product(one, two):
             if not _is_one(a[b], r):
                 continue
             letters = (a, b, np.argsort(a), np.argsort(b))
-            if all(_moved(word, letters)[0] != 0 for word in words):
-                return _spread(unfolding, motions, [_moved(word, letters) for word in words])
+            moves = [_moved(word, letters) for word in words]
+            if all(move[0] != 0 for move in moves):
+                return moves
     return None
 
 

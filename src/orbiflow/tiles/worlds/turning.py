@@ -1,0 +1,64 @@
+"""A sphere or the hyperbolic plane as one web page, to be turned by hand; without a network."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from orbiflow import __version__
+from orbiflow.arrays import Array
+from orbiflow.drawing import Palette, rendered
+from orbiflow.tiles.page import Motif
+from orbiflow.tiles.worlds.sheet import World, cut_motif, stepped
+from orbiflow.tiles.worlds.world_copies import colour_moves
+
+DIGITS = 5  # of vectors, of the radius
+STEPS = 40  # of a drawing's lines along the tile
+SPARE = 2  # colours that a page may need elsewhere
+AROUND = 10  # points of the outline by which a copy's size is seen
+
+
+def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: str) -> str:
+    """Return the page, with outlines and drawings as vectors, and what neighbours' motions do."""
+    found = world.unfolding
+    assert found is not None
+    moves = colour_moves(found)
+    count = int(world.colours.max()) + 1 if moves is None else len(moves[0])
+    rings = [own.polygon for own in world.tiling.prototiles]
+    parts = list[dict[str, Any]]()
+    for kind, motif in enumerate(motifs):
+        for part in cut_motif(motif, world.tiling.prototiles[kind].polygon, world.size):
+            lines = [(stepped(own, world.size / STEPS), own.closed) for own in part.curves]
+            curves = [[_listed(world.vectors(line)), closed] for line, closed in lines]
+            style, width = part.style, part.style.width / world.size
+            own = {"fill": style.fill, "stroke": style.stroke, "width": width}
+            parts.append({**own, "opacity": part.opacity, "curves": curves})
+    first = world.vectors(rings[0])
+    data = {
+        "name": re.sub(r"[^A-Za-z0-9]+", "-", title).strip("-").lower() or "world",
+        "sign": found.sign,
+        "view": (world.view.motion @ world.motions[0]).ravel().tolist(),
+        "middle": found.middle.tolist(),
+        "near": found.neighbours.reshape(-1, 9).tolist(),
+        "moves": moves and [move.tolist() for move in moves],  # else the page chooses colours
+        "rings": [_listed(world.vectors(ring)) for ring in rings],
+        "around": _listed(first[:: max(1, len(first) // AROUND)]),
+        "parts": parts,
+        "fills": [chosen.fill(k) for k in range(count + SPARE)],
+        "inks": [chosen.ink(k) for k in range(count + SPARE)],
+        "outline": chosen.outline,
+        "paper": chosen.paper,
+    }
+    script = resources.files("orbiflow").joinpath("tiles/write/turning.js").read_text("utf-8")
+    script = re.sub(r"^export (?=function|class|const)", "", script, flags=re.MULTILINE)
+    shown = {"title": title, "version": __version__, "script": Markup(script)}
+    return rendered("orbiflow.tiles.write", "turning.html", **shown, data=data)
+
+
+def _listed(vectors: Array) -> list[list[float]]:
+    return np.round(vectors, DIGITS).tolist()
