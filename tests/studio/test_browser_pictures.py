@@ -84,6 +84,18 @@ def test_one_colour_is_no_picture_to_show(studio: RunningStudio, coloured: str) 
     assert found == [False, True]
 
 
+def test_what_is_added_of_the_background_is_no_colour(studio: RunningStudio) -> None:
+    plain = studio.with_picture(picture_of((20, 20, 20)), "black.png")
+    size = [studio.project(plain)["silhouette"][name] for name in ("width", "height")]
+    mask, file = Image.new("LA", size), io.BytesIO()
+    ImageDraw.Draw(mask).rectangle((100, 60, size[0] - 30, 100), fill=(255, 255))
+    mask.save(file, "PNG")
+    before = studio.project(plain)["silhouette"]["mark"]
+    studio.client.put(f"projects/{plain}/mend", content=file.getvalue()).raise_for_status()
+    studio.until(lambda: studio.project(plain)["silhouette"]["mark"] != before)
+    assert studio.project(plain)["silhouette"]["coloured"] is False
+
+
 def test_it_is_there_by_default_and_no_seam_shows(
     browser: Any, studio: RunningStudio, coloured: str, tile: int
 ) -> None:

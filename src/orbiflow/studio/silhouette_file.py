@@ -69,7 +69,7 @@ def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 
     # one that stays is not loaded again by the page
     if not backdrop.is_file() or backdrop.read_bytes() != drawn:
         write_atomic(backdrop, drawn)
-    document = {"shown": _shown(mended, picture), "target": _stored(mended)}
+    document = {"shown": _shown(mended, target, picture), "target": _stored(mended)}
     write_json(silhouette_file(home, number), document)
     return mended
 
@@ -164,22 +164,41 @@ def _mended(target: Target, file: Path, size: tuple[int, int]) -> Target:
     return replace(target, outline=placed(found.outline), notes=notes, seen=seen)
 
 
-def _is_coloured(picture: Image.Image, ring: list[list[float]]) -> bool:
-    """Whether a picture has several colours inside of a ring, such as eyes and lines."""
+def _is_coloured(picture: Image.Image, ring: Any, read: Any) -> bool:
+    """Whether a picture has several colours inside of a ring, such as eyes and lines.
+
+    The background counts only where it lies inside of what was `read`, not where that was mended.
+    """
     size = SAMPLED_PIXELS, SAMPLED_PIXELS
     small = picture.convert("RGBA").resize(size, Image.Resampling.NEAREST)
-    shares = np.array(ring) / picture.size * SAMPLED_PIXELS
-    inside = Image.new("L", size)
-    ImageDraw.Draw(inside).polygon(list(map(tuple, shares.tolist())), fill=255)
-    inside = inside.filter(ImageFilter.MinFilter(EDGE_PIXELS))  # without the soft edge
     laid = Image.alpha_composite(Image.new("RGBA", size, (*PAPER, 255)), small)  # holes are eyes
-    colours = np.asarray(laid, dtype=float)[np.asarray(inside) > 0]
-    others = np.abs(colours - np.median(colours, axis=0)).max(axis=1) > MIN_CONTRAST
-    return bool(others.sum() > MIN_COLOURED_SHARE * len(others))
+    colours = np.asarray(laid, dtype=float)
+
+    def covered(points: Any, edge: ImageFilter.Filter) -> Any:
+        mask = Image.new("L", size)
+        shares = np.asarray(points) / picture.size * SAMPLED_PIXELS
+        ImageDraw.Draw(mask).polygon(list(map(tuple, shares.tolist())), fill=255)
+        return np.asarray(mask.filter(edge)) > 0
+
+    def differing(of: Any) -> Any:
+        return np.abs(colours - np.median(colours[of], axis=0)).max(axis=2) > MIN_CONTRAST
+
+    inner, outer = ImageFilter.MinFilter(EDGE_PIXELS), ImageFilter.MaxFilter(EDGE_PIXELS)
+    inside, around = covered(ring, inner), ~covered(read, outer)  # without the soft edge
+    if not inside.any():
+        return False
+    counts = covered(read, inner)
+    if around.any():
+        counts |= around & differing(around)
+    others = inside & counts & differing(inside)
+    return bool(others.sum() > MIN_COLOURED_SHARE * inside.sum())
 
 
-def _shown(target: Target, picture: Image.Image) -> dict[str, Any]:
-    """Return what a browser needs of the silhouette, in pixels of the backdrop."""
+def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]:
+    """Return what a browser needs of the silhouette, in pixels of the backdrop.
+
+    `read`: the silhouette before it was mended.
+    """
     size = picture.size
 
     def pixels(ring: Any) -> list[list[float]]:
@@ -192,7 +211,7 @@ def _shown(target: Target, picture: Image.Image) -> dict[str, Any]:
     return {
         "outline": outline,
         "mark": hashlib.sha256(json.dumps(outline).encode()).hexdigest()[:12],
-        "coloured": _is_coloured(picture, outline),
+        "coloured": _is_coloured(picture, outline, pixels(read.outline)),
         "width": size[0],
         "height": size[1],
         "notes": [page_words(note) for note in target.notes if not note.startswith(twice)],
