@@ -248,7 +248,7 @@ def test_copied_link_opens_the_tile_in_a_studio(
     taking: Any, studio: RunningStudio, searched: str
 ) -> None:
     taking.get_by_role("button", name="Copy link").click()
-    taking.get_by_text("The link is copied").wait_for()
+    taking.get_by_text("without your picture and what you drew").wait_for()
     link = clipboard(taking)
     assert link.startswith(f"{studio.address}/#/open/")
     taking.goto("about:blank")
@@ -281,6 +281,28 @@ def test_drawing_is_copied_and_printed(taking: Any) -> None:
     assert len(document) == 1
     assert document[0].get_textpage().get_text_bounded().strip() == ""
     assert taking.locator(".share").is_visible()
+
+
+def test_what_was_drawn_is_copied_and_printed_where_it_is_wished(
+    taking: Any, studio: RunningStudio, searched: str
+) -> None:
+    points = np.mean(studio.project(searched)["tiles"][0]["polygon"], axis=0).tolist()
+    drawing = {"strokes": [{"colour": "#ff0000", "width": 4, "points": [points]}], "eyes": []}
+    studio.client.patch(f"projects/{searched}", json={"view": {"drawing": drawing}})
+    taking.reload()
+    box = taking.get_by_label("With what you drew on it")
+    assert box.is_checked()
+
+    def copied() -> str:
+        taking.evaluate("navigator.clipboard.writeText('')")
+        taking.get_by_role("button", name="Copy as SVG").click()
+        studio.until(lambda: clipboard(taking))
+        return clipboard(taking)
+
+    assert "<image " in copied()
+    box.uncheck()
+    assert "<image " not in copied()
+    studio.client.patch(f"projects/{searched}", json={"view": {"drawing": {}}})
 
 
 def test_first_page_shows_the_best_tile_of_each_project(

@@ -338,17 +338,17 @@ export function sized(canvas) {
 }
 
 /**
- * Draw a card's tiling into a canvas as large as it lies in the page; `skins(figures, scale)` gives what lies on it.
+ * Draw a card's tiling into a canvas as large as it lies in the page; `skins(tiling, scale)` gives what lies on it.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {Outlined} card
  * @param {Palette} palette
- * @param {{ across?: number, line?: number, skins?: (figures: Figure[], scale: number) => any[] }} how
+ * @param {{ across?: number, line?: number, skins?: (tiling: Tiling, scale: number) => any[] }} how
  */
 export function paintCard(canvas, card, palette, { across = 5, line = 1.2, skins } = {}) {
   const { context, width, height, ratio } = sized(canvas);
   const tiling = new Tiling(card);
   const camera = Camera.fit(tiling, width, height, across);
-  const own = skins?.(tiling.figures, camera.scale * ratio);
+  const own = skins?.(tiling, camera.scale * ratio);
   paint(context, tiling, camera, palette, { width, height, ratio, line, skins: own });
 }

@@ -2,21 +2,15 @@
 
 import { eyeInto, lineInto, markInto } from "../skin.js";
 import { partAround } from "./bucket.js";
-import { beside, rubbed, short, simplified } from "./lines.js";
 import { Riders } from "./carry.js";
+import { drawnOn, marksOf } from "./drawn.js";
+import { rubbed, short, simplified } from "./lines.js";
 
 const PIECES = 40; // of a straight line, which bends with the tile
 const NEAR = 0.0015; // by which a line may be simplified
 const LONGEST = 0.03; // side of a line
 const RUBBER = 0.03;
-const ROOM = 0.75; // share of the distance to the outline that an eye may fill
 const KEY_STEP = 7; // pixels that a key moves the pen
-
-/** What is drawn on a figure. */
-const drawnOn = (drawing, figure) => {
-  const { strokes = [], eyes = [] } = (figure ? drawing?.second : drawing) ?? {};
-  return { strokes, eyes };
-};
 
 /** Points on the way from one to another. */
 const straight = ([a, b], [c, d]) =>
@@ -59,33 +53,9 @@ export class Pen {
   }
 
   #carried() {
-    this.marks = this.carries.map((carry, figure) => {
-      const { strokes, eyes } = drawnOn(this.drawing, figure);
-      return {
-        lines: strokes.map(({ points, colour, width, rings }) => ({
-          points: points.map((point) => carry.forward(point)),
-          colour,
-          width: width * carry.scale, // as exports keep it
-          rings: rings?.map((ring) => ring.map((point) => carry.forward(point))),
-        })),
-        eyes: eyes.map(([x, y, radius]) => this.#eye(figure, [x, y], radius)),
-      };
-    });
+    this.marks = marksOf(this.drawing, this.carries, this.stage.tiling);
     this.moving = null;
     this.on.marks();
-  }
-
-  #eye(figure, point, radius) {
-    const carry = this.carries[figure];
-    const at = carry.forward(point);
-    const grown = radius * carry.growth(point, 0.02 * this.size / carry.scale);
-    return { at, radius: Math.min(grown, ROOM * this.#room(figure, at)), light: carry.light };
-  }
-
-  /** The distance of a point of a figure from its outline. */
-  #room(figure, at) {
-    const ring = this.stage.tiling.figures[figure].polygon;
-    return Math.min(...ring.map((a, k) => beside(at, a, ring[(k + 1) % ring.length]).apart));
   }
 
   down(place) {

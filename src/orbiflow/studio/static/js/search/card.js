@@ -61,7 +61,7 @@ export function cardView(project, actions) {
     const how = { look, palette, pictures };
     paintCard(canvas, shown, palette, {
       across: canvas.clientWidth > 480 ? 6 : 4.5,
-      skins: (outlines, scale) => view && skinsOf(project, figuresOf(view), outlines, how, scale),
+      skins: ({ figures }, scale) => view && skinsOf(project, figuresOf(view), figures, how, scale),
     });
   }
 

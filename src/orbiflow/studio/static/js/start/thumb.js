@@ -26,7 +26,8 @@ export function thumb(api, id) {
       const how = { look, palette, pictures };
       paintCard(canvas, card, palette, {
         across: 4,
-        skins: (outlines, scale) => view && skinsOf(project, figuresOf(view), outlines, how, scale),
+        skins: ({ figures }, scale) =>
+          view && skinsOf(project, figuresOf(view), figures, how, scale),
       });
       canvas.dataset.tile = String(card.id);
     };

@@ -1,5 +1,7 @@
 /** Take a tile away: to print or cut, as a picture, a solid or an animation, or the whole project. */
 
+import { Carry } from "../closeup/carry.js";
+import { drawnOn, marksOf } from "../closeup/drawn.js";
 import { button, choice, h, icon, put, style, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
@@ -94,10 +96,11 @@ class TakeawayPage {
     this.before = h("div");
     this.earlier = section("earlier", "earlier", "Made before", this.before);
     this.wishes = h("div", { class: "stack" });
-    this.shared = share(this.api, this.project, () => {
-      const { card, view, look, pictures, about } = this;
-      return { card, view, look, pictures, palette: paletteOf(look, about) };
-    });
+    this.shared = share(this.api, this.project, this.card, () => ({
+      look: this.look,
+      palette: paletteOf(this.look, this.about),
+      skins: (tiling, scale) => this.skins(tiling, scale),
+    }));
     this.make = button("Make it", () => trying(() => this.press()), { kind: "primary big" });
     /** @type {[string, string, any][]} */
     const kindChoices = Object.entries(KINDS).map(([key, { title, image }]) => [key, title, image]);
@@ -176,13 +179,26 @@ class TakeawayPage {
 
   paint() {
     if (!this.canvas.clientWidth) return;
-    const { look, pictures, project, view } = this;
-    const palette = paletteOf(look, this.about);
-    const how = { look, palette, pictures };
-    paintCard(this.canvas, this.card, palette, {
+    paintCard(this.canvas, this.card, paletteOf(this.look, this.about), {
       across: 6,
-      skins: (outlines, scale) => view && skinsOf(project, figuresOf(view), outlines, how, scale),
+      skins: (tiling, scale) => this.skins(tiling, scale),
     });
+  }
+
+  /** What lies on the tiles, the drawing if that is wished. */
+  skins(tiling, scale) {
+    const { look, pictures, project, view } = this;
+    const figures = figuresOf(view);
+    const isDrawn = this.layer("drawing")?.checked ?? look.drawn;
+    const marks = isDrawn &&
+      marksOf(project.view?.drawing, figures.map((own) => new Carry(own)), tiling);
+    const how = { look, palette: paletteOf(look, this.about), pictures, marks };
+    return skinsOf(project, figures, tiling.figures, how, scale);
+  }
+
+  /** The box that lays a drawing or picture on the tiles, if there is one. */
+  layer(name) {
+    return this.layers?.find((own) => own.name === name)?.box;
   }
 
   /** Show the settings of another kind of thing. */
@@ -221,10 +237,10 @@ class TakeawayPage {
   /** What can be laid on the tiles: {name, box, text} of each. */
   laidOn(kind) {
     const two = Boolean(this.card.figures);
-    const { drawing = {} } = this.project.view ?? {};
-    const isDrawn = [drawing, two && drawing.second].some((own) =>
-      own && (own.strokes?.length || own.eyes?.length)
-    );
+    const isDrawn = figuresOf(this.view).some((_, k) => {
+      const { strokes, eyes } = drawnOn(this.project.view?.drawing, k);
+      return strokes.length || eyes.length;
+    });
     const pictures = figuresOf(this.view).filter((figure, k) =>
       backdropOf(this.project, figure, k) &&
       PICTURES.includes((k ? this.project.second : this.project).input?.type)
@@ -268,9 +284,7 @@ class TakeawayPage {
 
   /** The picture is laid on what shows its colours, as the look says; else if that is wished, where it can be. */
   fitLayers() {
-    const [drawing, picture] = ["drawing", "picture"].map((own) =>
-      this.layers.find(({ name }) => name === own)?.box
-    );
+    const [drawing, box] = [this.layer("drawing"), this.layer("picture")];
     const may = (own, can) => {
       own.disabled = own.parentElement.hidden = !can;
     };
@@ -279,7 +293,6 @@ class TakeawayPage {
     );
     const plain = this.kind === "animate" && format === "svg"; // moves in plain colours
     if (drawing) may(drawing, !plain && kind !== "cutter"); // which is open inside
-    const box = picture;
     const suits = !COLOURLESS.includes(purpose);
     if (!box) return;
     if (suits !== this.suits) box.checked = suits && this.look.art;

@@ -1,41 +1,40 @@
 /** Share a tile: by a link that carries it, on the clipboard, on paper. */
 
 import { button, h, toast, trying } from "../dom.js";
-import { skinsOf } from "../skin.js";
 import { copied, printed, svgOf } from "../svg.js";
-import { Camera, figuresOf, Tiling } from "../tiling.js";
+import { Camera, Tiling } from "../tiling.js";
 
 const SIDES = { width: 1200, height: 900 }; // of a drawing to paste, in its own pixels
 const SHEET = { width: 1200, height: 1200 }; // of what is printed, which fills the sheet
 const ACROSS = 6; // tiles along the longer side
 
 /**
- * A section with what shares a tile; `seen()` gives its card, view, look, palette and pictures as they are now.
+ * A section with what shares a tile; `seen()` gives its look, palette and `skins(tiling, scale)` as they are now.
  * Returns it with `close()`.
  *
  * @param {Api} api
  * @param {Project} project
+ * @param {Card} card
  * @param {() => any} seen
  */
-export function share(api, project, seen) {
+export function share(api, project, card, seen) {
   const drawn = (sides) => {
-    const { card, view, look, palette, pictures } = seen();
+    const { look, palette, skins } = seen();
     const tiling = new Tiling(card);
     const camera = Camera.fit(tiling, sides.width, sides.height, ACROSS);
-    const how = { look, palette, pictures };
-    const skins = view &&
-      skinsOf(project, figuresOf(view), tiling.figures, how, 1.5 * camera.scale);
     return svgOf(tiling, camera, palette, {
       ...sides,
       line: look.line,
-      skins,
+      skins: skins(tiling, 1.5 * camera.scale),
       title: project.name,
     });
   };
   const link = async () => {
-    const { text } = await api.get(`projects/${project.id}/tiles/${seen().card.id}/link`);
+    const { text } = await api.get(`projects/${project.id}/tiles/${card.id}/link`);
     await copied(`${location.origin}${location.pathname}#/open/${text}`);
-    toast("The link is copied. It opens this tile, without your picture, in any studio.");
+    toast(
+      "The link is copied. It opens this tile in any studio, without your picture and what you drew.",
+    );
   };
   const paste = async () => {
     await copied(drawn(SIDES));
