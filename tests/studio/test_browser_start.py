@@ -154,6 +154,29 @@ def test_painting_mends_the_shape_and_can_be_undone(page, drawing, studio: Runni
     assert studio.project(own)["mend"]
 
 
+def test_two_tabs_paint_on_one_picture(page, drawing, studio: RunningStudio) -> None:
+    own = begun(page, drawing)
+    whole = area_of(studio.project(own))
+    other = page.context.new_page()
+    other.goto(page.url)
+    other.wait_for_selector(READ)
+    page.get_by_role("radio", name="Remove").check()
+    page.get_by_role("radio", name="lasso").check()
+    stroke(page, "canvas.reading", (0.3, 0.68), (0.6, 0.68), (0.6, 0.97), (0.3, 0.97))
+    cut = studio.until(
+        lambda: (area := area_of(studio.project(own))) < 0.95 * whole and area  # a leg is gone
+    )
+    seen = "() => document.querySelector('canvas.reading').toDataURL()"
+    before = other.evaluate(seen)
+    studio.until(lambda: other.wait_for_timeout(50) or other.evaluate(seen) != before)
+    other.wait_for_selector(READ)
+    other.get_by_role("radio", name="Add").check()
+    stroke(other, "canvas.reading", (0.7, 0.3), (0.9, 0.16))
+    studio.until(lambda: area_of(studio.project(own)) > 1.02 * cut)
+    assert area_of(studio.project(own)) < 0.98 * whole
+    other.close()
+
+
 def test_marks_are_kept_and_only_on_the_animal(page, drawing, studio: RunningStudio) -> None:
     own = begun(page, drawing)
     page.get_by_role("radio", name="Keep its shape").check()

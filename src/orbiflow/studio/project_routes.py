@@ -349,8 +349,12 @@ def _mask_file(here: Studio, project: str, mask: str, number: int) -> Path:
 
 
 async def _mask_changed(here: Studio, project: str, mask: str, number: int) -> dict[str, Any]:
+    """Return the address of what is painted now, by which a page knows it from what others paint."""
     here.store.change(project, "silhouette")
-    return await _read_anew(here, project, number) if mask == "mend" else {}
+    shown = shown_project(here.store, here.store.project(project), "silhouette")
+    address = (shown["second"] if number else shown)[mask]
+    task = await _read_anew(here, project, number) if mask == "mend" else {}
+    return {"mask": address, **task}
 
 
 @routes("GET", "/projects/{project}/{picture}.png")

@@ -68,6 +68,9 @@ class PicturePage {
     this.tints = new Map(); // the marks in their colours, painted anew when strokes change
     this.known = 0; // strokes that the outline on the screen knows
     this.sent = 0; // strokes that the server has
+    this.unsent = new Set();
+    this.sending = 0; // layers that are on their way
+    this.kept = this.masks; // of the server, that the marks began with or became
     this.read = newest(async () =>
       this.began(await api.put(`${this.place}/reading?number=${number}`, this.reading))
     );
@@ -195,10 +198,8 @@ class PicturePage {
       if (silhouette !== this.own.silhouette) return; // there is a newer one, or none
       if (!loaded) return toast("The picture cannot be loaded: reload the page", { bad: true });
       [this.picture, this.shown] = [image, silhouette.backdrop];
-      if (this.marks.width !== silhouette.width || this.marks.height !== silhouette.height) {
-        await this.fit(silhouette);
-      }
     }
+    if (silhouette) await this.follow(silhouette);
     this.known = Math.min(this.sent, this.marks.strokes.length);
     [this.lead, this.stage, this.side].forEach((part) => {
       part.hidden = !silhouette;
@@ -208,20 +209,38 @@ class PicturePage {
     this.tell();
   }
 
-  /** Begin with marks of the picture's size, those that the server has. */
-  async fit({ width, height }) {
-    this.stage.style.setProperty("--shape", `${width} / ${height}`);
-    this.stage.style.setProperty("--ratio", String(width / height));
+  /** The addresses of what the server has of each layer. */
+  get masks() {
+    return LAYERS.map((layer) => this.own[layer] ?? null);
+  }
+
+  /** Whether the server has other marks than these, painted elsewhere. */
+  get isBehind() {
+    return !this.sending && String(this.masks) !== String(this.kept);
+  }
+
+  /** Begin with marks of the picture's size, those that the server has; what is not sent is painted over them. */
+  async follow({ width, height }) {
+    const other = this.marks.width !== width || this.marks.height !== height;
+    if (this.isBehind) Object.assign(this.project, await this.api.get(this.place)); // what is told may be older
+    if (!other && !this.isBehind) return;
+    const kept = this.kept = this.masks;
     const marks = new Marks(width, height);
-    const found = LAYERS.filter((layer) => this.own[layer]);
     await Promise.all(
-      found.map((layer) =>
-        trying(() => marks.load(layer, this.own[layer], { both: layer === "mend" }))
+      LAYERS.map((layer, k) =>
+        kept[k] && trying(() => marks.load(layer, kept[k], { both: layer === "mend" }))
       ),
     );
+    if (kept !== this.kept) return;
+    marks.strokes = [...this.unsent];
     this.marks = marks;
-    this.view = new View(width, height);
+    this.sent = 0;
+    this.tints.clear();
     this.states = new States(this.state);
+    if (!other) return;
+    this.view = new View(width, height);
+    this.stage.style.setProperty("--shape", `${width} / ${height}`);
+    this.stage.style.setProperty("--ratio", String(width / height));
   }
 
   /** What can be undone: what is painted, and how the picture is read. */
@@ -330,6 +349,7 @@ class PicturePage {
       return this.paint();
     }
     this.marks.add(stroke);
+    this.unsent.add(stroke);
     this.states.add(this.state);
     this.slid = -Infinity;
     return this.changed(
@@ -346,14 +366,20 @@ class PicturePage {
   }
 
   async upload(layer) {
-    const count = this.marks.strokes.length;
+    const { strokes } = this.marks;
     const address = `${this.place}/${layer}?number=${this.number}`;
-    if (this.marks.has(layer)) {
-      this.began(
-        await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" })),
-      );
-    } else this.began(await this.api.remove(address));
-    if (layer === "mend") this.sent = count;
+    this.sending += 1;
+    try {
+      const answer = this.marks.has(layer)
+        ? await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" }))
+        : await this.api.remove(address);
+      this.own[layer] = this.kept[LAYERS.indexOf(layer)] = answer.mask;
+      this.marks.of(layer, strokes).forEach((stroke) => this.unsent.delete(stroke));
+      if (layer === "mend") this.sent = strokes.length;
+      this.began(answer);
+    } finally {
+      this.sending -= 1;
+    }
   }
 
   startOver() {
