@@ -28,6 +28,13 @@ export function h(tag, attributes = {}, ...children) {
   return made;
 }
 
+/** @param {...Child} words small print */
+export const aside = (...words) => h("p", { class: "soft small" }, ...words);
+/** @param {...Child} parts one beside the other */
+export const row = (...parts) => h("div", { class: "row" }, ...parts);
+/** @param {...Child} parts one below the other */
+export const stack = (...parts) => h("div", { class: "stack" }, ...parts);
+
 const ICONS = {
   upload: "M12 16V4m-5 5 5-5 5 5M4 16v3a1 1 0 0 0 1 1h14a1 1 0 0 0 1-1v-3",
   camera: "M4 8h3l2-3h6l2 3h3v11H4zM12 10a3.5 3.5 0 1 0 0 7 3.5 3.5 0 0 0 0-7",
@@ -295,7 +302,7 @@ export function dialog(title, build) {
  */
 export function confirmed(title, text, verb) {
   return dialog(title, (close) =>
-    [
+    stack(
       h("p", {}, text),
       h(
         "footer",
@@ -303,10 +310,7 @@ export function confirmed(title, text, verb) {
         button("Keep it", () => close(false), { autofocus: true }),
         button(verb, () => close(true), { kind: "primary" }),
       ),
-    ].reduce((box, part) => {
-      box.append(part);
-      return box;
-    }, h("div", { class: "stack" })));
+    ));
 }
 
 /**

@@ -1,6 +1,6 @@
 /** Forms from the JSON Schema of an operation's settings. */
 
-import { h, unique } from "./dom.js";
+import { h, stack, unique } from "./dom.js";
 import { capital } from "./words.js";
 
 /** The kinds of values that a schema allows, `null` apart. */
@@ -175,7 +175,7 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
         "details",
         {},
         h("summary", {}, group),
-        h("div", { class: "stack" }, own.map((name) => controls.get(name).root)),
+        stack(own.map((name) => controls.get(name).root)),
       )
     ),
   );

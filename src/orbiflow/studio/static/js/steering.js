@@ -1,6 +1,6 @@
 /** The buttons of a task that is not done: hold it or let it go on, and stop it. */
 
-import { button, h, icon, trying } from "./dom.js";
+import { button, icon, row, trying } from "./dom.js";
 
 /** Milliseconds for which a click is still meant for the button that stood at its place before. */
 export const LATE = 600;
@@ -18,12 +18,7 @@ export function steering(api) {
   const hold = button("Pause", () => act(task.state === "paused" ? "resume" : "pause"), {
     kind: "hold",
   });
-  const root = h(
-    "div",
-    { class: "row" },
-    hold,
-    button("Stop", () => act("cancel"), { image: "stop" }),
-  );
+  const root = row(hold, button("Stop", () => act("cancel"), { image: "stop" }));
 
   /** @param {Task} now */
   function update(now) {

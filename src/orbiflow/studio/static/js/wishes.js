@@ -1,6 +1,6 @@
 /** How to search, one wish for all pages of a project: how long, and what counts. */
 
-import { choice, h, newest } from "./dom.js";
+import { aside, choice, h, newest } from "./dom.js";
 import { EFFORT_TIMES, EFFORTS, OBJECTIVE_MEANINGS, OBJECTIVES, PAIR_TIMES } from "./words.js";
 
 /**
@@ -14,7 +14,7 @@ export function wishes({ api, project, about }) {
 
   /** @type {(label: string, name: string, options: [string, string][], meanings: Record<string, string>) => HTMLElement} */
   const wish = (label, name, options, meanings) => {
-    const meaning = h("p", { class: "soft small" }, meanings[wanted[name]]);
+    const meaning = aside(meanings[wanted[name]]);
     const chosen = (own) => {
       wanted[name] = own;
       project.view = { ...project.view, search: wanted };

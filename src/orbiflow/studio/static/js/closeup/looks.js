@@ -1,6 +1,6 @@
 /** The controls for colours, outline, artwork and symmetry. */
 
-import { button, choice, h, put, slider, unique } from "../dom.js";
+import { button, choice, h, put, slider, stack, unique } from "../dom.js";
 import { kindsOf, signInto } from "./signs.js";
 
 export const HELP = {
@@ -165,9 +165,7 @@ export function shapePanel(look, { count, hasMap, hasArt }, change) {
     said: (v) => (v ? PERCENT(v) : "none"),
   }, (share) => change({ tint: share }));
   tint.hidden = !look.art;
-  return h(
-    "div",
-    { class: "stack" },
+  return stack(
     hasMap &&
       slider(`From your ${pictures} to the tile`, {
         min: 0,
@@ -257,9 +255,7 @@ export function signPanel(elements, look, change, light) {
 export function pullPanel(pull, change, back, hasInside, lay) {
   if (!hasInside) pull.what = "outline";
   const inside = pull.what === "inside";
-  return h(
-    "div",
-    { class: "stack" },
+  return stack(
     hasInside &&
       choice(
         "What to pull",
@@ -363,9 +359,7 @@ export function penPanel(pen, change, clear, drawn, show) {
     for (const [name, part] of Object.entries(parts)) part.hidden = !USES[tool].includes(name);
   };
   fit(pen.tool);
-  return h(
-    "div",
-    { class: "stack" },
+  return stack(
     h("p", { class: "soft" }, "Draw inside any tile: the same appears in all of them."),
     choice("Draw with", TOOLS, pen.tool, (tool) => {
       fit(tool);

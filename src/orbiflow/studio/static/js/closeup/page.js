@@ -1,7 +1,19 @@
 /** The close-up of one tile: look, pull, draw. */
 
 import { client } from "../api.js";
-import { button, choice, dialog, h, newest, notes, put, style, toast, trying } from "../dom.js";
+import {
+  button,
+  choice,
+  dialog,
+  h,
+  newest,
+  notes,
+  put,
+  stack,
+  style,
+  toast,
+  trying,
+} from "../dom.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { shapeCards } from "../shapes/page.js";
 import { backdropOf } from "../skin.js";
@@ -405,18 +417,19 @@ class Closeup {
   async #lay() {
     const shapes = await this.api.get("shapes");
     const { list, close } = shapeCards(this.about);
-    const name = await dialog("Lay the copies another way", (done) =>
-      h(
-        "div",
-        { class: "stack" },
-        h("p", { class: "soft" }, "The outline stays as near to what it is as it can."),
-        list(shapes, (own, parts) =>
-          h("button", {
-            type: "button",
-            disabled: own.name === this.view.class_name,
-            onclick: () => done(own.name),
-          }, parts)),
-      ));
+    const name = await dialog(
+      "Lay the copies another way",
+      (done) =>
+        stack(
+          h("p", { class: "soft" }, "The outline stays as near to what it is as it can."),
+          list(shapes, (own, parts) =>
+            h("button", {
+              type: "button",
+              disabled: own.name === this.view.class_name,
+              onclick: () => done(own.name),
+            }, parts)),
+        ),
+    );
     close();
     if (name) this.#byHand("class", { name });
   }

@@ -1,6 +1,6 @@
 /** Words about a fit: how well it fits, and what it is made of. */
 
-import { h } from "../dom.js";
+import { aside, h } from "../dom.js";
 import { partBar } from "./watch.js";
 import { count, figure, PARTS, percent } from "./words.js";
 
@@ -69,11 +69,7 @@ export function parts(fit) {
     h("h2", {}, "What it is made of"),
     h("ul", { class: "parts stack" }, used.map(said)),
     idle.length > 0 &&
-      h(
-        "p",
-        { class: "soft small" },
-        `Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`,
-      ),
+      aside(`Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`),
     h(
       "details",
       {},

@@ -1,6 +1,6 @@
 /** The density page: a table, where its rows live, the fit, and what it shows. */
 
-import { button, h, put, style, trying } from "../dom.js";
+import { button, h, put, row, style, trying } from "../dom.js";
 import { alive, capital } from "../words.js";
 import { Result } from "./result.js";
 import { chooseSpace, chooseTable } from "./table.js";
@@ -21,12 +21,7 @@ export async function show(root, page) {
     h(
       "div",
       { class: "density stack" },
-      h(
-        "div",
-        { class: "row" },
-        h("h1", { class: "grow", tabindex: "-1" }, "See where your data crowd"),
-        actions,
-      ),
+      row(h("h1", { class: "grow", tabindex: "-1" }, "See where your data crowd"), actions),
       problem,
       body,
     ),

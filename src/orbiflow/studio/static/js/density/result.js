@@ -1,7 +1,7 @@
 /** What a fit shows: the surface, the map, regions, an angle that is held, how well it fits, and files. */
 
 import { showSurface } from "../../api/density/surface.js";
-import { choice, h, put, slider, toast, trying, unique } from "../dom.js";
+import { aside, choice, h, put, row, slider, stack, toast, trying, unique } from "../dom.js";
 import { likelihood, parts } from "./facts.js";
 import { Grid } from "./grid.js";
 import { dark, drawBar, drawCurve, FlatMap, painted, pale } from "./map.js";
@@ -91,7 +91,7 @@ export class Result {
         this.pairs,
         this.mapCanvas,
         !one && this.bar,
-        h("p", { class: "soft small" }, about),
+        aside(about),
       ),
     ];
     if (fit.surface) figures.unshift(this.surfaceFigure());
@@ -104,7 +104,7 @@ export class Result {
         "div",
         { class: "panel stack controls" },
         h("div", {}, region, this.areaText),
-        !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel),
+        !one && row(dotsLabel, fit.surface && surfaceLabel),
       ),
     );
   }
@@ -215,7 +215,7 @@ export class Result {
       this.pairs,
       h("label", { for: id, class: "label" }, "Which two angles"),
       box,
-      h("p", { class: "soft small" }, "Whatever the others are."),
+      aside("Whatever the others are."),
     );
   }
 
@@ -330,7 +330,7 @@ export class Result {
     return h(
       "section",
       { class: "panel grid" },
-      h("div", { class: "stack" }, h("h2", {}, "If you know one angle"), controls),
+      stack(h("h2", {}, "If you know one angle"), controls),
       canvas,
     );
   }

@@ -1,6 +1,6 @@
 /** Choosing a table, and what is fitted to it. */
 
-import { button, h, icon, put, trying, unique } from "../dom.js";
+import { aside, button, h, icon, put, row, stack, trying, unique } from "../dom.js";
 import { count, figure, SEEMS, shape, spaceOf, SPACES, UNITS } from "./words.js";
 
 const ENDINGS = ".csv,.tsv,.txt,.npy";
@@ -39,11 +39,7 @@ export function chooseTable(page, examples) {
     { class: "drop panel stack" },
     icon("upload"),
     h("p", {}, "Drop a table here"),
-    h(
-      "p",
-      { class: "soft small" },
-      "CSV, TSV or .npy, with a row for each thing that you measured.",
-    ),
+    aside("CSV, TSV or .npy, with a row for each thing that you measured."),
     h("div", {}, button("Choose a file", () => input.click(), { kind: "primary" }), input),
   );
   input.tabIndex = -1;
@@ -73,17 +69,11 @@ export function chooseTable(page, examples) {
         h("span", { class: "soft small" }, about),
       ),
     );
-  return h(
-    "div",
-    { class: "stack" },
+  return stack(
     drop,
     h("h2", {}, "Or try one of these"),
     h("ul", { class: "grid narrow" }, examples.map(example)),
-    h(
-      "p",
-      { class: "soft small" },
-      "From the Top8000 proteins of Duke University (CC BY 4.0), PmagPy and javaPlex (BSD).",
-    ),
+    aside("From the Top8000 proteins of Duke University (CC BY 4.0), PmagPy and javaPlex (BSD)."),
   );
 }
 
@@ -167,22 +157,18 @@ export function chooseSpace(table, start, last) {
     "fieldset",
     {},
     h("legend", {}, "Which columns?"),
-    h(
-      "div",
-      { class: "row" },
-      table.columns.map((column) => {
-        const box = h("input", {
-          type: "checkbox",
-          checked: chosen.columns.includes(column.name),
-          onchange: () => {
-            chosen.columns = chosen.columns.filter((own) => own !== column.name);
-            if (box.checked) chosen.columns.push(column.name);
-            fit();
-          },
-        });
-        return h("label", { class: "check" }, box, column.name);
-      }),
-    ),
+    row(table.columns.map((column) => {
+      const box = h("input", {
+        type: "checkbox",
+        checked: chosen.columns.includes(column.name),
+        onchange: () => {
+          chosen.columns = chosen.columns.filter((own) => own !== column.name);
+          if (box.checked) chosen.columns.push(column.name);
+          fit();
+        },
+      });
+      return h("label", { class: "check" }, box, column.name);
+    })),
     order,
   );
 
@@ -237,7 +223,7 @@ export function chooseSpace(table, start, last) {
       ),
       firstRows(table),
       table.notes.length > 0 &&
-        h("p", { class: "soft small" }, `Read so: ${table.notes.join("; ")}.`),
+        aside(`Read so: ${table.notes.join("; ")}.`),
     ),
     h(
       "section",
@@ -247,7 +233,7 @@ export function chooseSpace(table, start, last) {
       spaces,
       columns,
       units,
-      h("div", { class: "row" }, go, says),
+      row(go, says),
     ),
   );
 }

@@ -1,6 +1,6 @@
 /** What can be taken away of a density: new rows, pictures, regions, and itself. */
 
-import { button, h, icon, put, trying, unique } from "../dom.js";
+import { aside, button, h, icon, put, trying, unique } from "../dom.js";
 import { alive, bytes } from "../words.js";
 
 /**
@@ -37,7 +37,7 @@ export function takeaway(page, fit, ends, submit) {
       "div",
       { class: "take stack" },
       h("h3", {}, title),
-      h("p", { class: "soft small" }, about),
+      aside(about),
       fields,
       act,
     );

@@ -1,6 +1,6 @@
 /** A fit as it goes on: how far it is, what it tries, and buttons to hold or stop it. */
 
-import { h, put } from "../dom.js";
+import { aside, h, put } from "../dom.js";
 import { steering } from "../steering.js";
 import { capital, STATES } from "../words.js";
 import { PARTS } from "./words.js";
@@ -15,7 +15,7 @@ export const partBar = (name, share, words, more = "") => {
     {},
     h("div", { class: "share" }, h("strong", {}, title), h("span", {}, words)),
     h("meter", { value: share, "aria-label": title }),
-    h("p", { class: "soft small" }, `${capital(about)}. ${more}`),
+    aside(`${capital(about)}. ${more}`),
   );
 };
 
@@ -38,11 +38,7 @@ export class Watch {
       this.bar,
       this.says,
       this.steer.root,
-      h(
-        "p",
-        { class: "soft small" },
-        "Several kinds of density are tried. Rows that were kept aside choose among them.",
-      ),
+      aside("Several kinds of density are tried. Rows that were kept aside choose among them."),
       this.kinds,
     );
     this.update(task);

@@ -1,6 +1,6 @@
 /** The search as it goes: all classes side by side, best first. */
 
-import { button, confirmed, h, notes, put, style, toast, trying } from "../dom.js";
+import { button, confirmed, h, notes, put, row, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { Pictures } from "../skin.js";
@@ -64,7 +64,7 @@ class SearchPage {
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
     this.steer = steering(this.api);
     this.again = button("", () => this.search(), { kind: "primary", image: "arrow" });
-    this.deeds = h("div", { class: "row" }, this.steer.root, this.again);
+    this.deeds = row(this.steer.root, this.again);
     this.heading = h("h1", { tabindex: "-1" }, "Tiles");
     const { effort, objective } = this.wishes;
     this.panel = h("div", { class: "wishes" }, effort, objective);

@@ -1,6 +1,6 @@
 /** The page of a mesh: the figure, the search, the solids that were found, and what is made of them. */
 
-import { button, confirmed, h, newest, put, style, trying } from "../dom.js";
+import { button, confirmed, h, newest, put, stack, style, trying } from "../dom.js";
 import { alive, number } from "../words.js";
 import { Search } from "./search.js";
 import { Stage } from "./stage.js";
@@ -78,9 +78,7 @@ class SolidPage {
         h(
           "div",
           { class: "take" },
-          h(
-            "div",
-            { class: "stack" },
+          stack(
             this.stage.root,
             mesh.notes.length > 0 && notes,
             this.others,

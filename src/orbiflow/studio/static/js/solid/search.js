@@ -1,6 +1,6 @@
 /** How to search for solids, and how far a search is. */
 
-import { button, choice, h, put } from "../dom.js";
+import { aside, button, choice, h, put, stack } from "../dom.js";
 import { form } from "../forms.js";
 import { steering } from "../steering.js";
 import { alive, EFFORTS } from "../words.js";
@@ -22,7 +22,7 @@ export class Search {
     const wanted = { effort: "normal", up: mesh.up, form: {}, ...project.view?.fill };
     this.wanted = wanted;
     const changed = () => keep(wanted);
-    const meaning = h("p", { class: "soft small" }, EFFORT_MEANINGS[wanted.effort]);
+    const meaning = aside(EFFORT_MEANINGS[wanted.effort]);
     const long = choice(
       "How long",
       about.efforts.map((own) => [own, EFFORTS[own] ?? own]),
@@ -65,7 +65,7 @@ export class Search {
       "details",
       { class: "panel wishes", open: true },
       this.title,
-      h("div", { class: "stack" }, h("div", {}, long, meaning), up, this.form, this.error, this.go),
+      stack(h("div", {}, long, meaning), up, this.form, this.error, this.go),
     );
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
     this.share = h("p", { class: "soft" });
@@ -77,7 +77,7 @@ export class Search {
       this.bar,
       this.share,
       this.steer.root,
-      h("p", { class: "soft small" }, "You may close this page: the search goes on without it."),
+      aside("You may close this page: the search goes on without it."),
     );
   }
 

@@ -1,7 +1,7 @@
 /** A figure or a solid that turns, by the script of the pages that `orbiflow fill` writes, and its controls. */
 
 import { showStack } from "../../api/solids/stack.js";
-import { button, choice, h, put, slider, unique } from "../dom.js";
+import { button, choice, h, put, row, slider, unique } from "../dom.js";
 
 /** @type {[name: string, words: string][]} */
 const SHOWN = [["target", "Figure"], ["bent", "Bent"], ["tile", "Tile"], ["stack", "Stack"]];
@@ -37,7 +37,7 @@ export class Stage {
       type: "checkbox",
       onchange: () => this.view?.keepTurning(this.turner.checked),
     });
-    this.stack = h("div", { class: "row" }, this.apart, this.opening);
+    this.stack = row(this.apart, this.opening);
     this.keys = h("p", { class: "soft small", id: this.tips });
     this.root = h(
       "figure",
@@ -45,12 +45,7 @@ export class Stage {
       this.place,
       this.kinds,
       this.stack,
-      h(
-        "div",
-        { class: "row" },
-        h("label", { class: "check" }, this.turner, "Turn slowly"),
-        this.keys,
-      ),
+      row(h("label", { class: "check" }, this.turner, "Turn slowly"), this.keys),
     );
   }
 

@@ -1,6 +1,6 @@
 /** Words about solids. */
 
-import { h } from "../dom.js";
+import { aside, h } from "../dom.js";
 import { number, sentence, STATES } from "../words.js";
 
 export const EFFORT_MEANINGS = {
@@ -75,14 +75,12 @@ export function facts(card) {
             h("span", {}, percent(card[name])),
           ),
           h("meter", { value: card[name], "aria-label": title }),
-          h("p", { class: "soft small" }, about),
+          aside(about),
         )
       ),
     ),
     h("p", {}, `To get there, parts of the figure became ${percent(strain)} longer or shorter.`),
-    h(
-      "p",
-      { class: "soft small" },
+    aside(
       `${sides(size)}. ${
         ways === 1 ? "All copies lie alike" : `Its copies lie in ${ways} ways`
       }: space group ${group}.`,

@@ -1,6 +1,6 @@
 /** All ways to bring a picture, a table or a project: choose, drop, paste, photograph, draw. */
 
-import { button, h, put } from "../dom.js";
+import { aside, button, h, put, row } from "../dom.js";
 import { Feed } from "../events.js";
 import { alive, bytes, sentence } from "../words.js";
 
@@ -112,14 +112,8 @@ export class Bringing {
       "div",
       { class: "drop" },
       h("p", { class: "drop-words" }, this.touch ? "Bring a picture" : "Drop a picture here"),
-      h(
-        "p",
-        { class: "soft small" },
-        "One animal, or any other shape, on a plain background works best.",
-      ),
-      h(
-        "div",
-        { class: "row" },
+      aside("One animal, or any other shape, on a plain background works best."),
+      row(
         button("Choose a picture", () => this.file.click(), {
           kind: "primary big",
           image: "upload",

@@ -1,6 +1,6 @@
 /** A photo from the computer's own camera. */
 
-import { button, dialog, h } from "../dom.js";
+import { button, dialog, h, stack } from "../dom.js";
 
 /** Show what the camera sees; resolves with a PNG, or undefined. */
 export async function photograph() {
@@ -30,7 +30,7 @@ export async function photograph() {
           "The camera cannot be used. Allow it in your browser's settings, or choose a picture instead.";
       },
     );
-    return h("div", { class: "stack" }, video, said, h("footer", {}, shutter));
+    return stack(video, said, h("footer", {}, shutter));
   });
   /** @type {MediaStream | null} */ (stream)?.getTracks().forEach((track) => track.stop());
   return shot;

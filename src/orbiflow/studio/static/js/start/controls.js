@@ -1,6 +1,6 @@
 /** The controls beside the picture: how it is read, and with what it is painted on. */
 
-import { choice, h, slider } from "../dom.js";
+import { aside, choice, h, row, slider } from "../dom.js";
 
 /** @type {[tool: string, words: string, image: any][]} */
 const TOOLS = [
@@ -95,7 +95,7 @@ export function readingControls(reading, changed) {
  * @param {{ tool: string, shape: string, size: number }} pen
  */
 export function paintingControls(pen, changed, buttons) {
-  const meaning = h("p", { class: "soft small" }, MEANINGS[pen.tool]);
+  const meaning = aside(MEANINGS[pen.tool]);
   const tools = choice("Paint on the picture", TOOLS, pen.tool, (tool) => {
     pen.tool = tool;
     meaning.textContent = MEANINGS[tool];
@@ -130,6 +130,6 @@ export function paintingControls(pen, changed, buttons) {
     meaning,
     shapes,
     size,
-    h("div", { class: "row" }, buttons),
+    row(buttons),
   );
 }

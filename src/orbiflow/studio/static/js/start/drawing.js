@@ -1,6 +1,6 @@
 /** Draw a shape: each closed line adds to it or cuts from it. */
 
-import { button, choice, dialog, h } from "../dom.js";
+import { button, choice, dialog, h, row, stack } from "../dom.js";
 import { drawStroke, Marks } from "./marks.js";
 import { pointing } from "./pointing.js";
 import { States } from "./states.js";
@@ -83,14 +83,10 @@ export function drawn() {
       },
     });
     tell();
-    return h(
-      "div",
-      { class: "stack" },
+    return stack(
       h("p", { class: "soft" }, "Draw around the animal in one line. It closes when you let go."),
       canvas,
-      h(
-        "div",
-        { class: "row" },
+      row(
         choice("A line", [[true, "adds", "more"], [false, "cuts away", "cut"]], true, (chosen) => {
           black = chosen;
         }, { unseen: true }),

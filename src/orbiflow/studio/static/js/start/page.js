@@ -1,6 +1,6 @@
 /** The first page: bring a picture, go on with an earlier project, or take one of our animals. */
 
-import { button, h, put, style, trying } from "../dom.js";
+import { aside, button, h, put, stack, style, trying } from "../dom.js";
 import { Camera, paint, sized, Tiling } from "../tiling.js";
 import { Bringing } from "./bringing.js";
 import { Projects } from "./projects.js";
@@ -14,7 +14,7 @@ const FILE_WORDS = "Go on with what you saved, here or elsewhere.";
 
 /** Another way to begin, in a few words. */
 const other = (title, image, begin, words) =>
-  h("div", {}, button(title, begin, { image }), h("p", { class: "soft small" }, words));
+  h("div", {}, button(title, begin, { image }), aside(words));
 
 /**
  * @param {HTMLElement} root
@@ -31,9 +31,7 @@ export async function show(root, page) {
     h(
       "section",
       { class: "hero" },
-      h(
-        "div",
-        { class: "stack" },
+      stack(
         h("h1", { tabindex: "-1" }, "Turn an animal into a tile"),
         h(
           "p",

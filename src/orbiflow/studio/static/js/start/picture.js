@@ -1,6 +1,6 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
-import { button, h, newest, put, style, toast, trying, zooms } from "../dom.js";
+import { button, h, newest, put, stack, style, toast, trying, zooms } from "../dom.js";
 import { sized } from "../tiling.js";
 import { wishes } from "../wishes.js";
 import { alive, sentence } from "../words.js";
@@ -120,7 +120,7 @@ class PicturePage {
       h(
         "div",
         { class: "picture" },
-        h("div", { class: "stack" }, this.heading, this.lead, this.stage, this.unread),
+        stack(this.heading, this.lead, this.stage, this.unread),
         this.side,
       ),
     );

@@ -1,6 +1,6 @@
 /** The projects on the first page: go on with one, rename it, duplicate it, or delete it and take that back. */
 
-import { button, dialog, h, icon, put, toast, trying } from "../dom.js";
+import { button, dialog, h, icon, put, row, toast, trying } from "../dom.js";
 import { ago, number } from "../words.js";
 import { thumb as tilingOf } from "./thumb.js";
 
@@ -66,9 +66,7 @@ export class Projects {
       put(
         place,
         link(this.api, own),
-        h(
-          "div",
-          { class: "row" },
+        row(
           deed("Rename", "pencil", () => this.rename(own)),
           own.kind === "tile" && deed("Duplicate", "copy", () => this.duplicate(own)),
           deed("Delete", "bin", gone),

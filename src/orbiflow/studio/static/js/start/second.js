@@ -1,6 +1,6 @@
 /** The second picture of a project: bring one, see both, take it away again. */
 
-import { button, confirmed, dialog, h, icon, put, trying } from "../dom.js";
+import { aside, button, confirmed, dialog, h, icon, put, row, stack, trying } from "../dom.js";
 import { brief } from "../words.js";
 import { Bringing, stem } from "./bringing.js";
 
@@ -51,14 +51,10 @@ export async function addSecond(page) {
   let bring;
   await dialog("Add a second picture", (close) => {
     bring = new BringingSecond(page, close);
-    return h(
-      "div",
-      { class: "stack" },
+    return stack(
       h("p", { class: "soft" }, "Both animals then fill the plane together, without a gap."),
       bring.panel(),
-      h(
-        "div",
-        { class: "row" },
+      row(
         button("The same picture again", () => bring.again(), { image: "picture" }),
         h("span", { class: "soft small" }, "or one of ours:"),
       ),
@@ -123,7 +119,7 @@ export function bothPictures(page, number) {
     } else {
       put(
         root,
-        h("p", { class: "soft small" }, "Two animals can fill the plane together."),
+        aside("Two animals can fill the plane together."),
         h("div", {}, button("Add a second picture", () => addSecond(page), { image: "more" })),
       );
     }

@@ -40,7 +40,13 @@ export const COLOURLESS = ["laser", "plotter", "template", "colouring"];
 
 const SHARED = { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" };
 
+const FORMAT = { about: "", title: "Kind of file", usual: "What suits it" };
+const PALETTE = { about: "", title: "Colours" };
+
 const plain = (words) => ({
+  palette: PALETTE,
+  colour: { about: "", title: "Which tiles share a colour", options: SHARED },
+  tile_size: { title: "How long is one tile?" },
   ...Object.fromEntries(Object.entries(PLAIN).map(([name, title]) => [name, { title }])),
   ...words,
 });
@@ -69,9 +75,7 @@ export const KINDS = {
         },
       },
       format: {
-        about: "",
-        title: "Kind of file",
-        usual: "What suits it",
+        ...FORMAT,
         options: {
           svg: "SVG",
           pdf: "PDF",
@@ -81,7 +85,6 @@ export const KINDS = {
           html: "HTML (a page without an end)",
         },
       },
-      tile_size: { title: "How long is one tile?" },
       area: {
         title: "How large is the page?",
         about: "Such as A4, letter, mug, phone or 300x200mm.",
@@ -101,15 +104,13 @@ export const KINDS = {
         about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page.",
       },
       palette: {
-        about: "",
-        title: "Colours",
+        ...PALETTE,
         not: {
           purpose: COLOURLESS,
           cut: (now) => now("cut") !== "none" && now("purpose") !== "stickers",
           filled: [false],
         },
       },
-      colour: { about: "", title: "Which tiles share a colour", options: SHARED },
       cut: {
         title: "What is drawn",
         about: "",
@@ -133,9 +134,6 @@ export const KINDS = {
         title: "Width x height",
         about: "Pixels such as 3000x2000px, a size such as 300x200mm, or A4, square or story.",
       },
-      tile_size: { title: "How long is one tile?" },
-      palette: { about: "", title: "Colours" },
-      colour: { about: "", title: "Which tiles share a colour", options: SHARED },
     }),
   },
   solid: {
@@ -156,11 +154,8 @@ export const KINDS = {
           puzzle: "Puzzle in a tray",
         },
       },
-      tile_size: { title: "How long is one tile?" },
       format: {
-        about: "",
-        title: "Kind of file",
-        usual: "What suits it",
+        ...FORMAT,
         options: { stl: "STL", "3mf": "3MF" },
       },
     }),
@@ -185,13 +180,8 @@ export const KINDS = {
         about: "Pixels such as 800x534px, or square or story, as posts and clips have it.",
         some: ["800x534px", "square", "story"],
       },
-      tile_size: { title: "How long is one tile?" },
-      colour: { about: "", title: "Which tiles share a colour", options: SHARED },
-      palette: { about: "", title: "Colours" },
       format: {
-        about: "",
-        title: "Kind of file",
-        usual: "What suits it",
+        ...FORMAT,
         options: { gif: "GIF", mp4: "MP4", svg: "SVG" },
       },
     }),
@@ -221,8 +211,7 @@ export const BUILD = {
       },
     },
     format: {
-      about: "",
-      title: "Kind of file",
+      ...FORMAT,
       usual: "3MF",
       options: { "3mf": "3MF, with colours", stl: "STL" },
     },

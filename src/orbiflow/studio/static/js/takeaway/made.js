@@ -1,6 +1,6 @@
 /** What was made of a tile: its files, a picture of it, what is to be said. */
 
-import { h, icon } from "../dom.js";
+import { h, icon, row } from "../dom.js";
 import { ago, alive, bytes, capital, sentence } from "../words.js";
 import { EVERY_KIND as KINDS, lengthIn } from "./kinds.js";
 
@@ -76,7 +76,7 @@ export function words(task, stale) {
     notes.length > 0 &&
     h("ul", { class: "notice" }, notes.map((text) => h("li", {}, sentence(text)))),
     stale && h("p", { class: "soft" }, "You changed something since. Make it again to have it."),
-    h("div", { class: "row" }, files(task, "primary")),
+    row(files(task, "primary")),
   ];
 }
 

@@ -2,7 +2,7 @@
 
 import { Carry } from "../closeup/carry.js";
 import { drawnOn, marksOf } from "../closeup/drawn.js";
-import { button, choice, h, icon, put, style, trying } from "../dom.js";
+import { aside, button, choice, h, icon, put, stack, style, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf, Pictures, skinsOf } from "../skin.js";
@@ -116,7 +116,7 @@ class TakeawayPage {
       h(
         "div",
         { class: "take" },
-        h("div", { class: "stack" }, this.shown, this.noted, this.said, this.real, this.earlier),
+        stack(this.shown, this.noted, this.said, this.real, this.earlier),
         h(
           "div",
           { class: "stack side" },
@@ -132,11 +132,7 @@ class TakeawayPage {
             "panel whole",
             "whole",
             "The whole project",
-            h(
-              "p",
-              { class: "soft small" },
-              "One file with the picture and all tiles. It opens again here, and from Python.",
-            ),
+            aside("One file with the picture and all tiles. It opens again here, and from Python."),
             h(
               "a",
               { class: "button", href: `api/${this.place}/file`, download: true },

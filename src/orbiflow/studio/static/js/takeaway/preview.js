@@ -1,6 +1,6 @@
 /** What will be made, drawn small by what makes it, as soon as a setting changes. */
 
-import { h, put } from "../dom.js";
+import { h, put, stack } from "../dom.js";
 
 const PATIENCE = 1500; // ms after which a drawing that is no longer wanted is given up
 const SIDES = [480, 1000]; // pixels: soon, then in detail
@@ -21,7 +21,7 @@ export class Preview {
     this.told = told;
     this.says = h("p", { class: "soft small", "aria-live": "polite" });
     this.image = h("div", { class: "live" }, meanwhile);
-    this.root = h("div", { class: "stack" }, this.image, this.says);
+    this.root = stack(this.image, this.says);
     this.wanted = "";
     /** @type {AbortController | null} */
     this.running = null;

@@ -1,6 +1,6 @@
 /** Share a tile: by a link that carries it, on the clipboard, on paper. */
 
-import { button, h, toast, trying } from "../dom.js";
+import { aside, button, h, row, toast, trying } from "../dom.js";
 import { copied, printed, svgOf } from "../svg.js";
 import { Camera, Tiling } from "../tiling.js";
 
@@ -45,14 +45,10 @@ export function share(api, project, card, seen) {
     "section",
     { class: "panel stack share", "aria-labelledby": "share" },
     h("h2", { id: "share" }, "Share it"),
-    h(
-      "p",
-      { class: "soft small" },
+    aside(
       "The link holds the tile itself. For someone without a studio, make “A page to share” above.",
     ),
-    h(
-      "div",
-      { class: "row" },
+    row(
       button("Copy link", () => trying(link), { image: "copy" }),
       button("Copy as SVG", () => trying(paste), { image: "copy" }),
       button("Print", () => print(), { image: "picture" }),

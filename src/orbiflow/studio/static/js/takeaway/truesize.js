@@ -1,6 +1,6 @@
 /** The tile as large as it will be, on a screen that was measured with a bank card. */
 
-import { button, h, put, slider } from "../dom.js";
+import { button, h, put, row, slider } from "../dom.js";
 import { figuresOf, pathOf } from "../tiling.js";
 
 const CARD = [85.6, 53.98]; // mm: ISO/IEC 7810 ID-1
@@ -132,13 +132,9 @@ export function trueSize(tile) {
     { class: "stack", hidden: true },
     card,
     fit,
-    h(
-      "div",
-      { class: "row" },
-      button("That fits", () => {
-        tools.hidden = true;
-      }, {}),
-    ),
+    row(button("That fits", () => {
+      tools.hidden = true;
+    }, {})),
   );
   const measure = button("Measure my screen", () => {
     tools.hidden = !tools.hidden;
@@ -227,7 +223,7 @@ export function trueSize(tile) {
       "aria-label": "The tile in its true size",
     }, canvas),
     thin,
-    h("div", { class: "row" }, said, h("span", { class: "grow" }), measure),
+    row(said, h("span", { class: "grow" }), measure),
     tools,
   );
   return {
