@@ -1,11 +1,12 @@
 /** The tile as large as it will be, on a screen that was measured with a bank card. */
 
 import { button, h, put, row, slider } from "../dom.js";
-import { figuresOf, pathOf } from "../tiling.js";
+import { figuresOf, measured, pathOf } from "../tiling.js";
 
 const CARD = [85.6, 53.98]; // mm: ISO/IEC 7810 ID-1
 const KEY = "orbiflow.px-per-mm";
 const USUAL = 96 / 25.4; // what CSS takes a millimetre for
+const WIDEST_NECK = 0.5; // in square roots of the area: what is wider is no neck, but the whole tile
 const NECK = 9; // pixels of the circle around a narrow place
 const ROOM = 150; // pixels of a tile beside whose circle there is room for words
 
@@ -110,11 +111,12 @@ export function trueSize(tile) {
   const { long, short, corners } = figures.reduce((a, b) => (b.long > a.long ? b : a));
   const polygon = figures.flatMap((figure) => figure.polygon);
   const length = ([[a, b], [c, d]]) => Math.hypot(c - a, d - b);
-  const neck = figures.map((figure) => figure.neck).filter(Boolean)
-    .reduce((a, b) => (a && length(a) <= length(b) ? a : b), null);
+  const neck = figures.filter((own) =>
+    own.neck && length(own.neck) <= WIDEST_NECK * Math.sqrt(measured(own.polygon).area)
+  ).map((own) => own.neck).reduce((a, b) => (a && length(a) <= length(b) ? a : b), null);
   const canvas = h("canvas", { class: "true-tile", role: "img" });
   const said = h("p", { class: "soft small" });
-  const thin = h("p", { class: "small" });
+  const thin = h("p", { class: "small", hidden: !neck });
   const card = h("div", { class: "bank-card", "aria-hidden": "true" }, h("span", {}, "bank card"));
   let [size, least] = [40, 0];
   const fit = slider("Make this as large as a bank card held to the screen", {
@@ -209,8 +211,8 @@ export function trueSize(tile) {
         getComputedStyle(canvas).getPropertyValue(narrow && name === "--ink" ? "--bad" : name),
     );
     thin.classList.toggle("notice", narrow);
-    thin.textContent = `Its thinnest part, in the circle, is ${words} wide.${
-      narrow ? " It may break there: choose a longer tile." : ""
+    thin.textContent = `Its narrowest neck between two parts, in the circle, is ${words} wide${
+      narrow ? ": it may break there. Choose a longer tile." : "; tips may be thinner."
     }`;
   }
   const root = h("div", { class: "stack" });
