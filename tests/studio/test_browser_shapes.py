@@ -63,11 +63,21 @@ def test_shape_is_chosen_and_opened(page: Any, studio: RunningStudio) -> None:
         page.keyboard.press(key)
     page.wait_for_url(lambda url: not url.endswith(f"/{first['id']}"))
     assert len(studio.project(own)["tiles"]) == 2
-    pulled_url = page.url
+    pulled_url, pull = page.url, int(page.url.rsplit("/", 1)[1])
     page.get_by_role("button", name="Lay the copies another way").click()
     page.locator(".shapes button", has_text="IH5 ·").click()
     page.wait_for_url(lambda url: url != pulled_url)
     last = int(page.url.rsplit("/", 1)[1])
     assert {card["id"]: card["class_name"] for card in studio.project(own)["tiles"]}[last] == "IH5"
     page.wait_for_selector("[data-ready=pull]")  # nothing is still asked of what goes now
+    notes = [studio.client.get(f"projects/{own}/tiles/{k}").json()["notes"] for k in (last, pull)]
+    assert not any("silhouette" in text for text in [*notes[0], *notes[1]])  # there was none
+    page.goto(f"/#/p/{own}")
+    page.get_by_text("1 tile and 2 pulled versions. Each one covers the plane").wait_for()
+    assert page.locator(".stars").inner_text() == page.locator(".word").inner_text() == ""
+    for words in ("Search", "More like this"):
+        assert not page.get_by_role("button", name=words).is_visible()
+    assert not page.get_by_text("How long").is_visible()
+    page.get_by_role("link", name="Picture").click()
+    page.get_by_role("button", name="Choose a picture").wait_for()
     studio.client.delete(f"projects/{own}").raise_for_status()

@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.studio.share_link import NO_PICTURE
 from orbiflow.tiles import (
     Bending,
     EscherTile,
@@ -357,6 +358,9 @@ def moved_figure(
         notes=(note,),
         likeness=likeness,
     )
+    source = (before.silhouette or {}).get("source", NO_PICTURE)
+    if before.bending is None and source == NO_PICTURE:
+        return found  # nothing lies on it
     if before.bending is None:
         from orbiflow.tiles import with_map  # which needs torch
 

@@ -34,6 +34,7 @@ ENTRY = (
 )
 LOOK = ("palette", "custom", "line")
 MEASURES = ("bent", "metrics", "recognisability", "thinnest")
+NO_PICTURE = "shared"  # the source of a tile that comes without its silhouette
 DIGITS = 12  # of coordinates: rounding stays far below what a certificate allows
 DAMAGED = "the link is damaged or cut off; copy all of it again"
 
@@ -104,7 +105,7 @@ def write_linked(text: str, out: Path) -> None:
     project = {"format": FORMAT, "name": name, "kind": "tile", "view": view, "tiles": [{"id": 1}]}
     result = {
         "schema_version": told.get("schema"),
-        "input": {"source": "shared", "y_down": bool(told.get("y_down"))},  # it names no file
+        "input": {"source": NO_PICTURE, "y_down": bool(told.get("y_down"))},
         "tiles": [{key: own for key, own in told["tile"].items() if key in ENTRY}],
     }
     with zipfile.ZipFile(out, "w") as archive:

@@ -31,15 +31,13 @@ def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
         number: Its number in the studio.
         stage: How far its search is: sketch, better, final.
     """
-    rating = tile.rating or Rating(1)
     shown = tiling_json(tile.tiling, colouring(tile.tiling), y_down=tile.y_down)
     shown["group"]["name"] = tile.group_name
     card = {
         "id": number,
         "class_name": tile.isohedral_class,
         "stage": stage,
-        "stars": rating.stars,
-        "word": rating.word,
+        **_rated(tile.rating),
         "score": tile.score if tile.score == tile.score else 0.0,
         "arrangement": tile.arrangement,
         "certified": tile.certificate.valid,
@@ -51,12 +49,17 @@ def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
         card["figures"] = [
             {
                 "name": part.figure.name,
-                "stars": (part.figure.rating or rating).stars,
+                "stars": _rated(part.figure.rating or tile.rating)["stars"],
                 **_outline(part.prototile.polygon),
             }
             for part in tile.parts
         ]
     return card
+
+
+def _rated(rating: Rating | None) -> dict[str, Any]:
+    """Return the stars and the word of a rating; none for a tile that is like no picture."""
+    return {"stars": rating.stars if rating else 0, "word": rating.word if rating else ""}
 
 
 def _outline(ring: Array) -> dict[str, Any]:

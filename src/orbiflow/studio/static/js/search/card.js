@@ -94,11 +94,15 @@ export function cardView(project, actions) {
       put(
         versions,
         group.map(({ id, parent }, k) =>
-          button(parent ? `Pulled ${k || ""}`.trim() : "As found", () => {
-            chosen = id;
-            update(group, colours);
-            /** @type {HTMLElement} */ (versions.querySelector("[aria-pressed=true]")).focus();
-          }, { kind: "quiet", "aria-pressed": String(id === chosen) })
+          button(
+            parent ? `Pulled ${k || ""}`.trim() : project.silhouette ? "As found" : "First",
+            () => {
+              chosen = id;
+              update(group, colours);
+              /** @type {HTMLElement} */ (versions.querySelector("[aria-pressed=true]")).focus();
+            },
+            { kind: "quiet", "aria-pressed": String(id === chosen) },
+          )
         ),
       );
     }
@@ -135,7 +139,7 @@ export function cardView(project, actions) {
       "aria-label",
       `Open: ${about}. ${starWords(card)}. Class ${card.class_name}.`,
     );
-    more.hidden = Boolean(card.figures) !== Boolean(project.second);
+    more.hidden = !project.silhouette || Boolean(card.figures) !== Boolean(project.second);
     more.setAttribute("aria-label", `More like this: ${about}`);
     take.setAttribute("aria-label", `Take away: ${about}`);
     if (anew) paint();

@@ -206,7 +206,8 @@ class SearchPage {
     this.again.lastChild.textContent = task ? "Search again" : "Search";
     if (busy === this.busy) return;
     this.turned = this.busy === undefined ? -Infinity : performance.now();
-    this.busy = this.again.hidden = this.panel.hidden = busy;
+    this.busy = busy;
+    this.again.hidden = this.panel.hidden = busy || !this.project.silhouette;
     this.steer.root.hidden = !busy;
     /** @type {HTMLButtonElement} */
     const first = this.deeds.querySelector("button:not([hidden], [hidden] *)");
@@ -267,11 +268,12 @@ class SearchPage {
  * @param {Project} project
  * @param {number} tiles
  */
-function stateWords(task, { tiles: { length: every }, second }, tiles) {
+function stateWords(task, { tiles: { length: every }, second, silhouette }, tiles) {
   const pulled = every > tiles ? ` and ${number(every - tiles, "pulled version")}` : "";
+  const first = silhouette ? ", best first" : "";
   const found = `${
     number(tiles, "tile")
-  }${pulled}, best first. Each one covers the plane: we proved it.`;
+  }${pulled}${first}. Each one covers the plane: we proved it.`;
   if (!task) return tiles ? found : "Nothing has been searched yet.";
   if (task.state === "failed") return sentence(task.error);
   if (task.state === "waiting") {

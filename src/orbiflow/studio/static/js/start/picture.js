@@ -450,7 +450,13 @@ class PicturePage {
     const without = () => this.both.remove();
     return [
       error || h("p", { class: "soft" }, "There is no picture yet."),
-      h("p", {}, button("Choose another picture", () => trying(leave), { kind: "primary" })),
+      h(
+        "p",
+        {},
+        button(`Choose ${error ? "another" : "a"} picture`, () => trying(leave), {
+          kind: "primary",
+        }),
+      ),
       this.number > 0 && h("p", {}, button("Go on without it", without, { kind: "quiet" })),
     ];
   }
