@@ -277,9 +277,13 @@ def test_drawing_is_copied_and_printed(taking: Any) -> None:
     assert text.startswith("<svg ")
     assert text.count("<use ") > 20
     pdfium = pytest.importorskip("pypdfium2")
-    document = pdfium.PdfDocument(taking.pdf(format="A4"))
+    taking.emulate_media(color_scheme="dark")
+    taking.set_viewport_size({"width": 390, "height": 844})
+    document = pdfium.PdfDocument(taking.pdf(format="A4", print_background=True))
     assert len(document) == 1
     assert document[0].get_textpage().get_text_bounded().strip() == ""
+    pixels = np.asarray(document[0].render(scale=0.5).to_pil().convert("L"))
+    assert pixels[:, 20:-20].max(axis=1).min() > 100  # no row is dark all along
     assert taking.locator(".share").is_visible()
 
 
