@@ -241,7 +241,13 @@ def test_refusals_name_settings_in_plain_words(
 @pytest.mark.parametrize(
     ("operation", "settings", "name"),
     [
-        ("export", {"area": "80x60mm", "cut": "skeleton"}, "house-40mm.svg"),
+        ("export", {"area": "80x60mm", "cut": "skeleton"}, "house-skeleton-40mm.svg"),
+        ("export", {"area": "80x60mm", "purpose": "laser"}, "house-laser-40mm.svg"),
+        (
+            "export",
+            {"area": "80x60mm", "purpose": "laser", "cut": "jigsaw"},
+            "house-laser-jigsaw-40mm.svg",
+        ),
         ("export", {"area": "80x60mm", "purpose": "print"}, "house-print-40mm.pdf"),
         ("art", {"area": "60x40px"}, "house-picture.png"),
         ("art", {"area": "60x40px", "format": "svg"}, "house-picture.svg"),

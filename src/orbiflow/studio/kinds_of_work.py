@@ -182,10 +182,19 @@ def setting_words(error: SettingError, operation: Operation) -> str:
 
 
 def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str) -> str:
-    """Return a name for the file that a call with these settings writes, such as cat-laser-60mm.svg."""
+    """Return a name for the file that a call with these settings writes, such as cat-laser-60mm.svg.
+
+    What is drawn is named where it is not what the purpose usually has: cat-laser-jigsaw-60mm.svg.
+    """
     own = making_call(makes, settings, result).arguments["settings"]
+
+    def cut() -> str | None:
+        given = {"purpose": own.purpose} if own.purpose else {}
+        usual = making_call(makes, given, result).arguments["settings"].cut
+        return None if own.cut == usual else "filled" if own.cut == "none" else own.cut
+
     more = {
-        "export": lambda: [own.purpose, f"{own.tile_size:g}mm"],
+        "export": lambda: [own.purpose, cut(), f"{own.tile_size:g}mm"],
         "art": lambda: ["picture"],
         "solid": lambda: [own.kind],
         "build": lambda: [own.kind],
