@@ -62,19 +62,10 @@ class Closeup {
     this.keepLook = keeper(api, project);
     this.pull = { what: "outline", reach: 0.5, lattice: true, gives: false, ...kept.pull };
     this.penSettings = { ...PEN, ...kept.pen };
-    this.mode = kept.mode ?? "look";
+    this.mode = "look"; // not what it was: the first click of whoever comes back would draw
     this.lit = null;
     this.keep = newest(
-      () =>
-        api.patch(this.home, {
-          view: {
-            closeup: {
-              pull: this.pull,
-              pen: this.penSettings,
-              mode: this.mode,
-            },
-          },
-        }),
+      () => api.patch(this.home, { view: { closeup: { pull: this.pull, pen: this.penSettings } } }),
       300,
     );
     this.keepDrawing = newest((drawing) => api.patch(this.home, { view: { drawing } }), 500);
@@ -241,7 +232,6 @@ class Closeup {
     if (mode !== "look" && this.look.share < 1) this.#change({ share: 1 });
     this.#panels();
     if (mode === "pull") this.#ready();
-    this.keep();
     this.stage.redraw();
   }
 
