@@ -3,8 +3,9 @@
 import { lineInto } from "../skin.js";
 import { simplified } from "./lines.js";
 
-const CELLS = 260; // along the longer side of a tile
-const UNDER = 2; // cells by which a part goes on under the lines around it
+const CELLS = 520; // along the longer side of a tile
+const UNDER = 3; // cells by which a part goes on under the lines around it
+const TIP = 60; // of 255, how much of a cell is in the tile, so that sharp tips count
 
 /** Which cells can be reached from one without crossing what is dark, and some around them. */
 function reached(light, wide, from) {
@@ -90,7 +91,9 @@ export function partAround({ polygon, path }, lines, place) {
     if (!rings) lineInto(context, points, "#000", Math.max(width, 1.5 / scale));
   }
   const { data } = context.getImageData(0, 0, wide, high);
-  const light = new Uint8Array(wide * high).map((_, cell) => Number(data[4 * cell] > 127));
+  const light = new Uint8Array(wide * high).map((_, cell) =>
+    Number(data[4 * cell] > 127 && data[4 * cell + 3] > TIP)
+  );
   const [x, y] = [[place[0], left], [place[1], top]].map(([at, least]) =>
     Math.floor((at - least) * scale + pad)
   );

@@ -1,6 +1,6 @@
 /** The controls for colours, outline, artwork and symmetry. */
 
-import { button, choice, h, put, slider, stack, unique } from "../dom.js";
+import { aside, button, choice, h, put, slider, stack, unique } from "../dom.js";
 import { kindsOf, signInto } from "./signs.js";
 
 export const HELP = {
@@ -34,7 +34,7 @@ const TOOLS = [
 const USES = {
   pencil: ["colour", "size", "mirror"],
   line: ["colour", "size", "mirror"],
-  fill: ["colour"],
+  fill: ["colour", "fill"],
   eye: ["eye", "mirror"],
   rubber: [],
 };
@@ -353,6 +353,7 @@ export function penPanel(pen, change, clear, drawn, show) {
     colour: swatches,
     size: size("Size of the brush", "size", 0.004, 0.12),
     eye: size("Size of an eye", "eye", 0.015, 0.15),
+    fill: aside("It fills what your lines and the outline bound, and covers the picture there."),
     mirror: check("The same on the other side", pen.mirror, (mirror) => change({ mirror })),
   };
   const fit = (tool) => {
