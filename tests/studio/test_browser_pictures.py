@@ -175,3 +175,38 @@ def test_a_preview_follows_each_setting(page: Any, coloured: str, tile: int) -> 
     changed(lambda: page.get_by_role("radio", name="Animation").check())
     page.get_by_text("One moment of the animation").wait_for()
     page.wrong[:] = [said for said in page.wrong if "422" not in said]
+
+
+def test_the_new_file_is_what_comes_next_until_something_is_changed(
+    page: Any, coloured: str, tile: int
+) -> None:
+    page.goto(f"/#/p/{coloured}/take/{tile}")
+    page.locator(".live img").wait_for()
+    make = page.get_by_role("button", name="Make it")
+    make.press("Enter")
+    file = page.locator(".said a")
+    file.wait_for()
+    assert file.evaluate("link => link === document.activeElement")
+    assert page.locator(".earlier a").count() == 0
+    page.get_by_label("What is it for?").select_option("laser")
+    page.get_by_text("You changed something since").wait_for()
+    assert file.count() == 0
+    assert page.locator(".earlier a").count() == 1
+    assert page.evaluate(  # the form comes before what was made
+        """() => {
+            const [kinds, made] = [".wishes input", ".earlier a"].map((own) =>
+                document.querySelector(own));
+            return Boolean(kinds.compareDocumentPosition(made) & Node.DOCUMENT_POSITION_FOLLOWING);
+        }"""
+    )
+
+
+def test_what_will_be_made_stays_in_view(page: Any, coloured: str, tile: int) -> None:
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.goto(f"/#/p/{coloured}/take/{tile}")
+    page.get_by_label("What is it for?").select_option("laser")
+    page.locator("details").evaluate_all("all => all.forEach((own) => { own.open = true; })")
+    page.locator(".live img").wait_for()
+    page.locator("details:visible").last.scroll_into_view_if_needed()
+    assert page.evaluate("scrollY") > 300
+    assert page.locator(".preview").bounding_box()["y"] >= 0

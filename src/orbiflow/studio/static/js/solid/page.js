@@ -82,7 +82,7 @@ class SolidPage {
             this.stage.root,
             mesh.notes.length > 0 && notes,
             this.others,
-            this.takeaway.earlier,
+            this.takeaway.making.earlier,
           ),
           h(
             "div",
@@ -136,7 +136,7 @@ class SolidPage {
     if (this.said.textContent !== words) this.said.textContent = words;
     this.said.classList.toggle("error", task?.state === "failed");
     search.update(task, solids.length > 0);
-    takeaway.tell();
+    takeaway.making.tell();
     this.others.hidden = this.facts.hidden = takeaway.root.hidden = !own;
     const told = JSON.stringify([own?.id, solids.map(({ id }) => id)]);
     if (told === this.told) return;

@@ -1,6 +1,7 @@
-/** What was made of a tile: its files, a picture of it, what is to be said. */
+/** What is made of a tile: the button, its files, a picture of it, what is to be said, what was made before. */
 
-import { h, icon, row } from "../dom.js";
+import { button, h, icon, put, row, trying } from "../dom.js";
+import { LATE } from "../steering.js";
 import { ago, alive, bytes, capital, sentence } from "../words.js";
 import { EVERY_KIND as KINDS, lengthIn } from "./kinds.js";
 
@@ -17,13 +18,8 @@ const address = ({ result }, name) =>
 export const isMade = (task) =>
   Boolean(KINDS[task?.operation] && task.state === "done" && task.result?.files?.length);
 
-/**
- * Links to the files that a task has made.
- *
- * @param {Task} task
- * @param {string} kind
- */
-export function files(task, kind) {
+/** Links to the files that a task has made. */
+function files(task, kind) {
   return task.result.files.map(({ name, bytes: size }) =>
     h(
       "a",
@@ -52,12 +48,11 @@ export function picture(task) {
 }
 
 /**
- * What there is to say of a task; `stale`: whether its settings were changed since.
+ * What there is to say of a task.
  *
  * @param {Task | null} task
- * @param {boolean} stale
  */
-export function words(task, stale) {
+function words(task) {
   if (alive(task)) {
     return [
       h(
@@ -75,7 +70,6 @@ export function words(task, stale) {
   return [
     notes.length > 0 &&
     h("ul", { class: "notice" }, notes.map((text) => h("li", {}, sentence(text)))),
-    stale && h("p", { class: "soft" }, "You changed something since. Make it again to have it."),
     row(files(task, "primary")),
   ];
 }
@@ -106,13 +100,9 @@ function about({ operation, result }) {
   ].filter(Boolean).join(" · ");
 }
 
-/**
- * A list of what was made before.
- *
- * @param {Task[]} tasks
- */
-export function madeBefore(tasks) {
-  return h(
+/** A list of what was made before. */
+const madeBefore = (tasks) =>
+  h(
     "ul",
     { class: "made" },
     tasks.map((task) =>
@@ -125,4 +115,89 @@ export function madeBefore(tasks) {
       )
     ),
   );
+
+/** A button that makes things, what it has to say, and what was made `earlier`. */
+export class Making {
+  /** @type {Task | null} */
+  task = null; // the one whose result is shown
+  stale = false; // whether settings were changed since
+  busy = false;
+  turned = -Infinity; // when the button last changed its meaning
+
+  /**
+   * `asked()` gives the operation and settings; `refused(setting, text)` says where they are wrong, if it can;
+   * `show(task)` shows what was made, or with null what may be.
+   *
+   * @param {Api} api
+   * @param {Project} project
+   * @param {{ asked(): [string, object], refused(setting: string, text: string): boolean, show(task: Task | null): void }} on
+   */
+  constructor(api, project, on) {
+    this.api = api;
+    this.project = project;
+    this.on = on;
+    this.make = button("Make it", () => trying(() => this.press()), { kind: "primary big" });
+    this.said = h("div", { class: "stack said", role: "status" });
+    this.before = h("div");
+    this.earlier = h(
+      "section",
+      { class: "stack earlier", "aria-labelledby": "earlier" },
+      h("h2", { id: "earlier" }, "Made before"),
+      this.before,
+    );
+  }
+
+  /** Something else is asked for now. */
+  change() {
+    this.stale = true;
+    this.tell();
+  }
+
+  /** Make it, or stop what is being made. */
+  async press() {
+    if (performance.now() - this.turned < LATE) return; // meant for what the button said before
+    if (alive(this.task)) {
+      await this.api.post(`tasks/${this.task.id}/cancel`);
+      return;
+    }
+    try {
+      await this.submit(...this.on.asked());
+    } catch (error) {
+      if (!this.on.refused(error.setting, error.message)) throw error;
+    }
+  }
+
+  async submit(operation, settings) {
+    const body = { operation, settings };
+    this.task = (await this.api.post(`projects/${this.project.id}/tasks`, body)).task;
+    [this.stale, this.news] = [false, true];
+    this.tell();
+  }
+
+  /** Show how far it is, or what was made: the new file is what whoever waits for it meets next. */
+  tell() {
+    const { tasks } = this.project;
+    this.task = tasks.find(({ id }) => id === this.task?.id) ?? this.task; // as the events have told
+    const [made, busy] = [isMade(this.task), alive(this.task)];
+    const [old, done] = [this.stale && !busy, made && !this.stale ? this.task : null];
+    if (busy !== this.busy) [this.busy, this.turned] = [busy, performance.now()];
+    this.make.lastChild.textContent = busy ? "Stop" : made && old ? "Make it again" : "Make it";
+    const before = tasks.filter((task) => isMade(task) && task.id !== done?.id);
+    const told = JSON.stringify([this.task, old, before.map(({ id }) => id)]);
+    if (told === this.told) return; // what has the focus stays
+    this.told = told;
+    put(
+      this.said,
+      !old
+        ? words(this.task)
+        : made && h("p", { class: "soft" }, "You changed something since: see “Made before”."),
+    );
+    this.earlier.hidden = !before.length;
+    put(this.before, madeBefore(before));
+    if (done?.id !== this.seen) this.on.show(done);
+    this.seen = done?.id;
+    if (!done || !this.news) return;
+    this.news = false;
+    if (document.activeElement === this.make) this.said.querySelector("a").focus();
+  }
 }

@@ -2,15 +2,14 @@
 
 import { Carry } from "../closeup/carry.js";
 import { drawnOn, marksOf } from "../closeup/drawn.js";
-import { aside, button, choice, h, icon, put, stack, style, trying } from "../dom.js";
+import { aside, choice, h, icon, put, stack, style, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf, Pictures, skinsOf } from "../skin.js";
 import { figuresOf, paintCard } from "../tiling.js";
-import { LATE } from "../steering.js";
-import { alive, sentence } from "../words.js";
+import { sentence } from "../words.js";
 import { COLOURLESS, colours, KINDS, lengthIn } from "./kinds.js";
-import { isMade, madeBefore, picture, words } from "./made.js";
+import { Making, picture } from "./made.js";
 import { Preview } from "./preview.js";
 import { share } from "./share.js";
 import { trueSize } from "./truesize.js";
@@ -67,10 +66,15 @@ class TakeawayPage {
     /** @type {TileView | null} */
     this.view = null;
     this.schemas = new Map();
-    this.task = null; // the one whose result is shown
-    this.stale = false; // whether settings were changed since
-    this.busy = false;
-    this.turned = -Infinity; // when the button last changed its meaning
+    this.making = new Making(api, project, {
+      asked: () => [this.kind, this.settings()],
+      refused: (setting, text) => this.form.refuse(setting, text),
+      show: (task) => {
+        put(this.shown, (task && picture(task)) || this.live.root);
+        this.paint();
+        if (task) this.shown.scrollIntoView({ block: "nearest" });
+      },
+    });
   }
 
   build(root) {
@@ -90,18 +94,14 @@ class TakeawayPage {
     );
     this.shown = h("div", { class: "preview" }, this.live.root);
     this.noted = h("ul", { class: "notice", hidden: true });
-    this.said = h("div", { class: "stack said", role: "status" });
     this.size = trueSize(this.card);
     this.real = section("panel real", "true", "In its true size", this.size.root);
-    this.before = h("div");
-    this.earlier = section("earlier", "earlier", "Made before", this.before);
     this.wishes = h("div", { class: "stack" });
     this.shared = share(this.api, this.project, this.card, () => ({
       look: this.look,
       palette: paletteOf(this.look, this.about),
       skins: (tiling, scale) => this.skins(tiling, scale),
     }));
-    this.make = button("Make it", () => trying(() => this.press()), { kind: "primary big" });
     /** @type {[string, string, any][]} */
     const kindChoices = Object.entries(KINDS).map(([key, { title, image }]) => [key, title, image]);
     const kinds = choice(
@@ -116,7 +116,6 @@ class TakeawayPage {
       h(
         "div",
         { class: "take" },
-        stack(this.shown, this.noted, this.said, this.real, this.earlier),
         h(
           "div",
           { class: "stack side" },
@@ -125,7 +124,7 @@ class TakeawayPage {
             { class: "panel stack wishes" },
             kinds,
             this.wishes,
-            h("div", { class: "go" }, this.make),
+            h("div", { class: "go" }, this.making.make),
           ),
           this.shared.root,
           section(
@@ -141,7 +140,9 @@ class TakeawayPage {
             ),
           ),
         ),
+        stack(this.shown, this.noted, this.making.said, this.real),
       ),
+      this.making.earlier,
     );
     this.listen();
   }
@@ -149,7 +150,7 @@ class TakeawayPage {
   listen() {
     this.watch = new ResizeObserver(() => this.paint());
     this.watch.observe(this.shown);
-    const tell = () => this.tell();
+    const tell = () => this.making.tell();
     const gone = ({ tile }) => {
       if (tile === this.card.id) this.navigate(`p/${this.project.id}`);
     };
@@ -167,6 +168,7 @@ class TakeawayPage {
 
   /** What the preview has to say: why it cannot be made, or what is to be known of it. */
   heard(error, notes) {
+    this.noted.classList.remove("past");
     if (error && this.form.refuse(error.setting, error.message, false)) return;
     const words = error ? [error.message] : notes;
     this.noted.hidden = !words.length;
@@ -225,9 +227,8 @@ class TakeawayPage {
       this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)),
       this.form,
     );
-    this.task = null;
+    this.making.task = null;
     this.changed();
-    this.tell();
   }
 
   /** What can be laid on the tiles: {name, box, text} of each. */
@@ -297,15 +298,15 @@ class TakeawayPage {
     may(box, !plain && (holds || this.project.input?.type === "svg"));
   }
 
-  /** Show the size at once; what was made before is no longer what is asked for. */
+  /** Show the size at once; what was said or made before is no longer what is asked for. */
   changed() {
     this.fitLayers();
     const size = lengthIn(this.form.now("tile_size"));
     this.real.hidden = !(size && KINDS[this.kind].solid);
     if (!this.real.hidden) this.size.show(size, this.form.now("warn_neck"));
-    this.stale = true;
-    this.live.ask(this.kind, this.settings(), KINDS[this.kind].title.toLowerCase());
-    this.tell();
+    const title = KINDS[this.kind].title.toLowerCase();
+    if (this.live.ask(this.kind, this.settings(), title)) this.noted.classList.add("past");
+    this.making.change();
   }
 
   /** What is to be made, as the server takes it. */
@@ -316,50 +317,5 @@ class TakeawayPage {
     const chosen = { tile: this.card.id, ...Object.fromEntries(layers), ...this.form.values() };
     const isTinted = chosen.picture && [undefined, "none"].includes(this.form.now("cut"));
     return isTinted ? { ...chosen, tint: this.look.tint } : chosen;
-  }
-
-  /** Make it, or stop what is being made. */
-  async press() {
-    if (performance.now() - this.turned < LATE) return; // meant for what the button said before
-    if (alive(this.task)) {
-      await this.api.post(`tasks/${this.task.id}/cancel`);
-      return;
-    }
-    const settings = this.settings();
-    try {
-      this.task =
-        (await this.api.post(`${this.place}/tasks`, { operation: this.kind, settings })).task;
-    } catch (error) {
-      if (this.form.refuse(error.setting, error.message)) return;
-      throw error;
-    }
-    [this.stale, this.news] = [false, true];
-    this.tell();
-  }
-
-  /** Show how far it is, or what was made. */
-  tell() {
-    const { tasks } = this.project;
-    this.task = tasks.find(({ id }) => id === this.task?.id) ?? this.task; // as the events have told
-    const made = isMade(this.task);
-    const again = made && this.stale;
-    const busy = alive(this.task);
-    if (busy !== this.busy) [this.busy, this.turned] = [busy, performance.now()];
-    this.make.lastChild.textContent = busy ? "Stop" : again ? "Make it again" : "Make it";
-    const key = made && !this.stale ? this.task.id : null;
-    if (key !== this.seen) {
-      this.seen = key;
-      put(this.shown, (key && picture(this.task)) || this.live.root);
-      this.paint();
-      if (this.news) this.shown.scrollIntoView({ block: "nearest" });
-      this.news = false;
-    }
-    const before = tasks.filter((task) => isMade(task) && task.id !== this.task?.id);
-    const told = JSON.stringify([this.task, again, before.map(({ id }) => id)]);
-    if (told === this.told) return; // what has the focus stays
-    this.told = told;
-    put(this.said, words(this.task, again));
-    this.earlier.hidden = !before.length;
-    put(this.before, madeBefore(before));
   }
 }

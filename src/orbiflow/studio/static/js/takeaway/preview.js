@@ -27,15 +27,16 @@ export class Preview {
     this.running = null;
   }
 
-  /** Draw what these settings make; of several that are asked for meanwhile, the last. */
+  /** Draw what these settings make; of several that are asked for meanwhile, the last. False if they are drawn already. */
   ask(operation, settings, title) {
     const wanted = JSON.stringify({ operation, settings });
-    if (wanted === this.wanted) return;
+    if (wanted === this.wanted) return false;
     this.wanted = wanted;
     this.title = title;
     const late = this.running && performance.now() - this.began > PATIENCE;
     if (late) this.running.abort();
     if (!this.running || late) this.#draw(late);
+    return true;
   }
 
   async #draw(instead, detail = 0) {
