@@ -43,9 +43,25 @@ ON_THE_PAGE = {
 """What messages say of options and levels, once these are named, and what the page has for them."""
 
 
+IN_PLAIN_WORDS = {
+    r"line 1: .* is not a number of vertices, a vertex .*": (
+        "this is a text, not a picture or a polygon; choose a PNG, JPEG, WebP or SVG picture"
+    ),
+    r"the image is blank, every pixel .*": (
+        "the picture is empty, it has one colour all over; choose another one"
+    ),
+    r"averaged \d+ x \d+ pixels into one before tracing": "the picture was made smaller to read it",
+    r"shape taken: the opaque part \(.*?\)": "the shape is what is not transparent",
+    r" \([01][.]\d\d of 1\)": "",
+}
+"""What messages say in the words of image processing, as patterns, and what the page says instead."""
+
+
 def page_words(text: str) -> str:
     """Return a message in the page's own words.
 
+    >>> page_words("cat.png: the image is blank, every pixel has luminance 1.00; there is no shape")
+    'cat.png: the picture is empty, it has one colour all over; choose another one'
     >>> page_words(Advice("raise the contrast or try another {threshold}"))
     'raise the contrast or try another edge (Where it ends)'
     """
@@ -53,6 +69,8 @@ def page_words(text: str) -> str:
         text = text.named(lambda name: LABELS.get(name, name.replace("_", " ")))
     for words, meant in ON_THE_PAGE.items():
         text = text.replace(words, meant)
+    for pattern, meant in IN_PLAIN_WORDS.items():
+        text = re.sub(pattern, meant, text)
     return text
 
 
