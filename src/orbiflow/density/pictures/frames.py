@@ -163,9 +163,14 @@ def symbol(name: str) -> str:
 
 
 def axis_label(view: View, column: int) -> str:
-    """Return the name and the unit of an angle."""
+    """Return the name and the unit of an angle, which the name may have already."""
     name = cut(view.names[column], MAX_NAME)
-    return name if column in real_spans(view.space) else f"{name} ({view.space.unit or ''})"
+    has_unit = re.search(r"[(\[](deg|rad|turn|°)", name)
+    return (
+        name
+        if has_unit or column in real_spans(view.space)
+        else f"{name} ({view.space.unit or ''})"
+    )
 
 
 def shortened(label: str, side: float, sheet: Sheet) -> str:
