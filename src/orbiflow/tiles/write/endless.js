@@ -104,7 +104,9 @@ export async function showEndless({ title, tile, palettes, tint, outline, skins 
     const count = Math.max(used, palettes[k].colours.length);
     take(Array.from({ length: count }, (_, j) => fill(palettes[k], j)));
   };
-  at("palette").append(...palettes.map(({ name }, k) => new Option(name, String(k))));
+  at("palette").append(
+    ...palettes.map(({ name }, k) => new Option(name[0].toUpperCase() + name.slice(1), String(k))),
+  );
   at("palette").onchange = () => choose(Number(at("palette").value));
   at("order").onclick = () => take([...state.colours.slice(1), state.colours[0]]);
   at("turn").oninput = () => {
