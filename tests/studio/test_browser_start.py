@@ -160,14 +160,14 @@ def test_two_tabs_paint_on_one_picture(page, drawing, studio: RunningStudio) -> 
     other = page.context.new_page()
     other.goto(page.url)
     other.wait_for_selector(READ)
+    seen = "() => document.querySelector('canvas.reading').toDataURL()"
+    before = other.evaluate(seen)
     page.get_by_role("radio", name="Remove").check()
     page.get_by_role("radio", name="lasso").check()
     stroke(page, "canvas.reading", (0.3, 0.68), (0.6, 0.68), (0.6, 0.97), (0.3, 0.97))
     cut = studio.until(
         lambda: (area := area_of(studio.project(own))) < 0.95 * whole and area  # a leg is gone
     )
-    seen = "() => document.querySelector('canvas.reading').toDataURL()"
-    before = other.evaluate(seen)
     studio.until(lambda: other.wait_for_timeout(50) or other.evaluate(seen) != before)
     other.wait_for_selector(READ)
     other.get_by_role("radio", name="Add").check()
@@ -398,6 +398,44 @@ def test_a_project_is_deleted_when_the_page_is_left_unless_that_is_taken_back(
     page.get_by_role("button", name="Delete keep me", exact=True).click()
     page.reload()
     studio.until(lambda: not there(own))
+
+
+def test_no_table_no_project(page, studio: RunningStudio) -> None:
+    count = len(studio.client.get("projects").json())
+    page.goto("/")
+    page.get_by_role("button", name="Numbers instead of animals").click()
+    page.get_by_text("Drop a table here").wait_for()
+    page.go_back()
+    page.get_by_role("heading", name="Turn an animal into a tile").wait_for()
+    studio.until(lambda: len(studio.client.get("projects").json()) == count)
+
+
+def test_a_search_is_told_of_beside_the_picture_and_cards_stay_in_place(
+    page, drawing, studio: RunningStudio
+) -> None:
+    own = begun(page, drawing)
+    assert not page.get_by_text("A search is at work").is_visible()
+    tools = page.get_by_role("radio", name="Add")
+    before = tools.bounding_box()
+    page.locator("canvas.reading").evaluate(
+        """(canvas) => {
+            globalThis.places = [];
+            new MutationObserver(() => {
+                const { y } = document.querySelector(".tools").getBoundingClientRect();
+                globalThis.places.push(Math.round(y + scrollY));
+            }).observe(canvas, { attributes: true, attributeFilter: ["aria-busy"] });
+        }"""
+    )
+    page.get_by_label("Smoothing").press("ArrowRight")
+    studio.until(lambda: studio.project(own)["reading"]["smooth"])
+    page.wait_for_selector(SETTLED)
+    assert len(set(page.evaluate("globalThis.places"))) <= 1
+    assert tools.bounding_box() == before
+    task = {"id": 10**9, "operation": "search", "share": 0.4, "what": "", "error": None}
+    found = {**studio.project(own), "tasks": [{**task, "state": "running", "place": 0}]}
+    page.route(f"**/projects/{own}", lambda route: route.fulfill(json=found))
+    page.reload()
+    page.get_by_text("A search is at work").wait_for()
 
 
 def test_projects_stand_above_the_animals(page, studio: RunningStudio) -> None:

@@ -1,19 +1,18 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
-import { button, h, newest, put, stack, style, toast, trying, zooms } from "../dom.js";
+import { button, h, newest, put, row, soft, stack, style, toast, trying, zooms } from "../dom.js";
 import { sized } from "../tiling.js";
 import { wishes } from "../wishes.js";
 import { alive, sentence } from "../words.js";
 import { paintingControls, readingControls } from "./controls.js";
 import { findings } from "./findings.js";
-import { Marks } from "./marks.js";
+import { Kept, LAYERS } from "./kept.js";
 import { paintBrush, paintSilhouette, paintStrokes, tinted, touches } from "./overlay.js";
 import { pointing } from "./pointing.js";
 import { addSecond, bothPictures } from "./second.js";
 import { States } from "./states.js";
 import { View } from "./view.js";
 
-const LAYERS = ["mend", "pins", "emphasis"];
 /** @type {Reading} */
 const AS_FOUND = { threshold: null, invert: null, smooth: 0, thicken: 0 };
 const ONE_GO = 700; // ms between two moves of a slider that are undone together
@@ -59,7 +58,7 @@ class PicturePage {
     this.place = `projects/${project.id}`;
     this.pen = { tool: "add", shape: "brush", size: 4 };
     this.reading = { ...AS_FOUND, ...this.own.reading };
-    this.marks = new Marks(1, 1);
+    this.kept = new Kept(page, number, { own: () => this.own, began: (told) => this.began(told) });
     this.view = new View(1, 1);
     this.states = new States(this.state);
     /** @type {HTMLImageElement | undefined} */
@@ -67,15 +66,8 @@ class PicturePage {
     this.shown = ""; // the address of the picture
     this.tints = new Map(); // the marks in their colours, painted anew when strokes change
     this.known = 0; // strokes that the outline on the screen knows
-    this.sent = 0; // strokes that the server has
-    this.unsent = new Set();
-    this.sending = 0; // layers that are on their way
-    this.kept = this.masks; // of the server, that the marks began with or became
     this.read = newest(async () =>
       this.began(await api.put(`${this.place}/reading?number=${number}`, this.reading))
-    );
-    this.send = Object.fromEntries(
-      LAYERS.map((layer) => [layer, newest(() => this.upload(layer), 200)]),
     );
   }
 
@@ -90,16 +82,20 @@ class PicturePage {
       "div",
       { class: "stage", hidden: true },
       this.canvas,
-      zooms((by) => this.zoom(by), () => this.zoom(0)),
     );
+    this.busy = h("p", { class: "soft grow", role: "status" });
+    this.under = row(this.busy, zooms((by) => this.zoom(by), () => this.zoom(0)));
     this.heading = h("h1", { tabindex: "-1" }, this.title);
     this.said = h("div", { class: "said stack", role: "status" });
-    this.lead = h(
-      "p",
-      { class: "soft" },
-      "What has a green line around it is what we read. If something is missing or too much, mend it here.",
-    );
+    this.lead = h("p", { class: "soft" });
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
+    this.searches = h(
+      "p",
+      { role: "status", hidden: true },
+      "A search is at work: ",
+      h("a", { href: `#/p/${this.project.id}` }, "see its tiles"),
+      ".",
+    );
     this.both = bothPictures(this.page, this.number);
     this.back = button("Undo", () => this.go(-1), { kind: "quiet", image: "undo" });
     this.again = button("Redo", () => this.go(1), { kind: "quiet", image: "redo" });
@@ -109,9 +105,8 @@ class PicturePage {
     this.side = h(
       "div",
       { class: "stack side" },
-      h("div", { class: "go" }, this.find, this.wishes.effort),
+      h("div", { class: "go" }, this.find, this.searches, this.wishes.effort),
       this.both.root,
-      this.said,
       this.controls.root,
       paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]),
     );
@@ -120,7 +115,7 @@ class PicturePage {
       h(
         "div",
         { class: "picture" },
-        stack(this.heading, this.lead, this.stage, this.unread),
+        stack(this.heading, this.lead, this.stage, this.under, this.said, this.unread),
         this.side,
       ),
     );
@@ -200,47 +195,33 @@ class PicturePage {
       [this.picture, this.shown] = [image, silhouette.backdrop];
     }
     if (silhouette) await this.follow(silhouette);
-    this.known = Math.min(this.sent, this.marks.strokes.length);
-    [this.lead, this.stage, this.side].forEach((part) => {
+    this.known = Math.min(this.kept.sent, this.marks.strokes.length);
+    [this.lead, this.stage, this.under, this.side].forEach((part) => {
       part.hidden = !silhouette;
     });
+    this.lead.textContent = `What is ${
+      silhouette?.coloured ? "inside the green line" : "green"
+    } is what we read. If something is missing or too much, mend it here.`;
     this.unread.hidden = Boolean(silhouette);
     this.heading.textContent = this.title;
     this.tell();
   }
 
-  /** The addresses of what the server has of each layer. */
-  get masks() {
-    return LAYERS.map((layer) => this.own[layer] ?? null);
-  }
-
-  /** Whether the server has other marks than these, painted elsewhere. */
-  get isBehind() {
-    return !this.sending && String(this.masks) !== String(this.kept);
-  }
-
-  /** Begin with marks of the picture's size, those that the server has; what is not sent is painted over them. */
-  async follow({ width, height }) {
-    const other = this.marks.width !== width || this.marks.height !== height;
-    if (this.isBehind) Object.assign(this.project, await this.api.get(this.place)); // what is told may be older
-    if (!other && !this.isBehind) return;
-    const kept = this.kept = this.masks;
-    const marks = new Marks(width, height);
-    await Promise.all(
-      LAYERS.map((layer, k) =>
-        kept[k] && trying(() => marks.load(layer, kept[k], { both: layer === "mend" }))
-      ),
-    );
-    if (kept !== this.kept) return;
-    marks.strokes = [...this.unsent];
-    this.marks = marks;
-    this.sent = 0;
+  /** Show the marks that the server has, if they are others. */
+  async follow(silhouette) {
+    if (!(await this.kept.follow(silhouette))) return;
+    const { width, height } = silhouette;
     this.tints.clear();
     this.states = new States(this.state);
-    if (!other) return;
-    this.view = new View(width, height);
+    if (this.view.width !== width || this.view.height !== height) {
+      this.view = new View(width, height);
+    }
     this.stage.style.setProperty("--shape", `${width} / ${height}`);
     this.stage.style.setProperty("--ratio", String(width / height));
+  }
+
+  get marks() {
+    return this.kept.marks;
   }
 
   /** What can be undone: what is painted, and how the picture is read. */
@@ -348,8 +329,7 @@ class PicturePage {
       toast("Paint on the animal itself: that is outside of it.");
       return this.paint();
     }
-    this.marks.add(stroke);
-    this.unsent.add(stroke);
+    this.kept.add(stroke);
     this.states.add(this.state);
     this.slid = -Infinity;
     return this.changed(
@@ -361,25 +341,8 @@ class PicturePage {
   changed(layers) {
     this.tints.clear();
     this.known = Math.min(this.known, this.marks.strokes.length);
-    layers.forEach((layer) => this.send[layer]());
+    layers.forEach((layer) => this.kept.send[layer]());
     this.tell();
-  }
-
-  async upload(layer) {
-    const { strokes } = this.marks;
-    const address = `${this.place}/${layer}?number=${this.number}`;
-    this.sending += 1;
-    try {
-      const answer = this.marks.has(layer)
-        ? await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" }))
-        : await this.api.remove(address);
-      this.own[layer] = this.kept[LAYERS.indexOf(layer)] = answer.mask;
-      this.marks.of(layer, strokes).forEach((stroke) => this.unsent.delete(stroke));
-      if (layer === "mend") this.sent = strokes.length;
-      this.began(answer);
-    } finally {
-      this.sending -= 1;
-    }
   }
 
   startOver() {
@@ -409,6 +372,8 @@ class PicturePage {
     const busy = alive(task);
     const unread = !project.silhouette || (project.second && !project.second.silhouette);
     this.find.disabled = Boolean(unread || this.searching);
+    this.searches.hidden = !project.tasks.some((own) => own.operation === "search" && alive(own));
+    this.busy.textContent = busy ? "Reading it again …" : "";
     this.both.update();
     this.back.disabled = !this.states.can(-1);
     this.again.disabled = !this.states.can(1);
@@ -428,15 +393,12 @@ class PicturePage {
     if (silhouette) {
       put(
         this.said,
-        busy && h("p", { class: "soft" }, "Reading it again …"),
         error,
         findings(silhouette, (thicken) => this.controls.take({ thicken })),
       );
     } else {put(
         this.unread,
-        ...(this.project.tasks.some(alive)
-          ? [h("p", { class: "soft" }, "Reading the picture …")]
-          : this.nothing(error)),
+        ...(this.project.tasks.some(alive) ? [soft("Reading the picture …")] : this.nothing(error)),
       );}
   }
 
@@ -449,15 +411,14 @@ class PicturePage {
     };
     const without = () => this.both.remove();
     return [
-      error || h("p", { class: "soft" }, "There is no picture yet."),
+      error || soft("There is no picture yet."),
       h(
         "p",
-        {},
         button(`Choose ${error ? "another" : "a"} picture`, () => trying(leave), {
           kind: "primary",
         }),
       ),
-      this.number > 0 && h("p", {}, button("Go on without it", without, { kind: "quiet" })),
+      this.number > 0 && h("p", button("Go on without it", without, { kind: "quiet" })),
     ];
   }
 
@@ -465,7 +426,9 @@ class PicturePage {
   search() {
     this.searching = this.find.disabled = true;
     return trying(async () => {
-      await Promise.all([this.read, ...Object.values(this.send)].map((pending) => pending.done()));
+      await Promise.all(
+        [this.read, ...Object.values(this.kept.send)].map((pending) => pending.done()),
+      );
       await this.settled();
       await this.api.post(`${this.place}/tasks`, {
         operation: "search",
