@@ -229,14 +229,24 @@ def test_the_inside_is_pulled_and_the_outline_stays(closeup, studio, searched: s
     studio.client.patch(f"projects/{searched}", json={"view": {"closeup": {}}})
 
 
-def test_notes_of_the_tile_and_of_its_search_are_shown(page, searched: str, tile) -> None:
+def test_notes_of_the_tile_are_shown_and_none_of_the_whole_search(
+    page, studio: RunningStudio, searched: str, tile
+) -> None:
     def noted(route: Any) -> None:
         answer = route.fetch()
         route.fulfill(json={**answer.json(), "notes": ["its thinnest part was rounded off"]})
 
+    def searching(route: Any) -> None:
+        project = studio.project(searched)
+        for task in project["tasks"]:
+            task["result"] = {**(task["result"] or {}), "notes": ["rounded off in 1 of 9 tiles"]}
+        route.fulfill(json=project)
+
     page.route(f"**/tiles/{tile['id']}", noted)
+    page.route(f"**/projects/{searched}", searching)
     page.goto(f"/#/p/{searched}/t/{tile['id']}")
     page.get_by_text("Its thinnest part was rounded off").wait_for()
+    assert page.get_by_text("of 9 tiles").count() == 0
 
 
 def test_the_help_says_what_moves_the_view(closeup) -> None:

@@ -5,15 +5,16 @@ import { sentence } from "./words.js";
 const SVG = "http://www.w3.org/2000/svg";
 
 /**
- * Make an element. Attributes that are functions listen, `style` is an object, the rest is as in HTML.
+ * Make an element. Attributes, which may be left out, are as in HTML; functions listen, `style` is an object.
  *
  * @template {keyof HTMLElementTagNameMap} T
  * @param {T} tag
- * @param {Record<string, any>} [attributes]
+ * @param {any} [attributes]
  * @param {...Child} children
  */
 export function h(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
+  if (attributes?.constructor !== Object) [attributes, children] = [{}, [attributes, ...children]];
   for (const [name, value] of Object.entries(attributes)) {
     if (value === undefined || value === null || value === false) continue;
     if (typeof value === "function") made.addEventListener(name.replace(/^on/, ""), value);
@@ -30,6 +31,19 @@ export function h(tag, attributes = {}, ...children) {
 
 /** @param {...Child} words small print */
 export const aside = (...words) => h("p", { class: "soft small" }, ...words);
+/** @param {...Child} words what is less important */
+export const soft = (...words) => h("p", { class: "soft" }, ...words);
+/** A part of a page by its title's id. */
+export const section = (kind, id, title, ...parts) =>
+  h(
+    "section",
+    { class: `stack ${kind}`, "aria-labelledby": id },
+    h("h2", { id }, title),
+    ...parts,
+  );
+/** A part of a page, with a title. */
+export const panel = (title, ...parts) =>
+  h("section", { class: "panel stack" }, h("h2", title), ...parts);
 /** @param {...Child} parts one beside the other */
 export const row = (...parts) => h("div", { class: "row" }, ...parts);
 /** @param {...Child} parts one below the other */
@@ -63,6 +77,7 @@ const ICONS = {
   cut: "M6 6a2 2 0 1 0 .1 0zM6 14a2 2 0 1 0 .1 0zM8 9l12 9M8 15 20 6",
   picture: "M4 5h16v14H4zM4 16l5-5 4 4 3-3 4 4",
   solid: "m12 3 8 4.500v9L12 21l-8-4.500v-9zM12 12l8-4.500M12 12v9M12 12 4 7.500",
+  curve: "M3 17c4 0 5-11 9-11s5 11 9 11M3 20h18",
   film: "M4 5h16v14H4zM8 5v14M16 5v14M4 12h16",
 };
 
@@ -115,6 +130,15 @@ export const zooms = (zoom, fit) =>
     button("Fit", fit),
   );
 
+/** A box to tick. */
+export const check = (words, checked, onchange) =>
+  h(
+    "label",
+    { class: "check" },
+    h("input", { type: "checkbox", checked, onchange: ({ target }) => onchange(target.checked) }),
+    h("span", words),
+  );
+
 let count = 0;
 /**
  * A name that no other element of the page has.
@@ -150,9 +174,8 @@ export function choice(label, options, value, onchange, { unseen = false } = {})
     h("legend", { class: unseen && "unseen" }, label),
     h(
       "div",
-      {},
       options.map(([, words, image], k) =>
-        h("label", {}, boxes[k], h("span", {}, image && icon(image), words))
+        h("label", boxes[k], h("span", image && icon(image), words))
       ),
     ),
   );
@@ -217,7 +240,7 @@ export function toast(text, { bad = false } = {}) {
   const made = h(
     "div",
     { class: bad ? "toast bad" : "toast" },
-    h("span", {}, text),
+    h("span", text),
     h(
       "button",
       { type: "button", "aria-label": "Close", onclick: () => made.remove() },
@@ -236,7 +259,7 @@ export function toast(text, { bad = false } = {}) {
  */
 export const notes = (texts) =>
   texts.length > 0 &&
-  h("ul", { class: "said-notes soft small" }, texts.map((text) => h("li", {}, sentence(text))));
+  h("ul", { class: "said-notes soft small" }, texts.map((text) => h("li", sentence(text))));
 
 /**
  * Call a function that may fail; if it does, say why.
@@ -278,10 +301,8 @@ export function dialog(title, build) {
     made.append(
       h(
         "div",
-        {},
         h(
           "header",
-          {},
           h("h2", { id }, title),
           button("Close", () => close(), { kind: "quiet icon", image: "close" }),
         ),
@@ -303,10 +324,9 @@ export function dialog(title, build) {
 export function confirmed(title, text, verb) {
   return dialog(title, (close) =>
     stack(
-      h("p", {}, text),
+      h("p", text),
       h(
         "footer",
-        {},
         button("Keep it", () => close(false), { autofocus: true }),
         button(verb, () => close(true), { kind: "primary" }),
       ),

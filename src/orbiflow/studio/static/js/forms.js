@@ -116,7 +116,7 @@ function control(name, schema, words, changed) {
 
 /**
  * A form: the settings named in `first` on top, the rest folded away in their groups.
- * `words`: titles and the like by setting; `some` in them: texts to choose from; `not` in them: values of others with which it does not apply.
+ * `words`: titles and the like by setting; in them `some`: texts to choose from; `not`: values of others that rule it out.
  * `hidden`: settings that the page sets itself. `start`: values to begin with.
  * `.values()`: what differs from the defaults and applies. `.refuse(name, text)`: show what is wrong beside the
  * setting that the text begins with; false if it names none.
@@ -173,8 +173,7 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     [...groups].map(([group, own]) =>
       h(
         "details",
-        {},
-        h("summary", {}, group),
+        h("summary", group),
         stack(own.map((name) => controls.get(name).root)),
       )
     ),

@@ -25,6 +25,7 @@ const ROUTES = [
 
 const page = document.querySelector("#page");
 const bar = document.querySelector("#top");
+/** @type {() => any} */
 let close = () => {};
 /** @type {Feed | null} */
 let feed = null;
@@ -51,8 +52,9 @@ async function show() {
   const mine = (turn += 1);
   const [pattern, load, step] = ROUTES.find(([known]) => known.test(path)) ?? [null];
   const [, id, tileId] = pattern ? path.match(pattern) : [];
-  close();
+  const leave = close;
   close = () => {};
+  await leave();
   const root = h("div", { class: "page" });
   const waiting = setTimeout(
     () => put(page, h("p", { class: "lonely soft" }, "One moment …")),
@@ -85,8 +87,8 @@ async function show() {
         "div",
         { class: "lonely stack" },
         h("h1", { tabindex: "-1" }, "This page cannot be shown"),
-        h("p", {}, error.message),
-        h("p", {}, h("a", { href: "#/" }, "Back to the start")),
+        h("p", error.message),
+        h("p", h("a", { href: "#/" }, "Back to the start")),
       ),
     );
     head();
@@ -176,7 +178,7 @@ function drawBar(step, tile) {
         "a",
         { class: "brand", href: "#/", "aria-label": "orbiflow studio: start" },
         h("img", { src: "icon.svg", alt: "" }),
-        h("span", {}, "orbiflow"),
+        h("span", "orbiflow"),
       ),
       project && h("input", {
         class: "title",

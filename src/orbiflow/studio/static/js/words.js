@@ -27,6 +27,17 @@ export const STATES = {
   cancelled: "Stopped",
 };
 
+/** What there is to say of a task that waits, failed, or has been ended; undefined of others. */
+export function waitWords({ state, place, error }) {
+  if (state === "failed") return sentence(error);
+  if (state === "waiting") {
+    return place > 0
+      ? `Waiting: ${number(place, "other thing")} to do first.`
+      : "It starts in a moment.";
+  }
+  return ["done", "running"].includes(state) ? undefined : `${STATES[state]}.`;
+}
+
 /**
  * Whether a task may still do something.
  *

@@ -1,6 +1,6 @@
 /** The controls for colours, outline, artwork and symmetry. */
 
-import { aside, button, choice, h, put, slider, stack, unique } from "../dom.js";
+import { aside, button, check, choice, h, put, slider, soft, stack, unique } from "../dom.js";
 import { kindsOf, signInto } from "./signs.js";
 
 export const HELP = {
@@ -40,15 +40,6 @@ const USES = {
 };
 const PERCENT = (value) => `${Math.round(100 * value)} %`;
 
-function check(words, checked, onchange) {
-  return h(
-    "label",
-    { class: "check" },
-    h("input", { type: "checkbox", checked, onchange: ({ target }) => onchange(target.checked) }),
-    h("span", {}, words),
-  );
-}
-
 /**
  * Palettes as rows of swatches, and one of the user's own.
  *
@@ -83,7 +74,6 @@ export function colourPanel(about, look, needed, change) {
       labels.map(([words, value, set]) =>
         h(
           "label",
-          {},
           h("input", {
             type: "color",
             value,
@@ -93,16 +83,16 @@ export function colourPanel(about, look, needed, change) {
               change({ palette: "own" });
             },
           }),
-          h("span", {}, words),
+          h("span", words),
         )
       ),
     );
     wells.hidden = look.palette !== "own";
   };
-  const radio = (value, words, colours) =>
+  const radio = (value, words, colours = null) =>
     h(
       "label",
-      { class: "palette", title: words },
+      { class: colours ? "palette" : "palette own", title: words },
       h("input", {
         type: "radio",
         name,
@@ -115,32 +105,16 @@ export function colourPanel(about, look, needed, change) {
           drawWells();
         },
       }),
-      chips(colours),
+      colours ? chips(colours) : h("span", words),
     );
   const made = h(
     "fieldset",
-    {},
-    h("legend", {}, "Colours"),
+    h("legend", "Colours"),
     h(
       "div",
       { class: "palettes" },
       about.palettes.map((palette) => radio(palette.name, palette.name, palette.colours)),
-      h(
-        "label",
-        { class: "palette own" },
-        h("input", {
-          type: "radio",
-          name,
-          value: "own",
-          checked: look.palette === "own",
-          onchange: () => {
-            look.custom = own();
-            change({ palette: "own" });
-            drawWells();
-          },
-        }),
-        h("span", {}, "My own"),
-      ),
+      radio("own", "My own"),
     ),
     wells,
   );
@@ -221,14 +195,13 @@ export function signPanel(elements, look, change, light) {
         onclick: () => light(key),
       },
       canvas,
-      h("span", {}, h("strong", {}, name), h("span", { class: "small" }, says)),
+      h("span", h("strong", name), h("span", { class: "small" }, says)),
     );
-    list.append(h("li", {}, row));
+    list.append(h("li", row));
     requestAnimationFrame(draw);
   }
   const made = h(
     "div",
-    {},
     check("Show the symmetry", look.signs, (signs) => {
       list.hidden = !signs;
       change({ signs });
@@ -264,12 +237,10 @@ export function pullPanel(pull, change, back, hasInside, lay) {
         (what) => change({ what }),
         { unseen: true },
       ),
-    h(
-      "p",
-      { class: "soft" },
+    soft(
       inside
         ? "Take hold of an eye, a fin or anything inside and pull. The tile stays a tile."
-        : "Take hold of any point of the outline and pull. All copies follow, so there is never a gap.",
+        : "Take hold of any point of the outline and pull: all copies follow, without a gap.",
     ),
     slider("How far the pull reaches", {
       min: 0.1,
@@ -286,13 +257,13 @@ export function pullPanel(pull, change, back, hasInside, lay) {
       "p",
       { class: "small soft by-keys" },
       "By keyboard: click the picture or go to it with ",
-      h("kbd", {}, "Tab"),
+      h("kbd", "Tab"),
       ", choose a point with ",
-      h("kbd", {}, "←"),
+      h("kbd", "←"),
       " ",
-      h("kbd", {}, "→"),
+      h("kbd", "→"),
       ", move it with ",
-      h("kbd", {}, "Shift"),
+      h("kbd", "Shift"),
       " and arrows.",
     ),
     lay && button("Lay the copies another way …", lay),
@@ -319,8 +290,7 @@ export function penPanel(pen, change, clear, drawn, show) {
   });
   const swatches = h(
     "fieldset",
-    {},
-    h("legend", {}, "Colour"),
+    h("legend", "Colour"),
     h(
       "div",
       { class: "swatches" },
@@ -361,7 +331,7 @@ export function penPanel(pen, change, clear, drawn, show) {
   };
   fit(pen.tool);
   return stack(
-    h("p", { class: "soft" }, "Draw inside any tile: the same appears in all of them."),
+    soft("Draw inside any tile: the same appears in all of them."),
     choice("Draw with", TOOLS, pen.tool, (tool) => {
       fit(tool);
       change({ tool });
@@ -372,7 +342,7 @@ export function penPanel(pen, change, clear, drawn, show) {
       "p",
       { class: "small soft by-keys" },
       "By keyboard: move the pen with arrows, put it down and up with ",
-      h("kbd", {}, "Space"),
+      h("kbd", "Space"),
       ".",
     ),
     button("Clear the drawing", clear, { kind: "quiet", image: "bin" }),

@@ -9,6 +9,7 @@ import {
   newest,
   notes,
   put,
+  soft,
   stack,
   style,
   toast,
@@ -165,7 +166,7 @@ class Closeup {
     const side = h(
       "div",
       { class: "closeup-side" },
-      h("div", {}, this.heading, this.kind, this.noted),
+      h("div", this.heading, this.kind, this.noted),
       this.modes,
       this.panel,
       this.help,
@@ -195,7 +196,7 @@ class Closeup {
     this.kind.textContent = [named(view), view.class_name, view.group.name].filter(Boolean).join(
       " · ",
     );
-    this.#note();
+    put(this.noted, notes(view.notes ?? []));
     this.#proved();
     this.#panels();
     this.past.show(view, quiet);
@@ -350,7 +351,7 @@ class Closeup {
     this.signs?.light?.(key);
     const kind = key && kindsOf(this.view.elements).find((own) => own.key === key);
     this.hint.hidden = !kind || !this.stage.canvas.matches(":hover");
-    if (kind) put(this.hint, h("strong", {}, kind.name), h("span", {}, kind.says));
+    if (kind) put(this.hint, h("strong", kind.name), h("span", kind.says));
     this.stage.redraw();
   }
 
@@ -366,13 +367,6 @@ class Closeup {
     clearTimeout(this.calming);
     if (kind !== "checking") this.stop.hidden = true;
     if (kind === "refused") this.calming = setTimeout(() => this.#proved(), CALM);
-  }
-
-  /** All that is to be known of the tile, and of the work that made it. */
-  #note() {
-    const work = this.project.tasks.find(({ id }) => id === Math.floor(this.view.id / 1000));
-    const said = new Set([...(this.view.notes ?? []), ...(work?.result?.notes ?? [])]);
-    put(this.noted, said.size > 0 && notes([...said]));
   }
 
   /** How far the check of a pulled tile is; it can be stopped. */
@@ -411,7 +405,7 @@ class Closeup {
       "Lay the copies another way",
       (done) =>
         stack(
-          h("p", { class: "soft" }, "The outline stays as near to what it is as it can."),
+          soft("The outline stays as near to what it is as it can."),
           list(shapes, (own, parts) =>
             h("button", {
               type: "button",

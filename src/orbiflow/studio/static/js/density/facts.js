@@ -1,6 +1,6 @@
 /** Words about a fit: how well it fits, and what it is made of. */
 
-import { aside, h } from "../dom.js";
+import { aside, h, panel, soft } from "../dom.js";
 import { partBar } from "./watch.js";
 import { count, figure, PARTS, percent } from "./words.js";
 
@@ -16,26 +16,21 @@ export function likelihood(fit) {
   const which = rows === fit.rows
     ? `all ${count(rows)} rows`
     : `${count(rows)} of the ${count(fit.rows)} rows, drawn at random`;
-  return h(
-    "section",
-    { class: "panel stack" },
-    h("h2", {}, "How well it fits"),
+  return panel(
+    "How well it fits",
     h("p", { class: "big" }, `Rows are ${times(mean - uniform)} times as likely as by chance`),
     h(
       "p",
-      {},
       `Mean log density: ${
         figure(mean, 4)
       } nats, over ${which} that it was made from. If all places were alike it would be ${
         figure(uniform, 4)
       }.`,
     ),
-    h(
-      "p",
-      { class: "soft" },
+    soft(
       `The fairer test: ${count(kept)} rows were kept aside in turn while it was made. They were ${
         times(gain)
-      } times as likely as by chance (${figure(gain, 3)} nats).`,
+      } times as likely as by chance.`,
     ),
   );
 }
@@ -63,18 +58,15 @@ export function parts(fit) {
   );
   const idle = components.filter(({ share }) => !share).map(({ name }) => PARTS[name]?.[0] ?? name);
   if (weights?.uniform) used.push({ name: "uniform", share: weights.uniform });
-  return h(
-    "section",
-    { class: "panel stack" },
-    h("h2", {}, "What it is made of"),
+  return panel(
+    "What it is made of",
     h("ul", { class: "parts stack" }, used.map(said)),
     idle.length > 0 &&
       aside(`Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`),
     h(
       "details",
-      {},
-      h("summary", {}, "Notes of the fit"),
-      h("ul", { class: "notes soft small" }, notes.map((note) => h("li", {}, note))),
+      h("summary", "Notes of the fit"),
+      h("ul", { class: "notes soft small" }, notes.map((note) => h("li", note))),
     ),
   );
 }

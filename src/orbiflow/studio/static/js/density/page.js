@@ -117,7 +117,10 @@ export async function show(root, page) {
   build();
   complain();
   return () => {
+    // a project that nobody brought a table to is not kept
+    const empty = !state.table && !project.tasks.length;
     offs.forEach((off) => off());
     part?.stop?.();
+    return empty && api.remove(`projects/${project.id}`).catch(() => {});
   };
 }

@@ -1,7 +1,7 @@
 /** What a fit shows: the surface, the map, regions, an angle that is held, how well it fits, and files. */
 
 import { showSurface } from "../../api/density/surface.js";
-import { aside, choice, h, put, row, slider, stack, toast, trying, unique } from "../dom.js";
+import { aside, choice, h, put, row, slider, soft, stack, toast, trying, unique } from "../dom.js";
 import { likelihood, parts } from "./facts.js";
 import { Grid } from "./grid.js";
 import { dark, drawBar, drawCurve, FlatMap, painted, pale } from "./map.js";
@@ -41,11 +41,7 @@ export class Result {
     );
     put(
       root,
-      h(
-        "p",
-        { class: "soft" },
-        `${shape(fit.space, fit.columns.length)}. ${count(fit.rows)} rows of ${names}.`,
-      ),
+      soft(`${shape(fit.space, fit.columns.length)}. ${count(fit.rows)} rows of ${names}.`),
       ...panels,
     );
     await trying(async () => {
@@ -87,7 +83,7 @@ export class Result {
       h(
         "figure",
         { class: "panel stack" },
-        h("h2", {}, one ? "The curve" : "The map"),
+        h("h2", one ? "The curve" : "The map"),
         this.pairs,
         this.mapCanvas,
         !one && this.bar,
@@ -103,7 +99,7 @@ export class Result {
       h(
         "div",
         { class: "panel stack controls" },
-        h("div", {}, region, this.areaText),
+        h("div", region, this.areaText),
         !one && row(dotsLabel, fit.surface && surfaceLabel),
       ),
     );
@@ -131,7 +127,7 @@ export class Result {
     return h(
       "figure",
       { class: "panel stack" },
-      h("h2", {}, "The surface"),
+      h("h2", "The surface"),
       h("div", { class: "turned" }, this.surfaceCanvas),
       h(
         "p",
@@ -139,7 +135,7 @@ export class Result {
         "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again.",
       ),
       this.cut,
-      h("details", {}, h("summary", {}, "What am I looking at?"), this.caption),
+      h("details", h("summary", "What am I looking at?"), this.caption),
     );
   }
 
@@ -330,7 +326,7 @@ export class Result {
     return h(
       "section",
       { class: "panel grid" },
-      stack(h("h2", {}, "If you know one angle"), controls),
+      stack(h("h2", "If you know one angle"), controls),
       canvas,
     );
   }

@@ -1,6 +1,7 @@
 /** Choosing a table, and what is fitted to it. */
 
-import { aside, button, h, icon, put, row, stack, trying, unique } from "../dom.js";
+import { aside, button, h, icon, panel, put, row, soft, stack, trying, unique } from "../dom.js";
+import { bytes } from "../words.js";
 import { count, figure, SEEMS, shape, spaceOf, SPACES, UNITS } from "./words.js";
 
 const ENDINGS = ".csv,.tsv,.txt,.npy";
@@ -16,11 +17,7 @@ export function chooseTable(page, examples) {
   const take = (file) =>
     file && trying(async () => {
       if (file.size > page.about.limits.bytes) {
-        throw new Error(
-          `This file is too large: at most ${
-            Math.round(page.about.limits.bytes / 2 ** 20)
-          } MB are taken.`,
-        );
+        throw new Error(`At most ${bytes(page.about.limits.bytes)} are taken.`);
       }
       await api.put(
         `${path}/table?name=${encodeURIComponent(file.name)}`,
@@ -30,7 +27,7 @@ export function chooseTable(page, examples) {
   const input = h("input", {
     type: "file",
     id: unique("table"),
-    class: "unseen",
+    hidden: true,
     accept: ENDINGS,
     onchange: () => take(input.files[0]),
   });
@@ -38,12 +35,10 @@ export function chooseTable(page, examples) {
     "div",
     { class: "drop panel stack" },
     icon("upload"),
-    h("p", {}, "Drop a table here"),
+    h("p", "Drop a table here"),
     aside("CSV, TSV or .npy, with a row for each thing that you measured."),
-    h("div", {}, button("Choose a file", () => input.click(), { kind: "primary" }), input),
+    h("div", button("Choose a file", () => input.click(), { kind: "primary" }), input),
   );
-  input.tabIndex = -1;
-  input.setAttribute("aria-label", "A table");
   const over = (yes) => (event) => {
     event.preventDefault();
     drop.classList.toggle("over", yes);
@@ -57,7 +52,6 @@ export function chooseTable(page, examples) {
   const example = ({ name, title, about }) =>
     h(
       "li",
-      {},
       h(
         "button",
         {
@@ -65,13 +59,13 @@ export function chooseTable(page, examples) {
           class: "example panel",
           onclick: () => trying(() => api.post(`${path}/example`, { name })),
         },
-        h("strong", {}, title),
+        h("strong", title),
         h("span", { class: "soft small" }, about),
       ),
     );
   return stack(
     drop,
-    h("h2", {}, "Or try one of these"),
+    h("h2", "Or try one of these"),
     h("ul", { class: "grid narrow" }, examples.map(example)),
     aside("From the Top8000 proteins of Duke University (CC BY 4.0), PmagPy and javaPlex (BSD)."),
   );
@@ -87,16 +81,15 @@ function firstRows(table) {
       h("span", { class: "soft small" }, SEEMS[seems], missing > 0 && `, ${count(missing)} empty`),
     )
   );
-  const cell = (value) => h("td", {}, value === null ? "" : figure(value, 6));
+  const cell = (value) => h("td", value === null ? "" : figure(value, 6));
   return h(
     "div",
     { class: "scroll", tabindex: "0", role: "region", "aria-label": "First rows of the table" },
     h(
       "table",
-      {},
       h("caption", { class: "unseen" }, "First rows of the table"),
-      h("thead", {}, h("tr", {}, head)),
-      h("tbody", {}, table.first.map((row) => h("tr", {}, row.map(cell)))),
+      h("thead", h("tr", head)),
+      h("tbody", table.first.map((row) => h("tr", row.map(cell)))),
     ),
   );
 }
@@ -123,8 +116,7 @@ export function chooseSpace(table, start, last) {
   const name = unique("space");
   const spaces = h(
     "fieldset",
-    {},
-    h("legend", {}, "What are the numbers?"),
+    h("legend", "What are the numbers?"),
     h(
       "div",
       { class: "grid narrow" },
@@ -143,8 +135,7 @@ export function chooseSpace(table, start, last) {
           }),
           h(
             "span",
-            {},
-            h("strong", {}, space.title),
+            h("strong", space.title),
             h("span", { class: "soft small" }, space.about),
             h("span", { class: "soft small" }, `Needs ${space.needs}.`),
           ),
@@ -155,8 +146,7 @@ export function chooseSpace(table, start, last) {
   const order = h("span", { class: "soft small" });
   const columns = h(
     "fieldset",
-    {},
-    h("legend", {}, "Which columns?"),
+    h("legend", "Which columns?"),
     row(table.columns.map((column) => {
       const box = h("input", {
         type: "checkbox",
@@ -210,13 +200,9 @@ export function chooseSpace(table, start, last) {
   return h(
     "div",
     { class: "ask" },
-    h(
-      "section",
-      { class: "panel stack" },
-      h("h2", {}, "The table"),
-      h(
-        "p",
-        { class: "soft" },
+    panel(
+      "The table",
+      soft(
         `${count(table.rows)} rows${
           table.more ? `; ${count(table.more)} more columns are not shown` : ""
         }. Rows with an empty cell are left out.`,
@@ -225,15 +211,6 @@ export function chooseSpace(table, start, last) {
       table.notes.length > 0 &&
         aside(`Read so: ${table.notes.join("; ")}.`),
     ),
-    h(
-      "section",
-      { class: "panel stack" },
-      h("h2", {}, "Where they live"),
-      !last && why,
-      spaces,
-      columns,
-      units,
-      row(go, says),
-    ),
+    panel("Where they live", !last && why, spaces, columns, units, row(go, says)),
   );
 }

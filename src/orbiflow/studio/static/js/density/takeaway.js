@@ -1,6 +1,6 @@
 /** What can be taken away of a density: new rows, pictures, regions, and itself. */
 
-import { aside, button, h, icon, put, trying, unique } from "../dom.js";
+import { aside, button, h, icon, panel, put, trying, unique } from "../dom.js";
 import { alive, bytes } from "../words.js";
 
 /**
@@ -36,7 +36,7 @@ export function takeaway(page, fit, ends, submit) {
     h(
       "div",
       { class: "take stack" },
-      h("h3", {}, title),
+      h("h3", title),
       aside(about),
       fields,
       act,
@@ -48,7 +48,6 @@ export function takeaway(page, fit, ends, submit) {
       tasks.map((task) =>
         h(
           "li",
-          {},
           alive(task)
             ? h("span", { role: "status" }, `${task.what || "Waiting"} …`)
             : task.state === "done"
@@ -71,10 +70,8 @@ export function takeaway(page, fit, ends, submit) {
   };
   ends.push(page.events.on("task", list), page.events.on("refresh", list));
   list();
-  return h(
-    "section",
-    { class: "panel stack" },
-    h("h2", {}, "Take away"),
+  return panel(
+    "Take away",
     h(
       "div",
       { class: "grid narrow" },

@@ -12,8 +12,7 @@ export const partBar = (name, share, words, more = "") => {
   const [title, about] = PARTS[name] ?? [name, ""];
   return h(
     "li",
-    {},
-    h("div", { class: "share" }, h("strong", {}, title), h("span", {}, words)),
+    h("div", { class: "share" }, h("strong", title), h("span", words)),
     h("meter", { value: share, "aria-label": title }),
     aside(`${capital(about)}. ${more}`),
   );
@@ -34,11 +33,11 @@ export class Watch {
     this.root = h(
       "section",
       { class: "panel stack watch" },
-      h("h2", {}, "Fitting"),
+      h("h2", "Making the density"),
       this.bar,
       this.says,
       this.steer.root,
-      aside("Several kinds of density are tried. Rows that were kept aside choose among them."),
+      aside("Several kinds of density are tried. Rows kept aside choose among them."),
       this.kinds,
     );
     this.update(task);

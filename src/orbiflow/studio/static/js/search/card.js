@@ -142,6 +142,7 @@ export function cardView(project, actions) {
     more.hidden = !project.silhouette || Boolean(card.figures) !== Boolean(project.second);
     more.setAttribute("aria-label", `More like this: ${about}`);
     take.setAttribute("aria-label", `Take away: ${about}`);
+    drop.setAttribute("aria-label", `Remove this tile: ${about}`);
     if (anew) paint();
     fetchMap(card);
   }

@@ -1,11 +1,11 @@
 /** The search as it goes: all classes side by side, best first. */
 
-import { button, confirmed, h, notes, put, row, style, toast, trying } from "../dom.js";
+import { button, confirmed, h, notes, put, row, soft, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { Pictures } from "../skin.js";
 import { LATE, steering } from "../steering.js";
-import { alive, capital, isOutdated, number, sentence, STATES } from "../words.js";
+import { alive, capital, isOutdated, number, waitWords } from "../words.js";
 import { wishes } from "../wishes.js";
 import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
@@ -71,8 +71,8 @@ class SearchPage {
     this.empty = h(
       "div",
       { class: "lonely stack" },
-      h("p", { class: "soft" }, "No tiles yet."),
-      h("p", {}, h("a", { href: `#/p/${this.project.id}/picture` }, "Back to the picture")),
+      soft("No tiles yet."),
+      h("p", h("a", { href: `#/p/${this.project.id}/picture` }, "Back to the picture")),
     );
     put(
       root,
@@ -275,17 +275,13 @@ function stateWords(task, { tiles: { length: every }, second, silhouette }, tile
     number(tiles, "tile")
   }${pulled}${first}. Each one covers the plane: we proved it.`;
   if (!task) return tiles ? found : "Nothing has been searched yet.";
-  if (task.state === "failed") return sentence(task.error);
-  if (task.state === "waiting") {
-    return task.place > 0
-      ? `Waiting: ${number(task.place, "other thing")} to do first.`
-      : "It starts in a moment.";
-  }
+  const wait = waitWords(task);
+  if (wait) return wait;
   if (task.state === "running") {
     if (second && !tiles) return "Looking for tiles of both: the first takes a moment";
+    if (task.what === "gluing") return "Laying both animals side by side";
     return task.what ? capital(task.what) : "Looking for tiles";
   }
-  if (task.state !== "done") return `${STATES[task.state]}.`;
   if (!tiles) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
   return found;
 }

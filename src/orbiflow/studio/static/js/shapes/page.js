@@ -7,11 +7,7 @@ import { capital } from "../words.js";
 
 /** What a shape keeps of its own symmetry, however its edges are pulled. */
 const symmetryWords = (name) =>
-  name === "C1"
-    ? "no symmetry of its own"
-    : name[0] === "C"
-    ? "looks the same when it is turned"
-    : "its halves mirror each other";
+  name[0] === "C" ? "looks the same when it is turned" : "its halves mirror each other";
 
 /**
  * What shows shapes: `list(shapes, link)` has a card for each, made by `link(shape, parts)`.
@@ -35,10 +31,10 @@ export function shapeCards(about) {
     const parts = [
       canvas,
       h("span", { class: "shape-words" }, capital(own.arrangement)),
-      h("span", { class: "soft small" }, symmetryWords(own.symmetry)),
+      own.symmetry !== "C1" && h("span", { class: "soft small" }, symmetryWords(own.symmetry)),
       h("span", { class: "soft small" }, `${own.name} · ${own.group_name}`),
     ];
-    return h("li", {}, link(own, parts));
+    return h("li", link(own, parts));
   };
   return {
     list: (shapes, link) => h("ul", { class: "shapes" }, shapes.map((own) => card(own, link))),
@@ -66,7 +62,7 @@ export async function show(root, { api, about }) {
         others.firstChild ||
         trying(async () => put(others, list(await api.get("shapes?every=1")))),
     },
-    h("summary", {}, "All other types"),
+    h("summary", "All other types"),
     others,
   );
   put(
@@ -75,7 +71,7 @@ export async function show(root, { api, about }) {
     h(
       "p",
       { class: "lead soft" },
-      "Copies of each of these fill the plane. Choose one, then Pull: drag its edges and corners, and all copies follow. Draw an animal into it, and take it away.",
+      "Copies of each fill the plane. Choose one and pull its edges: all copies follow. Then draw an animal into it.",
     ),
     list(await api.get("shapes")),
     more,

@@ -68,13 +68,13 @@ class SolidPage {
       h("h2", { id: "found", tabindex: "-1" }, "Solids"),
       this.list,
     );
-    const notes = h("ul", { class: "notice" }, mesh.notes.map((text) => h("li", {}, text)));
+    const notes = h("ul", { class: "notice" }, mesh.notes.map((text) => h("li", text)));
     put(
       root,
       h(
         "div",
         { class: "solid stack" },
-        h("div", {}, heading, this.said),
+        h("div", heading, this.said),
         h(
           "div",
           { class: "take" },
@@ -183,7 +183,6 @@ class SolidPage {
     };
     return h(
       "li",
-      {},
       h(
         "a",
         { href: `#/${path}`, "aria-current": current && "true", onclick: choose },
@@ -192,7 +191,7 @@ class SolidPage {
           alt: "",
           loading: "lazy",
         }),
-        h("strong", {}, group),
+        h("strong", group),
         h("span", { class: "soft small" }, `shadows ${percent(shadows)}`),
       ),
       button(`Remove the solid in ${group}`, () => this.remove(card), {

@@ -60,12 +60,12 @@ export class Search {
       wanted.form = values;
       changed();
     });
-    this.title = h("summary", {}, "How to search");
+    this.title = h("summary", "How to search");
     this.wishes = h(
       "details",
       { class: "panel wishes", open: true },
       this.title,
-      stack(h("div", {}, long, meaning), up, this.form, this.error, this.go),
+      stack(h("div", long, meaning), up, this.form, this.error, this.go),
     );
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
     this.share = h("p", { class: "soft" });
@@ -73,7 +73,7 @@ export class Search {
     this.watch = h(
       "section",
       { class: "panel stack watch" },
-      h("h2", {}, "Searching"),
+      h("h2", "Searching"),
       this.bar,
       this.share,
       this.steer.root,

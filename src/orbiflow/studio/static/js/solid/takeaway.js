@@ -1,6 +1,6 @@
 /** What can be taken away of a solid: things to print, a film, a picture, a page. */
 
-import { button, h, icon, put, trying } from "../dom.js";
+import { button, h, icon, put, section, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { BUILD } from "../takeaway/kinds.js";
 import { Making, picture } from "../takeaway/made.js";
@@ -35,15 +35,15 @@ export class Takeaway {
     }, () => this.making.change());
     this.shown = h("div", { class: "preview", hidden: true });
     this.files = h("div", { class: "row" });
-    this.root = h(
-      "section",
-      { class: "panel stack", "aria-labelledby": "take" },
-      h("h2", { id: "take" }, "Take it away"),
+    this.root = section(
+      "panel",
+      "take",
+      "Take it away",
       this.form,
       this.making.make,
       this.shown,
       this.making.said,
-      h("h3", {}, "To show it to others"),
+      h("h3", "To show it to others"),
       this.files,
     );
   }

@@ -1,7 +1,7 @@
 /** Words about solids. */
 
 import { aside, h } from "../dom.js";
-import { number, sentence, STATES } from "../words.js";
+import { number, waitWords } from "../words.js";
 
 export const EFFORT_MEANINGS = {
   fast: "A minute or two.",
@@ -30,14 +30,9 @@ export const sides = (sides) =>
  */
 export function stateWords(task, count) {
   if (!task) return "This is what was read. Say how to search, and look for solids like it.";
-  if (task.state === "failed") return sentence(task.error);
-  if (task.state === "waiting") {
-    return task.place > 0
-      ? `Waiting: ${number(task.place, "other thing")} to do first.`
-      : "It starts in a moment.";
-  }
+  const wait = waitWords(task);
+  if (wait) return wait;
   if (task.state === "running") return `${STEPS[task.what] ?? "Looking for solids"} …`;
-  if (task.state !== "done") return `${STATES[task.state]}.`;
   if (!count) {
     return "No solid was found that is one piece and fills space. Search more carefully, or in other space groups.";
   }
@@ -60,26 +55,25 @@ const MEASURES = [
 export function facts(card) {
   const { strain, size, group, positions: ways } = card;
   return [
-    h("h2", {}, "How alike it is"),
+    h("h2", "How alike it is"),
     h(
       "ul",
       { class: "stack measures" },
       MEASURES.map(([name, title, about]) =>
         h(
           "li",
-          {},
           h(
             "div",
             { class: "share" },
-            h("strong", {}, title),
-            h("span", {}, percent(card[name])),
+            h("strong", title),
+            h("span", percent(card[name])),
           ),
           h("meter", { value: card[name], "aria-label": title }),
           aside(about),
         )
       ),
     ),
-    h("p", {}, `To get there, parts of the figure became ${percent(strain)} longer or shorter.`),
+    h("p", `To get there, parts of the figure became ${percent(strain)} longer or shorter.`),
     aside(
       `${sides(size)}. ${
         ways === 1 ? "All copies lie alike" : `Its copies lie in ${ways} ways`

@@ -14,8 +14,7 @@ const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
 function chooser(label, use, attributes) {
   const box = h("input", {
     type: "file",
-    class: "unseen",
-    tabindex: "-1",
+    hidden: true,
     "aria-label": label,
     ...attributes,
     onchange: () => {
@@ -174,12 +173,11 @@ export class Bringing {
       animals.map((own) =>
         h(
           "li",
-          {},
           h(
             "button",
             { type: "button", class: "animal", onclick: () => this.animal(own) },
             h("img", { src: own.picture, alt: "", loading: "lazy" }),
-            h("span", {}, own.title),
+            h("span", own.title),
           ),
         )
       ),

@@ -27,10 +27,10 @@ export async function photograph() {
       },
       () => {
         said.textContent =
-          "The camera cannot be used. Allow it in your browser's settings, or choose a picture instead.";
+          "The camera cannot be used. Allow it in your browser, or choose a picture.";
       },
     );
-    return stack(video, said, h("footer", {}, shutter));
+    return stack(video, said, h("footer", shutter));
   });
   /** @type {MediaStream | null} */ (stream)?.getTracks().forEach((track) => track.stop());
   return shot;

@@ -19,7 +19,7 @@ const MEANINGS = {
 };
 
 /**
- * Sliders and choices for `reading`, {threshold, invert, smooth, thicken}, which they change and tell: {root, take(reading)}.
+ * Sliders and choices for `reading`, which they change and tell: {root, take(reading)}.
  *
  * @param {Reading} reading
  * @param {() => void} changed

@@ -1,6 +1,6 @@
 /** Draw a shape: each closed line adds to it or cuts from it. */
 
-import { button, choice, dialog, h, row, stack } from "../dom.js";
+import { button, choice, dialog, h, row, soft, stack } from "../dom.js";
 import { drawStroke, Marks } from "./marks.js";
 import { pointing } from "./pointing.js";
 import { States } from "./states.js";
@@ -84,7 +84,7 @@ export function drawn() {
     });
     tell();
     return stack(
-      h("p", { class: "soft" }, "Draw around the animal in one line. It closes when you let go."),
+      soft("Draw around the animal in one line. It closes when you let go."),
       canvas,
       row(
         choice("A line", [[true, "adds", "more"], [false, "cuts away", "cut"]], true, (chosen) => {
@@ -94,7 +94,7 @@ export function drawn() {
         back,
         again,
       ),
-      h("footer", {}, use),
+      h("footer", use),
     );
   });
 }

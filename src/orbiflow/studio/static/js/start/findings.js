@@ -30,13 +30,12 @@ export function findings({ doubts, notes: said, left_out: others = [] }, grow) {
     out > 0 &&
       h(
         "li",
-        {},
         h("span", { class: "swatch" }),
         `${number(out, "part is", "parts are")} left out: a tile is one piece. `,
         out < MANY
           ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
-          : "A busy photograph? Draw round the head first: choose “Add” and the lasso. Then “Remove” what is too much.",
+          : "A busy photograph? Draw round the head with “Add” and the lasso, then “Remove” what is too much.",
       ),
-    said.length > 0 && h("li", {}, notes(said)),
+    said.length > 0 && h("li", notes(said)),
   );
 }

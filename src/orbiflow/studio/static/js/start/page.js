@@ -14,7 +14,7 @@ const FILE_WORDS = "Go on with what you saved, here or elsewhere.";
 
 /** Another way to begin, in a few words. */
 const other = (title, image, begin, words) =>
-  h("div", {}, button(title, begin, { image }), aside(words));
+  h("div", button(title, begin, { image }), aside(words));
 
 /**
  * @param {HTMLElement} root
@@ -36,7 +36,7 @@ export async function show(root, page) {
         h(
           "p",
           { class: "lead soft" },
-          "Bring a picture. We bend its outline, as little as we can, until copies of it fill the plane without a gap.",
+          "Bring a picture. We bend its outline as little as we can, until its copies fill the plane without a gap.",
         ),
         bring.panel(),
       ),
@@ -54,7 +54,7 @@ export async function show(root, page) {
       { class: "others" },
       other("A solid instead of a picture", "solid", () => bring.mesh.click(), MESH_WORDS),
       other("A shape that fits", "pencil", () => page.navigate("shapes"), SHAPE_WORDS),
-      other("Numbers instead of animals", "arrow", () => bring.count(), TABLE_WORDS),
+      other("Numbers instead of animals", "curve", () => bring.count(), TABLE_WORDS),
       other("Open a project file", "open", () => bring.saved.click(), FILE_WORDS),
     ),
   );

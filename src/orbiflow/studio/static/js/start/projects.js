@@ -5,6 +5,8 @@ import { ago, number } from "../words.js";
 import { thumb as tilingOf } from "./thumb.js";
 
 const PAGES = { density: "d", solid: "s" }; // of projects that are no tiles
+/** @type {Record<string, "curve" | "solid" | "picture">} */
+const SIGNS = { density: "curve", solid: "solid", tile: "picture" };
 const SOME = 10; // projects that are shown at first
 
 export class Projects {
@@ -81,7 +83,7 @@ export class Projects {
         place.querySelector("a").focus();
       }, { image: "undo" });
       const text = `“${own.name}” is deleted when you leave this page.`;
-      put(place, h("div", { class: "gone stack", role: "status" }, h("p", {}, text), undo));
+      put(place, h("div", { class: "gone stack", role: "status" }, h("p", text), undo));
       undo.focus();
     };
     (this.leaving.has(own.id) ? gone : whole)();
@@ -96,7 +98,7 @@ export class Projects {
         close(box.value.trim());
       };
       const done = button("Rename it", () => {}, { kind: "primary", type: "submit" });
-      return h("form", { class: "stack", onsubmit: save }, box, h("footer", {}, done));
+      return h("form", { class: "stack", onsubmit: save }, box, h("footer", done));
     });
     if (given) await this.after(() => this.api.patch(`projects/${id}`, { name: given }));
   }
@@ -130,7 +132,7 @@ function link(api, { id, kind, name, thumb, tiles, busy, changed }) {
         ? tilingOf(api, id)
         : thumb
         ? h("img", { src: thumb, alt: "", loading: "lazy" })
-        : icon("picture"),
+        : icon(SIGNS[kind]),
     ),
     h("span", { class: "project-name" }, name),
     h("span", { class: "soft small" }, facts.join(" · ")),

@@ -1,6 +1,18 @@
 /** The second picture of a project: bring one, see both, take it away again. */
 
-import { aside, button, confirmed, dialog, h, icon, put, row, stack, trying } from "../dom.js";
+import {
+  aside,
+  button,
+  confirmed,
+  dialog,
+  h,
+  icon,
+  put,
+  row,
+  soft,
+  stack,
+  trying,
+} from "../dom.js";
 import { brief } from "../words.js";
 import { Bringing, stem } from "./bringing.js";
 
@@ -52,7 +64,7 @@ export async function addSecond(page) {
   await dialog("Add a second picture", (close) => {
     bring = new BringingSecond(page, close);
     return stack(
-      h("p", { class: "soft" }, "Both animals then fill the plane together, without a gap."),
+      soft("Both animals then fill the plane together, without a gap."),
       bring.panel(),
       row(
         button("The same picture again", () => bring.again(), { image: "picture" }),
@@ -80,7 +92,7 @@ export function bothPictures(page, number) {
       "a",
       { href: `#/${place}${k ? "/2" : ""}`, "aria-current": k === number && "page" },
       silhouette ? h("img", { src: silhouette.backdrop, alt: "" }) : icon("picture"),
-      h("span", {}, brief(stem(input?.name ?? "picture"))),
+      h("span", brief(stem(input?.name ?? "picture"))),
     );
 
   async function remove() {
@@ -112,7 +124,7 @@ export function bothPictures(page, number) {
     if (second) {
       put(
         root,
-        h("p", {}, "These two fill the plane together:"),
+        h("p", "These two fill the plane together:"),
         h("nav", { class: "figures", "aria-label": "Pictures" }, [project, second].map(link)),
         button("Take the second picture away", remove, { kind: "quiet", image: "bin" }),
       );
@@ -120,7 +132,7 @@ export function bothPictures(page, number) {
       put(
         root,
         aside("Two animals can fill the plane together."),
-        h("div", {}, button("Add a second picture", () => addSecond(page), { image: "more" })),
+        h("div", button("Add a second picture", () => addSecond(page), { image: "more" })),
       );
     }
   }

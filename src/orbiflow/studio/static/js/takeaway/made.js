@@ -1,6 +1,6 @@
 /** What is made of a tile: the button, its files, a picture of it, what is to be said, what was made before. */
 
-import { button, h, icon, put, row, trying } from "../dom.js";
+import { button, h, icon, put, row, section, soft, trying } from "../dom.js";
 import { LATE } from "../steering.js";
 import { ago, alive, bytes, capital, sentence } from "../words.js";
 import { EVERY_KIND as KINDS, lengthIn } from "./kinds.js";
@@ -57,19 +57,18 @@ function words(task) {
     return [
       h(
         "p",
-        {},
         task.state === "waiting" ? "Waiting its turn …" : capital(task.what || "At work …"),
       ),
       h("progress", { max: 1, value: task.share, "aria-label": "How far it is" }),
     ];
   }
   if (task?.state === "failed") return [h("p", { class: "error" }, sentence(task.error))];
-  if (task?.state === "cancelled") return [h("p", { class: "soft" }, "Stopped.")];
+  if (task?.state === "cancelled") return [soft("Stopped.")];
   if (!isMade(task)) return [];
   const notes = task.result.notes ?? [];
   return [
     notes.length > 0 &&
-    h("ul", { class: "notice" }, notes.map((text) => h("li", {}, sentence(text)))),
+    h("ul", { class: "notice" }, notes.map((text) => h("li", sentence(text)))),
     row(files(task, "primary")),
   ];
 }
@@ -139,12 +138,7 @@ export class Making {
     this.make = button("Make it", () => trying(() => this.press()), { kind: "primary big" });
     this.said = h("div", { class: "stack said", role: "status" });
     this.before = h("div");
-    this.earlier = h(
-      "section",
-      { class: "stack earlier", "aria-labelledby": "earlier" },
-      h("h2", { id: "earlier" }, "Made before"),
-      this.before,
-    );
+    this.earlier = section("earlier", "earlier", "Made before", this.before);
   }
 
   /** Something else is asked for now. */
@@ -188,9 +182,7 @@ export class Making {
     this.told = told;
     put(
       this.said,
-      !old
-        ? words(this.task)
-        : made && h("p", { class: "soft" }, "You changed something since: see “Made before”."),
+      !old ? words(this.task) : made && soft("You changed something since: see “Made before”."),
     );
     this.earlier.hidden = !before.length;
     put(this.before, madeBefore(before));

@@ -2,7 +2,7 @@
 
 import { Carry } from "../closeup/carry.js";
 import { drawnOn, marksOf } from "../closeup/drawn.js";
-import { aside, choice, h, icon, put, stack, style, trying } from "../dom.js";
+import { aside, choice, h, icon, put, section, stack, style, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf, Pictures, skinsOf } from "../skin.js";
@@ -78,13 +78,6 @@ class TakeawayPage {
   }
 
   build(root) {
-    const section = (kind, id, title, ...parts) =>
-      h(
-        "section",
-        { class: `stack ${kind}`, "aria-labelledby": id },
-        h("h2", { id }, title),
-        parts,
-      );
     this.canvas = h("canvas", { role: "img", "aria-label": `A tiling: ${this.card.arrangement}` });
     this.live = new Preview(
       this.api,
@@ -172,7 +165,7 @@ class TakeawayPage {
     if (error && this.form.refuse(error.setting, error.message, false)) return;
     const words = error ? [error.message] : notes;
     this.noted.hidden = !words.length;
-    put(this.noted, words.map((text) => h("li", {}, sentence(text))));
+    put(this.noted, words.map((text) => h("li", sentence(text))));
   }
 
   paint() {

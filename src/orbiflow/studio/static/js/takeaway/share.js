@@ -1,6 +1,6 @@
 /** Share a tile: by a link that carries it, on the clipboard, on paper. */
 
-import { aside, button, h, row, toast, trying } from "../dom.js";
+import { aside, button, row, section, toast, trying } from "../dom.js";
 import { copied, printed, svgOf } from "../svg.js";
 import { Camera, Tiling } from "../tiling.js";
 
@@ -41,10 +41,10 @@ export function share(api, project, card, seen) {
     toast("The drawing is copied. Paste it into a drawing program.");
   };
   const close = printed(() => drawn(SHEET));
-  const root = h(
-    "section",
-    { class: "panel stack share", "aria-labelledby": "share" },
-    h("h2", { id: "share" }, "Share it"),
+  const root = section(
+    "panel share",
+    "share",
+    "Share it",
     aside(
       "The link holds the tile itself. For someone without a studio, make “A page to share” above.",
     ),

@@ -117,7 +117,7 @@ export function trueSize(tile) {
   const canvas = h("canvas", { class: "true-tile", role: "img" });
   const said = h("p", { class: "soft small" });
   const thin = h("p", { class: "small", hidden: !neck });
-  const card = h("div", { class: "bank-card", "aria-hidden": "true" }, h("span", {}, "bank card"));
+  const card = h("div", { class: "bank-card", "aria-hidden": "true" }, h("span", "bank card"));
   let [size, least] = [40, 0];
   const fit = slider("Make this as large as a bank card held to the screen", {
     min: 2,
@@ -141,7 +141,7 @@ export function trueSize(tile) {
   const measure = button("Measure my screen", () => {
     tools.hidden = !tools.hidden;
     draw();
-  }, { kind: "quiet" });
+  });
 
   function draw() {
     const scale = pixels();
@@ -225,7 +225,8 @@ export function trueSize(tile) {
       "aria-label": "The tile in its true size",
     }, canvas),
     thin,
-    row(said, h("span", { class: "grow" }), measure),
+    said,
+    h("div", measure),
     tools,
   );
   return {
