@@ -145,7 +145,7 @@ def test_a_picture_of_another_aspect(result: Path, tmp_path: Path, orbiflow) -> 
 def test_other_endings(out: str, result: Path, tmp_path: Path, orbiflow) -> None:
     outcome = orbiflow("art", result, "-o", tmp_path / out)
     assert outcome.status == 2
-    assert "--out must be a file that ends in .png or .svg" in outcome.err
+    assert "--out must be a file that ends in .html, .png or .svg" in outcome.err
     assert out in outcome.err
 
 

@@ -68,6 +68,8 @@ def test_it_is_what_is_made_and_nothing_is_left_of_it(client: Client, address: s
         ("art", {"area": "3000x2000px"}),
         ("solid", {"kind": "cutter"}),
         ("animate", {"kind": "grow"}),
+        ("art", {"world": "spiral"}),
+        ("art", {"metamorphosis": "right"}),
     ],
 )
 def test_all_that_can_be_made_is_shown_small(

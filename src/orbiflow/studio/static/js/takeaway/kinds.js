@@ -88,16 +88,7 @@ export const KINDS = {
       area: {
         title: "How large is the page?",
         about: "Such as A4, letter, mug, phone or 300x200mm.",
-        some: [
-          "A4",
-          "A4-landscape",
-          "A3",
-          "A3-landscape",
-          "letter",
-          "letter-landscape",
-          "mug",
-          "phone",
-        ],
+        some: "A4 A4-landscape A3 A3-landscape letter letter-landscape mug phone".split(" "),
       },
       clip: {
         title: "Fill the page to its edge",
@@ -127,8 +118,28 @@ export const KINDS = {
   art: {
     title: "Picture",
     image: "picture",
-    first: ["area", "tile_size", "palette", "colour"],
+    first: ["world", "metamorphosis", "area", "tile_size", "palette", "colour"],
     words: plain({
+      world: {
+        about: "",
+        title: "In another world?",
+        usual: "no",
+        options: {
+          sphere: "on a ball",
+          disc: "in a disc without end",
+          "half-plane": "above a line",
+          band: "in a band",
+          spiral: "around a spiral",
+        },
+      },
+      metamorphosis: {
+        about: "",
+        title: "Polygons become animals",
+        usual: "no",
+        options: { right: "to the right", down: "downwards", middle: "to the middle" },
+      },
+      order: { title: "How many meet there?" },
+      arms: { title: "Steps of a turn" },
       stretch: { title: "How much it may be stretched" },
       area: {
         title: "Width x height",
@@ -152,6 +163,9 @@ export const KINDS = {
           stamp: "Stamp",
           mould: "Mould",
           puzzle: "Puzzle in a tray",
+          ball: "Ball",
+          "ball-piece": "Piece of a ball",
+          lamp: "Lamp",
         },
       },
       format: {

@@ -19,17 +19,7 @@ const ON = {
   drawing: ["export", "art", "solid", "animate"],
   picture: ["export", "art", "animate"],
 };
-const NEVER = [
-  "tile",
-  "result",
-  "out",
-  "force",
-  "picture",
-  "drawing",
-  "eyes",
-  "second_eyes",
-  "tint",
-]; // what the page itself sets, or drawings hold
+const NEVER = "tile result out force picture drawing eyes second_eyes tint".split(" "); // what the page itself sets, or drawings hold
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 /**
