@@ -69,7 +69,6 @@ def test_it_is_what_is_made_and_nothing_is_left_of_it(client: Client, address: s
         ("solid", {"kind": "cutter"}),
         ("animate", {"kind": "grow"}),
         ("art", {"world": "spiral"}),
-        ("art", {"metamorphosis": "right"}),
     ],
 )
 def test_all_that_can_be_made_is_shown_small(
