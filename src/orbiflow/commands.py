@@ -1,13 +1,13 @@
 """The operations of orbiflow by name, and where each is: "module:function"."""
 
 OPERATIONS = {
-    "escherize": "orbiflow.tiles.operations:escherize",
+    "escherize": "orbiflow.tiles.finding:escherize",
     "batch": "orbiflow.tiles.batches:batch",
     "export": "orbiflow.tiles.operations:export",
     "art": "orbiflow.tiles.operations:art",
     "solid": "orbiflow.tiles.operations:solid",
     "animate": "orbiflow.tiles.operations:animate",
-    "classes": "orbiflow.tiles.operations:classes",
+    "classes": "orbiflow.tiles.finding:classes",
     "fill": "orbiflow.solids.operations:fill",
     "build": "orbiflow.solids.operations:build",
     "density summary": "orbiflow.density.operations.summary:summary",

@@ -110,7 +110,7 @@ def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
 
 
 def test_a_process_may_be_started_before_there_is_a_call() -> None:
-    with CallProcess(modules=["orbiflow.tiles.operations"]) as process:
+    with CallProcess(modules=["orbiflow.tiles.finding"]) as process:
         assert process.alive
         process.begin(find("classes").call({"classes": ["IH4"]}))
         events = list(process.events())

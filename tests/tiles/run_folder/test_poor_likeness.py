@@ -20,8 +20,8 @@ from orbiflow.tiles import (
     run_folder,
     search,
 )
+from orbiflow.tiles.finding import escherize
 from orbiflow.tiles.likeness import Likeness, Recognisability, compare
-from orbiflow.tiles.operations import escherize
 from orbiflow.tiles.search import why_poor
 
 TARGET = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])

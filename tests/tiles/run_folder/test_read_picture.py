@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from orbiflow.errors import OutputError
 from orbiflow.runtime import Event, Note
-from orbiflow.tiles import operations
+from orbiflow.tiles import finding
 from orbiflow.tiles.run_folder import read_png, result_folder, show_reading
 from orbiflow.tiles.silhouette import Target
 
@@ -93,7 +93,7 @@ def test_a_failed_search_leaves_the_earlier_run(
 
     monkeypatch.setattr("orbiflow.tiles.search.escherizing._search_by_levels", fail)
     with pytest.raises(RuntimeError):
-        operations.escherize(picture, out, on_event=told.append)
+        finding.escherize(picture, out, on_event=told.append)
     note = f"read-next.png, and in {out / 'read.png'} once this run replaces the earlier one"
     assert any(isinstance(event, Note) and note in event.text for event in told)
     assert (out / "read.png").read_bytes() == b"earlier"

@@ -30,9 +30,9 @@ from orbiflow.tiles import (
     save_tiles,
     signed_area,
 )
+from orbiflow.tiles.finding import classes
 from orbiflow.tiles.flowing.overlap_search import OverlapSearch
 from orbiflow.tiles.geometry import subdivided
-from orbiflow.tiles.operations import classes
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
