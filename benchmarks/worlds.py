@@ -78,7 +78,7 @@ def main() -> None:
                 done = art(tile, Path(folder) / f"a.{ending}", settings)
                 spent = time.perf_counter() - begin
                 print(
-                    f"{name:7} {world}.{ending}: {done.summary['tiles']} copies in {spent:.1f} s",
+                    f"{name:7} {world}.{ending}: {done.shown:.0f} copies in {spent:.1f} s",
                     flush=True,
                 )
 

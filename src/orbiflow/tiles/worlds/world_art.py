@@ -52,9 +52,25 @@ class WorldArt(Outcome):
     motifs: tuple[Motif, ...]
     notes: tuple[str, ...]
 
+    @property
+    def width(self) -> int:
+        """The number of pixels in a row."""
+        return round(self.settings.page[0] * self.settings.pixels)
+
+    @property
+    def height(self) -> int:
+        """The number of rows."""
+        return round(self.settings.page[1] * self.settings.pixels)
+
+    @property
+    def shown(self) -> float:
+        """The number of copies."""
+        return float(len(self.world.motions))
+
     def written(self, out: Path) -> WorldArt:
         """Return what came of writing it to a file, with its facts as JSON has them."""
-        facts = {"file": str(out), "tiles": len(self.world.motions), "world": self.called}
+        facts = {"file": str(out), "width": self.width, "height": self.height}
+        facts |= {"tiles": self.shown, "world": self.called}
         return replace(self, summary={**facts, "class": self.tile.isohedral_class})
 
     @property
@@ -65,8 +81,12 @@ class WorldArt(Outcome):
     @property
     def words(self) -> str:
         """What was written, in a sentence."""
-        copies, name = len(self.world.motions), self.tile.isohedral_class or "a tile"
-        return f"written {self.summary['file']}: {copies} copies of {name}, {self.called}"
+        name = self.tile.isohedral_class or "a tile"
+        return f"written {self.summary['file']}: {self.shown:.0f} copies of {name}, {self.called}"
+
+    def _repr_png_(self) -> bytes:
+        """Return what a notebook shows."""
+        return write_png(self.scene, dpi=self.settings.dpi)
 
 
 def world_artwork(
