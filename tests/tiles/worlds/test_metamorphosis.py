@@ -25,9 +25,9 @@ tiles = st.builds(
 
 
 @settings(max_examples=8)
-@given(tiles, st.sampled_from(["right", "down", "middle"]))
-def test_nothing_gaps_or_overlaps(tile: Any, goes: Any) -> None:
-    chosen = ArtSettings(metamorphosis=goes, area=(150.0, 100.0))
+@given(tiles, st.sampled_from(["right", "down", "middle"]), st.integers(1, 2))
+def test_nothing_gaps_or_overlaps(tile: Any, goes: Any, stages: int) -> None:
+    chosen = ArtSettings(metamorphosis=goes, stages=stages, area=(150.0, 100.0))
     found, _ = world_of(EscherTile(tile), chosen)
     assert isinstance(found, Metamorphosis)
     rings = [curve.flattened(1.0) for _, curve in found.outlines(0)]
@@ -63,6 +63,17 @@ def test_one_end_is_polygons_and_the_other_the_tile() -> None:
             whole += abs(area - found.page.tiling.tile_area) < 1e-6 * area
     assert straight > 0
     assert whole > 0
+
+
+def test_stages_go_there_and_back() -> None:
+    tile = EscherTile(swirled_tile("IH4", 7, 0.15))
+    page: Any = {"metamorphosis": "right", "area": (300.0, 60.0), "tile_size": 16.0}
+    found, _ = world_of(tile, ArtSettings(stages=2, **page))
+    assert isinstance(found, Metamorphosis)
+    shares = found.shares(np.array([[0.0, 30.0], [150.0, 30.0], [300.0, 30.0], [75.0, 30.0]]))
+    assert shares == pytest.approx([0, 1, 0, 0.5])
+    with pytest.raises(OrbiflowError, match="stages"):
+        ArtSettings(stages=2)
 
 
 def test_drawings_appear_on_the_way(tmp_path: Path) -> None:

@@ -127,6 +127,11 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     """Let the class's polygons become the tile: from left to right, from top to bottom, or from the
     edges to the middle of the page."""
 
+    stages: Annotated[
+        int, Range(1, 9), OnlyWith(metamorphosis=("right", "down", "middle"), because="it changes")
+    ] = 1
+    """How many changes there are across the page: with 2, the tile becomes polygons again."""
+
     samples: Annotated[int, Range(1, 8), Hidden()] = 3
     """Number of samples along each side of a pixel."""
 

@@ -40,12 +40,14 @@ class Metamorphosis(World):
     - `way`: Points (V, 2) that fill the tile, in its place on the page, at `STEPS` + 1 shares.
     - `triangles`: (T, 3) of these; the first points are the tile's own vertices.
     - `goes`: "right", "down" or "middle".
+    - `stages`: How many changes there are, there and back.
     """
 
     page: Page = field(kw_only=True)
     way: Array = field(kw_only=True)
     triangles: Integers = field(kw_only=True)
     goes: str = field(kw_only=True)
+    stages: int = field(kw_only=True)
 
     def shares(self, places: Array) -> Array:
         """Return how far on their way points (..., 2) of the sheet are, 0 to 1."""
@@ -56,7 +58,9 @@ class Metamorphosis(World):
             along = 1 - far / (np.hypot(width, height) / 2)
         else:
             along = x if self.goes == "right" else y
-        share = np.clip((along - STILL) / (1 - 2 * STILL), 0, 1)
+        stage, part = np.divmod(self.stages * np.clip(along, 0, 1 - 1e-12), 1.0)
+        part = np.where(stage % 2, 1 - part, part)
+        share = np.clip((part - STILL) / (1 - 2 * STILL), 0, 1)
         return share * share * (3 - 2 * share)
 
     def moved(self, copies: Integers) -> Array:
@@ -157,6 +161,7 @@ def _on_page(
         way=np.stack([page.place(way) for way in ways]),
         triangles=triangles,
         goes=settings.metamorphosis or "right",
+        stages=settings.stages,
     )
     rings = made.moved(np.arange(len(motions)))[:, : len(tile.tile.polygon)]
     seen = (rings.max(axis=1) > 0).all(axis=1) & (rings.min(axis=1) < page.size).all(axis=1)

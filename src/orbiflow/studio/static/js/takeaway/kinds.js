@@ -140,6 +140,7 @@ export const KINDS = {
       },
       order: { title: "How many meet there?" },
       arms: { title: "Steps of a turn" },
+      stages: { title: "How many changes?" },
       stretch: { title: "How much it may be stretched" },
       area: {
         title: "Width x height",
