@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from orbiflow.tiles.geometry import orient, signed_area
 from orbiflow.tiles.worlds import Unfolding, colours, copies, unfolded, world_of, world_scene
 from orbiflow.tiles.worlds.schwarz import TriangleMap, curvature, disc_of, form, triangle_map
 from orbiflow.tiles.worlds.sheet import TOLERANCE
+from small_pairs import pair_result
 from swirled_tiles import is_sound, swirled_tile
 
 FLAT = [(3, 3, 3), (4, 4, 2), (4, 2, 4), (2, 4, 4), (6, 3, 2), (3, 2, 6), (2, 6, 3)]
@@ -234,6 +236,8 @@ def test_artwork_of_another_world_is_written(tmp_path: Path) -> None:
     ("name", "given_settings", "what"),
     [
         ("IH4", {"world": "sphere"}, "thirds, quarters or sixths"),
+        ("IH4", {"world": "disc"}, "thirds, quarters or sixths"),
+        ("IH4", {"world": "disc", "order": (2, 3, 7)}, "thirds, quarters or sixths"),
         ("IH7", {"world": "sphere", "order": (2, 3, 7)}, "not of the sphere"),
         ("IH7", {"world": "disc", "order": (2, 3, 5)}, "not of the hyperbolic plane"),
         ("IH7", {"world": "disc", "order": (3, 3, 3)}, "not of the hyperbolic plane"),
@@ -244,6 +248,18 @@ def test_what_has_no_such_world_says_why(
 ) -> None:
     with pytest.raises(OrbiflowError, match=what):
         art(escher(name), tmp_path / "a.png", ArtSettings(**given_settings))
+
+
+def test_each_of_two_figures_has_its_own_colours(tmp_path: Path) -> None:
+    pair = pair_result().tiles[0]
+    art(pair, tmp_path / "pair.svg", ArtSettings(format="svg", world="spiral", palette="lagoon"))
+    found, _ = world_of(pair, ArtSettings(world="spiral"))
+    numbers = [{found.colour(k, kind) for k in range(len(found.motions))} for kind in (0, 1)]
+    assert not numbers[0] & numbers[1]
+    text = (tmp_path / "pair.svg").read_text()
+    fills = set(re.findall(r'fill="(#[0-9a-f]{6})"', text))
+    shaded = palette("lagoon").shaded((found.count,) * 2)
+    assert {shaded.fill(k) for k in range(2 * found.count)} <= fills
 
 
 def test_settings_of_worlds_are_checked() -> None:

@@ -72,6 +72,15 @@ class World:
     view: View
     unfolding: Unfolding | None = None
 
+    @property
+    def count(self) -> int:
+        """The number of colours of each figure's copies."""
+        return int(self.colours.max(initial=0)) + 1
+
+    def colour(self, copy: int, kind: int) -> int:
+        """Return the number in the palette of a figure's colour in a copy."""
+        return kind * self.count + int(self.colours[copy])
+
     @cached_property
     def fade(self) -> Array:
         """How much (M,) of what lies on it a copy shows, 0 to 1."""
@@ -250,7 +259,7 @@ def pictured(
     width, height = (round(side * pixels) for side in world.view.size)
     picture = Image.new("RGBA", (width, height))
     levels = np.digitize(world.sizes, DETAIL_SIZES)
-    for own, painting in zip(world.tiling.prototiles, paintings, strict=True):
+    for kind, (own, painting) in enumerate(zip(world.tiling.prototiles, paintings, strict=True)):
         back = painting.place.inverse
         for level in np.unique(levels[world.faces]).tolist():
             step = 3 * world.size / DETAIL_STEPS[level]
@@ -262,7 +271,7 @@ def pictured(
             for k in np.flatnonzero((levels == level) & world.faces).tolist():
                 cancel.check()
                 places = world.places(vectors, np.array([k]))[0] * pixels
-                colours = painting.colours[world.colours[k]]
+                colours = painting.colours[world.colour(k, kind)]
                 _lay(picture, places, texels, mesh.triangles, colours, float(world.fade[k]))
     return Raster(png_bytes(picture), (width, height), np.eye(2) / pixels, np.zeros(2))
 
@@ -317,14 +326,15 @@ def world_scene(
     layers = [Layer("paper", "paper", Style(chosen.paper), (paper,))]
     plain = not paintings and not any(motif.parts for motif in motifs)
     widths = {k: _width(world, k, line) for own in outlines for k in own}
-    for colour in sorted(set(world.colours.tolist())):
-        fill, name = chosen.fill(colour), f"colour {colour + 1}"
-        mine = [k for k in np.flatnonzero(world.colours == colour).tolist() if k in widths]
-        for width in sorted({widths[k] for k in mine}) if plain and line != 0 else [0.0]:
-            style = Style(fill, chosen.outline, width) if width else Style(fill, fill, SEAM)
-            kept = [k for k in mine if not width or widths[k] == width]
-            curves = tuple(own[k] for own in outlines for k in kept)
-            layers.append(Layer(name, "tiles", style, curves, clipped=True))
+    for kind, own in enumerate(outlines):
+        for colour in sorted(set(world.colours[list(own)].tolist())):
+            mine = [k for k in own if world.colours[k] == colour]
+            number = kind * world.count + colour
+            fill, name = chosen.fill(number), f"colour {number + 1}"
+            for width in sorted({widths[k] for k in mine}) if plain and line != 0 else [0.0]:
+                style = Style(fill, chosen.outline, width) if width else Style(fill, fill, SEAM)
+                curves = tuple(own[k] for k in mine if not width or widths[k] == width)
+                layers.append(Layer(name, "tiles", style, curves, clipped=True))
     if paintings:
         layers.append(
             Layer("pictures", "drawing", Style(), (pictured(world, paintings, pixels, cancel),))
@@ -337,7 +347,7 @@ def world_scene(
                     "drawing",
                     "drawing",
                     Style(),
-                    tuple(_inked(part, chosen, int(world.colours[k])) for k, part in parts),
+                    tuple(_inked(part, chosen, world.colour(k, kind)) for k, part in parts),
                     clipped=True,
                 )
             )

@@ -19,7 +19,7 @@ from orbiflow.tiles.worlds.world_copies import colour_moves
 
 DIGITS = 5  # of vectors, of the radius
 STEPS = 40  # of a drawing's lines along the tile
-SPARE = 2  # colours that a page may need elsewhere
+SPARE = 2  # colours that a page which chooses them may need elsewhere
 AROUND = 10  # points of the outline by which a copy's size is seen
 
 
@@ -28,7 +28,8 @@ def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: 
     found = world.unfolding
     assert found is not None
     moves = colour_moves(found)
-    count = int(world.colours.max()) + 1 if moves is None else len(moves[0])
+    count = world.count + SPARE if moves is None else len(moves[0])
+    fills = len(world.tiling.prototiles) * count
     rings = [own.polygon for own in world.tiling.prototiles]
     parts = list[dict[str, Any]]()
     for kind, motif in enumerate(motifs):
@@ -36,7 +37,7 @@ def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: 
             lines = [(stepped(own, world.size / STEPS), own.closed) for own in part.curves]
             curves = [[_listed(world.vectors(line)), closed] for line, closed in lines]
             style, width = part.style, part.style.width / world.size
-            own = {"fill": style.fill, "stroke": style.stroke, "width": width}
+            own = {"kind": kind, "fill": style.fill, "stroke": style.stroke, "width": width}
             parts.append({**own, "opacity": part.opacity, "curves": curves})
     first = world.vectors(rings[0])
     data = {
@@ -49,8 +50,9 @@ def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: 
         "rings": [_listed(world.vectors(ring)) for ring in rings],
         "around": _listed(first[:: max(1, len(first) // AROUND)]),
         "parts": parts,
-        "fills": [chosen.fill(k) for k in range(count + SPARE)],
-        "inks": [chosen.ink(k) for k in range(count + SPARE)],
+        "fills": [chosen.fill(k) for k in range(fills)],
+        "count": count,
+        "inks": [chosen.ink(k) for k in range(fills)],
         "outline": chosen.outline,
         "paper": chosen.paper,
     }

@@ -107,12 +107,7 @@ def base_triangles(group: CrystallographicGroup, middle: Array) -> tuple[Orders,
     Raises:
         OrbiflowError: If the group has mirrors or glides, or no rotations by less than half a turn.
     """
-    flat = FLAT.get(group.name or "")
-    if flat is None:
-        raise OrbiflowError(
-            f"tiles of {group.name} stay in the plane: the sphere and the disc take tiles whose copies "
-            "are turned by thirds, quarters or sixths (p3, p4 and p6: IH7, IH28, IH21)"
-        )
+    flat = FLAT[_named(group)]
     size = float(np.sqrt(group.cell_volume))
     centres = symmetry_elements(group, middle, 1.5 * size).centers
     places = {
@@ -282,8 +277,22 @@ class Unfolding:
 
 
 def usual_orders(group: CrystallographicGroup, sign: int) -> Orders:
-    """Return the orders of a sphere, 1, or a disc, -1, for a group's tiles."""
-    return USUAL.get((group.name or "", sign), (2, 3, 5))
+    """Return the orders of a sphere, 1, or a disc, -1, for a group's tiles.
+
+    Raises:
+        OrbiflowError: If the group has no pattern there.
+    """
+    return USUAL[_named(group), sign]
+
+
+def _named(group: CrystallographicGroup) -> str:
+    """Return the name of a group whose pattern goes to other worlds."""
+    if group.name not in FLAT:
+        raise OrbiflowError(
+            f"tiles of {group.name} stay in the plane: the sphere and the disc take tiles whose copies "
+            "are turned by thirds, quarters or sixths (p3, p4 and p6: IH7, IH28, IH21)"
+        )
+    return group.name
 
 
 def unfolded(tiling: Tiling, orders: Orders) -> Unfolding:

@@ -16,9 +16,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Outcome
 from orbiflow.tiles.make import ArtSettings
 from orbiflow.tiles.motifs import Over, drawn_motif, picture_paint, require_figures, with_map
-from orbiflow.tiles.page import Motif, Scene, shades
+from orbiflow.tiles.page import Motif, Scene
 from orbiflow.tiles.tile import EscherTile, TileSource
-from orbiflow.tiles.tilings import colouring
 from orbiflow.tiles.worlds.metamorphosis import metamorphosis
 from orbiflow.tiles.worlds.schwarz import curvature, undone
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, TEXELS_PER_PIXEL, Painting, World, world_scene
@@ -101,8 +100,9 @@ def world_artwork(
     require_figures(tile, settings, len(overs))
     world, notes = world_of(tile, settings)
     known = [over or Over() for over, _ in zip_longest(overs, tile.figures)]
-    chosen = shades(palette(settings.palette), colouring(tile.tiling))
-    count = int(world.colours.max()) + 1
+    count, chosen = len(tile.figures) * world.count, palette(settings.palette)
+    if tile.parts:  # each figure has a colour of its own, and its shades
+        chosen = chosen.shaded((world.count,) * len(tile.figures))
     motifs, paintings = list[Any](), list[Painting]()
     tint = settings.tint * any(over.picture or over.drawing for over in known)
     for number, (over, part) in enumerate(zip(known, tile.figures, strict=True)):

@@ -169,7 +169,7 @@ class World {
       const taken = this.data.near.map((step) => this.chosen.get(this.#key(times(own, step))));
       let colour = 0;
       while (taken.includes(colour)) colour += 1;
-      this.chosen.set(name, Math.min(colour, this.data.fills.length - 1));
+      this.chosen.set(name, colour % this.data.count);
     }
     return this.chosen.get(name);
   }
@@ -204,10 +204,9 @@ class World {
       return data.rings.map((ring) => path(motion, ring.filter((_, k) => k % step === 0), true));
     });
     copies.forEach(({ colour }, k) => {
-      context.fillStyle = data.fills[colour];
-      context.strokeStyle = data.fills[colour];
       context.lineWidth = 0.6;
-      outlines[k].forEach((outline) => {
+      outlines[k].forEach((outline, kind) => {
+        context.fillStyle = context.strokeStyle = data.fills[kind * data.count + colour];
         context.fill(outline);
         context.stroke(outline);
       });
@@ -218,7 +217,8 @@ class World {
         context.globalAlpha = part.opacity;
         const whole = new Path2D();
         part.curves.forEach(([vectors, closed]) => whole.addPath(path(motion, vectors, closed)));
-        const ink = (own) => (own === "currentColor" ? data.inks[colour] : own);
+        const number = part.kind * data.count + colour;
+        const ink = (own) => (own === "currentColor" ? data.inks[number] : own);
         if (part.fill) {
           context.fillStyle = ink(part.fill);
           context.fill(whole, "evenodd");
