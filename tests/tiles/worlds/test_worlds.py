@@ -262,8 +262,18 @@ def test_each_of_two_figures_has_its_own_colours(tmp_path: Path) -> None:
     assert {shaded.fill(k) for k in range(2 * found.count)} <= fills
 
 
+@pytest.mark.parametrize("model", ["sphere", "disc", "spiral"])
+def test_pages_are_turned(model: Any) -> None:
+    tile = escher("IH28")
+    page: Any = {"world": model, "area": (60.0, 60.0)}
+    straight, turned = (world_of(tile, ArtSettings(**page, rotate=a))[0] for a in (0.0, 90.0))
+    vectors, first = straight.vectors(tile.tile.polygon), np.arange(1)
+    x, y = (straight.places(vectors, first)[0] - 30).T
+    assert np.abs(turned.places(vectors, first)[0] - 30 - np.column_stack([y, -x])).max() < 1e-9
+
+
 def test_settings_of_worlds_are_checked() -> None:
-    every: Any = ({"order": (1, 3, 5)}, {"tile_size": 20.0}, {"clip": False})
+    every: Any = ({"order": (1, 3, 5)}, {"tile_size": 20.0}, {"clip": False}, {"colour": "aspect"})
     for wrong in every:
         with pytest.raises(OrbiflowError):
             ArtSettings(world="disc", **wrong)

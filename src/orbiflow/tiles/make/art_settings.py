@@ -151,14 +151,24 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
             raise SettingError(f"{{order}} has whole numbers from 2 to {MOST_ORDER}")
         if self.arms is not None and (max(map(abs, self.arms)) > MOST_ARMS or not any(self.arms)):
             raise SettingError(f"{{arms}} has whole numbers up to {MOST_ARMS}, not both 0")
-        if self.world is not None and (self.tile_size is not None or not self.clip):
-            raise SettingError(
-                "in another {world} each copy has its own size; leave out {tile_size} and {clip}"
-            )
+        self._check_world()
         if self.tile_size is not None and self.tile_size * self.pixels < SMALLEST_TILE - 1e-9:
             raise SettingError(
                 f"a tile of {self.tile_size * self.pixels:.1f} pixels shows nothing ({{tile_size}}); "
                 f"choose at least {SMALLEST_TILE:g}px"
+            )
+
+    def _check_world(self) -> None:
+        """Check that nothing is asked for that another world, or a sheet that changes, has not."""
+        if self.world is not None and self.tile_size is not None:
+            raise SettingError(
+                "copies in another {world} have sizes of their own; leave out {tile_size}"
+            )
+        if self.world is not None and self.colour == "aspect":
+            raise SettingError("{colour} is neighbour or one in another {world}")
+        if (self.world or self.metamorphosis) and not self.clip:
+            raise SettingError(
+                "{clip} is for a page of the plane whose tiles are all alike; leave it out"
             )
 
 

@@ -44,7 +44,8 @@ def spiral(
     keep = (share.real > -0.5 + 1e-9) & (share.real <= 0.5 + 1e-9) & (share.imag < inner)
     motions = np.tile(np.eye(3), (int(keep.sum()), 1, 1))
     motions[:, :2, :2], motions[:, :2, 2] = linear[keep], shift[keep]
-    motions = _moved_to(start) @ motions
+    turned = period * np.radians(settings.rotate) / (2 * np.pi)
+    motions = _moved_to(start - turned) @ motions
     ring = np.column_stack(
         [tiling.prototiles[0].polygon, np.ones(len(tiling.prototiles[0].polygon))]
     )
