@@ -14,11 +14,8 @@ from orbiflow.tiles.worlds.unfolding import Unfolding
 
 Booleans = NDArray[np.bool_]
 
-SAME = 1e-5  # of a vector's length: middles of copies that are one
-FEW_COLOURS, MOST_COLOURS = (
-    6,
-    7,
-)  # that a colouring by the group has on a page, and if it must be one
+SAME = 1e-3  # of vectors' coordinates: middles of copies are farther apart, wherever they are
+FEW_COLOURS = 6  # that a colouring by the group has at most
 MOST_PAIRS = 150_000  # of permutations that are tried
 LONGEST_WORD = 8  # of rotations by which a neighbour is reached
 
@@ -44,8 +41,7 @@ def copies(unfolding: Unfolding, shown: Callable[[Array], Booleans], most: int) 
 
 def _key(vector: Array) -> tuple[int, ...]:
     """Return what tells a middle from others: they are apart by more than its rounding."""
-    unit = vector / np.linalg.norm(vector) if abs(vector[2]) > 1e3 else vector
-    return tuple(np.rint(unit / SAME / 100).astype(np.int64).tolist())
+    return tuple(np.rint(vector / SAME).astype(np.int64).tolist())
 
 
 def colours(unfolding: Unfolding, motions: Array) -> tuple[Integers, int]:
