@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from pathlib import Path
 from typing import Any
@@ -265,6 +266,12 @@ def test_each_of_two_figures_has_its_own_colours(tmp_path: Path) -> None:
     found, _ = world_of(pair, ArtSettings(world="spiral"))
     numbers = [{found.colour(k, kind) for k in range(len(found.motions))} for kind in (0, 1)]
     assert not numbers[0] & numbers[1]
+    for kind, one in enumerate(found.tiling.prototiles):  # copies that touch differ
+        rings = found.places(found.vectors(one.polygon), np.arange(len(found.motions)))
+        wide = [shapely.Polygon(ring).buffer(0.05) for ring in rings]
+        for j, k in itertools.combinations(range(len(wide)), 2):
+            if found.colour(j, kind) == found.colour(k, kind):
+                assert wide[j].intersection(wide[k]).length < 0.5
     text = (tmp_path / "pair.svg").read_text()
     fills = set(re.findall(r'fill="(#[0-9a-f]{6})"', text))
     shaded = palette("lagoon").shaded((found.count,) * 2)
@@ -283,6 +290,8 @@ def test_pages_are_turned(model: Any) -> None:
 
 def test_settings_of_worlds_are_checked() -> None:
     every: Any = ({"order": (1, 3, 5)}, {"tile_size": 20.0}, {"clip": False}, {"colour": "aspect"})
+    with pytest.raises(OrbiflowError, match="as long as high"):
+        ArtSettings(world="band", area=(400.0, 30.0))
     for wrong in every:
         with pytest.raises(OrbiflowError):
             ArtSettings(world="disc", **wrong)

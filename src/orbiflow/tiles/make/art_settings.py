@@ -23,6 +23,7 @@ from orbiflow.tiles.page import PageSettings
 from orbiflow.units import LineWidth, PageArea, PageLength
 
 MOST_ORDER, MOST_ARMS = 12, 60  # of a centre of rotation, and steps along a lattice vector
+LONGEST_BAND = 12  # heights: beyond 15 places can no longer be told apart
 MOST_PIXELS = 100_000_000  # the largest number of pixels of a picture
 LONGEST = 30_000  # the longest side of a picture in pixels
 SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
@@ -163,6 +164,10 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
         if self.world is not None and self.tile_size is not None:
             raise SettingError(
                 "copies in another {world} have sizes of their own; leave out {tile_size}"
+            )
+        if self.world == "band" and self.page[0] > LONGEST_BAND * self.page[1]:
+            raise SettingError(
+                f"a band can be {LONGEST_BAND} times as long as high: choose another {{area}}"
             )
         if self.world is not None and self.colour == "aspect":
             raise SettingError("{colour} is neighbour or one in another {world}")

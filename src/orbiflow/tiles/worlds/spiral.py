@@ -46,17 +46,15 @@ def spiral(
     motions[:, :2, :2], motions[:, :2, 2] = linear[keep], shift[keep]
     turned = period * np.radians(settings.rotate) / (2 * np.pi)
     motions = _moved_to(start - turned) @ motions
-    ring = np.column_stack(
-        [tiling.prototiles[0].polygon, np.ones(len(tiling.prototiles[0].polygon))]
-    )
-    seen = view.places(np.einsum("mij,nj->mni", motions, ring))
-    near = (seen.max(axis=1) > 0).all(axis=1) & (seen.min(axis=1) < view.size).all(axis=1)
-    motions = motions[near]
 
     def vectors(points: Array) -> Array:
         return np.column_stack([points @ flip, np.ones(len(points))])
 
-    numbers = _around(motions, ring, period, size)
+    rings = [vectors(own.polygon) for own in given.prototiles]
+    seen = view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings)))
+    near = (seen.max(axis=1) > 0).all(axis=1) & (seen.min(axis=1) < view.size).all(axis=1)
+    motions = motions[near]
+    numbers = _around(motions, rings, period, size)
     if settings.colour == "one":
         numbers = 0 * numbers
     said = f"{len(motions)} copies, {arms[0]},{arms[1]} lattice vectors around"
@@ -73,23 +71,27 @@ def _moved_to(start: complex) -> Array:
     return np.array([[1.0, 0.0, -start.real], [0.0, 1.0, -start.imag], [0.0, 0.0, 1.0]])
 
 
-def _around(motions: Array, ring: Array, period: complex, size: float) -> Integers:
+def _around(motions: Array, rings: list[Array], period: complex, size: float) -> Integers:
     """Return colours of copies in the plane that differ from their neighbours', also over a period."""
-    rings = np.einsum("mij,nj->mni", motions, ring)[..., :2]
-    step = np.array([period.real, period.imag])
-    every = np.concatenate([rings - step, rings, rings + step])
-    wide: Any = shapely.buffer(shapely.polygons(every), TOUCHING * size)
-    tree, count = shapely.STRtree(wide), len(rings)
+    step, count, small = np.array([period.real, period.imag]), len(motions), TOUCHING * size
+    placed = [np.einsum("mij,nj->mni", motions, ring)[..., :2] for ring in rings]
     near: list[set[int]] = [set() for _ in range(count)]
-    one, two = tree.query(wide[count : 2 * count], predicate="intersects")
-    for i, j in zip(one.tolist(), two.tolist(), strict=True):
-        if (
-            j % count != i
-            and shapely.area(shapely.intersection(wide[count + i], wide[j]))
-            > 50 * (TOUCHING * size) ** 2
-        ):
-            near[i].add(j % count)
-            near[j % count].add(i)
+    wide: list[Any] = [shapely.buffer(shapely.polygons(own), small) for own in placed]
+    every: Any = np.concatenate(
+        [
+            shapely.buffer(shapely.polygons(own + turn * step), small)
+            for own in placed
+            for turn in (-1, 0, 1)
+        ]
+    )
+    tree = shapely.STRtree(every)
+    for own in wide:
+        one, two = tree.query(own, predicate="intersects")
+        shared = shapely.area(shapely.intersection(own[one], every[two]))
+        for i, j in zip(one[shared > 50 * small**2], two[shared > 50 * small**2], strict=True):
+            if j % count != i:
+                near[i].add(int(j % count))
+                near[j % count].add(int(i))
     numbers, left = np.full(count, -1), set(range(count))
     while left:  # the one whose neighbours have most colours first
         taken = {i: {int(numbers[j]) for j in near[i]} - {-1} for i in left}

@@ -184,7 +184,10 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
         tile.tiling, lambda points: found.vectors(points @ flip), motions, numbers, view, found
     )
     turned = ", ".join(map(str, found.triangle.curved))
-    return world, [f"{len(motions)} copies meet at centres of the orders {turned}"]
+    notes = [f"{len(motions)} copies meet at centres of the orders {turned}"]
+    if len(motions) == MOST_COPIES:
+        notes.append("more copies than these are not drawn: choose a smaller {area}")
+    return world, notes
 
 
 def _facing(found: Unfolding, settings: ArtSettings) -> Array:
