@@ -34,6 +34,7 @@ from .scene import Scene as Scene
 from .scene import Style as Style
 from .scene import Uses as Uses
 from .scene import Words as Words
+from .scene import bezier as bezier
 from .scene import clipped as clipped
 from .scene import rectangle as rectangle
 from .settings import MARKS_EDGE as MARKS_EDGE

@@ -14,10 +14,11 @@ from PIL import Image
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, png_bytes
 from orbiflow.runtime import Cancel
-from orbiflow.tiles.geometry import Place, doubled_areas, orient, polygons_in
+from orbiflow.tiles.geometry import Place, doubled_areas, orient
 from orbiflow.tiles.motifs import Grid, bilinear, carried_places
 from orbiflow.tiles.page import (
     INK,
+    Box,
     Curve,
     Layer,
     Motif,
@@ -25,8 +26,10 @@ from orbiflow.tiles.page import (
     Raster,
     Scene,
     Style,
-    boundary,
+    bezier,
+    cut_off,
     outline,
+    rectangle,
 )
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tilings import Tiling
@@ -41,10 +44,8 @@ LEVELS = 6  # of detail, each four times as coarse as the one before
 PIECES = 14  # of a curve's length, at least, in a copy of which all is seen
 LEAST_COPY = 0.8  # mm of the smallest copies
 LEAST_DRAWN = 3.0  # mm of copies that carry their drawing
-DETAIL_SIZES, DETAIL_STEPS = (
-    (10.0, 40.0),
-    (14.0, 30.0, 60.0),
-)  # mm of copies, and steps along a tile
+DETAIL_SIZES = 10.0, 40.0  # mm of copies from which they are drawn in more detail
+DETAIL_STEPS = 14.0, 30.0, 60.0  # steps along a tile, in less and in more detail
 LEAST_SHOWN = 0.25  # mm of what is drawn
 SEAM = 0.08  # mm of hairlines between filled copies
 LINE = 1 / 150  # of a copy's size: the width of its outline
@@ -132,15 +133,13 @@ class World:
             curve = outline(self.tiling, fine).closed[kind]
             mine = np.flatnonzero((levels == level) & self.faces)
             pieces = _divided(curve, self.size / PIECES if level < 2 else self.size)
-            shares = np.linspace(0, 1, 4)[:, None, None]
-            points = _bezier(pieces, shares).swapaxes(0, 1)  # (n, 4, 2)
-            vectors = self.vectors(points.reshape(-1, 2))
+            vectors = self.vectors(_between(pieces, 0.0, 1.0).reshape(-1, 2))
             for k, places in zip(mine.tolist(), self.places(vectors, mine), strict=True):
                 yield k, _through(places.reshape(-1, 4, 2))
 
     def drawn(self, motif: Motif, kind: int) -> Iterator[tuple[int, Part]]:
         """Yield the parts of a motif, which lies on a prototile, in each copy that is large enough."""
-        within = cut_motif(motif, self.tiling.prototiles[kind].polygon, self.size)
+        within = cut_off(motif, shapely.Polygon(self.tiling.prototiles[kind].polygon)).parts
         seen = np.flatnonzero((self.sizes > LEAST_DRAWN) & self.faces & (self.fade > 0))
         levels = np.digitize(self.sizes[seen], DETAIL_SIZES)
         for level in np.unique(levels).tolist():
@@ -177,42 +176,10 @@ def stepped(curve: Curve, step: float) -> Array:
     return found[:-1] if curve.closed else found
 
 
-def cut_motif(motif: Motif, ring: Array, size: float) -> list[Part]:
-    """Return what of a motif's parts lies within a ring (N, 2) of this size."""
-    tile = shapely.Polygon(ring)
-    return [own for part in motif.parts if (own := _cut(part, tile, size)) is not None]
-
-
-def _cut(part: Part, tile: shapely.Polygon, size: float) -> Part | None:
-    """Return what of a part lies within a tile; None for nothing."""
-    lines = [own.flattened(SHARE_OF_TILE * size) for own in part.curves]
-    filled = part.style.fill is not None and all(own.closed for own in part.curves)
-    curves = list[Curve]()
-    if filled:
-        region = shapely.Polygon()
-        for points in lines:  # holes run the other way: as a whole, by turns
-            if len(points) > 2:
-                own = shapely.make_valid(shapely.Polygon(points))
-                region = shapely.symmetric_difference(region, own)
-        for polygon in polygons_in(shapely.intersection(region, tile)):
-            curves += boundary(polygon)
-    else:
-        for points, own in zip(lines, part.curves, strict=True):
-            ends = np.concatenate([points, points[:1]]) if own.closed else points
-            if len(ends) < 2:
-                continue
-            inside = shapely.intersection(shapely.LineString(ends), tile)
-            for piece in shapely.get_parts(shapely.line_merge(inside)):
-                if piece.geom_type == "LineString":
-                    curves.append(Curve.polyline(shapely.get_coordinates(piece)))
-    return part._replace(curves=tuple(curves)) if curves else None
-
-
-def _bezier(pieces: Array, shares: Array) -> Array:
-    """Return points (S, n, 2) of pieces (n, 4, 2) at shares (S, 1, 1)."""
-    t, u = shares, 1 - shares
-    a, b, c, d = (pieces[:, k] for k in range(4))
-    return u**3 * a + 3 * u**2 * t * b + 3 * u * t**2 * c + t**3 * d
+def _between(pieces: Array, start: float, end: float) -> Array:
+    """Return four points (n, 4, 2) of each piece (n, 4, 2), evenly from a share of it to another."""
+    every = np.repeat(pieces, 4, axis=0)
+    return bezier(every, np.tile(np.linspace(start, end, 4), len(pieces))).reshape(-1, 4, 2)
 
 
 def _divided(curve: Curve, longest: float) -> Array:
@@ -221,15 +188,9 @@ def _divided(curve: Curve, longest: float) -> Array:
     for piece in curve.pieces:
         length = float(np.linalg.norm(np.diff(piece, axis=0), axis=1).sum())
         count = max(1, int(np.ceil(length / longest)))
-        for k in range(count):
-            found.append(_part(piece, k / count, (k + 1) / count))
+        parts = (_between(piece[None], k / count, (k + 1) / count) for k in range(count))
+        found += [_through(part).pieces[0] for part in parts]
     return np.stack(found)
-
-
-def _part(piece: Array, start: float, end: float) -> Array:
-    """Return a part of a cubic piece (4, 2)."""
-    points = _bezier(piece[None], np.linspace(start, end, 4)[:, None, None])[:, 0]
-    return _through(points[None]).pieces[0]
 
 
 def _through(points: Array) -> Curve:
@@ -292,9 +253,8 @@ def _lay(
     width, height = (high - low).astype(int).tolist()
     grid = Grid(low, 1.0, width, height)
     areas = doubled_areas(places, triangles)
-    sound = (
-        areas * np.sign(np.median(areas)) > FLATTEST
-    )  # not at the edge of a sphere, or behind it
+    # not at the edge of a sphere, or behind it
+    sound = areas * np.sign(np.median(areas)) > FLATTEST
     if not sound.any():
         return
     at, mask = carried_places(grid, places, texels, triangles[sound])
@@ -320,10 +280,8 @@ def world_scene(
     """Return a page of a world: fills, pictures of pixels, drawings, and outlines above all."""
     kinds = range(len(world.tiling.prototiles))
     outlines = [dict(world.outlines(kind)) for kind in kinds]
-    paper = Curve.polyline(
-        [[0, 0], [world.view.size[0], 0], [*world.view.size], [0, world.view.size[1]]], closed=True
-    )
-    layers = [Layer("paper", "paper", Style(chosen.paper), (paper,))]
+    page = rectangle(Box(0.0, 0.0, *world.view.size))
+    layers = [Layer("paper", "paper", Style(chosen.paper), (page,))]
     plain = not paintings and not any(motif.parts for motif in motifs)
     widths = {k: _width(world, k, line) for own in outlines for k in own}
     for kind, own in enumerate(outlines):

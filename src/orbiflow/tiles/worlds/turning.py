@@ -8,13 +8,14 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+import shapely
 from markupsafe import Markup
 
 from orbiflow import __version__
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, rendered
-from orbiflow.tiles.page import Motif
-from orbiflow.tiles.worlds.sheet import World, cut_motif, stepped
+from orbiflow.tiles.page import Motif, cut_off
+from orbiflow.tiles.worlds.sheet import World, stepped
 from orbiflow.tiles.worlds.world_copies import colour_moves
 
 DIGITS = 5  # of vectors, of the radius
@@ -33,7 +34,7 @@ def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: 
     rings = [own.polygon for own in world.tiling.prototiles]
     parts = list[dict[str, Any]]()
     for kind, motif in enumerate(motifs):
-        for part in cut_motif(motif, world.tiling.prototiles[kind].polygon, world.size):
+        for part in cut_off(motif, shapely.Polygon(rings[kind])).parts:
             lines = [(stepped(own, world.size / STEPS), own.closed) for own in part.curves]
             curves = [[_listed(world.vectors(line)), closed] for line, closed in lines]
             style, width = part.style, part.style.width / world.size
