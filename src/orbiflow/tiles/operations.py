@@ -277,7 +277,8 @@ def animate(
     given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", *pictures)
     given, overs = motion.dressed(given, settings, pictures)
     known = colouring(given.tiling)
-    said = [note for over in overs for note in over.notes]
+    carried = [part.figure for part in given.figures] if overs else []
+    said = [note for own in (*carried, *overs) for note in own.notes]
     for note in (*said, *shades(palette(settings.palette), known).shortage(known.count)):
         on_event(Note(note))
 

@@ -7,7 +7,6 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,26 +24,26 @@ from orbiflow.tiles.make.art_settings import ArtSettings
 from orbiflow.tiles.make.repeats import repeating_page
 from orbiflow.tiles.motifs import (
     NOWHERE,
+    TEXELS_PER_PIXEL,
     Grid,
     Over,
     Paint,
     Picture,
     bilinear,
     carried_raster,
-    drawn_motif,
+    figure_paint,
     paint_motif,
-    picture_paint,
     require_figures,
     rgb_of,
     ring_sides,
     runs,
     with_map,
+    worn,
 )
 from orbiflow.tiles.page import Curve, Motif, Page, Part, Scene, Style, edge_margin, tiling_size
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.write import write_svg
 
-TEXELS_PER_PIXEL = 1.5  # texels of the tile's raster along a pixel of the page
 TILE_PER_OUTLINE = 120  # the tile's size over the outline's usual width
 USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
 SEAM = 0.3  # width in pixels of hairlines between filled tiles
@@ -143,25 +142,16 @@ def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over 
     """
     settings, tile = settings or ArtSettings(), with_map(tile)
     require_figures(tile, settings, len(overs))
-    known = [over or Over() for over, _ in zip_longest(overs, tile.figures)]
-    figures = [part.figure for part in tile.figures]
-    for over, figure in zip(known, figures, strict=True):
-        if over.picture is not None:
-            figure.require_map()
     (page, told), chosen = _art_page(tile, settings), palette(settings.palette)
-    motifs = tuple(
-        drawn_motif(figure, settings.of_figure(number), chosen, over.drawing)
-        for number, (over, figure) in enumerate(zip(known, figures, strict=True))
-    )
-    said = [note for own in (*figures, *known) for note in own.notes]
+    on = worn(tile, settings, chosen, overs, settings.tint)
     return Artwork(
         tile=tile,
         settings=settings,
         page=page,
-        pictures=tuple(over.picture for over in known),
-        motifs=motifs,
-        tint=settings.tint * any(over.picture or over.drawing for over in known),
-        notes=(*said, *filter(None, [told]), *page.palette(chosen).shortage(page.count)),
+        pictures=on.pictures,
+        motifs=on.motifs,
+        tint=on.tint,
+        notes=(*on.notes, *filter(None, [told]), *page.palette(chosen).shortage(page.count)),
     )
 
 
@@ -207,10 +197,7 @@ def paint_of(art: Artwork, number: int) -> Paint:
         art.density(number),
     )
     polygon = figure.tile.polygon
-    paint = picture_paint(art.pictures[number], figure, density, art.page.count)
-    if motif.parts:
-        paint_motif(paint, motif)
-        paint.bleed(paint.grid.inside(polygon))
+    paint = figure_paint(art.pictures[number], motif, figure, density, art.page.count)
     if art.outline > 0:
         # half of its width inside
         colour, width = palette(art.settings.palette).outline, art.outline / art.place(number).scale

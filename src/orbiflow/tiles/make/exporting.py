@@ -145,7 +145,7 @@ def laid_out(
     """Return a tile in its place with what lies on its figures, and what the user should know."""
     overs: list[Over] = []
     require_figures(given, settings, 1 + any(pictures[1:]))
-    if settings.strokes or settings.eyes or settings.second_eyes or any(pictures):
+    if settings.draws or any(pictures):
         given = with_map(given)
         overs = read_overs(pictures, given, followed=not settings.coloured)
     if any(over.picture for over in overs) and settings.file_format in LINES_ALONE:

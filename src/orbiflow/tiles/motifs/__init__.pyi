@@ -9,6 +9,10 @@ from .carried import read_over as read_over
 from .carried import read_overs as read_overs
 from .carried import require_figures as require_figures
 from .carried import with_map as with_map
+from .on_figures import TEXELS_PER_PIXEL as TEXELS_PER_PIXEL
+from .on_figures import Worn as Worn
+from .on_figures import figure_paint as figure_paint
+from .on_figures import worn as worn
 from .page_pictures import page_picture as page_picture
 from .raster import MARGIN as MARGIN
 from .raster import NOWHERE as NOWHERE

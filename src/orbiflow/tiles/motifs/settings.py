@@ -49,6 +49,11 @@ class MotifSettings(Settings):
     second_eyes: Annotated[tuple[Eye, ...], Repeated(), Option("--second-eye"), ON_TILE] = ()
     """An eye of the second figure, in its own silhouette's coordinates. May be repeated."""
 
+    @property
+    def draws(self) -> bool:
+        """Whether something is drawn on the tile."""
+        return bool(self.strokes or self.eyes or self.second_eyes)
+
     def of_figure(self, number: int) -> Self:
         """Return the settings of one of a tile's figures, counted from 0."""
         return self.replace(eyes=self.second_eyes, second_eyes=()) if number else self

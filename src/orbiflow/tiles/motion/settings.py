@@ -46,11 +46,6 @@ class AnimationSettings(PageSettings, MotifSettings, TintSettings, group="Animat
         OnlyWith(kind=("bend", "grow"), because="a morph fills the page"),
     ] = True
 
-    @property
-    def draws(self) -> bool:
-        """Whether something is drawn on the tiles."""
-        return bool(self.strokes or self.eyes or self.second_eyes)
-
     def defaults(self) -> Mapping[str, Any]:
         return {**super().defaults(), "area": "800x534px"}
 

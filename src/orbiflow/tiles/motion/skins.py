@@ -16,22 +16,21 @@ from orbiflow.drawing import Palette
 from orbiflow.tiles.geometry import Place
 from orbiflow.tiles.motifs import (
     MARGIN,
+    TEXELS_PER_PIXEL,
     Grid,
     Over,
     bilinear,
     carried_places,
-    drawn_motif,
-    paint_motif,
-    picture_paint,
+    figure_paint,
     read_overs,
     require_figures,
     with_map,
+    worn,
 )
 from orbiflow.tiles.motion.settings import AnimationSettings
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tile import EscherTile
 
-TEXELS_PER_PIXEL = 1.5  # texels of a skin along a pixel of a frame
 STILL = 1e-9  # pixels by which a body moves that has not moved
 
 
@@ -96,7 +95,6 @@ class Dress:
 
     bodies: tuple[Body, ...]
     skins: tuple[Skin, ...]
-    notes: tuple[str, ...]
 
     @classmethod
     def of(
@@ -109,21 +107,15 @@ class Dress:
         count: int,
     ) -> Dress:
         """Paint all that lies on a tile's figures, whose units lie at `places`, in so many colours."""
-        bodies, skins, notes = list[Body](), list[Skin](), list[str]()
-        tinted = settings.tint * any(over.picture or over.drawing for over in overs)
-        known = [*overs, *[Over()] * (len(places) - len(overs))]
-        for number, (over, part) in enumerate(zip(known, tile.figures, strict=True)):
-            figure, density = part.figure, TEXELS_PER_PIXEL * places[number].scale
-            motif = drawn_motif(figure, settings.of_figure(number), shaded, over.drawing)
-            paint = picture_paint(over.picture, figure, density, count)
-            paint_motif(paint, motif)
-            if motif.parts:
-                paint.bleed(paint.grid.inside(figure.tile.polygon))
-            body = Body.of(figure)
+        on = worn(tile, settings, shaded, overs, settings.tint)
+        bodies, skins = list[Body](), list[Skin]()
+        own = zip(on.pictures, on.motifs, tile.figures, places, strict=True)
+        for picture, motif, part, place in own:
+            density, body = TEXELS_PER_PIXEL * place.scale, Body.of(part.figure)
+            paint = figure_paint(picture, motif, part.figure, density, count)
             bodies.append(body)
-            skins.append(Skin(body, paint.grid, paint.coloured(shaded, count, tinted)))
-            notes += [*figure.notes, *over.notes]
-        return cls(tuple(bodies), tuple(skins), tuple(dict.fromkeys(notes)))
+            skins.append(Skin(body, paint.grid, paint.coloured(shaded, count, on.tint)))
+        return cls(tuple(bodies), tuple(skins))
 
 
 def dressed(

@@ -124,7 +124,7 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     @property
     def usual_format(self) -> str:
         """3MF for a puzzle and for a tile with a drawing, else STL."""
-        drawn = self.kind == "tile" and (self.strokes or self.eyes or self.second_eyes)
+        drawn = self.kind == "tile" and self.draws
         return "3mf" if self.kind == "puzzle" or drawn else "stl"
 
     @property

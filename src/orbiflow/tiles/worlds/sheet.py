@@ -50,7 +50,6 @@ LEAST_SHOWN = 0.25  # mm of what is drawn
 SEAM = 0.08  # mm of hairlines between filled copies
 LINE = 1 / 150  # of a copy's size: the width of its outline
 WIDEST_LINE = 0.4  # mm
-TEXELS_PER_PIXEL = 1.5
 FLATTEST = 1e-3  # twice the area in pixels of triangles that are seen
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +14,19 @@ from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Outcome
 from orbiflow.tiles.make import ArtSettings
-from orbiflow.tiles.motifs import Over, drawn_motif, picture_paint, require_figures, with_map
+from orbiflow.tiles.motifs import (
+    TEXELS_PER_PIXEL,
+    Over,
+    picture_paint,
+    require_figures,
+    with_map,
+    worn,
+)
 from orbiflow.tiles.page import Motif, Scene
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.worlds.metamorphosis import metamorphosis
 from orbiflow.tiles.worlds.schwarz import curvature, undone
-from orbiflow.tiles.worlds.sheet import LEAST_COPY, TEXELS_PER_PIXEL, Painting, World, world_scene
+from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, world_scene
 from orbiflow.tiles.worlds.spiral import spiral
 from orbiflow.tiles.worlds.turning import turning_page
 from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded, usual_orders
@@ -99,26 +105,21 @@ def world_artwork(
     tile = with_map(source)
     require_figures(tile, settings, len(overs))
     world, notes = world_of(tile, settings)
-    known = [over or Over() for over, _ in zip_longest(overs, tile.figures)]
     count, chosen = len(tile.figures) * world.count, palette(settings.palette)
     if tile.parts:  # each figure has a colour of its own, and its shades
         chosen = chosen.shaded((world.count,) * len(tile.figures))
-    motifs, paintings = list[Any](), list[Painting]()
-    tint = settings.tint * any(over.picture or over.drawing for over in known)
-    for number, (over, part) in enumerate(zip(known, tile.figures, strict=True)):
-        if over.picture is not None:
-            part.figure.require_map()
-        motif = drawn_motif(part.figure, settings.of_figure(number), chosen, over.drawing)
-        motifs.append(motif.moved(*part.place))
-        notes += [*part.figure.notes, *over.notes]
-        if settings.format == "html" and over.picture is not None:
-            notes.append("a page to turn has drawings in SVG, but no pictures of pixels")
-        elif any(own.picture for own in known):
-            scale = float(world.sizes.max()) / world.size * settings.pixels * TEXELS_PER_PIXEL
-            scale = min(scale, float(np.sqrt(TEXTURE / max(count, 1))) / world.size)
-            paint = picture_paint(over.picture, part.figure, scale * part.place.scale, count)
-            moved = paint.grid
-            paintings.append(Painting(moved, paint.coloured(chosen, count, tint), part.place))
+    on, paintings = worn(tile, settings, chosen, overs, settings.tint), list[Painting]()
+    motifs = [own.moved(*part.place) for own, part in zip(on.motifs, tile.figures, strict=True)]
+    notes += on.notes
+    if any(on.pictures) and settings.format == "html":
+        notes.append("a page to turn has drawings in SVG, but no pictures of pixels")
+    elif any(on.pictures):
+        scale = float(world.sizes.max()) / world.size * settings.pixels * TEXELS_PER_PIXEL
+        scale = min(scale, float(np.sqrt(TEXTURE / count)) / world.size)
+        for picture, part in zip(on.pictures, tile.figures, strict=True):
+            paint = picture_paint(picture, part.figure, scale * part.place.scale, count)
+            coloured = paint.coloured(chosen, count, on.tint)
+            paintings.append(Painting(paint.grid, coloured, part.place))
     notes += chosen.shortage(count)
     name = tile.isohedral_class or "a tile"
     scene = world_scene(
