@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from importlib import resources
 from typing import Any
 
 import numpy as np
 import shapely
-from markupsafe import Markup
 
-from orbiflow import __version__
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette, rendered
+from orbiflow.drawing import Palette
 from orbiflow.tiles.page import Motif, cut_off
 from orbiflow.tiles.worlds.sheet import World, stepped
 from orbiflow.tiles.worlds.world_copies import colour_moves
+from orbiflow.tiles.write import canvas_page, page_script
 
 DIGITS = 5  # of vectors, of the radius
 STEPS = 40  # of a drawing's lines along the tile
@@ -57,10 +55,8 @@ def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: 
         "outline": chosen.outline,
         "paper": chosen.paper,
     }
-    script = resources.files("orbiflow").joinpath("tiles/write/turning.js").read_text("utf-8")
-    script = re.sub(r"^export (?=function|class|const)", "", script, flags=re.MULTILINE)
-    shown = {"title": title, "version": __version__, "script": Markup(script)}
-    return rendered("orbiflow.tiles.write", "turning.html", **shown, data=data)
+    script = page_script("tiles/write/turning.js")
+    return canvas_page("turning.html", title, script, "showWorld", data)
 
 
 def _listed(vectors: Array) -> list[list[float]]:

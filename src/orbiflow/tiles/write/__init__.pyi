@@ -3,6 +3,8 @@ from .formats import LINES_ALONE as LINES_ALONE
 from .formats import WRITERS as WRITERS
 from .formats import SceneFormat as SceneFormat
 from .formats import write_scene as write_scene
+from .html import canvas_page as canvas_page
+from .html import page_script as page_script
 from .json import write_json as write_json
 from .pdf import write_pdf as write_pdf
 from .png import INCH as INCH

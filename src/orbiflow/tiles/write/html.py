@@ -23,8 +23,8 @@ from orbiflow.tiles.write.png import Sheet, painted, shape_of
 SIDE_PIXELS = 900  # of the longer side of a picture on a tile, at most
 PAD_PIXELS = 2  # around the outline, or what is below would show between two copies
 QUALITY = 88  # of these pictures, in per cent
-SCRIPTS = ("tiling", "tinted", "svg", "view")
-"""The studio's own scripts that the page carries, before its own, in the order of their imports."""
+SHARED = [f"studio/static/js/{name}.js" for name in ("tiling", "tinted", "svg", "view")]
+"""The studio's own scripts that the page carries, before its own."""
 
 
 def write_html(scene: Scene) -> str:
@@ -50,16 +50,20 @@ def write_html(scene: Scene) -> str:
             for own, motif in zip(whole.tiling.prototiles, whole.motifs, strict=False)
         ],
     }
-    shown = {"title": scene.title, "version": __version__, "script": Markup(_script())}
-    return rendered("orbiflow.tiles.write", "endless.html", **shown, data=data)
+    script = page_script(*SHARED, "tiles/write/endless.js")
+    return canvas_page("endless.html", scene.title, script, "showEndless", data)
 
 
-def _script() -> str:
-    """Return the page's scripts as one module."""
+def canvas_page(template: str, title: str, script: str, shows: str, data: dict[str, Any]) -> str:
+    """Return a page that shows data on a canvas, by a function of its script."""
+    shown = {"title": title, "version": __version__, "script": Markup(script), "shows": shows}
+    return rendered("orbiflow.tiles.write", template, **shown, data=data)
+
+
+def page_script(*files: str) -> str:
+    """Return scripts of the package, in the order of their imports, as one module."""
     package = resources.files("orbiflow")
-    files = [package.joinpath(f"studio/static/js/{name}.js") for name in SCRIPTS]
-    files.append(package.joinpath("tiles/write/endless.js"))
-    text = "\n".join(file.read_text("utf-8") for file in files)
+    text = "\n".join(package.joinpath(file).read_text("utf-8") for file in files)
     text = re.sub(r"^import [^;]*;\n", "", text, flags=re.MULTILINE)
     return re.sub(r"^export (?=(async )?function|class|const)", "", text, flags=re.MULTILINE)
 
