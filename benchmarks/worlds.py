@@ -19,7 +19,7 @@ from scipy.spatial import KDTree
 
 from orbiflow import ArtSettings, art, read_result
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.worlds import Unfolding, copies, unfolded, usual_orders
+from orbiflow.tiles.worlds import Unfolding, copies, facing, unfolded, usual_orders
 from orbiflow.tiles.worlds.schwarz import disc_of
 
 SPHERES = (2, 3, 3), (2, 3, 4), (2, 3, 5)
@@ -36,10 +36,7 @@ def covered(found: Unfolding, count: int) -> tuple[int, int, int]:
     """Return of how many directions none, one or more pieces have them; sides are divided by 12."""
     ways = np.random.default_rng(0).normal(size=(count, 3))
     ways /= np.linalg.norm(ways, axis=1)[:, None]
-    ahead = found.middle
-    right = np.cross(ahead, [0.3, 0.8, 0.1])
-    right = right / np.linalg.norm(right)
-    turn = np.stack([right, np.cross(ahead, right), ahead])
+    turn = facing(found.middle)
     ring, ends = found.ring, np.roll(found.ring, -1, axis=0)
     shares = np.linspace(0, 1, 12, endpoint=False)[:, None, None]
     fine = ((1 - shares) * ring + shares * ends).swapaxes(0, 1).reshape(-1, 2)

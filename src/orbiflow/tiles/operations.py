@@ -162,8 +162,8 @@ def art(
     if settings.world or settings.metamorphosis:
         from orbiflow.tiles import worlds
 
-        made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs, cancel=cancel)
-        content = worlds.world_file(made, settings.file_format)
+        made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs)
+        content = worlds.world_file(made, settings.file_format, cancel=cancel)
     else:
         made = make.artwork(given, settings, *overs)
         cancel.check()

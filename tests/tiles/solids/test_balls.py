@@ -13,7 +13,7 @@ from manifold3d import Manifold, OpType
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import EscherTile, SolidSettings, make_solid, solid
-from orbiflow.tiles.worlds import copies, unfolded
+from orbiflow.tiles.worlds import copies, facing, unfolded
 from swirled_tiles import is_sound, swirled_tile
 
 COUNTS = {(2, 3, 3): 12, (2, 3, 4): 24, (2, 3, 5): 60}
@@ -52,10 +52,7 @@ def test_the_pieces_of_a_ball_are_the_ball(tile: Any, order: Any) -> None:
     loose = make_solid(given_tile, chosen.replace(clearance=0.4))
     assert next(iter(loose.parts.values())).volume() < piece.volume()
     found = unfolded(given_tile.tiling, order)
-    up = found.middle  # as `_piece` turns it
-    right = np.cross(up, [0.3, 0.8, 0.1])
-    right = right / np.linalg.norm(right)
-    frame = np.stack([right, np.cross(up, right), up])
+    frame = facing(found.middle)
     lowest = 30.0 - piece.bounding_box()[5]
     placed = piece.translate((0, 0, lowest))
     every = [
@@ -72,7 +69,7 @@ def test_what_makes_no_ball_says_why(tmp_path: Path) -> None:
     with pytest.raises(OrbiflowError, match="thirds, quarters or sixths"):
         make_solid(EscherTile(swirled_tile("IH4", 3, 0.1)), SolidSettings(kind="ball"))
     tile = EscherTile(swirled_tile("IH28", 3, 0.1))
-    with pytest.raises(OrbiflowError, match="not of a sphere"):
+    with pytest.raises(OrbiflowError, match="not of the sphere"):
         make_solid(tile, SolidSettings(kind="ball", order=(2, 3, 7)))
     with pytest.raises(OrbiflowError, match="quarter of"):
         SolidSettings(kind="lamp", wall=30.0)

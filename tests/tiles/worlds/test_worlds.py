@@ -22,7 +22,14 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import ArtSettings, EscherTile, art
 from orbiflow.tiles.geometry import orient, signed_area
 from orbiflow.tiles.worlds import Unfolding, colours, copies, unfolded, world_of, world_scene
-from orbiflow.tiles.worlds.schwarz import TriangleMap, curvature, disc_of, form, triangle_map
+from orbiflow.tiles.worlds.schwarz import (
+    TriangleMap,
+    curvature,
+    disc_of,
+    facing,
+    form,
+    triangle_map,
+)
 from orbiflow.tiles.worlds.sheet import TOLERANCE
 from small_pairs import pair_result
 from swirled_tiles import is_sound, swirled_tile
@@ -165,10 +172,7 @@ def test_copies_cover_the_sphere_once(tile: Any, orders: Any, seed: int) -> None
 
 def seen_from_middle(found: Unfolding) -> tuple[shapely.Polygon, Any]:
     """The tile in a stereographic picture about its middle, and what takes directions there."""
-    ahead = found.middle
-    right = np.cross(ahead, [0.3, 0.8, 0.1])
-    right = right / np.linalg.norm(right)
-    turn = np.stack([right, np.cross(ahead, right), ahead])
+    turn = facing(found.middle)
 
     def place(vectors: Array) -> Any:
         return disc_of(vectors @ turn.T)

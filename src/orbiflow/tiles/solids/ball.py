@@ -16,7 +16,7 @@ from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.shapes import Body
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.worlds import Unfolding, copies, unfolded, usual_orders
+from orbiflow.tiles.worlds import Unfolding, copies, facing, unfolded, usual_orders
 
 GROOVE = 2.0  # mm from the bottom of a groove between tiles to its edge
 FOOT = 0.03  # of the radius: what is cut off so that a ball stands
@@ -35,12 +35,7 @@ def ball_of(tile: EscherTile, settings: SolidSettings) -> tuple[dict[str, Body],
     if tile.parts:
         raise OrbiflowError("a ball is made of a tile of one figure")
     tiling = tile.tiling.transformed(np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
-    orders = settings.order or usual_orders(tiling.group, 1)
-    found = unfolded(tiling, orders)
-    if found.sign < 0:
-        raise OrbiflowError(
-            f"the orders {orders} are not of a sphere; choose 2,3,3, 2,3,4 or 2,3,5"
-        )
+    found = unfolded(tiling, settings.order or usual_orders(tiling.group, 1), 1)
     motions = copies(found, lambda own: np.ones(len(own), dtype=bool), 500)
     radius = settings.diameter / 2
     # mm in a unit of the plane, in the mean
@@ -192,9 +187,6 @@ def _piece(found: Unfolding, radius: float, scale: float, settings: SolidSetting
         np.column_stack([ahead, edge + count, ahead + count]),
     ]
     triangles = np.concatenate([mesh.triangles, mesh.triangles[:, ::-1] + count, *walls])
-    up = found.middle
-    right = np.cross(up, [0.3, 0.8, 0.1])
-    right = right / np.linalg.norm(right)
-    turned = vectors @ np.stack([right, np.cross(up, right), up]).T
+    turned = vectors @ facing(found.middle).T
     made = _closed(np.concatenate([radius * turned, (radius - settings.wall) * turned]), triangles)
     return made.translate((0, 0, -made.bounding_box()[2]))

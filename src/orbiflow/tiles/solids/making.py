@@ -19,7 +19,6 @@ from orbiflow.tiles.likeness import narrowest_slit
 from orbiflow.tiles.make import ExportSettings, dark_parts, fit_words, laid_out, place_on
 from orbiflow.tiles.page import Motif
 from orbiflow.tiles.result_file import as_tile
-from orbiflow.tiles.solids.ball import ball_of
 from orbiflow.tiles.solids.plates import Plate, plates_of
 from orbiflow.tiles.solids.settings import BALLS, SolidSettings
 from orbiflow.tiles.solids.shapes import Plan
@@ -139,6 +138,8 @@ def make_solid(
     if not certificate.valid:
         title = f"NOT CERTIFIED: {title}"
     if settings.kind in BALLS:
+        from orbiflow.tiles.solids.ball import ball_of  # other worlds, which flat solids do without
+
         bodies, notes = ball_of(given, settings)
         own = {"kind": settings.kind, "tile": given, "title": title, "notes": notes}
         return Solid(plates=(bodies,), **own)

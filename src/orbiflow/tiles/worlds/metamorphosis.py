@@ -22,7 +22,7 @@ from orbiflow.tiles.motion import Morph, OwnFrame
 from orbiflow.tiles.page import Box, Curve, Page, tiling_size
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.worlds.sheet import World
+from orbiflow.tiles.worlds.sheet import World, motions_of
 from orbiflow.tiles.worlds.views import View
 
 STEPS = 24  # of the way, between which points go straight
@@ -144,9 +144,7 @@ def _on_page(
     room = 2 * page.tiling.radius
     wider = replace(page, box=Box(-room, -room, width + room, height + room))
     copies = wider.copies
-    motions = np.tile(np.eye(3), (len(copies), 1, 1))
-    motions[:, :2, :2] = copies.group.linear_parts[copies.cosets]
-    motions[:, :2, 2] = copies.translations
+    motions = motions_of(copies.group.linear_parts[copies.cosets], copies.translations)
 
     def vectors(points: Array) -> Array:
         return np.column_stack([page.place(points), np.ones(len(points))])

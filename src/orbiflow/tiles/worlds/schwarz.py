@@ -30,6 +30,8 @@ AT_VERTEX = 1e-9  # of the reach: nearer points are the vertex, where a root wou
 NEWTON_STEPS = 60  # at most, of the inverse
 ENOUGH = 1e-15  # of the triangle's size, below which a step of the inverse ends it
 
+STEEP = 0.99  # of a direction: one that is nearer to the second axis has another one upwards
+
 Orders = tuple[int, int, int]
 
 
@@ -230,7 +232,7 @@ class TriangleMap:
             along = _shifted(2 * np.arctan(_side(_taken(curved, own))), self.sign)
             if self.sign < 0:
                 along = _shifted(2 * np.arctanh(_side(_taken(curved, own))), self.sign)
-            place = place @ along @ _turned(np.pi - np.pi / curved[(k + 1) % 3])
+            place = place @ along @ turned(np.pi - np.pi / curved[(k + 1) % 3])
         self.corners: Array = np.stack([frame[:, 2] for frame in self.frames])
 
     @cached_property
@@ -309,7 +311,16 @@ def _taken(orders: Orders, places: Sequence[int]) -> Orders:
     return one, two, three
 
 
-def _turned(angle: float) -> Array:
+def facing(ahead: Array) -> Array:
+    """Return the rotation that takes a direction (3,) to (0, 0, 1)."""
+    steepest = np.eye(3)[1 if abs(ahead[1]) < STEEP else 0]
+    right = np.cross(steepest, ahead)
+    right = right / np.linalg.norm(right)
+    return np.stack([right, np.cross(ahead, right), ahead])
+
+
+def turned(angle: float) -> Array:
+    """Return the rotation (3, 3) about the third axis by an angle."""
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 

@@ -53,6 +53,13 @@ WIDEST_LINE = 0.4  # mm
 FLATTEST = 1e-3  # twice the area in pixels of triangles that are seen
 
 
+def motions_of(linear: Array, shift: Array) -> Array:
+    """Return maps p -> linear p + shift, (M, 2, 2) and (M, 2), as motions (M, 3, 3) of (x, y, 1)."""
+    found = np.tile(np.eye(3), (len(linear), 1, 1))
+    found[:, :2, :2], found[:, :2, 2] = linear, shift
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class World:
     """Copies of a tile in a world, as a page shows them.

@@ -10,7 +10,7 @@ import shapely
 from orbiflow.arrays import Array, Integers
 from orbiflow.tiles.make import ArtSettings
 from orbiflow.tiles.tilings import Tiling, copies_meeting
-from orbiflow.tiles.worlds.sheet import LEAST_COPY, World
+from orbiflow.tiles.worlds.sheet import LEAST_COPY, World, motions_of
 from orbiflow.tiles.worlds.views import View
 
 AROUND = 9.0  # sizes of the tile that one turn of a spiral has
@@ -42,10 +42,8 @@ def spiral(
     share = (places @ (1, 1j) - start) / period
     view = View("spiral", settings.page, np.eye(3), period)
     keep = (share.real > -0.5 + 1e-9) & (share.real <= 0.5 + 1e-9) & (share.imag < inner)
-    motions = np.tile(np.eye(3), (int(keep.sum()), 1, 1))
-    motions[:, :2, :2], motions[:, :2, 2] = linear[keep], shift[keep]
-    turned = period * np.radians(settings.rotate) / (2 * np.pi)
-    motions = _moved_to(start - turned) @ motions
+    begin = start - period * np.radians(settings.rotate) / (2 * np.pi)
+    motions = motions_of(linear[keep], shift[keep] - (begin.real, begin.imag))
 
     def vectors(points: Array) -> Array:
         return np.column_stack([points @ flip, np.ones(len(points))])
@@ -65,10 +63,6 @@ def _usual_arms(first: complex, second: complex, length: float) -> tuple[int, in
     """Return the steps along both lattice vectors, neither of them 0, of about this length together."""
     steps = [(m, n) for m in range(1, 9) for n in range(-8, 9) if n]
     return min(steps, key=lambda own: abs(abs(own[0] * first + own[1] * second) - length))
-
-
-def _moved_to(start: complex) -> Array:
-    return np.array([[1.0, 0.0, -start.real], [0.0, 1.0, -start.imag], [0.0, 0.0, 1.0]])
 
 
 def _around(motions: Array, rings: list[Array], period: complex, size: float) -> Integers:

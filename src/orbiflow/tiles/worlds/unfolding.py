@@ -295,16 +295,20 @@ def _named(group: CrystallographicGroup) -> str:
     return group.name
 
 
-def unfolded(tiling: Tiling, orders: Orders) -> Unfolding:
+def unfolded(tiling: Tiling, orders: Orders, sign: int = 0) -> Unfolding:
     """Return a tile in the world of these orders, given to its centres as they distort it least.
 
+    With a `sign` it must be the sphere, 1, or the hyperbolic plane, -1.
+
     Raises:
-        OrbiflowError: If the tiling's group is not one of rotations, or the orders are of no world.
+        OrbiflowError: If the tiling's group is not one of rotations, or the orders are not of it.
     """
-    if min(orders) < 2 or not curvature(orders):
+    found = 0 if min(orders) < 2 else curvature(orders)
+    if not found or sign not in (0, found):
+        where = {0: "a sphere or a disc", 1: "the sphere", -1: "the hyperbolic plane"}[sign]
         raise OrbiflowError(
-            f"the orders {', '.join(map(str, orders))} are of the plane, or of no world; the sphere "
-            "has 2,3,3, 2,3,4, 2,3,5 and 2,2,n, the disc larger ones, such as 3,3,4 or 2,3,7"
+            f"the orders {', '.join(map(str, orders))} are not of {where}: the sphere has 2,3,3, "
+            "2,3,4, 2,3,5 and 2,2,n, the hyperbolic plane larger ones, such as 3,3,4 or 2,3,7"
         )
     flat, near = base_triangles(tiling.group, tiling.center)
     middle = complex(*tiling.center)

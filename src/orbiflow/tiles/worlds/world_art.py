@@ -11,7 +11,6 @@ import numpy as np
 from orbiflow import __version__
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, palette
-from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Outcome
 from orbiflow.tiles.make import ArtSettings
 from orbiflow.tiles.motifs import (
@@ -25,7 +24,7 @@ from orbiflow.tiles.motifs import (
 from orbiflow.tiles.page import Motif, Scene
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.worlds.metamorphosis import metamorphosis
-from orbiflow.tiles.worlds.schwarz import curvature, undone
+from orbiflow.tiles.worlds.schwarz import facing, turned, undone
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, world_scene
 from orbiflow.tiles.worlds.spiral import spiral
 from orbiflow.tiles.worlds.turning import turning_page
@@ -43,19 +42,34 @@ class WorldArt(Outcome):
     """A picture of a tile's copies in another world.
 
     - `world`: The copies, and how they are seen.
-    - `scene`: The page.
     - `palette`: Its colours.
     - `motifs`: What is drawn on each figure, in the tile's units.
+    - `paintings`: What of pixels lies on each figure; empty for none.
     - `notes`: What the user should know.
     """
 
     tile: EscherTile
     settings: ArtSettings
     world: World
-    scene: Scene
     palette: Palette
     motifs: tuple[Motif, ...]
+    paintings: tuple[Painting, ...]
     notes: tuple[str, ...]
+
+    def scene(self, cancel: Cancel | None = None) -> Scene:
+        """Return the page."""
+        name = self.tile.isohedral_class or "a tile"
+        return world_scene(
+            self.world,
+            self.palette,
+            self.motifs,
+            self.paintings,
+            pixels=self.settings.pixels,
+            line=self.settings.outline,
+            title=self.tile.name,
+            notes=(f"Artwork of {name}, made with orbiflow {__version__}.",),
+            cancel=cancel,
+        )
 
     @property
     def width(self) -> int:
@@ -91,12 +105,10 @@ class WorldArt(Outcome):
 
     def _repr_png_(self) -> bytes:
         """Return what a notebook shows."""
-        return write_png(self.scene, dpi=self.settings.dpi)
+        return write_png(self.scene(), dpi=self.settings.dpi)
 
 
-def world_artwork(
-    source: TileSource, settings: ArtSettings, *overs: Over | None, cancel: Cancel | None = None
-) -> WorldArt:
+def world_artwork(source: TileSource, settings: ArtSettings, *overs: Over | None) -> WorldArt:
     """Return a picture of a tile in the world that settings name; arguments as of `artwork`.
 
     Raises:
@@ -121,28 +133,23 @@ def world_artwork(
             coloured = paint.coloured(chosen, count, on.tint)
             paintings.append(Painting(paint.grid, coloured, part.place))
     notes += chosen.shortage(count)
-    name = tile.isohedral_class or "a tile"
-    scene = world_scene(
-        world,
-        chosen,
-        motifs,
-        paintings,
-        pixels=settings.pixels,
-        line=settings.outline,
-        title=tile.name,
-        notes=(f"Artwork of {name}, made with orbiflow {__version__}.",),
-        cancel=cancel,
+    return WorldArt(
+        tile=tile,
+        settings=settings,
+        world=world,
+        palette=chosen,
+        motifs=tuple(motifs),
+        paintings=tuple(paintings),
+        notes=tuple(dict.fromkeys(notes)),
     )
-    said = tuple(dict.fromkeys(notes))
-    own = {"world": world, "scene": scene, "palette": chosen, "motifs": tuple(motifs)}
-    return WorldArt(tile=tile, settings=settings, notes=said, **own)
 
 
-def world_file(art: WorldArt, format: str) -> bytes | str:
+def world_file(art: WorldArt, format: str, *, cancel: Cancel | None = None) -> bytes | str:
     """Return the content of a file in a format, svg, png, or html for a page to turn it."""
-    if format == "html" and art.world.unfolding is not None:
+    if format == "html":
         return turning_page(art.world, art.palette, art.motifs, art.tile.name)
-    return write_svg(art.scene) if format == "svg" else write_png(art.scene, dpi=art.settings.dpi)
+    scene = art.scene(cancel)
+    return write_svg(scene) if format == "svg" else write_png(scene, dpi=art.settings.dpi)
 
 
 def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]:
@@ -154,18 +161,7 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
     if settings.world == "spiral":
         return spiral(tile.tiling, tiling, flip, settings)
     sign = 1 if settings.world == "sphere" else -1
-    orders = settings.order or usual_orders(tiling.group, sign)
-    if curvature(orders) != sign:
-        where = "the sphere" if sign > 0 else "the hyperbolic plane"
-        raise OrbiflowError(
-            f"the orders {', '.join(map(str, orders))} are not of {where}; it has "
-            + (
-                "2,3,3, 2,3,4, 2,3,5 and 2,2,n"
-                if sign > 0
-                else "larger ones, such as 3,3,4 or 2,3,7"
-            )
-        )
-    found = unfolded(tiling, orders)
+    found = unfolded(tiling, settings.order or usual_orders(tiling.group, sign), sign)
     view = View(settings.world or "disc", settings.page, _facing(found, settings))
     ring = found.vectors(found.ring[:: max(1, len(found.ring) // 30)])
 
@@ -184,8 +180,8 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
     world = World(
         tile.tiling, lambda points: found.vectors(points @ flip), motions, numbers, view, found
     )
-    turned = ", ".join(map(str, found.triangle.curved))
-    notes = [f"{len(motions)} copies meet at centres of the orders {turned}"]
+    orders = ", ".join(map(str, found.triangle.curved))
+    notes = [f"{len(motions)} copies meet at centres of the orders {orders}"]
     if len(motions) == MOST_COPIES:
         notes.append("more copies than these are not drawn: choose a smaller {area}")
     return world, notes
@@ -193,14 +189,8 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
 
 def _facing(found: Unfolding, settings: ArtSettings) -> Array:
     """Return the motion that brings what is to be in the middle there, turned as asked."""
-    angle = np.radians(settings.rotate)
-    turn = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )
-    if found.sign < 0:
-        middle = int(np.argmax(found.triangle.curved))
-        return turn @ undone(found.triangle.frames[middle], found.sign)
-    ahead = found.middle
-    right = np.cross([0.0, 1.0, 0.0], ahead)
-    right = right / np.linalg.norm(right)
-    return turn @ np.stack([right, np.cross(ahead, right), ahead])
+    turn = turned(np.radians(settings.rotate))
+    if found.sign > 0:
+        return turn @ facing(found.middle)
+    middle = int(np.argmax(found.triangle.curved))
+    return turn @ undone(found.triangle.frames[middle], found.sign)
