@@ -2,7 +2,7 @@
 
     python benchmarks/worlds.py out/barbet [--directions 1000000]
 
-RESULT has tiles whose copies are turned by thirds, quarters or sixths (IH7, IH28, IH21).
+RESULT is the folder of a search; its tiles of the nine classes are taken.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from scipy.spatial import KDTree
 from orbiflow import ArtSettings, art, read_result
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.worlds import Unfolding, copies, facing, unfolded, usual_orders
-from orbiflow.tiles.worlds.schwarz import disc_of
+from orbiflow.tiles.worlds.curved import disc_of
 
+CLASSES = "IH1", "IH2", "IH3", "IH4", "IH5", "IH6", "IH7", "IH21", "IH28"
 SPHERES = (2, 3, 3), (2, 3, 4), (2, 3, 5)
 
 
@@ -59,17 +60,19 @@ def main() -> None:
     parser.add_argument("--directions", type=int, default=1_000_000)
     given = parser.parse_args()
     print("tile    orders   edges    in no, one, more pieces")
-    for name in ("IH7", "IH28", "IH21"):
+    for name in CLASSES:
         try:
             tile = read_result(given.result, name)
         except OrbiflowError:
             continue
-        for orders in (*SPHERES, usual_orders(tile.tiling.group, -1)):
+        spheres = SPHERES if len(usual_orders(tile.tiling.group, -1)) == 3 else ()
+        for orders in (*spheres, usual_orders(tile.tiling.group, -1)):
             found = unfolded(tile.tiling, orders)
             hits = covered(found, given.directions) if found.sign > 0 else ""
             print(f"{name:7} {orders!s:9} {match(found):.1e} {hits}", flush=True)
         with tempfile.TemporaryDirectory() as folder:
-            for world, ending in (("disc", "svg"), ("disc", "png"), ("sphere", "svg")):
+            files = [("disc", "svg"), ("disc", "png"), *[("sphere", "svg")] * bool(spheres)]
+            for world, ending in files:
                 begin = time.perf_counter()
                 settings = ArtSettings(world=world, format=ending)  # type: ignore[arg-type]
                 done = art(tile, Path(folder) / f"a.{ending}", settings)

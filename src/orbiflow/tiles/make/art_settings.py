@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 from orbiflow.drawing import PaletteName
@@ -34,35 +34,35 @@ COPIES = {"12": (2, 3, 3), "24": (2, 3, 4), "60": (2, 3, 5)}
 
 
 def order_numbers(text: str) -> tuple[int, ...]:
-    """Return the orders of three centres of rotation.
+    """Return the orders of centres of rotation.
 
-    >>> order_numbers("60"), order_numbers("3, 3,4")
-    ((2, 3, 5), (3, 3, 4))
+    >>> order_numbers("60"), order_numbers("3, 3,4"), order_numbers("3")
+    ((2, 3, 5), (3, 3, 4), (3,))
     """
     if text.strip() in COPIES:
         return COPIES[text.strip()]
     return _whole_numbers(
-        text, 3, "three whole numbers from 2 to 12, such as 2,3,5, or 12, 24 or 60"
+        text, (1, 2, 3, 4), "up to four whole numbers from 2 to 12, such as 2,3,5, or 12, 24 or 60"
     )
 
 
 def arm_numbers(text: str) -> tuple[int, ...]:
     """Return the steps of a spiral along two lattice vectors."""
-    return _whole_numbers(text, 2, "two whole numbers, such as 3,5")
+    return _whole_numbers(text, (2,), "two whole numbers, such as 3,5")
 
 
-def _whole_numbers(text: str, count: int, what: str) -> tuple[int, ...]:
+def _whole_numbers(text: str, counts: Sequence[int], what: str) -> tuple[int, ...]:
     try:
         found = tuple(int(part) for part in text.split(","))
     except ValueError:
         found = ()
-    if len(found) != count:
+    if len(found) not in counts:
         raise OrbiflowError(f"{text!a:.60} is not {what}")
     return found
 
 
 Orders: TypeAlias = Annotated[
-    tuple[int, int, int], Parsed(order_numbers, "three orders or a number of copies", "ORDERS")
+    tuple[int, ...], Parsed(order_numbers, "orders or a number of copies", "ORDERS")
 ]
 Arms: TypeAlias = Annotated[tuple[int, int], Parsed(arm_numbers, "two whole numbers", "M,N")]
 
@@ -106,15 +106,15 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
 
     world: Annotated[World | None, NotWith("repeat", because="a cell repeats in the plane")] = None
     """Carry the tiling to another world: a sphere; the hyperbolic plane as a disc, a half-plane or a
-    band; a spiral. All but the spiral need copies turned by thirds, quarters or sixths."""
+    band; a spiral. The sphere needs copies turned by thirds, quarters or sixths."""
 
     order: Annotated[
         Orders | None,
         OnlyWith(world=("sphere", "disc", "half-plane", "band")),
         DefaultText("what bends the tile least"),
     ] = None
-    """How many copies meet at the three centres of rotation, such as 2,3,5 or 3,3,4; or the number of
-    copies on a sphere: 12, 24 or 60."""
+    """How many copies meet at centres of rotation: three numbers for p3, p4 and p6, such as 2,3,5 or
+    3,3,4, four for p2, two for pgg, one for p1 and pg; or a sphere's number of copies: 12, 24, 60."""
 
     arms: Annotated[
         Arms | None, OnlyWith(world=("spiral",)), DefaultText("about nine tiles around")

@@ -1,4 +1,4 @@
-from .schwarz import facing as facing
+from .curved import facing as facing
 from .sheet import World as World
 from .sheet import world_scene as world_scene
 from .unfolding import Unfolding as Unfolding

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -33,7 +34,7 @@ from orbiflow.tiles.page import (
 )
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tilings import Tiling
-from orbiflow.tiles.worlds.unfolding import Unfolding
+from orbiflow.tiles.worlds.unfolding import Unfolding, with_points
 from orbiflow.tiles.worlds.views import View
 
 Booleans = NDArray[np.bool_]
@@ -42,6 +43,8 @@ TOLERANCE = 0.02  # mm of curves from the outlines
 SHARE_OF_TILE = 1 / 4000  # the least tolerance of an outline, in sizes of the tile
 LEVELS = 6  # of detail, each four times as coarse as the one before
 PIECES = 14  # of a curve's length, at least, in a copy of which all is seen
+CONE_NEAR = 1e-5  # of a tile's size: cones so near to its polygon are of it
+SAMPLES = 33  # of a curve, to find where it is nearest to a cone
 LEAST_COPY = 0.8  # mm of the smallest copies
 LEAST_DRAWN = 3.0  # mm of copies that carry their drawing
 DETAIL_SIZES = 10.0, 40.0  # mm of copies from which they are drawn in more detail
@@ -70,6 +73,7 @@ class World:
     - `colours`: The number of the colour (M,) of each.
     - `view`: How they are seen.
     - `unfolding`: Of a sphere or the hyperbolic plane, what its copies are found by.
+    - `flip`: What takes its tile's points to the tiling's (2, 2): 1, or y downwards.
     """
 
     tiling: Tiling
@@ -78,6 +82,7 @@ class World:
     colours: Integers
     view: View
     unfolding: Unfolding | None = None
+    flip: Array = field(default_factory=lambda: np.eye(2))
 
     @property
     def count(self) -> int:
@@ -87,6 +92,11 @@ class World:
     def colour(self, copy: int, kind: int) -> int:
         """Return the number in the palette of a figure's colour in a copy."""
         return kind * self.count + int(self.colours[copy])
+
+    @cached_property
+    def cones(self) -> Array:
+        """Points (K, 2) of the first tile's outline about which angles are others than in the plane."""
+        return np.zeros((0, 2)) if self.unfolding is None else self.unfolding.cones @ self.flip
 
     @cached_property
     def fade(self) -> Array:
@@ -138,7 +148,8 @@ class World:
             fine = SHARE_OF_TILE * self.size * 4.0 ** float(level)
             curve = outline(self.tiling, fine).closed[kind]
             mine = np.flatnonzero((levels == level) & self.faces)
-            pieces = _divided(curve, self.size / PIECES if level < 2 else self.size)
+            longest = self.size / PIECES if level < 2 else self.size
+            pieces = _divided(curve, longest, self.cones, 3 * fine)
             vectors = self.vectors(_between(pieces, 0.0, 1.0).reshape(-1, 2))
             for k, places in zip(mine.tolist(), self.places(vectors, mine), strict=True):
                 yield k, _through(places.reshape(-1, 4, 2))
@@ -188,15 +199,40 @@ def _between(pieces: Array, start: float, end: float) -> Array:
     return bezier(every, np.tile(np.linspace(start, end, 4), len(pieces))).reshape(-1, 4, 2)
 
 
-def _divided(curve: Curve, longest: float) -> Array:
-    """Return the pieces (n, 4, 2) of a curve, the longer ones divided."""
-    found = list[Array]()
+def _divided(curve: Curve, longest: float, cones: Array, near: float) -> Array:
+    """Return the pieces (n, 4, 2) of a curve, the longer ones divided, and all at cones (K, 2).
+
+    Those are points within the length `near` of the curve, where its image has a corner.
+    """
+    found, shares = list[Array](), np.linspace(0, 1, SAMPLES)
     for piece in curve.pieces:
         length = float(np.linalg.norm(np.diff(piece, axis=0), axis=1).sum())
-        count = max(1, int(np.ceil(length / longest)))
-        parts = (_between(piece[None], k / count, (k + 1) / count) for k in range(count))
+        cuts = set(np.linspace(0, 1, max(1, int(np.ceil(length / longest))) + 1).tolist())
+        for cone in cones:
+            away = np.linalg.norm(bezier(np.tile(piece, (SAMPLES, 1, 1)), shares) - cone, axis=1)
+            if away.min() < near + length / SAMPLES:
+                share = _nearest(piece, cone, float(shares[away.argmin()]))
+                cuts = {own for own in cuts if abs(own - share) > 1 / SAMPLES or own in (0, 1)} | {
+                    share
+                }
+        parts = (_between(piece[None], a, b) for a, b in pairwise(sorted(cuts)))
         found += [_through(part).pieces[0] for part in parts]
-    return np.stack(found)
+    every = np.stack(found)
+    for cone in cones:
+        for end in (0, 3):
+            every[np.linalg.norm(every[:, end] - cone, axis=1) < near, end] = cone
+    return every
+
+
+def _nearest(piece: Array, point: Array, share: float) -> float:
+    """Return the share of a piece (4, 2) that is nearest to a point, near a given one."""
+    low, high = max(0.0, share - 1 / SAMPLES), min(1.0, share + 1 / SAMPLES)
+    for _ in range(40):
+        ways = np.linspace(low, high, 4)
+        away = np.linalg.norm(bezier(np.tile(piece, (4, 1, 1)), ways) - point, axis=1)
+        best = int(away.argmin())
+        low, high = float(ways[max(0, best - 1)]), float(ways[min(3, best + 1)])
+    return (low + high) / 2
 
 
 def _through(points: Array) -> Curve:
@@ -231,9 +267,8 @@ def pictured(
         for level in np.unique(levels[world.faces]).tolist():
             step = 3 * world.size / DETAIL_STEPS[level]
             rough = shapely.simplify(shapely.Polygon(own.polygon), step / 10)
-            mesh = triangulate(
-                orient(shapely.get_coordinates(rough)[:-1], counter_clockwise=True), step
-            )
+            ring = orient(shapely.get_coordinates(rough)[:-1], counter_clockwise=True)
+            mesh = triangulate(with_points(ring, world.cones, step / 5), step)
             texels, vectors = painting.grid.texels(back(mesh.points)), world.vectors(mesh.points)
             for k in np.flatnonzero((levels == level) & world.faces).tolist():
                 cancel.check()

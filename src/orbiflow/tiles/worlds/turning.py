@@ -12,7 +12,8 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette
 from orbiflow.tiles.page import Motif, cut_off
-from orbiflow.tiles.worlds.sheet import World, stepped
+from orbiflow.tiles.worlds.sheet import CONE_NEAR, World, stepped
+from orbiflow.tiles.worlds.unfolding import with_points
 from orbiflow.tiles.worlds.world_copies import colour_moves
 from orbiflow.tiles.write import canvas_page, page_script
 
@@ -29,7 +30,10 @@ def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: 
     moves = colour_moves(found)
     count = world.count + SPARE if moves is None else len(moves[0])
     fills = len(world.tiling.prototiles) * count
-    rings = [own.polygon for own in world.tiling.prototiles]
+    rings = [
+        with_points(own.polygon, world.cones, CONE_NEAR * world.size)
+        for own in world.tiling.prototiles
+    ]
     parts = list[dict[str, Any]]()
     for kind, motif in enumerate(motifs):
         for part in cut_off(motif, shapely.Polygon(rings[kind])).parts:

@@ -1,134 +1,117 @@
 """A tile carried into another world, with its copies: the pattern of a group of rotations, bent.
 
-The plane's pattern is a surface with three cone points, the triangle of rotation centres twice. A
-world whose triangle has other angles gives the same surface other cone points, and the conformal map
-of the triangles takes the pattern along: a point of the tile is reached from the tile's middle through
-a row of reflected triangles, and the same row of reflections is gone in the world. What the plane's
-group identifies on the tile's edge, the world's group does, exactly.
+The tile has no centre of rotation inside, so that the map of its group's pattern (`developing`) is a
+map of the tile, followed from one triangle of a mesh to the next. Where an element of the plane's group
+takes one piece of the tile's edge to another, the solutions there differ by a matrix, which is the
+motion of the world that does the same: what the plane's group identifies, the world's does.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import permutations
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+import scipy.sparse
 import shapely
+from scipy.sparse.csgraph import breadth_first_order
 
-from orbiflow.arrays import Array, Complex
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
 from orbiflow.tiles.geometry import complex_points, orient
-from orbiflow.tiles.silhouette import triangulate
+from orbiflow.tiles.silhouette import Mesh, triangulate
 from orbiflow.tiles.tilings import Tiling, copies_meeting
-from orbiflow.tiles.worlds.schwarz import Orders, TriangleMap, curvature, triangle_map, undone
+from orbiflow.tiles.worlds.curved import curvature, motions_of_spinors, norms, vectors_of
+from orbiflow.tiles.worlds.developing import Development
+from orbiflow.tiles.worlds.pattern import Around, Pattern
+from orbiflow.tiles.worlds.potential import ROUND, Series
 
-FLAT: dict[str, Orders] = {"p3": (3, 3, 3), "p4": (4, 4, 2), "p6": (6, 3, 2)}
-"""The orders of the rotation centres of groups whose pattern goes to other worlds."""
-
-USUAL: dict[tuple[str, int], Orders] = {
+USUAL: dict[tuple[str, int], tuple[int, ...]] = {
     ("p3", 1): (2, 3, 3),
     ("p4", 1): (2, 3, 4),
     ("p6", 1): (2, 3, 5),
     ("p3", -1): (3, 3, 4),
     ("p4", -1): (2, 4, 5),
     ("p6", -1): (2, 3, 7),
+    ("p2", -1): (2, 2, 2, 3),
+    ("pgg", -1): (2, 3),
+    ("p1", -1): (2,),
+    ("pg", -1): (2,),
 }
 """The orders of the sphere, 1, and of the disc, -1, that bend the tiles of a group least."""
 
-NEAR = 1e-7  # of a lattice vector: places that are one
-ON_SIDE = 1e-12  # of a triangle's size, within which a point lies in it
-MOST_STEPS = 400  # triangles that the way to a point of a tile passes
+COUNTS = {"p3": 3, "p4": 3, "p6": 3, "p2": 4, "pgg": 2, "p1": 1, "pg": 1}
+"""How many orders each group's tiles take: its kinds of centres, or one of a vertex."""
+
+NEAR = 1e-6  # of lattice vectors: places that are one
 SPACING = 0.04  # of triangles inside, in sizes of the tile
+FINEST = 0.002  # where centres are near to each other
+REACHED = 0.6  # of the way to the next centre, within which a triangle's corners are to be
 BEYOND = 1e-4  # how far beyond its edge a tile's neighbour is looked for, in its size
+ON_EDGE = 0.37  # of a straight piece of the edge, where no centre is
+INSIDE = 1e-6  # of the tile's size: a centre so far from its edge is inside
 
 
-class Cells(NamedTuple):
-    """Where N points are: in which triangle of the plane, and in which one of the world.
+@dataclass(frozen=True, eq=False)
+class TileMesh:
+    """A tile divided into triangles, among its group's centres.
 
-    A point z lies at `turn` z + `shift`, or of its conjugate where `flips`, in the first triangle; the
-    world's triangle is that which `motion` (N, 3, 3) takes the first one to.
+    - `ring`: The tile's outline (N, 2), counter-clockwise; of several figures, their union.
+    - `mesh`: What fills the outline.
+    - `around`: What lies around the triangles' middles.
+    - `parents`, `order`, `halves`: Each triangle's parent (M,); all but the root, parents before others
+      (M - 1,); and the middles of the sides that they share with their parents. A straight line from
+      the middle of the pattern's polygon reaches the root far from any centre.
     """
 
-    turn: Complex
-    shift: Complex
-    flips: Any
-    motion: Array
+    ring: Array
+    mesh: Mesh
+    around: Around
+    parents: Integers
+    order: Integers
+    halves: Complex
 
-    def take(self, index: Any) -> Cells:
-        """Return those at an index."""
-        return Cells(*(part[index] for part in self))
+    @classmethod
+    def of(cls, tiling: Tiling, ring: Array, pattern: Pattern) -> TileMesh:
+        """Return that of a tile with such an outline, fine enough for series about its triangles."""
+        size = float(np.sqrt(tiling.tile_area))
+        spacing = SPACING * size
+        ring = _with_centres(ring, pattern, spacing, NEAR * size)
+        while True:
+            fine = shapely.get_coordinates(
+                shapely.segmentize(shapely.LinearRing(ring), 2 * spacing)
+            )[:-1]
+            mesh = triangulate(fine, spacing)
+            corners = complex_points(mesh.points[mesh.triangles])
+            middles = corners.mean(axis=1)
+            away = pattern.to_centres(middles)
+            near = np.abs(away).argmin(axis=1)
+            reach = pattern.around_centres.reach[near]
+            off = np.abs(away[np.arange(len(away)), near])
+            wide = np.abs(corners - middles[:, None]).max(axis=1)
+            # about a centre, within its own series, else about the middle
+            if (np.where(off < ROUND * reach, (off + wide) / reach, wide / off) < REACHED).all():
+                break
+            spacing /= 2
+            if spacing < FINEST * size:
+                raise OrbiflowError(
+                    "the centres of rotation are too near to each other for another world"
+                )
+        root = int(np.argmin(np.abs(middles - pattern.middle) / pattern.clearance(middles)))
+        parents, order, halves = _tree(mesh, root)
+        return cls(ring, mesh, pattern.around(middles), parents, order, halves)
 
-    def local(self, points: Complex) -> Complex:
-        """Return points (N,) of the plane in the first triangle's place."""
-        return self.turn * np.where(self.flips, np.conj(points), points) + self.shift
+    @cached_property
+    def _index(self) -> Any:
+        return shapely.STRtree(np.asarray(shapely.polygons(self.mesh.points[self.mesh.triangles])))
 
-
-def walked(triangle: TriangleMap, cells: Cells, start: Complex, end: Complex) -> Cells:
-    """Return the cells of points `end` (N,), reached along straight lines from `start`, in `cells`."""
-    corners = triangle.vertices
-    begin, ahead = np.roll(corners, -1), np.roll(corners, -2)  # side k is opposite to vertex k
-    along = (ahead - begin) / np.abs(ahead - begin)
-    size = float(np.abs(along * 0 + ahead - begin).max())
-    turn, shift, flips, motion = (part.copy() for part in cells)
-    here, there = cells.local(start), cells.local(end)
-    came = np.full(len(end), -1)
-    for _ in range(MOST_STEPS):
-        off = ((there[:, None] - begin) * np.conj(along)).imag  # of each side, inside positive
-        outside = off < -ON_SIDE * size
-        if not outside.any():
-            return Cells(turn, shift, flips, motion)
-        before = np.maximum(((here[:, None] - begin) * np.conj(along)).imag, 0.0)
-        share = np.where(outside, before / np.where(outside, before - off, 1.0), np.inf)
-        share[np.arange(len(end)), came] = np.where(came < 0, share[:, -1], np.inf)
-        side = np.argmin(share, axis=1)
-        go = np.flatnonzero(np.isfinite(share.min(axis=1)))
-        if not len(go):
-            return Cells(turn, shift, flips, motion)
-        k = side[go]
-        own = share[go, k]
-        crossing = here[go] + own * (there[go] - here[go])
-        u = along[k] ** 2  # z -> begin + u conj(z - begin)
-        there[go] = begin[k] + u * np.conj(there[go] - begin[k])
-        here[go] = crossing
-        turn[go] = u * np.conj(turn[go])
-        shift[go] = begin[k] + u * np.conj(shift[go] - begin[k])
-        flips[go] = np.logical_not(flips[go])
-        motion[go] = motion[go] @ triangle.mirrors[k]
-        came[go] = k
-    raise OrbiflowError("the way to a point of the tile does not end; this is a bug")
-
-
-def base_triangles(group: CrystallographicGroup, middle: Array) -> tuple[Orders, list[Complex]]:
-    """Return the orders of a group's rotation centres, and triangles (3,) of them near a point.
-
-    Raises:
-        OrbiflowError: If the group has mirrors or glides, or no rotations by less than half a turn.
-    """
-    flat = FLAT[_named(group)]
-    size = float(np.sqrt(group.cell_volume))
-    centres = symmetry_elements(group, middle, 1.5 * size).centers
-    places = {
-        order: [complex(*c.point) for c in centres if c.order == order] for order in set(flat)
-    }
-    ends = [np.exp(1j * np.pi / order) for order in flat]
-    found = list[Complex]()
-    for first in places[flat[0]]:
-        others = [own for own in places[flat[1]] if abs(own - first) > NEAR * size]
-        if not others:
-            continue
-        least = min(abs(own - first) for own in others)
-        for second in (own for own in others if abs(own - first) < (1 + NEAR) * least):
-            # the third is where the sides from both meet
-            side = second - first
-            one, two = side * ends[0], -side * np.conj(ends[1])
-            t = (side * np.conj(two)).imag / (one * np.conj(two)).imag
-            third = first + t * one
-            if any(abs(own - third) < NEAR * size for own in places[flat[2]]):
-                found.append(np.array([first, second, third]))
-    return flat, found
+    def nearest(self, points: Array) -> Integers:
+        """Return the triangles (N,) that are nearest to points (N, 2)."""
+        return self._index.nearest(shapely.points(points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,183 +119,292 @@ class Unfolding:
     """A tile in a world that its group's pattern goes to.
 
     - `tiling`: The plane's tiling.
-    - `triangle`: The conformal map.
-    - `placed`: The triangle of rotation centres (3,) in the tile's coordinates that it begins with.
+    - `development`: The conformal map.
+    - `tile`: The tile's triangles.
     """
 
     tiling: Tiling
-    triangle: TriangleMap
-    placed: Complex
+    development: Development
+    tile: TileMesh
 
     @property
     def sign(self) -> int:
         """Whether the world is curved as a sphere, 1, or hyperbolic, -1."""
-        return self.triangle.sign
+        return self.development.sign
 
-    @cached_property
+    @property
+    def words(self) -> str:
+        """How many copies meet where."""
+        pattern, orders = self.development.potential.pattern, self.development.orders
+        if COUNTS[self.tiling.group.name] == 1:
+            return (
+                f"at one point of a tile's edge meet {orders[0] // 2} times as many as in the plane"
+            )
+        every = [str(orders[pattern.kinds.index(kind)]) for kind in sorted(set(pattern.kinds))]
+        return f"they meet at centres of the orders {', '.join(every)}"
+
+    @property
     def ring(self) -> Array:
         """The tile's outline (N, 2), counter-clockwise; of several figures, their union."""
-        polygons = [shapely.Polygon(own.polygon) for own in self.tiling.prototiles]
-        if len(polygons) == 1:
-            return orient(self.tiling.prototiles[0].polygon, counter_clockwise=True)
+        return self.tile.ring
+
+    @cached_property
+    def cones(self) -> Array:
+        """Points (K, 2) of the outline about which angles are others in the world than in the plane."""
+        potential = self.development.potential
+        away = potential.pattern.to_centres(complex_points(self.ring))
+        own = potential.pattern.corner_of
+        bent = potential.pattern.flat[own] != np.array(potential.orders)[own]
         size = float(np.sqrt(self.tiling.tile_area))
-        union: Any = shapely.union_all(polygons, grid_size=1e-9 * size)
-        return orient(shapely.get_coordinates(union.exterior)[:-1], counter_clockwise=True)
+        return self.ring[(np.abs(away[:, bent]) < NEAR * size).any(axis=1)]
 
     @cached_property
-    def mesh(self) -> Any:
-        """What fills the outline."""
-        return triangulate(self.ring, SPACING * float(np.sqrt(self.tiling.tile_area)))
-
-    def _normal(self, points: Array) -> Complex:
-        """Return points (N, 2) where the first triangle is that of the map."""
-        first, second, _ = self.placed
-        scale = self.triangle.vertices[1] / (second - first)
-        return (complex_points(points) - first) * scale
+    def _series(self) -> Series:
+        """Solutions about a point near each triangle."""
+        return self.development.potential.about(self.tile.around)
 
     @cached_property
-    def _cells(self) -> tuple[Complex, Cells]:
-        """The middles of the mesh's triangles, and their cells."""
-        middles = self._normal(self.mesh.points[self.mesh.triangles].mean(axis=1))
-        triangles, count = self.mesh.triangles, len(middles)
-        pairs = np.sort(np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
-        owner = np.tile(np.arange(count), 3)
-        order = np.lexsort(pairs.T)
-        pairs, owner = pairs[order], owner[order]
-        twins = np.flatnonzero((pairs[1:] == pairs[:-1]).all(axis=1))
-        near: list[list[tuple[int, int]]] = [[] for _ in range(count)]
-        for k in twins.tolist():
-            near[owner[k]].append((int(owner[k + 1]), k))
-            near[owner[k + 1]].append((int(owner[k]), k))
-        halves = self._normal(self.mesh.points[pairs].mean(axis=1))
-        middle = self._normal(np.array([shapely.Polygon(self.ring).centroid.coords[0]]))[0]
-        root = int(np.argmin(np.abs(middles - middle)))
-        one = np.ones(count, dtype=np.complex128)
-        cells = Cells(one, 0 * one, np.zeros(count, dtype=bool), np.tile(np.eye(3), (count, 1, 1)))
-        # from the corner's triangle to the root, then outwards
-        start = np.array([self.triangle.vertices.mean()])
-        first = walked(self.triangle, cells.take([0]), start, middles[[root]])
-        for part, value in zip(cells, first, strict=True):
-            part[root] = value[0]
-        known, level = np.zeros(count, dtype=bool), [root]
-        known[root] = True
-        while level:
-            steps = [(i, j, k) for i in level for j, k in near[i] if not known[j]]
-            unique = {j: (i, k) for i, j, k in reversed(steps)}
-            level = list(unique)
-            if not level:
-                break
-            parents, sides = (np.array([unique[j][m] for j in level]) for m in (0, 1))
-            half = walked(self.triangle, cells.take(parents), middles[parents], halves[sides])
-            done = walked(self.triangle, half, halves[sides], middles[level])
-            for part, values in zip(cells, done, strict=True):
-                part[level] = values
-            known[level] = True
-        return middles, cells
-
-    @cached_property
-    def _tree(self) -> Any:
-        return shapely.STRtree(np.asarray(shapely.polygons(self.mesh.points[self.mesh.triangles])))
-
-    def cells(self, points: Array) -> tuple[Complex, Cells]:
-        """Return points (N, 2) of the tile in the triangle's place, and their cells."""
-        middles, cells = self._cells
-        nearest = self._tree.nearest(shapely.points(points))
-        goal = self._normal(points)
-        found = walked(self.triangle, cells.take(nearest), middles[nearest], goal)
-        return goal, found
+    def _matrices(self) -> Complex:
+        """What takes the solutions near each triangle to those of the development (N, 2, 2)."""
+        tile, series = self.tile, self._series
+        one, two = (
+            series.take(own).wronskians(tile.halves)
+            for own in (tile.parents[tile.order], tile.order)
+        )
+        steps = one @ np.linalg.inv(two)
+        root = tile.parents[tile.order[:1]]
+        middle = tile.around.points[root]
+        here = self.development.reached(complex(middle[0]))
+        found = np.zeros((len(tile.parents), 2, 2), dtype=np.complex128)
+        found[root] = here @ np.linalg.inv(series.take(root).wronskians(middle))
+        for k, step in zip(tile.order.tolist(), steps, strict=True):
+            found[k] = found[tile.parents[k]] @ step
+        return found
 
     def vectors(self, points: Array) -> Array:
         """Return where points (N, 2) of the tile are in the world, vectors (N, 3)."""
-        goal, cells = self.cells(points)
-        local = self.triangle.forward(cells.local(goal))
-        return np.einsum("nij,nj->ni", cells.motion, local)
+        near = self.tile.nearest(points)
+        values = self._series.take(near).spinors(complex_points(points))
+        return vectors_of(np.einsum("nij,nj->ni", self._matrices[near], values), self.sign)
+
+    def _wronskians(self, points: Array) -> Complex:
+        """Return the solutions and their derivatives (N, 2, 2) at points (N, 2) that are no centres."""
+        near = self.tile.nearest(points)
+        return self._matrices[near] @ self._series.take(near).wronskians(complex_points(points))
 
     @cached_property
     def middle(self) -> Array:
         """The vector (3,) of a point inside of the tile."""
-        middles, cells = self._cells
-        center = self._normal(
-            np.array([shapely.Polygon(self.ring).representative_point().coords[0]])
-        )
-        root = int(np.argmin(np.abs(middles - center[0])))
-        local = self.triangle.forward(cells.take([root]).local(middles[[root]]))
-        return cells.motion[root] @ local[0]
+        point = shapely.Polygon(self.ring).representative_point()
+        return self.vectors(np.array(point.coords))[0]
 
     @cached_property
     def neighbours(self) -> Array:
         """The motions (E, 3, 3) that take the tile to those along its edge."""
-        size = float(np.sqrt(self.tiling.tile_area))
-        ring = self.ring
-        ends = np.roll(ring, -1, axis=0)
-        step = ends - ring
-        normals = np.column_stack([step[:, 1], -step[:, 0]]) / np.linalg.norm(step, axis=1)[:, None]
-        inside, beyond = ((ring + ends) / 2 + side * BEYOND * size * normals for side in (-1, 1))
-        low, high = ring.min(axis=0) - size, ring.max(axis=0) + size
-        copies = copies_meeting(self.tiling, (*low.tolist(), *high.tolist()))
-        polygon = shapely.Polygon(ring)
-        back = np.full(ring.shape, np.nan)
-        for k in range(len(copies)):
-            if copies.prototiles[k]:
-                continue
-            own = copies.isometry(k).inverse()(beyond)
-            held = shapely.contains_xy(polygon, *own.T)
-            back[held] = own[held]
-        sound = ~np.isnan(back).any(axis=1)
-        start, begin = self.cells(inside[sound])
-        there = walked(self.triangle, begin, start, self._normal(beyond[sound]))
-        _, here = self.cells(back[sound])
-        motions = there.motion @ undone(here.motion, self.sign)
+        found = list[Array]()
+        for isometry, points in _contacts(self.tiling, self.ring):
+            here, there = self._wronskians(points), self._wronskians(isometry.inverse()(points))
+            turn = complex(*isometry.linear[:, 0])
+            here = here * np.array([turn**-0.5, turn**0.5])
+            if mirrored := isometry.determinant < 0:
+                there = np.conj(there)
+            found.append(motions_of_spinors(here @ np.linalg.inv(there), self.sign, mirrored))
+        motions = np.concatenate(found)
         _, first = np.unique(np.round(motions @ self.middle, 6), axis=0, return_index=True)
         return motions[np.sort(first)]
+
+    @property
+    def generators(self) -> tuple[Array, tuple[int, ...]] | None:
+        """Rotations (k, 3, 3) with the product 1, and their orders, if they generate the group."""
+        if self.tiling.group.name in ("p1", "pg", "pgg"):
+            return None
+        return self.development.rotations, self.development.orders
 
     @cached_property
     def distortion(self) -> float:
         """How unevenly the map enlarges the tile: the deviation of the logarithm of its scale."""
-        middles, cells = self._cells
-        logs = np.log(self.triangle.scale(cells.local(middles)))
-        weights = shapely.area(shapely.polygons(self.mesh.points[self.mesh.triangles]))
+        values = self._matrices @ self._series.wronskians(self.tile.around.points)
+        logs = np.log(np.abs(np.linalg.det(values)) / norms(values[..., 0], self.sign))
+        mesh = self.tile.mesh
+        weights = shapely.area(shapely.polygons(mesh.points[mesh.triangles]))
         mean = np.average(logs, weights=weights)
         return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
 
 
-def usual_orders(group: CrystallographicGroup, sign: int) -> Orders:
+def _with_centres(ring: Array, pattern: Pattern, spacing: float, near: float) -> Array:
+    """Return an outline (N, 2) with the pattern's centres that lie on it among its points."""
+    fine = shapely.get_coordinates(shapely.segmentize(shapely.LinearRing(ring), spacing))
+    points = complex_points(fine)
+    away = pattern.to_centres(points)
+    centres = (points[:, None] - away)[np.abs(away) < spacing]
+    return with_points(ring, np.column_stack([centres.real, centres.imag]), near)
+
+
+def with_points(ring: Array, points: Array, near: float) -> Array:
+    """Return an outline (N, 2) with those points (K, 2) that are nearer to it among its own."""
+    line, found = shapely.LinearRing(ring), list[tuple[float, Array]]()
+    for point in points:
+        others = np.array([*ring, *(own for _, own in found)])
+        apart = float(np.linalg.norm(others - point, axis=1).min())
+        if line.distance(shapely.Point(*point)) < near < apart:
+            found.append((line.project(shapely.Point(*point)), point))
+    found.sort(key=lambda own: own[0])
+    lengths = np.cumsum(np.append(0.0, np.linalg.norm(np.diff(ring, axis=0), axis=1)))
+    places = np.searchsorted(lengths, [length for length, _ in found])
+    return np.insert(ring, places, np.reshape([own for _, own in found], (-1, 2)), axis=0)
+
+
+def _tree(mesh: Mesh, root: int) -> tuple[Integers, Integers, Complex]:
+    """Return `parents`, `order` and `halves` of a mesh's triangles from a root."""
+    triangles, count = mesh.triangles, len(mesh.triangles)
+    pairs = np.sort(np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    order, owner = np.lexsort(pairs.T), np.tile(np.arange(count), 3)
+    pairs, owner = pairs[order], owner[order]
+    twins = np.flatnonzero((pairs[1:] == pairs[:-1]).all(axis=1))
+    graph: Any = scipy.sparse.csr_matrix(
+        (twins + 1, (owner[twins], owner[twins + 1])), (count, count)
+    )
+    graph = graph + graph.T
+    order, parents = breadth_first_order(graph, root, directed=False)
+    sides = np.asarray(graph[order[1:], parents[order[1:]]]).ravel() - 1
+    order, parents = order.astype(np.int64), parents.astype(np.int64)
+    return parents, order[1:], complex_points(mesh.points[pairs[sides]].mean(axis=1))
+
+
+def ring_of(tiling: Tiling) -> Array:
+    """Return a tile's outline (N, 2), counter-clockwise; of several figures, their union."""
+    polygons = [shapely.Polygon(own.polygon) for own in tiling.prototiles]
+    if len(polygons) == 1:
+        return orient(tiling.prototiles[0].polygon, counter_clockwise=True)
+    union: Any = shapely.union_all(polygons, grid_size=1e-9 * float(np.sqrt(tiling.tile_area)))
+    return orient(shapely.get_coordinates(union.exterior)[:-1], counter_clockwise=True)
+
+
+def _sides(tiling: Tiling, ring: Array) -> tuple[list[Any], Integers, Array]:
+    """Return the copies around a tile, which of them (N,) is beyond each piece of its edge, -1 for none
+    that was found, and a point (N, 2) of each piece."""
+    size = float(np.sqrt(tiling.tile_area))
+    step = np.roll(ring, -1, axis=0) - ring
+    normals = np.column_stack([step[:, 1], -step[:, 0]]) / np.linalg.norm(step, axis=1)[:, None]
+    edge = ring + ON_EDGE * step
+    beyond = edge + BEYOND * size * normals
+    low, high = ring.min(axis=0) - size, ring.max(axis=0) + size
+    copies = copies_meeting(tiling, (*low.tolist(), *high.tolist()))
+    polygon, found = shapely.Polygon(ring), np.full(len(ring), -1)
+    isometries = [copies.isometry(int(k)) for k in np.flatnonzero(copies.prototiles == 0)]
+    for number, isometry in enumerate(isometries):
+        found[shapely.contains_xy(polygon, *isometry.inverse()(beyond).T)] = number
+    return isometries, found, edge
+
+
+def _contacts(tiling: Tiling, ring: Array) -> list[tuple[Any, Array]]:
+    """Return each copy along a tile's edge, and points (n, 2) of the edge that both share."""
+    isometries, sides, edge = _sides(tiling, ring)
+    return [(isometries[k], edge[sides == k]) for k in np.unique(sides[sides >= 0])]
+
+
+def _cone_points(tiling: Tiling, ring: Array) -> tuple[Array, list[complex]]:
+    """Return a lattice (2, 2), and points of a tile's outline, one of each orbit under it.
+
+    In a group of translations these are the tile's vertices. With glides, they are points on the lines
+    of these: their images are a lattice that reflections in the lines keep.
+    """
+    group = tiling.group
+    if group.name == "p1":
+        _, sides, _ = _sides(tiling, ring)
+        known = np.flatnonzero(sides >= 0)
+        ends = known[np.flatnonzero(np.diff(sides[known], append=sides[known[0]]))]
+        lattice, points = group.lattice, ring[(ends + 1) % len(ring)]
+    else:
+        reach = float(np.linalg.norm(ring - tiling.center, axis=1).max())
+        lines = symmetry_elements(group, tiling.center, reach).lines
+        step = lines[0].shift * lines[0].line.direction
+        lattice = np.column_stack([step, (-step[1], step[0])])
+        lattice = lattice * [1.0, group.cell_volume / (2 * step @ step)]
+        found = list[Array]()
+        for own in lines:
+            ends = own.line.point + 2 * reach * np.outer((-1, 1), own.line.direction)
+            crossed: Any = shapely.LineString(ends).intersection(shapely.LinearRing(ring))
+            found.append(shapely.get_coordinates(crossed))
+        points = np.concatenate(found)
+    kept = list[Array]()
+    back = np.linalg.inv(lattice)
+    for point in points:
+        shares = (np.array(kept).reshape(-1, 2) - point) @ back.T
+        if not (np.abs(shares - np.round(shares)) < NEAR).all(axis=1).any():
+            kept.append(point)
+    return lattice, [complex(*point) for point in kept]
+
+
+def usual_orders(group: CrystallographicGroup, sign: int) -> tuple[int, ...]:
     """Return the orders of a sphere, 1, or a disc, -1, for a group's tiles.
 
     Raises:
         OrbiflowError: If the group has no pattern there.
     """
-    return USUAL[_named(group), sign]
+    _check_group(group, sign)
+    return USUAL[group.name, sign]
 
 
-def _named(group: CrystallographicGroup) -> str:
-    """Return the name of a group whose pattern goes to other worlds."""
-    if group.name not in FLAT:
+def _check_group(group: CrystallographicGroup, sign: int) -> None:
+    if (group.name, -1) not in USUAL:
         raise OrbiflowError(
-            f"tiles of {group.name} stay in the plane: the sphere and the disc take tiles whose copies "
-            "are turned by thirds, quarters or sixths (p3, p4 and p6: IH7, IH28, IH21)"
+            f"tiles of {group.name or 'this group'} stay in the plane, or go around a spiral: other "
+            f"worlds take tiles of the groups {', '.join(COUNTS)}"
         )
-    return group.name
+    if sign > 0 and (group.name, 1) not in USUAL:
+        raise OrbiflowError(
+            f"tiles of {group.name} have no pattern on a sphere, which takes tiles turned by thirds, "
+            "quarters or sixths (p3, p4 and p6: IH7, IH28, IH21)"
+        )
 
 
-def unfolded(tiling: Tiling, orders: Orders, sign: int = 0) -> Unfolding:
+def unfolded(tiling: Tiling, orders: Sequence[int], sign: int = 0) -> Unfolding:
     """Return a tile in the world of these orders, given to its centres as they distort it least.
 
-    With a `sign` it must be the sphere, 1, or the hyperbolic plane, -1.
+    With a `sign` it must be the sphere, 1, or the hyperbolic plane, -1. Groups of translations and
+    glides have one order: so many times as many copies meet at a point of the tile's edge.
 
     Raises:
-        OrbiflowError: If the tiling's group is not one of rotations, or the orders are not of it.
+        OrbiflowError: If the tiling's group has no pattern there, or the orders are not of it, or a
+            centre of rotation is inside of the tile.
     """
-    found = 0 if min(orders) < 2 else curvature(orders)
+    group, ring = tiling.group.primitive(), ring_of(tiling)
+    _check_group(group, sign)
+    count = COUNTS[group.name]
+    if len(orders) != count:
+        raise OrbiflowError(
+            f"tiles of {group.name} take {count} order{'s' * (count > 1)}, such as "
+            f"{','.join(map(str, USUAL[group.name, -1]))}, but {','.join(map(str, orders))} was given"
+        )
+    _check_inside(tiling, ring)
+    if count == 1:
+        lattice, points = _cone_points(tiling, ring)
+        every = [(Pattern.about(lattice, point), (2 * orders[0], 2, 2, 2)) for point in points]
+    else:
+        pattern, chosen = Pattern.near(group, tiling.center), sorted(set(permutations(orders)))
+        every = [(pattern, tuple(own[k] for k in pattern.kinds)) for own in chosen]
+    found = 0 if min(orders) < 2 else curvature(every[0][1])
     if not found or sign not in (0, found):
         where = {0: "a sphere or a disc", 1: "the sphere", -1: "the hyperbolic plane"}[sign]
         raise OrbiflowError(
             f"the orders {', '.join(map(str, orders))} are not of {where}: the sphere has 2,3,3, "
             "2,3,4, 2,3,5 and 2,2,n, the hyperbolic plane larger ones, such as 3,3,4 or 2,3,7"
         )
-    flat, near = base_triangles(tiling.group, tiling.center)
-    middle = complex(*tiling.center)
-    placed = min(near, key=lambda own: abs(own.mean() - middle))
-    every = sorted(set(permutations(orders)))
-    found = (Unfolding(tiling, triangle_map(flat, own), placed) for own in every)
-    return min(found, key=lambda own: round(own.distortion, 9))
+    meshes = {id(own): TileMesh.of(tiling, ring, own) for own, _ in every}
+    worlds = (
+        Unfolding(tiling, Development.of(own, chosen), meshes[id(own)]) for own, chosen in every
+    )
+    return min(worlds, key=lambda own: round(own.distortion, 9))
+
+
+def _check_inside(tiling: Tiling, ring: Array) -> None:
+    size = float(np.sqrt(tiling.tile_area))
+    polygon = shapely.Polygon(ring).buffer(-INSIDE * size)
+    reach = float(np.linalg.norm(ring - tiling.center, axis=1).max())
+    centres = symmetry_elements(tiling.group, tiling.center, reach).centers
+    if any(polygon.contains(shapely.Point(*own.point)) for own in centres):
+        raise OrbiflowError(
+            "the tile has a centre of rotation inside, where another world would have a cone's tip: "
+            "it stays in the plane, or goes around a spiral"
+        )

@@ -9,7 +9,7 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.tiles.page import Curve
-from orbiflow.tiles.worlds.schwarz import disc_of
+from orbiflow.tiles.worlds.curved import disc_of
 
 Model = Literal["sphere", "disc", "half-plane", "band", "spiral", "sheet"]
 

@@ -23,8 +23,8 @@ from orbiflow.tiles.motifs import (
 )
 from orbiflow.tiles.page import Motif, Scene
 from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.worlds.curved import facing, turned, undone
 from orbiflow.tiles.worlds.metamorphosis import metamorphosis
-from orbiflow.tiles.worlds.schwarz import facing, turned, undone
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, world_scene
 from orbiflow.tiles.worlds.spiral import spiral
 from orbiflow.tiles.worlds.turning import turning_page
@@ -178,10 +178,15 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
     if settings.colour == "one":
         numbers = 0 * numbers
     world = World(
-        tile.tiling, lambda points: found.vectors(points @ flip), motions, numbers, view, found
+        tile.tiling,
+        lambda points: found.vectors(points @ flip),
+        motions,
+        numbers,
+        view,
+        found,
+        flip,
     )
-    orders = ", ".join(map(str, found.triangle.curved))
-    notes = [f"{len(motions)} copies meet at centres of the orders {orders}"]
+    notes = [f"{len(motions)} copies; {found.words}"]
     if len(motions) == MOST_COPIES:
         notes.append("more copies than these are not drawn: choose a smaller {area}")
     return world, notes
@@ -192,5 +197,5 @@ def _facing(found: Unfolding, settings: ArtSettings) -> Array:
     turn = turned(np.radians(settings.rotate))
     if found.sign > 0:
         return turn @ facing(found.middle)
-    middle = int(np.argmax(found.triangle.curved))
-    return turn @ undone(found.triangle.frames[middle], found.sign)
+    middle = int(np.argmax(found.development.orders))
+    return turn @ undone(found.development.frame(middle), found.sign)

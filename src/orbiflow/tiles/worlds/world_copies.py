@@ -16,7 +16,7 @@ Booleans = NDArray[np.bool_]
 
 SAME = 1e-3  # of vectors' coordinates: middles of copies are farther apart, wherever they are
 FEW_COLOURS = 6  # that a colouring by the group has at most
-MOST_PAIRS = 150_000  # of permutations that are tried
+MOST_CHOICES = 150_000  # of permutations that are tried
 LONGEST_WORD = 8  # of rotations by which a neighbour is reached
 
 
@@ -76,24 +76,25 @@ def colour_moves(unfolding: Unfolding, most: int = FEW_COLOURS) -> list[Integers
     A copy's neighbour k has the colours of the copy in the order `moves[k]`; the first is its own.
     None if no number of colours up to `most` does.
     """
-    p, q, r = unfolding.triangle.curved
-    mirrors = unfolding.triangle.mirrors
-    # rotations about the first two corners; side k is opposite to corner k
-    turns = (mirrors[1] @ mirrors[2], mirrors[2] @ mirrors[0])
+    if unfolding.generators is None:
+        return None
+    *turns, _ = unfolding.generators[0]
+    *powers, last = unfolding.generators[1]
     words = _words(turns, [*unfolding.neighbours], unfolding.middle)
     if words is None:
         return None
     for count in range(2, most + 1):
         every = [np.array(own) for own in permutations(range(count))]
-        one = [own for own in every if _is_one(own, p)]
-        two = [own for own in every if _is_one(own, q)]
-        if len(one) * len(two) > MOST_PAIRS:
+        choices = [[own for own in every if _is_one(own, power)] for power in powers]
+        if np.prod([len(own) for own in choices]) > MOST_CHOICES:
             return None
-        for a, b in product(one, two):
-            if not _is_one(a[b], r):
+        for own in product(*choices):
+            whole = own[0]
+            for permutation in own[1:]:
+                whole = whole[permutation]
+            if not _is_one(whole, last):
                 continue
-            letters = (a, b, np.argsort(a), np.argsort(b))
-            moves = [_moved(word, letters) for word in words]
+            moves = [_moved(word, (*own, *map(np.argsort, own))) for word in words]
             if all(move[0] != 0 for move in moves):
                 return moves
     return None
@@ -114,10 +115,8 @@ def _moved(word: tuple[int, ...], letters: tuple[Integers, ...]) -> Integers:
     return found
 
 
-def _words(
-    turns: tuple[Array, Array], goals: list[Array], middle: Array
-) -> list[tuple[int, ...]] | None:
-    """Return goals as words of two rotations, 0 and 1, and their inverses, 2 and 3."""
+def _words(turns: list[Array], goals: list[Array], middle: Array) -> list[tuple[int, ...]] | None:
+    """Return goals as words of k rotations, 0 to k - 1, and their inverses, k to 2 k - 1."""
     letters = [*turns, *(np.linalg.inv(own) for own in turns)]
     left, found = (
         {_key(goal @ middle): k for k, goal in enumerate(goals)},
