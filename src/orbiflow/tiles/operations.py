@@ -118,7 +118,7 @@ def art(
     out: Annotated[
         Path | None,
         Option("-o"),
-        Ending(".html", ".png", ".svg"),
+        Ending(".html", ".pdf", ".png", ".svg"),
         DefaultText("a PNG named after the tile"),
     ] = None,
     settings: ArtSettings = ArtSettings(),
@@ -136,7 +136,7 @@ def art(
 
     Args:
         result: A search's folder, its result.json, or the folder of a tile in it.
-        out: The file, .png or .svg; a sphere or a disc also .html, to be turned by hand.
+        out: The file, .png, .svg or .pdf; a sphere or a disc also .html, to be turned by hand.
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.

@@ -151,7 +151,7 @@ def escher(name: str) -> EscherTile:
 
 
 SEEN = [(model, "IH28") for model in ("sphere", "disc", "half-plane", "band", "spiral")]
-SEEN += [("disc", "IH1"), ("disc", "IH3"), ("disc", "IH4"), ("band", "IH5")]
+SEEN += [("disc", "IH1"), ("disc", "IH3"), ("disc", "IH4"), ("band", "IH5"), ("cylinder", "IH4")]
 
 
 @pytest.mark.parametrize(("model", "name"), SEEN)
@@ -197,6 +197,8 @@ def test_artwork_of_another_world_is_written(tmp_path: Path) -> None:
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
     assert done.summary["tiles"] > 100
     art(escher("IH7"), tmp_path / "b.png", ArtSettings(world="sphere", order=(2, 3, 5), dpi=50))
+    art(escher("IH7"), tmp_path / "c.pdf", ArtSettings(world="cylinder", area=(120.0, 60.0)))
+    assert (tmp_path / "c.pdf").read_bytes().startswith(b"%PDF")
     picture = np.asarray(Image.open(tmp_path / "b.png").convert("RGB")).astype(int)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 3
 
@@ -228,6 +230,26 @@ def test_a_long_band_has_no_hole() -> None:
     ]
     seen = shapely.box(1, 6, 239, 24)
     assert seen.difference(shapely.union_all(rings, grid_size=1e-4)).area < 0.001 * seen.area
+
+
+@settings(max_examples=8)
+@given(sound(ORDERS), st.sampled_from([None, (2, 1), (-1, 3), (4, 0)]))
+def test_a_cylinder_meets_itself(tile: Any, arms: Any) -> None:
+    chosen = ArtSettings(world="cylinder", area=(200.0, 80.0), arms=arms)
+    found, _ = world_of(EscherTile(tile), chosen)
+    rings = found.places(found.vectors(tile.polygon), np.arange(len(found.motions)))
+    seen = shapely.box(0, 0, 200, 80)
+    shapes = [shapely.Polygon(ring).buffer(0) for ring in rings]
+    assert seen.difference(shapely.union_all(shapes, grid_size=1e-6)).area < 1e-3
+    middles = np.array([ring.mean(axis=0) for ring in rings])
+    for k in np.flatnonzero(rings[:, :, 0].min(axis=1) < 0):  # across the left edge
+        away = np.linalg.norm(middles - middles[k] - (200, 0), axis=1)
+        assert away.min() < 1e-6
+        assert found.colours[away.argmin()] == found.colours[k]
+    for j, k in itertools.combinations(range(len(shapes)), 2):
+        if found.colours[j] == found.colours[k]:
+            shared = shapes[j].buffer(0.01).intersection(shapes[k])
+            assert shared.area < 0.01 * 0.2 * np.sqrt(shapes[j].area)
 
 
 def test_each_of_two_figures_has_its_own_colours(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ from orbiflow.tiles.motifs import (
 )
 from orbiflow.tiles.page import Curve, Motif, Page, Part, Scene, Style, edge_margin, tiling_size
 from orbiflow.tiles.tile import EscherTile, TileSource
-from orbiflow.tiles.write import write_svg
+from orbiflow.tiles.write import write_pdf, write_svg
 
 TILE_PER_OUTLINE = 120  # the tile's size over the outline's usual width
 USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
@@ -231,9 +231,9 @@ def art_scene(art: Artwork) -> Scene:
 
 
 def art_file(art: Artwork, format: str, *, cancel: Cancel | None = None) -> bytes | str:
-    """Return the content of a file in a format, svg, or png for pixels."""
-    if format == "svg":
-        return write_svg(art_scene(art))
+    """Return the content of a file in a format, svg, pdf, or png for pixels."""
+    if format != "png":
+        return (write_svg if format == "svg" else write_pdf)(art_scene(art))
     return png_of(render_artwork(art, cancel=cancel), art.settings.dpi)
 
 

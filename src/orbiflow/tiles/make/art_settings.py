@@ -29,7 +29,7 @@ LONGEST = 30_000  # the longest side of a picture in pixels
 SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
 
 
-World = Literal["sphere", "disc", "half-plane", "band", "spiral"]
+World = Literal["sphere", "disc", "half-plane", "band", "spiral", "cylinder"]
 COPIES = {"12": (2, 3, 3), "24": (2, 3, 4), "60": (2, 3, 5)}
 
 
@@ -74,7 +74,7 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     (152.4, 101.6)
     """
 
-    format: Annotated[Literal["png", "svg", "html"] | None, Hidden()] = None
+    format: Annotated[Literal["png", "svg", "pdf", "html"] | None, Hidden()] = None
     """Format of the file. Default: its ending, or png. A sphere or a disc as html is turned by hand."""
 
     area: Annotated[
@@ -106,7 +106,8 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
 
     world: Annotated[World | None, NotWith("repeat", because="a cell repeats in the plane")] = None
     """Carry the tiling to another world: a sphere; the hyperbolic plane as a disc, a half-plane or a
-    band; a spiral. The sphere needs copies turned by thirds, quarters or sixths."""
+    band; a spiral; a cylinder, whose page meets itself when it is wrapped. The sphere needs copies
+    turned by thirds, quarters or sixths."""
 
     order: Annotated[
         Orders | None,
@@ -117,9 +118,9 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     3,3,4, four for p2, two for pgg, one for p1 and pg; or a sphere's number of copies: 12, 24, 60."""
 
     arms: Annotated[
-        Arms | None, OnlyWith(world=("spiral",)), DefaultText("about nine tiles around")
+        Arms | None, OnlyWith(world=("spiral", "cylinder")), DefaultText("about nine tiles around")
     ] = None
-    """Of a spiral: the steps along both lattice vectors that make one turn."""
+    """Of a spiral or cylinder: the steps along both lattice vectors that make one turn."""
 
     metamorphosis: Annotated[
         Literal["right", "down", "middle"] | None,
@@ -161,10 +162,12 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
 
     def _check_world(self) -> None:
         """Check that nothing is asked for that another world, or a sheet that changes, has not."""
-        if self.world is not None and self.tile_size is not None:
+        if self.world not in (None, "cylinder") and self.tile_size is not None:
             raise SettingError(
                 "copies in another {world} have sizes of their own; leave out {tile_size}"
             )
+        if self.world == "cylinder" and self.rotate:
+            raise SettingError("a cylinder's page turns as it must; leave out {rotate}")
         if self.world == "band" and self.page[0] > LONGEST_BAND * self.page[1]:
             raise SettingError(
                 f"a band can be {LONGEST_BAND} times as long as high: choose another {{area}}"

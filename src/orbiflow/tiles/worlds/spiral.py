@@ -1,4 +1,4 @@
-"""A tiling around a spiral: every copy of a turn about a lattice vector is the same copy."""
+"""A tiling around a spiral or a cylinder: what lies a lattice vector apart is the same copy."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 import shapely
 
-from orbiflow.arrays import Array, Integers
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.make import ArtSettings
+from orbiflow.tiles.page import tiling_size
 from orbiflow.tiles.tilings import Tiling, copies_meeting
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, World, motions_of
 from orbiflow.tiles.worlds.views import View
 
 AROUND = 9.0  # sizes of the tile that one turn of a spiral has
+MOST_STEPS = 8  # along a lattice vector that a turn has by default
 RIM = 0.35  # where a spiral's first tile is, as a share of its radius
 TOUCHING = 1e-3  # of a tile's size: how far neighbours are made wider to see whether they touch
 
@@ -23,9 +25,7 @@ def spiral(
 ) -> tuple[World, list[str]]:
     """Return the copies of a tiling around a spiral: z goes to exp(2 pi i z / w), w of the lattice."""
     middle, size = complex(*tiling.center), float(np.sqrt(tiling.tile_area))
-    first, second = (complex(*tiling.group.lattice[:, k]) for k in (0, 1))
-    arms = settings.arms or _usual_arms(first, second, AROUND * size)
-    period = arms[0] * first + arms[1] * second
+    arms, period = _turn(tiling, settings, AROUND * size, wound=True)
     # the first tile lies at a share of the radius; how far in and out, in periods
     start = middle - 1j * period * (-np.log(RIM) / (2 * np.pi))
     radius = float(np.linalg.norm(settings.page)) / 2
@@ -34,12 +34,8 @@ def spiral(
         [start + (a + 1j * b) * period for a in (-1.2, 1.2) for b in (-0.6, inner + 0.2)]
     )
     x, y = np.real(corners), np.imag(corners)
-    every = copies_meeting(tiling, (float(x.min()), float(y.min()), float(x.max()), float(y.max())))
-    first_kind = np.flatnonzero(every.prototiles == 0)
-    linear = every.group.linear_parts[every.cosets[first_kind]]
-    shift = every.translations[first_kind]
-    places = linear @ tiling.center + shift
-    share = (places @ (1, 1j) - start) / period
+    window = float(x.min()), float(y.min()), float(x.max()), float(y.max())
+    linear, shift, share = _first_copies(tiling, window, start, period)
     view = View("spiral", settings.page, np.eye(3), period)
     keep = (share.real > -0.5 + 1e-9) & (share.real <= 0.5 + 1e-9) & (share.imag < inner)
     begin = start - period * np.radians(settings.rotate) / (2 * np.pi)
@@ -59,10 +55,67 @@ def spiral(
     return World(given, vectors, motions, numbers, view), [said]
 
 
-def _usual_arms(first: complex, second: complex, length: float) -> tuple[int, int]:
-    """Return the steps along both lattice vectors, neither of them 0, of about this length together."""
-    steps = [(m, n) for m in range(1, 9) for n in range(-8, 9) if n]
-    return min(steps, key=lambda own: abs(abs(own[0] * first + own[1] * second) - length))
+def cylinder(
+    given: Tiling, tiling: Tiling, flip: Array, settings: ArtSettings
+) -> tuple[World, list[str]]:
+    """Return the copies of a tiling on a page whose left and right edges meet around a cylinder."""
+    (width, height), middle = settings.page, complex(*tiling.center)
+    size = float(np.sqrt(tiling.tile_area))
+    across = AROUND if settings.tile_size is None else width / settings.tile_size
+    around = across * (size if settings.tile_size is None else tiling_size(tiling))
+    arms, period = _turn(tiling, settings, around, wound=False)
+    far = 0.5 * height / width + 2 * tiling.radius / abs(period)
+    corners = [middle + complex(a, b) * period for a in (-1.5, 1.5) for b in (-far, far)]
+    x, y = np.real(corners), np.imag(corners)
+    window = float(x.min()), float(y.min()), float(x.max()), float(y.max())
+    linear, shift, share = _first_copies(tiling, window, middle, period)
+    keep = (share.real > -0.5 + 1e-9) & (share.real <= 0.5 + 1e-9) & (abs(share.imag) < far)
+    once = motions_of(linear[keep], shift[keep] - (middle.real, middle.imag))
+
+    def vectors(points: Array) -> Array:
+        return np.column_stack([points @ flip, np.ones(len(points))])
+
+    rings = [vectors(own.polygon) for own in given.prototiles]
+    numbers = _around(once, rings, period, size)
+    steps = np.array([period.real, period.imag]) * np.array([[-1.0], [0.0], [1.0]])
+    motions = np.concatenate([motions_of(once[:, :2, :2], once[:, :2, 2] + step) for step in steps])
+    view = View("cylinder", settings.page, np.eye(3), period)
+    seen = view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings)))
+    near = (seen.max(axis=1) > 0).all(axis=1) & (seen.min(axis=1) < view.size).all(axis=1)
+    colours = np.tile(numbers, 3)[near] * (settings.colour != "one")
+    said = f"the left and the right edge meet, {arms[0]},{arms[1]} lattice vectors around"
+    return World(given, vectors, motions[near], colours, view), [said]
+
+
+def _first_copies(
+    tiling: Tiling, window: tuple[float, float, float, float], start: complex, period: complex
+) -> tuple[Array, Array, Complex]:
+    """Return maps (M, 2, 2), (M, 2) to the first prototile's copies, and where (M,) their middles are,
+    in periods from `start`."""
+    every = copies_meeting(tiling, window)
+    first = np.flatnonzero(every.prototiles == 0)
+    linear, shift = every.group.linear_parts[every.cosets[first]], every.translations[first]
+    return linear, shift, ((linear @ tiling.center + shift) @ (1, 1j) - start) / period
+
+
+def _turn(
+    tiling: Tiling, settings: ArtSettings, length: float, wound: bool
+) -> tuple[tuple[int, int], complex]:
+    """Return the steps along both lattice vectors that make one turn of about a length, and their sum.
+
+    Unless the turn is `wound`, with steps along both, it is the one that turns the tiling least.
+    """
+    first, second = (complex(*tiling.group.lattice[:, k]) for k in (0, 1))
+
+    def cost(own: tuple[int, int]) -> float:
+        turn = own[0] * first + own[1] * second
+        off = abs(turn) / length - 1 if wound else np.log(abs(turn) / length)
+        return abs(off) + (0.0 if wound else abs(float(np.angle(turn))))
+
+    steps = range(-MOST_STEPS, MOST_STEPS + 1)
+    every = [(m, n) for m in steps for n in steps if (n and m > 0 if wound else n or m)]
+    chosen = settings.arms or min(every, key=cost)
+    return chosen, chosen[0] * first + chosen[1] * second
 
 
 def _around(motions: Array, rings: list[Array], period: complex, size: float) -> Integers:

@@ -11,7 +11,7 @@ from orbiflow.arrays import Array
 from orbiflow.tiles.page import Curve
 from orbiflow.tiles.worlds.curved import disc_of
 
-Model = Literal["sphere", "disc", "half-plane", "band", "spiral", "sheet"]
+Model = Literal["sphere", "disc", "half-plane", "band", "spiral", "cylinder", "sheet"]
 
 EDGE = 0.02  # of the page's shorter side, around a sphere or a disc
 HEIGHT = 0.08  # of the page's height, at which the middle of a half-plane lies
@@ -25,7 +25,7 @@ class View:
     - `model`: What the page shows.
     - `size`: The page's width and height in mm.
     - `motion`: What is done to vectors first (3, 3).
-    - `period`: Of a spiral, the lattice vector of the plane that is a turn around its middle.
+    - `period`: Of a spiral or cylinder, the lattice vector of the plane that is a turn around it.
     """
 
     model: Model
@@ -61,6 +61,8 @@ class View:
         if self.model == "spiral":
             turn = 2j * np.pi * (moved[..., 0] + 1j * moved[..., 1]) / self.period
             return np.exp(turn), self.radius
+        if self.model == "cylinder":
+            return (moved[..., 0] + 1j * moved[..., 1]) / self.period, self.size[0]
         z = disc_of(moved)
         if self.model == "disc":
             return z, self.radius

@@ -26,12 +26,12 @@ from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.worlds.curved import facing, turned, undone
 from orbiflow.tiles.worlds.metamorphosis import metamorphosis
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, world_scene
-from orbiflow.tiles.worlds.spiral import spiral
+from orbiflow.tiles.worlds.spiral import cylinder, spiral
 from orbiflow.tiles.worlds.turning import turning_page
 from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded, usual_orders
 from orbiflow.tiles.worlds.views import View
 from orbiflow.tiles.worlds.world_copies import colours, copies
-from orbiflow.tiles.write import write_png, write_svg
+from orbiflow.tiles.write import write_pdf, write_png, write_svg
 
 MOST_COPIES = 20_000
 TEXTURE = 6_000_000  # texels of a painting at most
@@ -145,11 +145,13 @@ def world_artwork(source: TileSource, settings: ArtSettings, *overs: Over | None
 
 
 def world_file(art: WorldArt, format: str, *, cancel: Cancel | None = None) -> bytes | str:
-    """Return the content of a file in a format, svg, png, or html for a page to turn it."""
+    """Return the content of a file in a format, svg, pdf, png, or html for a page to turn it."""
     if format == "html":
         return turning_page(art.world, art.palette, art.motifs, art.tile.name)
     scene = art.scene(cancel)
-    return write_svg(scene) if format == "svg" else write_png(scene, dpi=art.settings.dpi)
+    if format == "png":
+        return write_png(scene, dpi=art.settings.dpi)
+    return write_pdf(scene) if format == "pdf" else write_svg(scene)
 
 
 def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]:
@@ -158,8 +160,9 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
         return metamorphosis(tile, settings)
     flip = np.diag([1.0, -1.0 if tile.y_down else 1.0])  # a world's pictures have y upwards
     tiling = tile.tiling.transformed(flip, np.zeros(2))
-    if settings.world == "spiral":
-        return spiral(tile.tiling, tiling, flip, settings)
+    if settings.world in ("spiral", "cylinder"):
+        wound = spiral if settings.world == "spiral" else cylinder
+        return wound(tile.tiling, tiling, flip, settings)
     sign = 1 if settings.world == "sphere" else -1
     found = unfolded(tiling, settings.order or usual_orders(tiling.group, sign), sign)
     view = View(settings.world or "disc", settings.page, _facing(found, settings))

@@ -130,6 +130,7 @@ export const KINDS = {
           "half-plane": "above a line",
           band: "in a band",
           spiral: "around a spiral",
+          cylinder: "around a mug",
         },
       },
       metamorphosis: {
