@@ -20,9 +20,9 @@ from orbiflow.runtime import (
     write_atomic,
 )
 from orbiflow.settings import DefaultText, Ending, InMemory, Option, SettingError
-from orbiflow.tiles.make import ArtSettings, ExportSettings
+from orbiflow.tiles.make import CURVED, ArtSettings, ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
-from orbiflow.tiles.solids import SolidSettings
+from orbiflow.tiles.solids import BALLS, SolidSettings
 
 if TYPE_CHECKING:
     from orbiflow.tiles.make import Artwork, Exported
@@ -45,12 +45,25 @@ def _tell(on_event: Sink, notes: Sequence[str], *files: Path) -> None:
 
 
 def _taken(
-    result: TileSource, tile: str | None, out: Path | None, name: str, *pictures: Path | None
+    result: TileSource,
+    tile: str | None,
+    out: Path | None,
+    name: str,
+    *pictures: Path | None,
+    world: tuple[int | None, Sequence[int] | None] = (None, None),
 ) -> tuple[EscherTile, Path]:
-    """Return the tile that is meant, and the file to write, which is by default named after it."""
-    from orbiflow.tiles.result_file import as_tile
+    """Return the tile that is meant, and the file to write, which is by default named after it.
 
-    given = as_tile(result, tile)
+    For a `world`, its curvature and orders, that is the tile of a run whose image looks best there.
+    """
+    from orbiflow.tiles.result_file import as_tile, read_tiles
+
+    given = None
+    if tile is None and world[0] and isinstance(result, str | Path):
+        from orbiflow.tiles.worlds import best_in_world
+
+        given = best_in_world(read_tiles(result), world[1], world[0])
+    given = given or as_tile(result, tile)
     out = out or Path(name.format(given.name))
     read = (result,) if isinstance(result, str | Path) else ()
     check_output_file(out, *map(Path, read), *pictures)
@@ -151,7 +164,8 @@ def art(
     from orbiflow.tiles import make, motifs
 
     pictures = picture, second_picture
-    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)
+    world = CURVED.get(settings.world or ""), settings.order
+    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures, world=world)
     given.require_certified(
         force=force, otherwise="so it is not drawn; {force} draws it all the same"
     )
@@ -214,7 +228,9 @@ def solid(
     from orbiflow.tiles.solids import make_solid, solid_files
 
     pictures = picture, second_picture
-    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", *pictures)
+    name = f"{{}}-{settings.kind}.{settings.format}"
+    world = 1 if settings.kind in BALLS else None, settings.order
+    given, out = _taken(result, tile, out, name, *pictures, world=world)
     own = {"picture": picture, "second_picture": second_picture}
     made = make_solid(given, settings, **own, force=force)
     cancel.check()

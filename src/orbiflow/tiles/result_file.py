@@ -84,6 +84,19 @@ def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
     return found
 
 
+def read_tiles(path: str | Path) -> list[EscherTile]:
+    """Return the best tile of each class of a run, the best first; of a tile's folder that tile alone.
+
+    Raises:
+        InputFileError: As `read_result`.
+    """
+    file, document = read_document(path)
+    names, folder = _contents(file, document)[0], Path(path).resolve()
+    if folder.is_dir() and folder != file.parent.resolve():
+        return [read_result(path)]
+    return [read_result(path, 1 + names.index(name)) for name in dict.fromkeys(names)]
+
+
 def _measured(
     tile: Tile,
     entry: dict[str, Any],

@@ -3,6 +3,7 @@ from .art import art_file as art_file
 from .art import art_scene as art_scene
 from .art import artwork as artwork
 from .art import render_artwork as render_artwork
+from .art_settings import CURVED as CURVED
 from .art_settings import ArtSettings as ArtSettings
 from .art_settings import Orders as Orders
 from .drawings import dark_parts as dark_parts

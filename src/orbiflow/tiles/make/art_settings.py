@@ -30,6 +30,8 @@ SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
 
 
 World = Literal["sphere", "disc", "half-plane", "band", "spiral", "cylinder"]
+CURVED = {"sphere": 1, "disc": -1, "half-plane": -1, "band": -1}
+"""The worlds that are curved as a sphere, 1, or hyperbolic, -1."""
 COPIES = {"12": (2, 3, 3), "24": (2, 3, 4), "60": (2, 3, 5)}
 
 

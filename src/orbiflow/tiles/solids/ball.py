@@ -16,7 +16,7 @@ from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.shapes import Body
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.worlds import Unfolding, copies, facing, unfolded, usual_orders
+from orbiflow.tiles.worlds import Unfolding, copies, facing, in_world
 
 GROOVE = 2.0  # mm from the bottom of a groove between tiles to its edge
 FOOT = 0.03  # of the radius: what is cut off so that a ball stands
@@ -34,20 +34,19 @@ def ball_of(tile: EscherTile, settings: SolidSettings) -> tuple[dict[str, Body],
     """
     if tile.parts:
         raise OrbiflowError("a ball is made of a tile of one figure")
-    tiling = tile.tiling.transformed(np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
-    found = unfolded(tiling, settings.order or usual_orders(tiling.group, 1), 1)
+    found, seen = in_world(tile, settings.order, 1)
     motions = copies(found, lambda own: np.ones(len(own), dtype=bool), 500)
     radius = settings.diameter / 2
     # mm in a unit of the plane, in the mean
-    scale = radius * float(np.sqrt(4 * np.pi / len(motions) / tiling.tile_area))
+    scale = radius * float(np.sqrt(4 * np.pi / len(motions) / found.tiling.tile_area))
     if settings.kind == "ball":
         bodies = {"ball": Body(_relief(found, motions, radius, scale, settings.relief))}
-        return bodies, ()
+        return bodies, seen
     if settings.kind == "lamp":
-        return {"lamp": Body(_openwork(found, motions, radius, scale, settings))}, ()
+        return {"lamp": Body(_openwork(found, motions, radius, scale, settings))}, seen
     piece = _piece(found, radius, scale, settings)
     note = f"a ball of {settings.diameter:g} mm has {len(motions)} of these pieces, all alike"
-    return {"piece": Body(piece)}, (note,)
+    return {"piece": Body(piece)}, (note, *seen)
 
 
 def _closed(points: Array, triangles: Integers) -> Manifold:

@@ -1,3 +1,5 @@
+from .choosing import best_in_world as best_in_world
+from .choosing import in_world as in_world
 from .curved import facing as facing
 from .sheet import World as World
 from .sheet import world_scene as world_scene

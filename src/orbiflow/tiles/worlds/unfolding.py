@@ -8,7 +8,7 @@ motion of the world that does the same: what the plane's group identifies, the w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import permutations
@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
-from orbiflow.tiles.geometry import complex_points, orient
+from orbiflow.tiles.geometry import complex_points, doubled_areas, orient
 from orbiflow.tiles.silhouette import Mesh, triangulate
 from orbiflow.tiles.tilings import Tiling, copies_meeting
 from orbiflow.tiles.worlds.curved import curvature, motions_of_spinors, norms, vectors_of
@@ -220,15 +220,19 @@ class Unfolding:
             return None
         return self.development.rotations, self.development.orders
 
-    @cached_property
-    def distortion(self) -> float:
-        """How unevenly the map enlarges the tile: the deviation of the logarithm of its scale."""
+    @property
+    def scales(self) -> tuple[Array, Array]:
+        """Logarithms of how much triangles are enlarged, up to a constant, and twice their areas."""
         values = self._matrices @ self._series.wronskians(self.tile.around.points)
         logs = np.log(np.abs(np.linalg.det(values)) / norms(values[..., 0], self.sign))
-        mesh = self.tile.mesh
-        weights = shapely.area(shapely.polygons(mesh.points[mesh.triangles]))
-        mean = np.average(logs, weights=weights)
-        return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
+        return logs, abs(doubled_areas(self.tile.mesh.points, self.tile.mesh.triangles))
+
+
+def distortion(found: Unfolding) -> float:
+    """Return how unevenly a tile is enlarged: the deviation of the logarithm of its scale."""
+    logs, weights = found.scales
+    mean = np.average(logs, weights=weights)
+    return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
 
 
 def _with_centres(ring: Array, pattern: Pattern, spacing: float, near: float) -> Array:
@@ -359,8 +363,13 @@ def _check_group(group: CrystallographicGroup, sign: int) -> None:
         )
 
 
-def unfolded(tiling: Tiling, orders: Sequence[int], sign: int = 0) -> Unfolding:
-    """Return a tile in the world of these orders, given to its centres as they distort it least.
+def unfolded(
+    tiling: Tiling,
+    orders: Sequence[int],
+    sign: int = 0,
+    cost: Callable[[Unfolding], float] = distortion,
+) -> Unfolding:
+    """Return a tile in the world of these orders, given to its centres as they cost least.
 
     With a `sign` it must be the sphere, 1, or the hyperbolic plane, -1. Groups of translations and
     glides have one order: so many times as many copies meet at a point of the tile's edge.
@@ -395,7 +404,7 @@ def unfolded(tiling: Tiling, orders: Sequence[int], sign: int = 0) -> Unfolding:
     worlds = (
         Unfolding(tiling, Development.of(own, chosen), meshes[id(own)]) for own, chosen in every
     )
-    return min(worlds, key=lambda own: round(own.distortion, 9))
+    return min(worlds, key=lambda own: round(cost(own), 9))
 
 
 def _check_inside(tiling: Tiling, ring: Array) -> None:

@@ -23,12 +23,13 @@ from orbiflow.tiles.motifs import (
 )
 from orbiflow.tiles.page import Motif, Scene
 from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.worlds.choosing import flip_of, in_world
 from orbiflow.tiles.worlds.curved import facing, turned, undone
 from orbiflow.tiles.worlds.metamorphosis import metamorphosis
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, world_scene
 from orbiflow.tiles.worlds.spiral import cylinder, spiral
 from orbiflow.tiles.worlds.turning import turning_page
-from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded, usual_orders
+from orbiflow.tiles.worlds.unfolding import Unfolding
 from orbiflow.tiles.worlds.views import View
 from orbiflow.tiles.worlds.world_copies import colours, copies
 from orbiflow.tiles.write import write_pdf, write_png, write_svg
@@ -158,13 +159,13 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
     """Return the copies of a tile in the world that settings name, and what the user should know."""
     if settings.metamorphosis is not None:
         return metamorphosis(tile, settings)
-    flip = np.diag([1.0, -1.0 if tile.y_down else 1.0])  # a world's pictures have y upwards
-    tiling = tile.tiling.transformed(flip, np.zeros(2))
+    flip = np.diag(flip_of(tile))
     if settings.world in ("spiral", "cylinder"):
         wound = spiral if settings.world == "spiral" else cylinder
+        tiling = tile.tiling.transformed(flip, np.zeros(2))
         return wound(tile.tiling, tiling, flip, settings)
     sign = 1 if settings.world == "sphere" else -1
-    found = unfolded(tiling, settings.order or usual_orders(tiling.group, sign), sign)
+    found, seen = in_world(tile, settings.order, sign)
     view = View(settings.world or "disc", settings.page, _facing(found, settings))
     ring = found.vectors(found.ring[:: max(1, len(found.ring) // 30)])
 
@@ -189,7 +190,7 @@ def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]
         found,
         flip,
     )
-    notes = [f"{len(motions)} copies; {found.words}"]
+    notes = [f"{len(motions)} copies; {found.words}", *seen]
     if len(motions) == MOST_COPIES:
         notes.append("more copies than these are not drawn: choose a smaller {area}")
     return world, notes

@@ -1,0 +1,105 @@
+"""Which tile goes to another world, and which of its centres gets which order: by how images look."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from orbiflow.arrays import Array, Complex
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import complex_points, resampled, signed_area
+from orbiflow.tiles.likeness import Measures, Rating, kept_of
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.worlds.curved import disc_of, facing, undone
+from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded, usual_orders
+
+POINTS = 240  # of a silhouette's outline
+BETTER = 0.5  # marks, of 10, that an image has beyond its tile's in the plane at most
+
+
+class Seen:
+    """How a tile's image in another world looks beside its silhouette.
+
+    Args:
+        tile: A tile with a map from its silhouette.
+    """
+
+    def __init__(self, tile: EscherTile) -> None:
+        ring = resampled(tile.silhouette_outline, POINTS)
+        if signed_area(ring * flip_of(tile)) < 0:
+            ring = ring[::-1]
+        self._bent = tile.forward(ring) * flip_of(tile)
+        self._measures = Measures(complex_points(ring * flip_of(tile)))
+
+    @property
+    def plane(self) -> float:
+        """The mark in the plane, from 0 to 10."""
+        return self._mark(complex_points(self._bent))
+
+    def mark(self, found: Unfolding) -> float:
+        """Return the mark of the image, in the stereographic picture about its middle."""
+        return self._mark(disc_of(found.vectors(self._bent) @ _to_middle(found).T))
+
+    def _mark(self, outline: Complex) -> float:
+        return kept_of(self._measures, outline, 0.0).mark
+
+
+def flip_of(tile: EscherTile) -> Array:
+    """Return what makes a tile's coordinates (..., 2) those of a world, whose y points upwards."""
+    return np.array([1.0, -1.0 if tile.y_down else 1.0])
+
+
+def _to_middle(found: Unfolding) -> Array:
+    """Return the motion (3, 3) that takes the tile's middle to (0, 0, 1)."""
+    if found.sign > 0:
+        return facing(found.middle)
+    x, y, t = found.middle
+    far = np.hypot(x, y)
+    turn = np.eye(3)
+    turn[:2, :2] = np.array([[x, -y], [y, x]]) / far if far > 0 else np.eye(2)
+    boost = np.array([[t, 0.0, far], [0.0, 1.0, 0.0], [far, 0.0, t]])
+    return undone(turn @ boost, -1)
+
+
+def in_world(
+    tile: EscherTile, orders: Sequence[int] | None, sign: int
+) -> tuple[Unfolding, tuple[str, ...]]:
+    """Return a tile in a world of some orders, which its centres get as it looks best, and notes.
+
+    Without a map from a silhouette, they get them as the tile is distorted least.
+
+    Raises:
+        OrbiflowError: As `unfolded` and `usual_orders`.
+    """
+    tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
+    orders = orders or usual_orders(tiling.group, sign)
+    if tile.parts or tile.bending is None:
+        return unfolded(tiling, orders, sign), ()
+    seen = Seen(tile)
+    found = unfolded(tiling, orders, sign, lambda own: -seen.mark(own))
+    here, there = (Rating.of_mark(mark) for mark in (seen.plane, seen.mark(found)))
+    return found, (f"likeness {there} there, {here} in the plane",)
+
+
+def best_in_world(
+    tiles: Iterable[EscherTile], orders: Sequence[int] | None, sign: int
+) -> EscherTile | None:
+    """Return the tile, of some with the best in the plane first, whose image looks best; None if none
+    goes there."""
+    best, highest = None, -np.inf
+    for tile in tiles:
+        if tile.parts or tile.bending is None:
+            continue
+        seen = Seen(tile)
+        if seen.plane + BETTER < highest:
+            break
+        tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
+        try:
+            own = orders or usual_orders(tiling.group, sign)
+            found = unfolded(tiling, own, sign, lambda one, seen=seen: -seen.mark(one))
+        except OrbiflowError:  # it stays in the plane
+            continue
+        if (mark := seen.mark(found)) > highest:
+            best, highest = tile, mark
+    return best
