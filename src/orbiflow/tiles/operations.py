@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -50,24 +50,55 @@ def _taken(
     out: Path | None,
     name: str,
     *pictures: Path | None,
-    world: tuple[int | None, Sequence[int] | None] = (None, None),
+    best: Callable[[list[EscherTile]], EscherTile | None] | None = None,
 ) -> tuple[EscherTile, Path]:
     """Return the tile that is meant, and the file to write, which is by default named after it.
 
-    For a `world`, its curvature and orders, that is the tile of a run whose image looks best there.
+    Of a run that is the `best` of its tiles for what is made of it, if that is said, else the first.
     """
     from orbiflow.tiles.result_file import as_tile, read_tiles
 
     given = None
-    if tile is None and world[0] and isinstance(result, str | Path):
-        from orbiflow.tiles.worlds import best_in_world
-
-        given = best_in_world(read_tiles(result), world[1], world[0])
+    if best is not None and tile is None and isinstance(result, str | Path):
+        given = best(read_tiles(result))
     given = given or as_tile(result, tile)
     out = out or Path(name.format(given.name))
     read = (result,) if isinstance(result, str | Path) else ()
     check_output_file(out, *map(Path, read), *pictures)
     return given, out
+
+
+def _best_there(
+    orders: Sequence[int] | None, sign: int
+) -> Callable[[list[EscherTile]], EscherTile | None]:
+    """Return what chooses the tile whose image in another world looks best."""
+
+    def best(tiles: list[EscherTile]) -> EscherTile | None:
+        from orbiflow.tiles.worlds import best_in_world
+
+        return best_in_world(tiles, orders, sign)
+
+    return best
+
+
+def _best_to_become(begin: Path) -> Callable[[list[EscherTile]], EscherTile | None]:
+    """Return what chooses the tile that a tile of another run becomes best."""
+
+    def best(tiles: list[EscherTile]) -> EscherTile | None:
+        from orbiflow.tiles.result_file import read_tiles
+        from orbiflow.tiles.worlds import best_to_become
+
+        return best_to_become(tiles, read_tiles(begin))
+
+    return best
+
+
+def _of_class(path: Path, name: str) -> EscherTile:
+    """Return a run's best tile of a class, or the best one if there is none of it."""
+    from orbiflow.tiles.result_file import read_tiles
+
+    tiles = read_tiles(path)
+    return next((own for own in tiles if own.isohedral_class == name), tiles[0])
 
 
 @operation("export")
@@ -140,6 +171,7 @@ def art(
     force: bool = False,
     picture: Path | None = None,
     second_picture: Path | None = None,
+    begin: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Artwork | WorldArt:
@@ -153,30 +185,43 @@ def art(
         tile: A class, such as IH4, or a rank; 1 is best.
         force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
-        second_picture: One over the second silhouette, of a tile of two figures.
+        second_picture: One over the second silhouette, of a tile of two figures or of `begin`.
+        begin: A search's folder, or that of a tile in it, of whose tile a metamorphosis begins,
+            instead of polygons; it is of the same class.
 
     Raises:
         InputFileError: If the picture cannot be read.
         OrbiflowError: As `artwork` and `export` raise it.
     """
     settings = settings.for_file(out)
+    if begin is not None and settings.metamorphosis is None:
+        raise SettingError("{begin} is where a {metamorphosis} begins; give both or neither")
 
     from orbiflow.tiles import make, motifs
 
     pictures = picture, second_picture
-    world = CURVED.get(settings.world or ""), settings.order
-    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures, world=world)
+    best = None
+    if settings.world in CURVED:
+        best = _best_there(settings.order, CURVED[settings.world])
+    elif begin is not None:
+        best = _best_to_become(begin)
+    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures, best=best)
     given.require_certified(
         force=force, otherwise="so it is not drawn; {force} draws it all the same"
     )
     on_event(Progress(0.0, "laying out"))
     given = motifs.with_map(given)
-    motifs.require_figures(given, settings, 1 + (second_picture is not None))
-    overs = motifs.read_overs(pictures, given)
+    first = None if begin is None else _of_class(begin, given.isohedral_class)
+    if first is None:
+        motifs.require_figures(given, settings, 1 + (second_picture is not None))
+        overs = motifs.read_overs(pictures, given)
+    else:
+        both = zip(pictures, (given, first), strict=True)
+        overs = [own for over, figure in both for own in motifs.read_overs((over,), figure)]
     if settings.world or settings.metamorphosis:
         from orbiflow.tiles import worlds
 
-        made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs)
+        made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs, begin=first)
         content = worlds.world_file(made, settings.file_format, cancel=cancel)
     else:
         made = make.artwork(given, settings, *overs)
@@ -229,8 +274,8 @@ def solid(
 
     pictures = picture, second_picture
     name = f"{{}}-{settings.kind}.{settings.format}"
-    world = 1 if settings.kind in BALLS else None, settings.order
-    given, out = _taken(result, tile, out, name, *pictures, world=world)
+    best = _best_there(settings.order, 1) if settings.kind in BALLS else None
+    given, out = _taken(result, tile, out, name, *pictures, best=best)
     own = {"picture": picture, "second_picture": second_picture}
     made = make_solid(given, settings, **own, force=force)
     cancel.check()

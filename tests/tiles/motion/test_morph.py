@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, Tile, certify, isohedral_class
 from orbiflow.tiles.motion.morph import Morph, Orbits, OwnFrame
+from orbiflow.tiles.silhouette import triangulate
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 
@@ -83,6 +84,14 @@ def test_orbits_give_the_vertices_back(tile: Tile) -> None:
     orbits = Orbits.of(own)
     assert np.abs(orbits.spread(own.points) - own.points).max() < 1e-6
     assert (orbits.source[orbits.source] == orbits.source).all()
+
+
+def test_a_way_whose_weights_are_hard_to_balance_stays_finite() -> None:
+    tile = swirled_tile("IH2", 14, 0.3)
+    morph = Morph(OwnFrame.of(tile), [triangulate(tile.polygon).points])
+    for share in (0.5, 0.98):
+        ring = morph.rings(share)[0]
+        assert np.ptp(ring, axis=0).max() < 10
 
 
 def test_tiles_of_no_class_are_refused() -> None:

@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, ArtSettings, EscherTile, art, isohedral_class
-from orbiflow.tiles.worlds import world_of
+from orbiflow.tiles.worlds import best_to_become, world_of
 from orbiflow.tiles.worlds.metamorphosis import Metamorphosis
 from swirled_tiles import is_sound, swirled_tile
 
@@ -24,7 +24,7 @@ tiles = st.builds(
 ).filter(is_sound)
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(tiles, st.sampled_from(["right", "down", "middle"]), st.integers(1, 2))
 def test_nothing_gaps_or_overlaps(tile: Any, goes: Any, stages: int) -> None:
     chosen = ArtSettings(metamorphosis=goes, stages=stages, area=(150.0, 100.0))
@@ -75,6 +75,42 @@ def test_stages_go_there_and_back() -> None:
     assert shares == pytest.approx([0, 1, 0, 0.5])
     with pytest.raises(OrbiflowError, match="stages"):
         ArtSettings(stages=2)
+
+
+@settings(max_examples=3)
+@given(st.sampled_from(["IH1", "IH4", "IH5", "IH7", "IH21", "IH28"]), st.data())
+def test_a_tile_becomes_another_of_its_class(name: str, data: Any) -> None:
+    drawn = st.builds(swirled_tile, st.just(name), st.integers(0, 999), st.floats(0.05, 0.25))
+    first, last = (EscherTile(data.draw(drawn.filter(is_sound)), name=own) for own in "ab")
+    chosen = ArtSettings(metamorphosis="right", area=(200.0, 100.0))
+    found, notes = world_of(last, chosen, first)
+    assert isinstance(found, Metamorphosis)
+    assert "stretched" in notes[-1] or "cross" in notes[-1]
+    assert found.before is not None
+    # each end is its tile, but for the stretch; all between are tiles of one lattice
+    for world, tile in ((found, last), (found.before, first)):
+        ring = world.way[-1][: world.vertices]
+        points = world.vectors(tile.tile.polygon)[:, :2]
+        away = shapely.distance(shapely.points(points), shapely.LinearRing(ring))
+        assert away.max() < 0.01 * np.sqrt(found.page.tiling.tile_area)
+    for way in found.way:
+        area = shapely.Polygon(way[: found.vertices]).area
+        assert area == pytest.approx(found.page.tiling.tile_area, rel=1e-6)
+    assume(found.is_sound)
+    polygons = [shapely.Polygon(curve.flattened(1.0)) for _, curve in found.outlines(0)]
+    sheet = shapely.box(0, 0, 200, 100)
+    inside = [shapely.intersection(own, sheet) for own in polygons]
+    assert shapely.union_all(inside).area == pytest.approx(sheet.area, rel=1e-9)
+    assert sum(own.area for own in inside) == pytest.approx(sheet.area, rel=1e-9)
+
+
+def test_tiles_of_two_classes_do_not_become_each_other() -> None:
+    first, last = (EscherTile(swirled_tile(name, 7, 0.15), name=name) for name in ("IH4", "IH5"))
+    with pytest.raises(OrbiflowError, match="one of its own class"):
+        world_of(last, ArtSettings(metamorphosis="right"), first)
+    assert best_to_become([last], [first]) is None
+    same = EscherTile(swirled_tile("IH5", 9, 0.15), name="same")
+    assert best_to_become([first, last], [same]) is last
 
 
 def test_drawings_appear_on_the_way(tmp_path: Path) -> None:

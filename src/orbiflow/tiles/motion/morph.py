@@ -46,6 +46,8 @@ from orbiflow.tiles.tilings import (
 # How far corresponding vertices of identified edges may lie apart, in square roots of the area
 TOLERANCE = 1e-6
 
+NEAR_SHARE = 0.004  # of an edge: another tile's vertices so near to this one's are these
+
 
 @dataclass(frozen=True, eq=False)
 class OwnFrame:
@@ -144,11 +146,44 @@ class OwnFrame:
         starts = tuple(int(k + before[k]) for k in self.starts)
         return replace(self, points=points, starts=starts)
 
+    def shares(self, other: OwnFrame) -> list[Array]:
+        """Return for each edge the shares of its length, 0 to 1, at which this tile has vertices, and
+        those of another of its class that are not near to them; the same for edges that are identified.
+        """
+        found = [_along(self.edge(k)) for k in range(len(self.starts))]
+        for own in self.edge_classes:
+            kept = found[own.edge]
+            for share in _along(other.edge(own.edge)).tolist():
+                pair = [share] if own.turn is None else [share, 1 - share]
+                near = np.abs(np.subtract.outer(kept, pair)).min()
+                if near > NEAR_SHARE and (len(pair) == 1 or abs(1 - 2 * share) > NEAR_SHARE):
+                    kept = np.sort(np.append(kept, pair))
+            for image in own.images:
+                found[image.edge] = 1 - kept[::-1] if image.reversed else kept
+            found[own.edge] = kept
+        return found
+
+    def at_shares(self, shares: Sequence[Array]) -> OwnFrame:
+        """Return the tile with its vertices at these shares of its edges, both ends among them."""
+        parts = list[Array]()
+        for k, own in enumerate(shares):
+            edge = self.edge(k)
+            known = _along(edge)
+            parts.append(np.column_stack([np.interp(own[:-1], known, edge[:, j]) for j in (0, 1)]))
+        ends = np.cumsum([0, *map(len, parts)])[:-1]
+        return replace(self, points=np.concatenate(parts), starts=tuple(ends.tolist()))
+
     def tile(self) -> Tile:
         """The tile again, with this group."""
         group = self.group.conjugate(self.linear, self.offset)
         placed = self.points @ self.linear.T + self.offset
         return Tile(placed, group, self.kind.name, self.starts)
+
+
+def _along(edge: Array) -> Array:
+    """Return the shares of an edge's length (M,) at its vertices (M, 2)."""
+    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1)))
+    return lengths / lengths[-1]
 
 
 def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear: Array) -> Array:
@@ -253,6 +288,8 @@ STIFF = 1e4  # how much more strongly edges pull than the inside where they are 
 
 # Most steps in which weights are tilted, the force that counts as none, the finite difference's step
 TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
+# The logarithm by which a step changes weights at most, and halvings of a step that does not help
+WIDEST_TILT, HALVINGS = 2.0, 12
 
 # Number of places at which the way of the weights is measured, so that the outline moves evenly
 EVEN = 24
@@ -387,18 +424,22 @@ class _Weights:
         along = (self.guess[j] - self.guess[i]) @ ways.T
         tilt = np.zeros(len(ways))
         solution, force = self._solved(weights, ways)
-        steps: Array | None = None
         for _ in range(TILTS):
-            if np.abs(force).max(initial=0.0) < BALANCED:
+            left = np.abs(force).max(initial=0.0)
+            if left < BALANCED:
                 break
-            if steps is None:
-                nearby = [
-                    self._solved(weights * np.exp(along @ (tilt + way)), ways)[1] - force
-                    for way in TINY * np.eye(len(ways))
-                ]
-                steps = np.linalg.inv(np.stack(nearby, axis=1) / TINY)
-            tilt = tilt - steps @ force
-            solution, force = self._solved(weights * np.exp(along @ tilt), ways)
+            nearby = [
+                self._solved(weights * np.exp(along @ (tilt + way)), ways)[1] - force
+                for way in TINY * np.eye(len(ways))
+            ]
+            step = np.linalg.solve(np.stack(nearby, axis=1) / TINY, force)
+            step /= max(1.0, float(np.abs(along @ step).max()) / WIDEST_TILT)
+            for _ in range(HALVINGS):
+                solved = self._solved(weights * np.exp(along @ (tilt - step)), ways)
+                if np.abs(solved[1]).max() < left:
+                    break
+                step = step / 2
+            tilt, (solution, force) = tilt - step, solved
         return self.orbits.spread(solution)
 
     def _solved(self, weights: Array, ways: Array) -> tuple[Array, Array]:

@@ -1,6 +1,7 @@
 from .choosing import best_in_world as best_in_world
 from .choosing import in_world as in_world
 from .curved import facing as facing
+from .metamorphosis import best_to_become as best_to_become
 from .sheet import World as World
 from .sheet import world_scene as world_scene
 from .unfolding import Unfolding as Unfolding

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -254,6 +255,14 @@ class Painting:
     place: Place
 
 
+class Worn(NamedTuple):
+    """What lies on the prototiles of copies: a motif and, of pixels, a painting of each, or none."""
+
+    world: World
+    motifs: Sequence[Motif]
+    paintings: Sequence[Painting] = ()
+
+
 def pictured(
     world: World, paintings: Sequence[Painting], pixels: float, cancel: Cancel | None = None
 ) -> Raster:
@@ -309,8 +318,7 @@ def _lay(
 def world_scene(
     world: World,
     chosen: Palette,
-    motifs: Sequence[Motif] = (),
-    paintings: Sequence[Painting] = (),
+    worn: Sequence[Worn] = (),
     *,
     pixels: float,
     line: float | None = None,
@@ -323,7 +331,7 @@ def world_scene(
     outlines = [dict(world.outlines(kind)) for kind in kinds]
     page = rectangle(Box(0.0, 0.0, *world.view.size))
     layers = [Layer("paper", "paper", Style(chosen.paper), (page,))]
-    plain = not paintings and not any(motif.parts for motif in motifs)
+    plain = not any(own.paintings or any(motif.parts for motif in own.motifs) for own in worn)
     widths = {k: _width(world, k, line) for own in outlines for k in own}
     for kind, own in enumerate(outlines):
         for colour in sorted(set(world.colours[list(own)].tolist())):
@@ -334,22 +342,15 @@ def world_scene(
                 style = Style(fill, chosen.outline, width) if width else Style(fill, fill, SEAM)
                 curves = tuple(own[k] for k in mine if not width or widths[k] == width)
                 layers.append(Layer(name, "tiles", style, curves, clipped=True))
-    if paintings:
-        layers.append(
-            Layer("pictures", "drawing", Style(), (pictured(world, paintings, pixels, cancel),))
-        )
-    for kind, motif in enumerate(motifs):
-        if motif.parts:
-            parts = sorted(world.drawn(motif, kind), key=lambda one: one[0])
-            layers.append(
-                Layer(
-                    "drawing",
-                    "drawing",
-                    Style(),
-                    tuple(_inked(part, chosen, world.colour(k, kind)) for k, part in parts),
-                    clipped=True,
-                )
-            )
+    for own in worn:
+        if own.paintings:
+            picture = pictured(own.world, own.paintings, pixels, cancel)
+            layers.append(Layer("pictures", "drawing", Style(), (picture,)))
+        for kind, motif in enumerate(own.motifs):
+            drawn = sorted(own.world.drawn(motif, kind), key=lambda one: one[0])
+            parts = tuple(_inked(part, chosen, own.world.colour(k, kind)) for k, part in drawn)
+            if parts:
+                layers.append(Layer("drawing", "drawing", Style(), parts, clipped=True))
     for width in sorted(set(widths.values())) if line != 0 and not plain else []:
         style = Style(None, chosen.outline, width)
         curves = tuple(curve for own in outlines for k, curve in own.items() if widths[k] == width)

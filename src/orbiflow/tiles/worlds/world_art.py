@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,12 @@ from orbiflow.tiles.motifs import (
     with_map,
     worn,
 )
-from orbiflow.tiles.page import Motif, Scene
+from orbiflow.tiles.page import Scene
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.worlds.choosing import flip_of, in_world
 from orbiflow.tiles.worlds.curved import facing, turned, undone
-from orbiflow.tiles.worlds.metamorphosis import metamorphosis
-from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, world_scene
+from orbiflow.tiles.worlds.metamorphosis import Metamorphosis, metamorphosis
+from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, Worn, world_scene
 from orbiflow.tiles.worlds.spiral import cylinder, spiral
 from orbiflow.tiles.worlds.turning import turning_page
 from orbiflow.tiles.worlds.unfolding import Unfolding
@@ -44,8 +45,7 @@ class WorldArt(Outcome):
 
     - `world`: The copies, and how they are seen.
     - `palette`: Its colours.
-    - `motifs`: What is drawn on each figure, in the tile's units.
-    - `paintings`: What of pixels lies on each figure; empty for none.
+    - `worn`: What lies on its figures; in a metamorphosis also on those of the beginning.
     - `notes`: What the user should know.
     """
 
@@ -53,8 +53,7 @@ class WorldArt(Outcome):
     settings: ArtSettings
     world: World
     palette: Palette
-    motifs: tuple[Motif, ...]
-    paintings: tuple[Painting, ...]
+    worn: tuple[Worn, ...]
     notes: tuple[str, ...]
 
     def scene(self, cancel: Cancel | None = None) -> Scene:
@@ -63,8 +62,7 @@ class WorldArt(Outcome):
         return world_scene(
             self.world,
             self.palette,
-            self.motifs,
-            self.paintings,
+            self.worn,
             pixels=self.settings.pixels,
             line=self.settings.outline,
             title=self.tile.name,
@@ -109,56 +107,78 @@ class WorldArt(Outcome):
         return write_png(self.scene(), dpi=self.settings.dpi)
 
 
-def world_artwork(source: TileSource, settings: ArtSettings, *overs: Over | None) -> WorldArt:
+def world_artwork(
+    source: TileSource, settings: ArtSettings, *overs: Over | None, begin: EscherTile | None = None
+) -> WorldArt:
     """Return a picture of a tile in the world that settings name; arguments as of `artwork`.
+
+    A metamorphosis begins with the tile `begin` instead of polygons; the last of `overs` lies on it.
 
     Raises:
         OrbiflowError: As `artwork`, and if the tile's group has no pattern in that world.
     """
     tile = with_map(source)
-    require_figures(tile, settings, len(overs))
-    world, notes = world_of(tile, settings)
+    world, notes = world_of(tile, settings, begin)
     count, chosen = len(tile.figures) * world.count, palette(settings.palette)
     if tile.parts:  # each figure has a colour of its own, and its shades
         chosen = chosen.shaded((world.count,) * len(tile.figures))
-    on, paintings = worn(tile, settings, chosen, overs, settings.tint), list[Painting]()
-    motifs = [own.moved(*part.place) for own, part in zip(on.motifs, tile.figures, strict=True)]
-    notes += on.notes
-    if any(on.pictures) and settings.format == "html":
-        notes.append("a page to turn has drawings in SVG, but no pictures of pixels")
-    elif any(on.pictures):
-        scale = float(world.sizes.max()) / world.size * settings.pixels * TEXELS_PER_PIXEL
-        scale = min(scale, float(np.sqrt(TEXTURE / count)) / world.size)
-        for picture, part in zip(on.pictures, tile.figures, strict=True):
-            paint = picture_paint(picture, part.figure, scale * part.place.scale, count)
-            coloured = paint.coloured(chosen, count, on.tint)
-            paintings.append(Painting(paint.grid, coloured, part.place))
+    own_overs = overs if begin is None else overs[:1]
+    require_figures(tile, settings, len(own_overs))
+    wearing = [_worn(tile, world, settings, chosen, own_overs, notes)]
+    if isinstance(world, Metamorphosis) and world.before and begin:
+        wearing.append(_worn(with_map(begin), world.before, settings, chosen, overs[1:], notes))
     notes += chosen.shortage(count)
     return WorldArt(
         tile=tile,
         settings=settings,
         world=world,
         palette=chosen,
-        motifs=tuple(motifs),
-        paintings=tuple(paintings),
+        worn=tuple(wearing),
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _worn(
+    tile: EscherTile,
+    world: World,
+    settings: ArtSettings,
+    chosen: Palette,
+    overs: Sequence[Over | None],
+    notes: list[str],
+) -> Worn:
+    """Return what lies on a tile's copies in a world, and add what the user should know of it."""
+    on, paintings = worn(tile, settings, chosen, overs, settings.tint), list[Painting]()
+    motifs = [own.moved(*part.place) for own, part in zip(on.motifs, tile.figures, strict=True)]
+    notes += on.notes
+    if any(on.pictures) and settings.format == "html":
+        notes.append("a page to turn has drawings in SVG, but no pictures of pixels")
+    elif any(on.pictures):
+        count = len(tile.figures) * world.count
+        scale = float(world.sizes.max()) / world.size * settings.pixels * TEXELS_PER_PIXEL
+        scale = min(scale, float(np.sqrt(TEXTURE / count)) / world.size)
+        for picture, part in zip(on.pictures, tile.figures, strict=True):
+            paint = picture_paint(picture, part.figure, scale * part.place.scale, count)
+            coloured = paint.coloured(chosen, count, on.tint)
+            paintings.append(Painting(paint.grid, coloured, part.place))
+    return Worn(world, motifs, paintings)
 
 
 def world_file(art: WorldArt, format: str, *, cancel: Cancel | None = None) -> bytes | str:
     """Return the content of a file in a format, svg, pdf, png, or html for a page to turn it."""
     if format == "html":
-        return turning_page(art.world, art.palette, art.motifs, art.tile.name)
+        return turning_page(art.world, art.palette, art.worn[0].motifs, art.tile.name)
     scene = art.scene(cancel)
     if format == "png":
         return write_png(scene, dpi=art.settings.dpi)
     return write_pdf(scene) if format == "pdf" else write_svg(scene)
 
 
-def world_of(tile: EscherTile, settings: ArtSettings) -> tuple[World, list[str]]:
+def world_of(
+    tile: EscherTile, settings: ArtSettings, begin: EscherTile | None = None
+) -> tuple[World, list[str]]:
     """Return the copies of a tile in the world that settings name, and what the user should know."""
     if settings.metamorphosis is not None:
-        return metamorphosis(tile, settings)
+        return metamorphosis(tile, settings, begin)
     flip = np.diag(flip_of(tile))
     if settings.world in ("spiral", "cylinder"):
         wound = spiral if settings.world == "spiral" else cylinder
