@@ -54,7 +54,7 @@ def _taken(
 ) -> tuple[EscherTile, Path]:
     """Return the tile that is meant, and the file to write, which is by default named after it.
 
-    Of a run that is the `best` of its tiles for what is made of it, if that is said, else the first.
+    Of a run it is the `best` of its tiles for what is made of it, if one is given, else the first.
     """
     from orbiflow.tiles.result_file import as_tile, read_tiles
 
