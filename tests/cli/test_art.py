@@ -141,11 +141,11 @@ def test_a_picture_of_another_aspect(result: Path, tmp_path: Path, orbiflow) -> 
     assert "within 1 %" in outcome.err
 
 
-@pytest.mark.parametrize("out", ["tiles.pdf", "tiles"])
+@pytest.mark.parametrize("out", ["tiles.tiff", "tiles"])
 def test_other_endings(out: str, result: Path, tmp_path: Path, orbiflow) -> None:
     outcome = orbiflow("art", result, "-o", tmp_path / out)
     assert outcome.status == 2
-    assert "--out must be a file that ends in .html, .png or .svg" in outcome.err
+    assert "--out must be a file that ends in .html, .pdf, .png or .svg" in outcome.err
     assert out in outcome.err
 
 
