@@ -13,7 +13,7 @@ from manifold3d import Manifold, OpType
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import EscherTile, SolidSettings, make_solid, solid
-from orbiflow.tiles.worlds import copies, facing, unfolded
+from orbiflow.tiles.worlds import copies, facing, joints, unfolded
 from swirled_tiles import is_sound, swirled_tile
 
 COUNTS = {(2, 3, 3): 12, (2, 3, 4): 24, (2, 3, 5): 60}
@@ -63,6 +63,37 @@ def test_the_pieces_of_a_ball_are_the_ball(tile: Any, order: Any) -> None:
     assert union.volume() == pytest.approx(shell, rel=0.01)
     apart = sum(own.volume() for own in every) - union.volume()
     assert apart < 0.004 * shell
+
+
+@settings(max_examples=6)
+@given(tiles)
+def test_joints_of_neighbours_meet(tile: Any) -> None:
+    own = EscherTile(tile)
+    found = unfolded(own.tiling, (2, 3, 4))
+    pairs = joints(found.tiling, found.ring)
+    assert len(pairs) >= 2
+    for one, other in pairs:
+        here, there = found.vectors(np.stack([one, other]))
+        assert np.abs(found.neighbours @ there - here).max(axis=1).min() < 1e-9
+
+
+def test_magnets_have_holes_in_the_sides_of_pieces() -> None:
+    tile = EscherTile(swirled_tile("IH28", 3, 0.1))
+    chosen = SolidSettings(kind="ball-piece", order=(2, 3, 4), diameter=120.0, wall=6.0)
+    plain, holed = (
+        next(iter(made.parts.values()))
+        for made in (make_solid(tile, chosen), make_solid(tile, chosen.replace(magnet=3.0)))
+    )
+    found = unfolded(tile.tiling, (2, 3, 4))
+    count = 2 * len(joints(found.tiling, found.ring))
+    depth = 2.0 + chosen.clearance / 2
+    missing = plain.volume() - holed.volume()
+    assert missing == pytest.approx(count * np.pi * 1.5**2 * (depth - 0.1), rel=0.1)
+    assert holed.genus() == 0
+    with pytest.raises(OrbiflowError, match="no room in a wall"):
+        chosen.replace(magnet=6.0)
+    with pytest.raises(OrbiflowError, match="magnet"):
+        make_solid(tile, chosen.replace(magnet=5.0, magnet_depth=40.0))
 
 
 def test_what_makes_no_ball_says_why(tmp_path: Path) -> None:

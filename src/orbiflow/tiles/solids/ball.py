@@ -16,7 +16,7 @@ from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.shapes import Body
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.worlds import Unfolding, copies, facing, in_world
+from orbiflow.tiles.worlds import Unfolding, copies, facing, in_world, joints
 
 GROOVE = 2.0  # mm from the bottom of a groove between tiles to its edge
 FOOT = 0.03  # of the radius: what is cut off so that a ball stands
@@ -46,7 +46,14 @@ def ball_of(tile: EscherTile, settings: SolidSettings) -> tuple[dict[str, Body],
         return {"lamp": Body(_openwork(found, motions, radius, scale, settings))}, seen
     piece = _piece(found, radius, scale, settings)
     note = f"a ball of {settings.diameter:g} mm has {len(motions)} of these pieces, all alike"
-    return {"piece": Body(piece)}, (note, *seen)
+    notes = [note, *seen]
+    if settings.magnet is not None:
+        count = len(joints(found.tiling, found.ring))
+        notes.append(
+            f"{2 * count} holes for magnets of {settings.magnet:g} x {settings.magnet_depth:g} mm in "
+            "each piece; where two holes meet, the magnets' poles must be unlike, in all pieces alike"
+        )
+    return {"piece": Body(piece)}, tuple(notes)
 
 
 def _closed(points: Array, triangles: Integers) -> Manifold:
@@ -188,4 +195,42 @@ def _piece(found: Unfolding, radius: float, scale: float, settings: SolidSetting
     triangles = np.concatenate([mesh.triangles, mesh.triangles[:, ::-1] + count, *walls])
     turned = vectors @ facing(found.middle).T
     made = _closed(np.concatenate([radius * turned, (radius - settings.wall) * turned]), triangles)
+    if settings.magnet is not None:
+        holes = _holes(found, radius, scale, settings)
+        made = _with_holes(made, holes)
     return made.translate((0, 0, -made.bounding_box()[2]))
+
+
+def _holes(
+    found: Unfolding, radius: float, scale: float, settings: SolidSettings
+) -> list[Manifold]:
+    """Return the holes for magnets in the sides of a piece: those of two neighbours meet."""
+    frame, holes = facing(found.middle), list[Manifold]()
+    deep = settings.magnet_depth + settings.clearance / 2
+    shape = Manifold.cylinder(deep + STEP, (settings.magnet or 0.0) / 2, circular_segments=48)
+    polygon = shapely.Polygon(found.ring)
+    for point in (own for pair in joints(found.tiling, found.ring) for own in pair):
+        near = 1e-3 / scale
+        inner: Any = polygon.buffer(-near).exterior
+        inside = shapely.get_coordinates(inner.interpolate(inner.project(shapely.Point(*point))))
+        here, there = found.vectors(np.stack([point, inside[0]])) @ frame.T
+        inwards = there - here - ((there - here) @ here) * here
+        inwards /= np.linalg.norm(inwards)
+        # from STEP beyond the edge inwards, about the middle of the wall
+        turn = np.column_stack([np.cross(here, inwards), here, inwards])
+        start = (radius - settings.wall / 2) * here - STEP * inwards
+        holes.append(shape.transform(np.column_stack([turn, start])))
+    return holes
+
+
+def _with_holes(made: Manifold, holes: list[Manifold]) -> Manifold:
+    for k, hole in enumerate(holes):
+        if any((hole ^ other).volume() > 0 for other in holes[:k]):
+            raise OrbiflowError("magnets are in each other's way; choose a smaller {magnet}")
+    for hole in holes:
+        made = made - hole
+    if made.genus() or len(made.decompose()) > 1:
+        raise OrbiflowError(
+            "a hole for a magnet breaks through; choose a smaller {magnet}, or a larger {diameter}"
+        )
+    return made

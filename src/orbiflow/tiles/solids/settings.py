@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from orbiflow.settings import DefaultText, FileSettings, OnlyWith, Range, SettingError, Unit
+from orbiflow.settings import DefaultText, FileSettings, Needs, OnlyWith, Range, SettingError, Unit
 from orbiflow.tiles.make import Orders
 from orbiflow.tiles.motifs import MotifSettings
 from orbiflow.units import LONGEST_SIDE, Length, LengthOrZero, PageSize
@@ -47,6 +47,12 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
 
     order: Annotated[Orders | None, _ROUND, DefaultText("what bends the tile least")] = None
     """How many tiles meet at the centres of rotation, 2,3,3, 2,3,4 or 2,3,5; or 12, 24 or 60 tiles."""
+
+    magnet: Annotated[Length | None, OnlyWith(kind="ball-piece")] = None
+    """Diameter of round magnets in the sides of a ball's pieces, two for each edge."""
+
+    magnet_depth: Annotated[Length, Needs("magnet")] = 2.0
+    """Height of these magnets."""
 
     height: Annotated[
         Length, OnlyWith(kind=FLAT_KINDS), DefaultText("4 mm; cutter 13, stamp 3, mould 8 mm")
@@ -146,6 +152,10 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
                 raise SettingError(f"{{{part}}} must be at most a quarter of {{diameter}}")
         if self.kind == "cutter" and not self.blade <= self.wall <= self.foot:
             raise SettingError("{blade} must be at most {wall}, and {wall} at most {foot}")
+        if self.magnet is not None and self.magnet > self.wall - 2 * self.nozzle:
+            raise SettingError(
+                f"a {{magnet}} of {self.magnet:g} mm leaves no room in a {{wall}} of {self.wall:g} mm"
+            )
         if self.kind == "puzzle" and not self.clearance:
             raise SettingError("{clearance} must be above 0 in a puzzle, or no piece comes out")
 

@@ -5,6 +5,7 @@ from .metamorphosis import best_to_become as best_to_become
 from .sheet import World as World
 from .sheet import world_scene as world_scene
 from .unfolding import Unfolding as Unfolding
+from .unfolding import joints as joints
 from .unfolding import unfolded as unfolded
 from .unfolding import usual_orders as usual_orders
 from .views import View as View

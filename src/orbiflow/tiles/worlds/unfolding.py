@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import permutations
+from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
@@ -305,6 +305,34 @@ def _contacts(tiling: Tiling, ring: Array) -> list[tuple[Any, Array]]:
     """Return each copy along a tile's edge, and points (n, 2) of the edge that both share."""
     isometries, sides, edge = _sides(tiling, ring)
     return [(isometries[k], edge[sides == k]) for k in np.unique(sides[sides >= 0])]
+
+
+def joints(tiling: Tiling, ring: Array) -> list[tuple[Array, Array]]:
+    """Return pairs of points (2,) of a tile's edge, one for each edge, that meet where two copies do.
+
+    They are in the middle of the longest run of an edge between two copies; where a half-turn takes the
+    edge to itself, in the middles of its halves.
+    """
+    isometries, sides, edge = _sides(tiling, ring)
+    weights = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    starts = np.flatnonzero(sides != np.roll(sides, 1))
+    runs = [np.arange(a, b) % len(ring) for a, b in pairwise([*starts, starts[0] + len(ring)])]
+    longest = dict[int, Integers]()
+    for run in sorted(runs, key=lambda own: weights[own].sum()):
+        longest[int(sides[run[0]])] = run
+    found, size = list[tuple[Array, Array]](), float(np.sqrt(tiling.tile_area))
+    for k, run in longest.items():
+        if k < 0:
+            continue
+        back = isometries[k].inverse()
+        itself = bool(np.linalg.norm(edge[run] - back(edge[run])[::-1], axis=1).max() < 0.1 * size)
+        along = np.cumsum(weights[run]) / weights[run].sum()
+        point = edge[run[int(np.searchsorted(along, 0.25 if itself else 0.5))]]
+        line = shapely.LineString(ring[np.append(run, run[-1] + 1) % len(ring)])
+        known = (line.distance(shapely.Point(*own)) for pair in found for own in pair)
+        if min(known, default=np.inf) > NEAR * size:  # an edge's image has its points already
+            found.append((point, back(point)))
+    return found
 
 
 def _cone_points(tiling: Tiling, ring: Array) -> tuple[Array, list[complex]]:
