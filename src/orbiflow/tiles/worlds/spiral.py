@@ -29,7 +29,7 @@ def spiral(
     # the first tile lies at a share of the radius; how far in and out, in periods
     start = middle - 1j * period * (-np.log(RIM) / (2 * np.pi))
     radius = float(np.linalg.norm(settings.page)) / 2
-    inner = np.log(2 * np.pi * radius * size / abs(period) / (2 * LEAST_COPY)) / (2 * np.pi)
+    inner = np.log(2 * np.pi * radius * size / abs(period) / LEAST_COPY) / (2 * np.pi)
     corners = np.array(
         [start + (a + 1j * b) * period for a in (-1.2, 1.2) for b in (-0.6, inner + 0.2)]
     )
