@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, Tile, certify, isohedral_class
-from orbiflow.tiles.motion.morph import Morph, Orbits, OwnFrame
+from orbiflow.tiles.motion.morph import Morph, Orbits
+from orbiflow.tiles.motion.own_frame import OwnFrame
 from orbiflow.tiles.silhouette import triangulate
 from swirled_tiles import is_sound, swirled, swirled_tile
 

@@ -1,5 +1,5 @@
 from .morph import Morph as Morph
-from .morph import OwnFrame as OwnFrame
+from .own_frame import OwnFrame as OwnFrame
 from .settings import AnimationSettings as AnimationSettings
 from .skins import dressed as dressed
 from .writers import animation as animation

@@ -17,7 +17,8 @@ from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import Place, border, triangle_sides
 from orbiflow.tiles.motifs import Over
-from orbiflow.tiles.motion.morph import Morph, OwnFrame
+from orbiflow.tiles.motion.morph import Morph
+from orbiflow.tiles.motion.own_frame import OwnFrame
 from orbiflow.tiles.motion.settings import AnimationSettings
 from orbiflow.tiles.motion.skins import Body, Dress
 from orbiflow.tiles.page import Page, Style, edge_margin, tiling_size

@@ -2,10 +2,10 @@ from .choosing import best_in_world as best_in_world
 from .choosing import in_world as in_world
 from .curved import facing as facing
 from .metamorphosis import best_to_become as best_to_become
+from .outlines import joints as joints
 from .sheet import World as World
 from .sheet import world_scene as world_scene
 from .unfolding import Unfolding as Unfolding
-from .unfolding import joints as joints
 from .unfolding import unfolded as unfolded
 from .unfolding import usual_orders as usual_orders
 from .views import View as View

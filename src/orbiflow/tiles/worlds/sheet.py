@@ -35,7 +35,8 @@ from orbiflow.tiles.page import (
 )
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tilings import Tiling
-from orbiflow.tiles.worlds.unfolding import Unfolding, with_points
+from orbiflow.tiles.worlds.outlines import with_points
+from orbiflow.tiles.worlds.unfolding import Unfolding
 from orbiflow.tiles.worlds.views import View
 
 Booleans = NDArray[np.bool_]

@@ -12,8 +12,8 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette
 from orbiflow.tiles.page import Motif, cut_off
+from orbiflow.tiles.worlds.outlines import with_points
 from orbiflow.tiles.worlds.sheet import CONE_NEAR, World, stepped
-from orbiflow.tiles.worlds.unfolding import with_points
 from orbiflow.tiles.worlds.world_copies import colour_moves
 from orbiflow.tiles.write import canvas_page, page_script
 
