@@ -34,12 +34,12 @@ def match(found: Unfolding) -> float:
 
 
 def covered(found: Unfolding, count: int) -> tuple[int, int, int]:
-    """Return of how many directions none, one or more pieces have them; sides are divided by 12."""
+    """Return of how many directions none, one or more pieces have them; sides are divided by 96."""
     ways = np.random.default_rng(0).normal(size=(count, 3))
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     turn = facing(found.middle)
     ring, ends = found.ring, np.roll(found.ring, -1, axis=0)
-    shares = np.linspace(0, 1, 12, endpoint=False)[:, None, None]
+    shares = np.linspace(0, 1, 96, endpoint=False)[:, None, None]
     fine = ((1 - shares) * ring + shares * ends).swapaxes(0, 1).reshape(-1, 2)
     seen = disc_of(found.vectors(fine) @ turn.T)
     polygon = shapely.Polygon(np.column_stack([seen.real, seen.imag]))
