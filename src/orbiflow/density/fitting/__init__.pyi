@@ -2,6 +2,9 @@ from .automatic import fit_automatic as fit_automatic
 from .flow import fit_density as fit_density
 from .held_out import LEAST_PLACES as LEAST_PLACES
 from .held_out import lightest_folds as lightest_folds
+from .parameters import Parameter as Parameter
+from .parameters import ParametricFit as ParametricFit
+from .parametric import fit_parametric as fit_parametric
 from .repeats import places as places
 from .report import FitReport as FitReport
 from .report import Progress as Progress

@@ -13,6 +13,7 @@ from torch import Tensor
 from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.held_out import LEAST_PLACES
 from orbiflow.density.fitting.likelihood import Refinement
+from orbiflow.density.fitting.parameters import ParametricFit, parametric_fit_from
 from orbiflow.density.fitting.repeats import Repeats, places
 from orbiflow.density.fitting.rounding import Heap
 from orbiflow.density.fitting.rows import mean_of
@@ -85,6 +86,8 @@ class FitReport:
     - `components`: of a fit by evidence, what each component is worth.
     - `repeats`: of a fit by evidence, what was found of rows that repeat another.
     - `effective`: rows of equal weight that say as much (Kish); None where all weigh the same.
+    - `parametric`: of a parametric family alone, its parameters. No rows are held out then:
+      `validation` is 0, and `validation_nll` is Akaike's estimate for new rows.
     - `notes`: what the user should know, in words.
     """
 
@@ -103,6 +106,7 @@ class FitReport:
     components: tuple[ComponentEvidence, ...] = ()
     repeats: Repeats | None = None
     effective: float | None = None
+    parametric: ParametricFit | None = None
     notes: tuple[str, ...] = field(default=())
 
     def to_json(self) -> dict[str, Any]:
@@ -123,11 +127,12 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
             for stage in values.pop("stages")
         )
         components = tuple(ComponentEvidence(**entry) for entry in values.pop("components"))
-        repeats = values.pop("repeats")
+        repeats, parametric = values.pop("repeats"), values.pop("parametric", None)
         return FitReport(
             stages=stages,
             components=components,
             repeats=None if repeats is None else _repeats_from(repeats),
+            parametric=None if parametric is None else parametric_fit_from(parametric),
             **values,
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:

@@ -17,6 +17,10 @@ from .evaluation import midpoints as midpoints
 from .figures import Estimate as Estimate
 from .files import density_to_bytes as density_to_bytes
 from .files import read_density as read_density
+from .fisher_bingham import AngularCentralGaussian as AngularCentralGaussian
+from .fisher_bingham import FisherBingham as FisherBingham
+from .fisher_bingham import images_of as images_of
+from .fisher_bingham import log_fisher_bingham as log_fisher_bingham
 from .flow import MOST_DIM as MOST_DIM
 from .flow import FlowDensity as FlowDensity
 from .flow import UniformDensity as UniformDensity

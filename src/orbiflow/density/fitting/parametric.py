@@ -1,0 +1,298 @@
+"""Parametric families as fits of their own: parameters, intervals, and how well the family suits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import torch
+from numpy.typing import ArrayLike
+from scipy import special
+from torch import Tensor
+
+from orbiflow.arrays import Array
+from orbiflow.density.fitting.forms import FORMS, Cloud
+from orbiflow.density.fitting.goodness import DRAWS, smooth_test
+from orbiflow.density.fitting.intervals import (
+    LEVEL,
+    Writing,
+    concentration_interval,
+    direction_parameters,
+    shape_parameters,
+)
+from orbiflow.density.fitting.likelihood import training
+from orbiflow.density.fitting.maximum import Local, at_maximum, covariance
+from orbiflow.density.fitting.parameters import Goodness, Parameter, ParametricFit
+from orbiflow.density.fitting.repeats import places
+from orbiflow.density.fitting.report import FitReport, mean_nll, own_points
+from orbiflow.density.fitting.rows import (
+    Rows,
+    effective_rows,
+    group_numbers,
+    lone_groups_note,
+    weighed,
+    weights_note,
+)
+from orbiflow.density.models import AdaptiveKernels, Density, images_of
+from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
+from orbiflow.errors import OrbiflowError
+
+MOST_WIDTH = 16
+"""Coordinates of unit vectors up to which a family has a frame of axes."""
+
+ANGLES, DIRECTIONS = "von-mises", "von-mises-fisher"
+"""The families of angles, and of directions in any dimension."""
+
+
+class Side(NamedTuple):
+    """A factor of the space: what it is called, its rows, the family there, and how it is written."""
+
+    name: str
+    cloud: Cloud
+    local: Local
+    writing: Writing
+
+
+def families_of(space: Space) -> tuple[str, ...]:
+    """Return the parametric families that there are on a space, by name.
+
+    >>> from orbiflow.density import make_space
+    >>> families_of(make_space("rotation-space"))
+    ('bingham', 'angular-central-gaussian', 'watson', 'matrix-fisher')
+    """
+    if isinstance(space, Torus) and not isinstance(space, MixedTorus):
+        return (ANGLES,)
+    try:
+        images = images_of(space)
+    except OrbiflowError:
+        return ()
+    width = space.dim + 1
+    axes = ("bingham", "angular-central-gaussian", "watson") if width <= MOST_WIDTH else ("watson",)
+    if isinstance(space, RotationSpace):
+        return (*axes, "matrix-fisher")
+    if images == 2:
+        return axes
+    return (DIRECTIONS, *(("kent",) if width == 3 else ()), *axes)
+
+
+def require_family(space: Space, name: str) -> None:
+    """Check that a family is one of a space's."""
+    there = families_of(space)
+    if name not in there:
+        which = f"there are {', '.join(there)}" if there else "no parametric family has one"
+        raise OrbiflowError(f"there is no {name} density on the {space.name}: {which}")
+
+
+def fit_density_of(space: Space, name: str, rows: Rows) -> Density:
+    """Return the density of a family that is likeliest for some rows."""
+    return _density(space, name, _sides(space, name, rows, None))
+
+
+@training()
+def fit_parametric(
+    space: Space,
+    points: Tensor,
+    name: str,
+    *,
+    weights: Any = None,
+    groups: ArrayLike | None = None,
+    columns: Sequence[str] | None = None,
+    seed: int = 0,
+) -> tuple[Density, FitReport]:
+    """Fit a parametric family by maximum likelihood, with intervals of its parameters.
+
+    There are von-mises on tori, one for each angle; von-mises-fisher, kent, watson, bingham and
+    angular-central-gaussian on spheres; the last three of axes; and matrix-fisher of rotations. The
+    parameters, with standard errors and intervals, are `report.parametric`. Rows of one group are not
+    independent.
+
+    Args:
+        space: The space.
+        points: Points (N, d) of its chart.
+        name: The family.
+        weights: How much each row counts (N,); only ratios matter.
+        groups: A label (N,) for each row.
+        columns: Names of the data's columns, for those of the parameters.
+        seed: Seed of the draws of the test of the family.
+
+    Raises:
+        OrbiflowError: If there is no such family on the space, or no likeliest parameters.
+
+    >>> from orbiflow.density import make_space
+    >>> space = make_space("sphere")
+    >>> points = space.to_chart([[50.0, 10.0], [55, 20], [45, 12], [52, 5], [48, 14]])
+    >>> density, report = fit_parametric(space, points, "von-mises-fisher")
+    >>> [one.name for one in report.parametric.parameters]
+    ['mean_lat', 'mean_lon', 'concentration']
+    """
+    own = own_points(space, points)
+    labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
+    rows = weighed(own, weights, labels)
+    if rows.groups is not None:  # numbered anew, without rows of no weight
+        rows = Rows(rows.points, rows.weights, torch.as_tensor(group_numbers(rows.groups.numpy(), len(rows))))
+    sides = _sides(space, name, rows, columns)
+    density = _density(space, name, sides)
+    found = _parametric(space, name, rows, sides, density, seed)
+    counts, _ = places(rows.points)
+    train = mean_nll(density, rows.points, rows.weights)
+    report = FitReport(
+        points=len(rows),
+        duplicates=len(rows) - len(counts),
+        train=len(rows),
+        validation=0,
+        start_nll=train + found.gain,
+        train_nll=train,
+        validation_nll=train + found.free / found.rows,
+        stages=(),
+        steps=1,
+        mass=1.0 if space.dim == 2 else None,
+        integration_error=0.0,
+        effective=None if rows.weights is None else effective_rows(rows.weights),
+        parametric=found,
+        notes=(*weights_note(rows), *lone_groups_note(rows.groups)),
+    )
+    return density, report
+
+
+def _sides(
+    space: Space, name: str, rows: Rows, columns: Sequence[str] | None
+) -> list[Side]:
+    """Return the family at its maximum on each factor of the space: each angle of a torus is one."""
+    require_family(space, name)
+    found: list[Side] = []
+    for title, vectors, writing in _factors(space, rows.points, columns):
+        cloud = Cloud(vectors, rows.weights)
+        if len(vectors) <= cloud.width:
+            raise OrbiflowError(
+                f"{len(vectors)} rows are too few for a {name} density: there must be more than "
+                f"{cloud.width}"
+            )
+        form = FORMS[DIRECTIONS if name == ANGLES else name]
+        found.append(Side(title, cloud, at_maximum(form, cloud), writing))
+    return found
+
+
+def _factors(
+    space: Space, points: Tensor, columns: Sequence[str] | None
+) -> list[tuple[str, Tensor, Writing]]:
+    """Return the unit vectors (N, p) of each factor of the space, and how directions are written."""
+    names = tuple(columns or space.columns)
+    if not isinstance(space, Torus):
+        periods = tuple(360.0 if column == "lon" else 0.0 for column in space.columns)
+        if isinstance(space, RotationSpace) and space.form not in ("quaternion", "vector", "matrix"):
+            periods = (space.period,) * 3
+        written = names if len(names) == len(space.columns) else space.columns
+        writing = Writing(partial(_written, space), written, periods, _unit_of(space))
+        return [("", space.features(points)[0], writing)]
+    found: list[tuple[str, Tensor, Writing]] = []
+    for axis, name in enumerate(names):
+        angles = 2 * math.pi * points[:, axis]
+        vectors = torch.stack([angles.cos(), angles.sin()], dim=1)
+        write = partial(_written_angle, space, axis)
+        writing = Writing(write, (name,), (space.period_of(axis),), str(space.unit))
+        found.append((name, vectors, writing))
+    return found
+
+
+def _unit_of(space: Space) -> str:
+    """Return the unit in which a space writes directions, empty for coordinates."""
+    if "lat" in space.columns:
+        return "degrees"
+    if isinstance(space, RotationSpace) and space.form not in ("quaternion", "matrix"):
+        return space.angle_unit
+    return ""
+
+
+def _written(space: Space, vector: Tensor) -> Array:
+    return space.from_chart(space.from_features(vector[None]))[0]
+
+
+def _written_angle(space: Torus, axis: int, vector: Tensor) -> Array:
+    row = torch.zeros(1, space.dim, dtype=torch.float64)
+    row[0, axis] = torch.atan2(vector[1], vector[0]) / (2 * math.pi)
+    return space.from_chart(space.project(row))[0, axis : axis + 1]
+
+
+def _density(space: Space, name: str, sides: list[Side]) -> Density:
+    if name not in (ANGLES, DIRECTIONS):
+        local = sides[0].local
+        return local.form.density(space, local.at)
+    means = torch.stack([side.local.at.frame[0] for side in sides])
+    kappa = torch.stack([side.local.at.shape[0] for side in sides])[None]
+    if name == ANGLES:
+        centers = space.project(torch.atan2(means[:, 1], means[:, 0])[None] / (2 * math.pi))
+    else:
+        centers = space.from_features(means)
+    return AdaptiveKernels(space, centers, kappa, torch.ones(1, dtype=torch.float64))
+
+
+def _parametric(
+    space: Space, name: str, rows: Rows, sides: list[Side], density: Density, seed: int
+) -> ParametricFit:
+    even = rows.weights is None and rows.groups is None
+    count = float(len(rows)) if rows.weights is None else effective_rows(rows.weights)
+    parameters: list[Parameter] = []
+    cones: dict[str, float | None] = {}
+    free = 0
+    for side in sides:
+        local = side.local
+        spread = covariance(local, side.cloud, count, rows.groups, rows.weights is None)
+        free += len(spread)
+        for label, number in local.form.directions(local.width).items():
+            own, cone = direction_parameters(label, number, local, spread, side.writing)
+            parameters += own
+            cones[f"{label}_{side.name}" if side.name else label] = cone
+        shapes = shape_parameters(local, spread)
+        if local.form.name == DIRECTIONS and even:
+            shapes = [_inverted(shapes[0], side.cloud, count)]
+        parameters += [_of_side(one, side.name) for one in shapes]
+    if name == ANGLES:
+        cones = {}  # the interval of an angle says it
+    mean = float(rows.mean(density.log_prob(rows.points, measure="natural")))
+    uniform = -math.log(space.volume)
+    gain = mean - uniform
+    goodness = None
+    if even:
+        goodness = _goodness(space, sides, density, torch.Generator().manual_seed(seed))
+    notes: list[str] = []
+    if 2 * count * gain < _chi_square_quantile(free):
+        notes.append(
+            "the rows cannot tell this density from the uniform one: its directions and intervals mean "
+            "little"
+        )
+    total = count * mean
+    return ParametricFit(
+        name, tuple(parameters), cones, LEVEL, count, free, total,
+        2 * free - 2 * total, math.log(count) * free - 2 * total, gain, goodness, tuple(notes),
+    )  # fmt: skip
+
+
+def _chi_square_quantile(free: int) -> float:
+    return float(special.chdtri(free, 1 - LEVEL))
+
+
+def _of_side(one: Parameter, side: str) -> Parameter:
+    return replace(one, name=f"{one.name}_{side}") if side else one
+
+
+def _inverted(one: Parameter, cloud: Cloud, count: float) -> Parameter:
+    """Return a concentration with the interval that its estimate's distribution has."""
+    length = torch.linalg.vector_norm(cloud.mean)
+    chords = cloud.weights @ ((cloud.vectors - cloud.mean / length) ** 2).sum(dim=1)
+    low, high = concentration_interval(float(chords) / 2, count, cloud.width)
+    return replace(one, low=low, high=high)
+
+
+def _goodness(
+    space: Space, sides: list[Side], density: Density, generator: torch.Generator
+) -> Goodness | None:
+    draws = density.sample((DRAWS,), generator)
+    factors = _factors(space, draws, None)
+    seen = [
+        (side.local, side.cloud.vectors[:DRAWS], vectors)
+        for side, (_, vectors, _) in zip(sides, factors, strict=True)
+    ]
+    return smooth_test(seen, generator)
