@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,8 +21,9 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
-from orbiflow.density.fitting import COMPONENTS
-from orbiflow.density.fitting.settings import Component
+from orbiflow.density.fitting import COMPONENTS, KNOWN
+from orbiflow.density.fitting.parametric import families_of
+from orbiflow.density.fitting.settings import PARAMETRIC
 from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
 
@@ -194,8 +195,11 @@ def test_what_cannot_be_chosen_is_refused() -> None:
         fit_automatic(make_space("torus"), torch.rand(3, 2).repeat(10, 1))
 
 
-def test_the_settings_know_the_same_components() -> None:
-    assert get_args(Component) == COMPONENTS
+def test_the_components_are_those_that_choose_and_the_families() -> None:
+    assert COMPONENTS == ("flow", "kernels", "mixture", "chains", "network")
+    assert (*COMPONENTS, *PARAMETRIC) == KNOWN
+    spaces = ("torus", "sphere", "projective-plane", "rotation-space")
+    assert {name for space in spaces for name in families_of(make_space(space))} == set(PARAMETRIC)
 
 
 def test_parts_for_new_groups() -> None:

@@ -11,6 +11,9 @@ from .comparing.settings import ComparisonSettings as ComparisonSettings
 from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
+from .fitting.parameters import Parameter as Parameter
+from .fitting.parameters import ParametricFit as ParametricFit
+from .fitting.parametric import fit_parametric as fit_parametric
 from .fitting.repeats import places as places
 from .fitting.report import FitReport as FitReport
 from .fitting.report import Progress as Progress
@@ -27,6 +30,8 @@ from .models.density import Density as Density
 from .models.evaluation import log_density_gradient as log_density_gradient
 from .models.files import density_to_bytes as density_to_bytes
 from .models.files import read_density as read_density
+from .models.fisher_bingham import AngularCentralGaussian as AngularCentralGaussian
+from .models.fisher_bingham import FisherBingham as FisherBingham
 from .models.flow import FlowDensity as FlowDensity
 from .models.flow import UniformDensity as UniformDensity
 from .models.kernels import AdaptiveKernels as AdaptiveKernels

@@ -28,10 +28,12 @@ from orbiflow.density.data import (
 from orbiflow.density.fitting import (
     DensitySettings,
     FitReport,
+    Parameter,
     Progress,
     check_missing,
     fit_automatic,
     fit_density,
+    fit_parametric,
     mean_of,
     weighed,
 )
@@ -143,6 +145,7 @@ class DensityEstimator(FittedFigures):
         sample_weight: ArrayLike | None = None,
         *,
         groups: ArrayLike | None = None,
+        columns: Sequence[str] | None = None,
         progress: Progress | None = None,
     ) -> DensityEstimator:
         """Fit to data (N, k) in the space's own units; `y` is ignored.
@@ -156,6 +159,7 @@ class DensityEstimator(FittedFigures):
                 fitted and judged. Only ratios count, equal ones are none.
             groups: a label (N,) a row: rows of one are held out together where parts are chosen, for
                 densities of new groups (proteins, stations, fires).
+            columns: names of an array's columns, for those of a parametric family's parameters.
 
         Raises:
             OrbiflowError: for data that are not of the space, in another order than its columns, or of
@@ -171,7 +175,12 @@ class DensityEstimator(FittedFigures):
             _refuse_flows(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
         how: dict[str, Any] = {"weights": sample_weight, "progress": progress}
-        if settings.flow_alone:
+        if settings.parametric:
+            how = {"weights": sample_weight, "groups": groups, "columns": names or columns}
+            found = fit_parametric(
+                self.space_, points, settings.parametric, **how, seed=settings.seed
+            )
+        elif settings.flow_alone:
             found = fit_density(self.space_, points, settings.flow, **how)
         else:
             how |= {"missing": self.missing, "groups": groups}
@@ -193,6 +202,30 @@ class DensityEstimator(FittedFigures):
     def settings(self) -> DensitySettings:
         """Return the settings of a fit, which are checked here."""
         return DensitySettings(**self._changed(entry.name for entry in fields_of(DensitySettings)))
+
+    def parameters(self) -> dict[str, Parameter]:
+        """Estimates with their standard errors and intervals, by name, of a parametric family alone.
+
+        What else is known of the fit is `report_.parametric`.
+
+        Raises:
+            OrbiflowError: before `fit`, or for another density.
+
+        >>> directions = np.random.default_rng(0).normal([0, 0, 2], 1, (60, 3))
+        >>> directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        >>> fit = DensityEstimator("sphere", components="von-mises-fisher").fit(directions)
+        >>> found = fit.parameters()["concentration"]
+        >>> found.low < found.value < found.high
+        True
+        """
+        self._fitted()
+        found = getattr(self, "report_", None)
+        if found is None or found.parametric is None:
+            raise OrbiflowError(
+                "this density is of no parametric family alone: fit one, such as "
+                'components="von-mises-fisher"'
+            )
+        return {one.name: one for one in found.parametric.parameters}
 
     def marginal(self, *columns: str | int) -> DensityEstimator:
         """An estimator of some of the angles alone, by their columns' names or numbers from 0.

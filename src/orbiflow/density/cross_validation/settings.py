@@ -9,7 +9,7 @@ from typing import Annotated
 
 from orbiflow.arguments import as_whole
 from orbiflow.density import operations
-from orbiflow.density.fitting import COMPONENTS, ComponentSettings, DensitySettings
+from orbiflow.density.fitting import COMPONENTS, KNOWN, ComponentSettings, DensitySettings
 from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
 from orbiflow.errors import SettingError, literal
 from orbiflow.settings import DefaultText, Range, Repeated, Settings
@@ -105,14 +105,14 @@ def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, Compo
     """
     if components is None:
         return DEFAULT, None
-    unknown = [name for name in components if name not in COMPONENTS]
+    unknown = [name for name in components if name not in KNOWN]
     if unknown or not components:
         others = ", default or uniform" if field == "against" else ""
         raise SettingError(
-            f"{{{field}}} must be of {', '.join(COMPONENTS)} with commas between{others}, got "
+            f"{{{field}}} must be of {', '.join(KNOWN)} with commas between{others}, got "
             + literal(repr(", ".join(unknown)))
         )
-    own = tuple(name for name in COMPONENTS if name in components)
+    own = tuple(name for name in KNOWN if name in components)
     return (DEFAULT, None) if own == COMPONENTS else ("+".join(own), own)
 
 

@@ -14,6 +14,7 @@ from .rows import lone_groups_note as lone_groups_note
 from .rows import mean_of as mean_of
 from .rows import weighed as weighed
 from .settings import COMPONENTS as COMPONENTS
+from .settings import KNOWN as KNOWN
 from .settings import ComponentSettings as ComponentSettings
 from .settings import DensitySettings as DensitySettings
 from .settings import FlowSettings as FlowSettings

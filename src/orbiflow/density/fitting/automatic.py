@@ -28,6 +28,7 @@ from orbiflow.density.fitting.families import (
     KernelFamily,
     MixtureFamily,
     NetworkFamily,
+    ParametricFamily,
 )
 from orbiflow.density.fitting.flow_trial import (
     FittedFlow,
@@ -46,6 +47,7 @@ from orbiflow.density.fitting.held_out import (
 )
 from orbiflow.density.fitting.kernels import limit_notes, narrowest_for
 from orbiflow.density.fitting.likelihood import Budget, training
+from orbiflow.density.fitting.parametric import require_family
 from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
 from orbiflow.density.fitting.report import (
     ComponentEvidence,
@@ -71,7 +73,7 @@ from orbiflow.density.fitting.rows import (
     weights_note,
     weights_of,
 )
-from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
+from orbiflow.density.fitting.settings import COMPONENTS, PARAMETRIC, DensitySettings
 from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError
@@ -249,6 +251,10 @@ def _families(
         families.append(ChainFamily(space, settings.seed, starts))
     if isinstance(space, Torus) and space.dim > MOST_DIM:
         families.append(NetworkFamily(space, settings.seed))
+    named = [name for name in settings.allowed if name in PARAMETRIC]
+    for name in named:
+        require_family(space, name)
+    families += [ParametricFamily(space, name) for name in named]
     chosen = [family for family in families if family.name in settings.allowed]
     beside = "flow" in settings.allowed and settings.allowed not in (COMPONENTS, ("flow",))
     obstacle = flow_obstacle(space)

@@ -20,6 +20,7 @@ from orbiflow.density.fitting.chains import (
 )
 from orbiflow.density.fitting.held_out import stacking_weights
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
+from orbiflow.density.fitting.parametric import fit_density_of
 from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, UniformDensity, averaged_networks
@@ -214,6 +215,23 @@ class ChainFamily(SizedFamily):
             str(size): _mean([fit(size, turn) for turn in range(self.starts)])
             for size in self.sizes
         }
+
+
+@dataclass
+class ParametricFamily(Family):
+    """A parametric family, in the end at its maximum for all rows."""
+
+    space: Space
+    name: str
+
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
+        del number, held
+        say(self.name)
+        return {self.name: fit_density_of(self.space, self.name, train)}
+
+    def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
+        del folds
+        return [fit_density_of(self.space, self.name, rows) for _ in names]
 
 
 @dataclass

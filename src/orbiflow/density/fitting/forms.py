@@ -87,9 +87,16 @@ class Form(ABC):
     def density(self, space: Space, at: Start) -> Density:
         """Return the density of a frame and shape."""
 
-    @abstractmethod
+    shape_names: tuple[str, ...] = ()
+    """Names of the shape parameters as they are reported, unless there is one for each axis."""
+
+    axis_names: tuple[str, ...] = ()
+    """Names of the first axes of the frame, which are reported; unless all are, by number."""
+
     def names(self, width: int) -> tuple[str, ...]:
         """Return the names of the shape parameters as they are reported."""
+        del width
+        return self.shape_names
 
     def ordered(self, at: Start) -> Start:
         """Return the same density with its axes in their usual order."""
@@ -97,7 +104,8 @@ class Form(ABC):
 
     def directions(self, width: int) -> dict[str, int]:
         """Return the axes that are reported, each by its number in the frame."""
-        return {f"axis_{k + 1}": k for k in range(width)}
+        names = self.axis_names or tuple(f"axis_{k + 1}" for k in range(width))
+        return {name: k for k, name in enumerate(names)}
 
     def planes(self, width: int) -> Planes:
         """Return the planes in which turning the frame changes the density."""
@@ -164,12 +172,7 @@ class VonMisesFisher(ExponentialForm):
     """exp(k m.x): directions about a mean."""
 
     name, about, positive = "von-mises-fisher", "directions", True
-
-    def names(self, width: int) -> tuple[str, ...]:
-        return ("concentration",)
-
-    def directions(self, width: int) -> dict[str, int]:
-        return {"mean": 0}
+    shape_names, axis_names = ("concentration",), ("mean",)
 
     def planes(self, width: int) -> Planes:
         return [(0, k) for k in range(1, width)]
@@ -192,13 +195,7 @@ class VonMisesFisher(ExponentialForm):
 class Watson(ExponentialForm):
     """exp(k (m.x)^2): axes about one (k > 0) or across it (k < 0)."""
 
-    name = "watson"
-
-    def names(self, width: int) -> tuple[str, ...]:
-        return ("concentration",)
-
-    def directions(self, width: int) -> dict[str, int]:
-        return {"axis": 0}
+    name, shape_names, axis_names = "watson", ("concentration",), ("axis",)
 
     def planes(self, width: int) -> Planes:
         return [(0, k) for k in range(1, width)]
@@ -254,14 +251,11 @@ def _quaternion_tensors() -> Tensor:
 class MatrixFisher(Bingham):
     """exp(trace(F'R)): rotations about a mean, as a Bingham density of quaternions."""
 
-    name, about = "matrix-fisher", "rotations"
+    name, about, axis_names = "matrix-fisher", "rotations", ("mean",)
 
     def names(self, width: int) -> tuple[str, ...]:
         entries = tuple(f"f{i}{j}" for i in "123" for j in "123")
-        return ("singular_1", "singular_2", "singular_3", *entries)
-
-    def directions(self, width: int) -> dict[str, int]:
-        return {"mean": 0}
+        return (*(f"singular_{k}" for k in range(1, width)), *entries)
 
     def reported(self, shape: Tensor, frame: Tensor) -> Tensor:
         values = torch.cat([shape.new_zeros(1), shape])
@@ -275,12 +269,7 @@ class Kent(ExponentialForm):
     """exp(k m.x + b ((e_2.x)^2 - (e_3.x)^2)): directions about a mean, with ovals as contours."""
 
     name, about = "kent", "directions"
-
-    def names(self, width: int) -> tuple[str, ...]:
-        return ("concentration", "ovalness")
-
-    def directions(self, width: int) -> dict[str, int]:
-        return {"mean": 0, "major": 1, "minor": 2}
+    shape_names, axis_names = ("concentration", "ovalness"), ("mean", "major", "minor")
 
     def coefficients(self, shape: Tensor, width: int) -> tuple[Tensor, Tensor]:
         kappa, beta = shape
@@ -319,6 +308,7 @@ class CentralGaussian(Form):
         return -values.sum() / 2 - width / 2 * (y**2 @ (-values).exp()).log() - area
 
     def reported(self, shape: Tensor, frame: Tensor) -> Tensor:
+        del frame
         return torch.softmax(torch.cat([shape.new_zeros(1), shape]), dim=0)
 
     def starts(self, cloud: Cloud) -> list[Start]:

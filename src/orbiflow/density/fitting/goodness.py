@@ -23,7 +23,7 @@ MOST_MOMENTS = 60
 """Moments looked at: those of the highest degree are left out where there would be more."""
 
 REDUNDANT = 1e-4
-"""Share of the largest variance below which a moment is one that the family fits, or that others say."""
+"""Share of the largest variance below which a moment is one that is fitted, or that others say."""
 
 
 def smooth_test(

@@ -15,7 +15,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.fitting.maximum import Local
 from orbiflow.density.fitting.parameters import Parameter
-from orbiflow.typed_torch import linalg
+from orbiflow.typed_torch import linalg, listed
 
 LEVEL = 0.95
 """The level of intervals and cones."""
@@ -35,11 +35,13 @@ class Writing:
     """How a direction is written: `write` takes a unit vector (p,) to numbers of these `names`.
 
     - `periods`: Of each number, what goes around; 0 for what does not.
+    - `limits`: The largest absolute value that each may have.
     """
 
     write: Callable[[Tensor], Array]
     names: tuple[str, ...]
     periods: tuple[float, ...]
+    limits: tuple[float, ...]
     unit: str = ""
 
 
@@ -66,18 +68,19 @@ def direction_parameters(
     own = covariance[places][:, places]
     values = writing.write(axis)
     slopes = np.stack([_slope(writing, axis, way) for way in ways], axis=1)
-    cone = None
+    cone, variances = None, np.full(len(values), np.inf)
     if bool(own.isfinite().all()):
         variances = np.einsum("ki,ij,kj->k", slopes, own.numpy(), slopes)
         across = special.chdtri(len(places), 1 - LEVEL) * float(linalg.eigvalsh(own)[-1])
         cone = math.degrees(math.sqrt(across)) if across < (math.pi / 2) ** 2 else None
-    if cone is None:
-        variances = np.full(len(values), np.inf)
     found: list[Parameter] = []
-    for label, value, variance in zip(writing.names, values.tolist(), variances, strict=True):
-        error = math.sqrt(variance) if np.isfinite(variance) else None
-        ends = _ends(value, error)
-        found.append(Parameter(f"{name}_{label}", value, error, *ends, writing.unit))
+    columns = zip(writing.names, values.tolist(), variances, writing.limits, strict=True)
+    for label, value, variance, most in columns:
+        error = None if cone is None or not np.isfinite(variance) else math.sqrt(variance)
+        low, high = _ends(value, error)
+        if low is not None and high is not None:
+            low, high = max(low, -most), min(high, most)
+        found.append(Parameter(f"{name}_{label}", value, error, low, high, writing.unit))
     return found, cone
 
 
@@ -109,7 +112,7 @@ def shape_parameters(local: Local, covariance: Tensor) -> list[Parameter]:
         return local.form.reported(shape, frame)
 
     origin = local.origin()
-    values = reported(origin).tolist()
+    values: list[float] = listed(reported(origin))
     slopes = derivatives.jacobian(reported, origin)
     unknown = covariance.diagonal().isinf()
     told = torch.where(unknown | unknown[:, None], 0.0, covariance)
@@ -117,7 +120,7 @@ def shape_parameters(local: Local, covariance: Tensor) -> list[Parameter]:
     lost = (slopes[:, unknown].abs() > 1e-9).any(dim=1)
     found: list[Parameter] = []
     for name, value, variance, is_lost in zip(
-        local.form.names(local.width), values, variances.tolist(), lost.tolist(), strict=True
+        local.form.names(local.width), values, listed(variances), listed(lost), strict=True
     ):
         error = None if is_lost else math.sqrt(max(0.0, variance))
         low, high = _ends(value, error)

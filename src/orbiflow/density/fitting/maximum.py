@@ -79,7 +79,11 @@ class Local:
     def information(self, cloud: Cloud) -> Tensor:
         """Return minus the second derivatives (q, q) of the mean log density."""
         derivatives: Any = torch.autograd.functional
-        return -derivatives.hessian(lambda q: self.mean_log(q, cloud), self.origin())
+
+        def mean_log(q: Tensor) -> Tensor:
+            return self.mean_log(q, cloud)
+
+        return -derivatives.hessian(mean_log, self.origin())
 
     def moved(self, step: Tensor) -> Local:
         """Return the family about where a step (q,) leads, its frame orthogonal again."""
@@ -136,7 +140,9 @@ def _newton_step(local: Local, slope: Tensor, information: Tensor) -> Tensor:
     return step / float((step.abs() / most).max().clamp_min(1.0))
 
 
-def covariance(local: Local, cloud: Cloud, rows: float, groups: Tensor | None, even: bool) -> Tensor:
+def covariance(
+    local: Local, cloud: Cloud, rows: float, groups: Tensor | None, even: bool
+) -> Tensor:
     """Return the covariance (q, q) of the estimates, infinite where the rows say nothing.
 
     Of `rows` that are independent and count alike, it is the inverse of Fisher's information;

@@ -84,7 +84,7 @@ class ParametricFit:
             lines.append(f"cone of {100 * self.level:g} % about {name}: {size}")
         if self.goodness is not None:
             found = self.goodness
-            verdict = "the rows suit it" if found.p > 0.05 else "the rows are NOT of this family"
+            verdict = "the rows suit it" if found.p > 0.05 else "the rows do not suit it"
             lines.append(
                 f"smooth test of the family: {found.statistic:.4g} with {found.degrees} degrees of "
                 f"freedom, p {found.p:.2g} by {found.by}: {verdict}"

@@ -39,9 +39,13 @@ from orbiflow.density.fitting.rows import (
 from orbiflow.density.models import AdaptiveKernels, Density, images_of
 from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import linalg
 
 MOST_WIDTH = 16
 """Coordinates of unit vectors up to which a family has a frame of axes."""
+
+MIN_ROWS = 40
+"""Rows below which intervals are rough."""
 
 ANGLES, DIRECTIONS = "von-mises", "von-mises-fisher"
 """The families of angles, and of directions in any dimension."""
@@ -82,7 +86,7 @@ def require_family(space: Space, name: str) -> None:
     """Check that a family is one of a space's."""
     there = families_of(space)
     if name not in there:
-        which = f"there are {', '.join(there)}" if there else "no parametric family has one"
+        which = f"choose {' or '.join(there)}" if there else "there is no parametric family"
         raise OrbiflowError(f"there is no {name} density on the {space.name}: {which}")
 
 
@@ -132,7 +136,11 @@ def fit_parametric(
     labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
     rows = weighed(own, weights, labels)
     if rows.groups is not None:  # numbered anew, without rows of no weight
-        rows = Rows(rows.points, rows.weights, torch.as_tensor(group_numbers(rows.groups.numpy(), len(rows))))
+        rows = Rows(
+            rows.points,
+            rows.weights,
+            torch.as_tensor(group_numbers(rows.groups.numpy(), len(rows))),
+        )
     sides = _sides(space, name, rows, columns)
     density = _density(space, name, sides)
     found = _parametric(space, name, rows, sides, density, seed)
@@ -157,9 +165,7 @@ def fit_parametric(
     return density, report
 
 
-def _sides(
-    space: Space, name: str, rows: Rows, columns: Sequence[str] | None
-) -> list[Side]:
+def _sides(space: Space, name: str, rows: Rows, columns: Sequence[str] | None) -> list[Side]:
     """Return the family at its maximum on each factor of the space: each angle of a torus is one."""
     require_family(space, name)
     found: list[Side] = []
@@ -182,19 +188,30 @@ def _factors(
     names = tuple(columns or space.columns)
     if not isinstance(space, Torus):
         periods = tuple(360.0 if column == "lon" else 0.0 for column in space.columns)
-        if isinstance(space, RotationSpace) and space.form not in ("quaternion", "vector", "matrix"):
+        if isinstance(space, RotationSpace) and space.form not in (
+            "quaternion",
+            "vector",
+            "matrix",
+        ):
             periods = (space.period,) * 3
         written = names if len(names) == len(space.columns) else space.columns
-        writing = Writing(partial(_written, space), written, periods, _unit_of(space))
+        unit = _unit_of(space)
+        limits = tuple(_largest(column, unit) for column in space.columns)
+        writing = Writing(partial(_written, space), written, periods, limits, unit)
         return [("", space.features(points)[0], writing)]
     found: list[tuple[str, Tensor, Writing]] = []
     for axis, name in enumerate(names):
         angles = 2 * math.pi * points[:, axis]
         vectors = torch.stack([angles.cos(), angles.sin()], dim=1)
         write = partial(_written_angle, space, axis)
-        writing = Writing(write, (name,), (space.period_of(axis),), str(space.unit))
+        writing = Writing(write, (name,), (space.period_of(axis),), (math.inf,), str(space.unit))
         found.append((name, vectors, writing))
     return found
+
+
+def _largest(column: str, unit: str) -> float:
+    """Return the largest absolute value of a number of a direction."""
+    return 90.0 if column == "lat" else math.inf if unit else 1.0
 
 
 def _unit_of(space: Space) -> str:
@@ -257,7 +274,7 @@ def _parametric(
     goodness = None
     if even:
         goodness = _goodness(space, sides, density, torch.Generator().manual_seed(seed))
-    notes: list[str] = []
+    notes = _notes(sides, count)
     if 2 * count * gain < _chi_square_quantile(free):
         notes.append(
             "the rows cannot tell this density from the uniform one: its directions and intervals mean "
@@ -270,6 +287,17 @@ def _parametric(
     )  # fmt: skip
 
 
+def _notes(sides: list[Side], count: float) -> list[str]:
+    """Return what to keep in mind of the estimates."""
+    notes: list[str] = []
+    local = sides[0].local
+    if local.form.name == "kent" and 2 * float(local.at.shape[1]) > float(local.at.shape[0]):
+        notes.append("the ovalness is more than half the concentration: the density has two modes")
+    if count < MIN_ROWS:
+        notes.append(f"intervals are rough with fewer than {MIN_ROWS} rows, there are {count:.0f}")
+    return notes
+
+
 def _chi_square_quantile(free: int) -> float:
     return float(special.chdtri(free, 1 - LEVEL))
 
@@ -280,7 +308,7 @@ def _of_side(one: Parameter, side: str) -> Parameter:
 
 def _inverted(one: Parameter, cloud: Cloud, count: float) -> Parameter:
     """Return a concentration with the interval that its estimate's distribution has."""
-    length = torch.linalg.vector_norm(cloud.mean)
+    length = linalg.vector_norm(cloud.mean)
     chords = cloud.weights @ ((cloud.vectors - cloud.mean / length) ** 2).sum(dim=1)
     low, high = concentration_interval(float(chords) / 2, count, cloud.width)
     return replace(one, low=low, high=high)

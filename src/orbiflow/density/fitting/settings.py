@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from orbiflow.kinds import Parsed
 from orbiflow.settings import (
@@ -16,11 +16,20 @@ from orbiflow.settings import (
     fields_of,
 )
 
-Component = Literal["flow", "kernels", "mixture", "chains", "network"]
+Component = Literal[
+    "flow", "kernels", "mixture", "chains", "network", "von-mises", "von-mises-fisher", "kent",
+    "watson", "bingham", "angular-central-gaussian", "matrix-fisher",
+]  # fmt: skip
 Seed = Annotated[int, Range(-(2**63), 2**64 - 1)]
 
-COMPONENTS = ("flow", "kernels", "mixture", "chains", "network")
-"""What a density may be made of, beside its uniform floor."""
+KNOWN: tuple[str, ...] = get_args(Component)
+"""All components, in their order."""
+
+COMPONENTS = KNOWN[:5]
+"""What a density may be made of, beside its uniform floor, if nothing else is asked for."""
+
+PARAMETRIC = KNOWN[5:]
+"""Parametric families: alone each is a fit of its own, beside others it is one of the candidates."""
 
 FLOW = Group("Flow")
 
@@ -38,10 +47,11 @@ class ComponentSettings(Settings, group="Density"):
     components: Annotated[
         tuple[Component, ...] | None,
         Parsed(component_names, "names such as kernels,mixture"),
-        DefaultText("all"),
+        DefaultText("flow,kernels,mixture,chains,network"),
     ] = None
     """Components that may be used, such as kernels,mixture; held-out data choose among them. Chains are
-    for tori of two or more angles, a flow for three dimensions at most, a network for more."""
+    for tori of two or more angles, a flow for three dimensions at most, a network for more. One
+    parametric family alone, such as von-mises-fisher, is fitted with intervals of its parameters."""
 
     repeats: Literal["auto", "places", "rounding"] = "auto"
     """What rows that repeat another are. Places: new rows repeat them as often. Rounding: an accident,
@@ -119,6 +129,12 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
                 )
 
     @property
+    def parametric(self) -> str | None:
+        """The parametric family that is fitted alone."""
+        own = self.components or ()
+        return own[0] if len(own) == 1 and own[0] in PARAMETRIC else None
+
+    @property
     def flow_alone(self) -> bool:
         """Whether there is nothing to choose."""
         return self.components == ("flow",)
@@ -129,6 +145,11 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
             raise SettingError(
                 "{missing} marginalise is for kernels and mixtures: a flow cannot be fitted to rows "
                 "that lack angles; give other {components}"
+            )
+        if self.parametric and missing == "marginalise":
+            raise SettingError(
+                f"a {self.parametric} density cannot be fitted to rows that lack angles: use "
+                "{missing} drop"
             )
         if self.flow_alone and groups is not None:
             raise SettingError(

@@ -22,6 +22,7 @@ from orbiflow.settings import Hidden, Option, SettingError
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
     from orbiflow.density.estimator import DensityEstimator
+    from orbiflow.density.fitting import ParametricFit
     from orbiflow.density.spaces import Space
     from orbiflow.density.tables import TableRows
 
@@ -84,11 +85,33 @@ def fit(
         if picture:
             files[pictures.THUMBNAIL] = pictures.density_thumbnail(estimator.density_, values)
     write_files(folder, files, on_event)
+    parametric = estimator.report_.parametric
+    if parametric is not None:
+        on_event(parameter_table(parametric))
+        for line in parametric.words():
+            on_event(runtime.Note(line))
     for note in (*estimator.report_.notes, *_words(document, len(values), out)):
         on_event(runtime.Note(note))
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
     summary |= {"folder": str(out), "rows": len(values)}
     return runtime.Outcome({**summary, "picture": pictures.THUMBNAIL if picture else None})
+
+
+def parameter_table(found: ParametricFit) -> runtime.Table:
+    """Return the estimates of a parametric family, a line for each."""
+
+    def shown(value: float | None) -> str:
+        return "-" if value is None else f"{value:.5g}"
+
+    sure = f"{100 * found.level:g} %"
+    return runtime.Table(
+        f"Parameters of the {found.family} density",
+        ("parameter", "estimate", "error", f"{sure} from", "to", "unit"),
+        tuple(
+            (one.name, *map(shown, (one.value, one.error, one.low, one.high)), one.unit)
+            for one in found.parameters
+        ),
+    )
 
 
 def space_of(where: SpaceSettings) -> str | Space:
@@ -120,7 +143,9 @@ def fit_rows(
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # notes say the same, with names of columns
-        return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
+        how: dict[str, Any] = {"sample_weight": rows.weights, "groups": labels}
+        how |= {"columns": rows.table.columns, "progress": progress}
+        return estimator.fit(values, **how)
 
 
 def _check(where: SpaceSettings, settings: DensitySettings, reading: CountedRowSettings) -> None:

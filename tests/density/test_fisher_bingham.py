@@ -1,0 +1,165 @@
+"""Fisher-Bingham and angular central Gaussian densities: constants, integrals, samples, files."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import special_ortho_group, vonmises_fisher
+
+from orbiflow.density import AngularCentralGaussian, FisherBingham, make_space
+from orbiflow.density.models import density_to_bytes, log_fisher_bingham, read_density
+from orbiflow.errors import OrbiflowError
+
+mpmath.mp.dps = 30
+WIDTHS = st.sampled_from([2, 3, 4, 7, 20, 65])
+CONCENTRATIONS = st.floats(-3, 5).map(lambda power: 10.0**power)
+
+
+def numbers(*values: float) -> torch.Tensor:
+    return torch.tensor(values, dtype=torch.float64)
+
+
+def log_area(width: int) -> Any:
+    half = mpmath.mpf(width) / 2
+    return mpmath.log(2) + half * mpmath.log(mpmath.pi) - mpmath.loggamma(half)
+
+
+@given(WIDTHS, CONCENTRATIONS)
+@settings(max_examples=40, deadline=None)
+def test_constant_of_von_mises_fisher_is_a_bessel_function(width: int, kappa: float) -> None:
+    vector = torch.zeros(width, dtype=torch.float64)
+    vector[-1] = kappa
+    order = mpmath.mpf(width) / 2 - 1
+    exact = (order + 1) * mpmath.log(2 * mpmath.pi) - order * mpmath.log(kappa)
+    exact += mpmath.log(mpmath.besseli(order, kappa))
+    found = float(log_fisher_bingham(torch.zeros_like(vector), vector))
+    assert abs(found - float(exact)) < 2e-13 + 1e-15 * kappa
+
+
+@given(WIDTHS, CONCENTRATIONS, st.sampled_from([-1.0, 1.0]))
+@settings(max_examples=40, deadline=None)
+def test_constant_of_watson_is_kummers_function(width: int, size: float, sign: float) -> None:
+    values = torch.zeros(width, dtype=torch.float64)
+    values[0] = sign * size
+    other = (
+        (width - 1) / mpmath.mpf(2) if sign < 0 else mpmath.mpf(1) / 2
+    )  # Kummer's transformation
+    exact = log_area(width) + min(0.0, sign * size)
+    exact += mpmath.log(mpmath.hyp1f1(other, mpmath.mpf(width) / 2, size))
+    found = float(log_fisher_bingham(values, torch.zeros_like(values)))
+    assert abs(found - float(exact)) < 2e-13 + 1e-15 * size
+
+
+def test_constant_of_kent_is_kents_series() -> None:
+    for kappa, beta in ((3.0, 1.0), (40.0, 19.0), (0.5, 0.2), (8.0, 9.0)):
+        terms = mpmath.nsum(
+            lambda j, k=kappa, b=beta: (
+                mpmath.gamma(j + 0.5) / mpmath.gamma(j + 1) * mpmath.mpf(b) ** (2 * j)
+                * (mpmath.mpf(k) / 2) ** (-2 * j - 0.5) * mpmath.besseli(2 * j + 0.5, k)
+            ),
+            [0, 400], method="direct",
+        )  # fmt: skip
+        exact = float(mpmath.log(2 * mpmath.pi * terms))
+        found = log_fisher_bingham(numbers(0, beta, -beta), numbers(kappa, 0, 0))
+        assert float(found) == pytest.approx(exact, abs=1e-12)
+
+
+@given(st.lists(st.floats(-50, 50), min_size=3, max_size=5), st.floats(-100, 100), st.floats(0, 20))
+@settings(max_examples=30, deadline=None)
+def test_constant_moves_with_its_eigenvalues(
+    values: list[float], shift: float, length: float
+) -> None:
+    own = numbers(*values)
+    vector = torch.full_like(own, length)
+    found = log_fisher_bingham(own, vector)
+    assert float(log_fisher_bingham(own + shift, vector) - shift - found) == pytest.approx(
+        0, abs=1e-11
+    )
+    # the gradient is the mean of the squares, whose sum is 1
+    own.requires_grad_()
+    (means,) = torch.autograd.grad(log_fisher_bingham(own, vector), own)
+    assert float(means.sum()) == pytest.approx(1, abs=1e-10)
+    assert bool((means > 0).all())
+
+
+def some_densities() -> list[FisherBingham | AngularCentralGaussian]:
+    turn = torch.tensor(special_ortho_group.rvs(3, random_state=1))
+    sphere, plane = make_space("sphere"), make_space("projective-plane")
+    oval = turn.mT @ torch.diag(numbers(0, 4, -4)) @ turn
+    girdle = turn.mT @ torch.diag(numbers(0, -2, -9)) @ turn
+    wide = turn.mT @ torch.diag(numbers(4, 1, 0.3)) @ turn
+    none = torch.zeros(3)
+    return [
+        FisherBingham(sphere, 10 * turn[0], oval),
+        FisherBingham(sphere, numbers(0, 0, 1.5), torch.diag(numbers(-3, 2, 0))),
+        FisherBingham(plane, none, girdle),
+        AngularCentralGaussian(plane, wide),
+        FisherBingham(make_space("hypersphere", dim=2), none, girdle),
+    ]
+
+
+@pytest.mark.parametrize(
+    "density", some_densities(), ids=lambda own: f"{own.kind} {own.space.name}"
+)
+def test_integral_and_samples(density: FisherBingham | AngularCentralGaussian) -> None:
+    space = density.space
+    line, turns = (np.arange(400) + 0.5) / 200 - 1, (np.arange(400) + 0.5) / 400
+    z, angle = (own.ravel() for own in np.meshgrid(line, 2 * np.pi * turns))
+    radius = np.sqrt(1 - z**2)
+    even = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    area = 4 * math.pi / (2 if space.name == "projective-plane" else 1)
+    heights = density.log_prob(space.to_chart(even), measure="natural").exp()
+    assert area * float(heights.mean()) == pytest.approx(1, abs=2e-5)
+    # means of the samples' products are integrals
+    drawn = space.features(density.sample((20_000,), torch.Generator().manual_seed(0)))[0].numpy()
+    weights = heights.numpy() / float(heights.sum())
+    exact = (even * weights[:, None]).T @ even
+    assert np.abs(drawn.T @ drawn / len(drawn) - exact).max() < 0.012
+    if space.name == "sphere":
+        assert np.abs(drawn.mean(axis=0) - weights @ even).max() < 0.025
+
+
+def test_directions_agree_with_scipy() -> None:
+    space, mean = make_space("sphere"), numbers(0.6, 0, 0.8)
+    density = FisherBingham(space, 7 * mean, torch.zeros(3, 3))
+    other = vonmises_fisher(mean.numpy(), 7)
+    points = other.rvs(50, random_state=3)
+    found = density.log_prob(space.to_chart(points), measure="natural").numpy()
+    assert np.abs(found - other.logpdf(points)).max() < 1e-9
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_saved_density_is_the_same(number: int, tmp_path: Path) -> None:
+    density = some_densities()[number]
+    (tmp_path / "d.safetensors").write_bytes(density_to_bytes(density))
+    again, _ = read_density(tmp_path / "d.safetensors")
+    points = density.sample((20,))
+    assert torch.equal(again.log_prob(points), density.log_prob(points))
+    assert type(again) is type(density)
+
+
+def test_gradient_of_the_density_is_that_of_its_logarithm() -> None:
+    density = some_densities()[0]
+    points = density.sample((5,), torch.Generator().manual_seed(1)).requires_grad_()
+    assert torch.autograd.gradcheck(density.log_prob, (points,))
+
+
+def test_refusals() -> None:
+    with pytest.raises(OrbiflowError, match="a mean direction is for other spaces"):
+        FisherBingham(make_space("projective-plane"), numbers(0, 0, 1), torch.zeros(3, 3))
+    with pytest.raises(OrbiflowError, match="symmetric"):
+        FisherBingham(make_space("sphere"), torch.zeros(3), torch.eye(3).cumsum(0))
+    with pytest.raises(OrbiflowError, match="3 by 3"):
+        FisherBingham(make_space("sphere"), torch.zeros(4), torch.zeros(4, 4))
+    with pytest.raises(OrbiflowError, match="positive definite"):
+        AngularCentralGaussian(make_space("sphere"), -torch.eye(3))
+    with pytest.raises(OrbiflowError, match="is for other spaces"):
+        FisherBingham(make_space("torus"), torch.zeros(3), torch.zeros(3, 3))
+    with pytest.raises(OrbiflowError, match="is for other spaces"):
+        AngularCentralGaussian(make_space("cubic-orientations"), torch.eye(4))
