@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from scipy import optimize, special, stats
 
 from orbiflow.density import summarize_angles, summarize_axes, summarize_directions
-from orbiflow.density.summaries import concentration, kuiper_p, watson_p
+from orbiflow.density.fitting import concentration
+from orbiflow.density.summaries import kuiper_p, watson_p
 from orbiflow.errors import OrbiflowError
 
 SIX = [356, 97, 211, 232, 343, 292, 157, 302, 335, 302, 324, 85, 324, 340, 157, 238, 254, 146]

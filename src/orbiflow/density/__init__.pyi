@@ -1,6 +1,9 @@
 from .comparing.data_sets import DataComparison as DataComparison
 from .comparing.data_sets import Divergence as Divergence
 from .comparing.data_sets import compare_samples as compare_samples
+from .comparing.named import NamedTest as NamedTest
+from .comparing.named import SampleTests as SampleTests
+from .comparing.named import named_tests as named_tests
 from .comparing.paired import Difference as Difference
 from .comparing.paired import ModelComparison as ModelComparison
 from .comparing.paired import ModelScore as ModelScore

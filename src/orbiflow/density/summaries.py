@@ -18,21 +18,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, special
+from scipy import special
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
 from orbiflow.density.data import as_data, as_numbers, data_of, unit_of
+from orbiflow.density.fitting import SAME, concentration
 from orbiflow.density.spaces import to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 
 MIN_ROWS = 25
 """Rows or groups below which an interval is rough (Fisher, 1993, section 4.4.4)."""
 
-MAX_CONCENTRATION = 1e9
-
-CLOSE, SAME = 1e-6, 1e-30
-"""How far a resultant is below 1, where that is taken from differences, and of equal rows."""
+CLOSE = 1e-6
+"""How far a resultant is below 1, where that is taken from differences."""
 
 
 @dataclass(frozen=True)
@@ -288,28 +287,6 @@ def _half_angle(errors: Array, rows: _Rows) -> float | None:
         quantile = free * _tail(special.fdtri, free, units - 1, rows.level)
     sine = math.sqrt(quantile * variance)
     return math.asin(sine) if sine < 1 else None
-
-
-def concentration(resultant: float, dimension: int, below: float | None = None) -> float | None:
-    """Return the likeliest concentration of a von Mises-Fisher distribution, None if it is infinite.
-
-    `below` is 1 less the resultant, if it is known to more digits.
-
-    >>> round(concentration(0.5, 2), 3), round(concentration(0.5, 3), 3)
-    (1.159, 1.797)
-    """
-
-    def excess(kappa: float) -> float:
-        ratio = special.ive(dimension / 2, kappa) / special.ive(dimension / 2 - 1, kappa)
-        return float(ratio) - resultant
-
-    if resultant <= 1e-12:
-        return 0.0
-    if below is not None and below < 1 / MAX_CONCENTRATION:
-        return None if below < SAME else (dimension - 1) / (2 * below)
-    if excess(MAX_CONCENTRATION) <= 0:
-        return None
-    return float(optimize.brentq(excess, 1e-12, MAX_CONCENTRATION, xtol=1e-12, rtol=1e-12))
 
 
 def rayleigh_p(vectors: Array, rows: _Rows) -> float | None:

@@ -2,6 +2,9 @@ from .data_sets import DataComparison as DataComparison
 from .data_sets import Divergence as Divergence
 from .data_sets import compare_samples as compare_samples
 from .known_rows import RowSketch as RowSketch
+from .named import NamedTest as NamedTest
+from .named import SampleTests as SampleTests
+from .named import named_tests as named_tests
 from .paired import Difference as Difference
 from .paired import ModelComparison as ModelComparison
 from .paired import ModelScore as ModelScore

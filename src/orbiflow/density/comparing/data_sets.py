@@ -143,20 +143,14 @@ def compare_samples(
     >>> compare_samples({"a": one, "b": other}).differ
     True
     """
-    name = space.name if isinstance(space, Space) else space
-    names, tables, columns = _two(samples, name)
     settings = settings or ComparisonSettings()
     seed = settings.seed
-    if isinstance(space, Space):
-        own = space
-    else:
-        found = unit_of(space, np.concatenate(tables), columns, unit)
-        own = _space_of(space, names, tables, found, seed)
-    points = torch.cat(
-        [_named(name, own.to_chart, table) for name, table in zip(names, tables, strict=True)]
-    )
-    first = np.arange(len(points)) < len(tables[0])
-    members = Groups.of(_labels(groups, names, tables), len(points))
+    if not is_a(samples, Mapping) or len(samples) != 2:
+        raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
+    own, names, _, both = sample_points(samples, space, unit, seed)
+    sizes, points = (len(both[0]), len(both[1])), torch.cat(both)
+    first = np.arange(len(points)) < sizes[0]
+    members = Groups.of(_labels(groups, names, sizes), len(points))
     members.require()
     notes = members.notes()
     progress(0.0, "permuting")
@@ -172,36 +166,45 @@ def compare_samples(
         divergence = cross_fitted(own, points, first, members, settings, told)
     except OrbiflowError as error:
         notes.append(f"how far apart they are was not estimated: {error}")
-    rows = (len(tables[0]), len(tables[1]))
     groups_in_all = members.count if members.given else None
-    found = (rows, groups_in_all, test, divergence, settings.level, settings.bootstrap, seed)
+    found = (sizes, groups_in_all, test, divergence, settings.level, settings.bootstrap, seed)
     return DataComparison((names[0], names[1]), *found, tuple(notes))
 
 
-def _two(
-    samples: Mapping[str, ArrayLike], space: str
-) -> tuple[list[str], list[np.ndarray], tuple[str, ...] | None]:
-    """Return the names of two data sets, their values in one order, and the names of the columns."""
-    if not is_a(samples, Mapping) or len(samples) != 2:
-        raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
-    read = [
-        data_of(space, table, f"data set {name}", stacklevel=4) for name, table in samples.items()
-    ]
-    (first, columns), (second, others) = read
-    if columns and others and columns != others and sorted(columns) == sorted(others):
-        second = second[:, [others.index(name) for name in columns]]
-    tables = [
-        as_array(table, f"data set {name}", ("N", "k"))
-        for name, table in zip(samples, (first, second), strict=True)
-    ]
-    widths = [table.shape[1] for table in tables]
-    if widths[0] != widths[1]:
+def sample_points(
+    samples: Mapping[str, ArrayLike], space: str | Space, unit: str | None, seed: int
+) -> tuple[Space, list[str], tuple[str, ...], list[Tensor]]:
+    """Return the space of data sets, their names, those of their columns, and their chart points.
+
+    Raises `OrbiflowError` if there are not two or more by their names, with the same columns.
+    """
+    if not is_a(samples, Mapping) or len(samples) < 2:
         raise OrbiflowError(
-            f"the data sets have {widths[0]} and {widths[1]} columns: give both in one form"
+            "give two data sets or more by their names, such as {'before': a, 'after': b}"
+        )
+    name, names = space.name if isinstance(space, Space) else space, list(samples)
+    tables: list[np.ndarray] = []
+    columns: tuple[str, ...] | None = None
+    for own, table in samples.items():
+        values, others = data_of(name, table, f"data set {own}", stacklevel=4)
+        if columns and others and columns != others and sorted(columns) == sorted(others):
+            values = values[:, [others.index(column) for column in columns]]
+        columns = columns or others
+        tables.append(as_array(values, f"data set {own}", ("N", "k")))
+    widths = [table.shape[1] for table in tables]
+    if len(set(widths)) > 1:
+        raise OrbiflowError(
+            f"the data sets have {' and '.join(map(str, widths))} columns: give all in one form"
         )
     if not all(len(table) for table in tables):
         raise OrbiflowError("a data set has no rows")
-    return list(samples), tables, columns
+    if isinstance(space, Space):
+        known = space
+    else:
+        found = unit_of(space, np.concatenate(tables), columns, unit)
+        known = _space_of(space, names, tables, found, seed)
+    points = [_named(own, known.to_chart, table) for own, table in zip(names, tables, strict=True)]
+    return known, names, columns or known.columns, points
 
 
 def _space_of(
@@ -226,7 +229,7 @@ def _named(name: str, call: Callable[[np.ndarray], T], table: np.ndarray) -> T:
 
 
 def _labels(
-    groups: Mapping[str, ArrayLike] | None, names: list[str], tables: list[np.ndarray]
+    groups: Mapping[str, ArrayLike] | None, names: list[str], sizes: tuple[int, int]
 ) -> np.ndarray | None:
     if groups is None:
         return None
@@ -235,11 +238,11 @@ def _labels(
             f"groups must have labels for {names[0]} and {names[1]}, by these names"
         )
     found: list[NDArray[np.str_]] = []
-    for name, table in zip(names, tables, strict=True):
+    for name, rows in zip(names, sizes, strict=True):
         labels = np.asarray(groups[name])
-        if labels.shape != (len(table),):
+        if labels.shape != (rows,):
             raise OrbiflowError(
-                f"groups of {name}: expected a label for each of {len(table)} rows, got shape "
+                f"groups of {name}: expected a label for each of {rows} rows, got shape "
                 f"{labels.shape}"
             )
         found.append(labels.astype(str))

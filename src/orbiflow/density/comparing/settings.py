@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from orbiflow.settings import Range, Settings
+from orbiflow.kinds import Parsed
+from orbiflow.settings import DefaultText, Range, Settings
+
+TestName = Literal[
+    "watson-williams", "common-mean", "common-median", "common-concentration",
+    "mardia-watson-wheeler", "watson-u2", "kuiper", "bingham", "energy", "all",
+]  # fmt: skip
+
+
+def test_names(text: str) -> tuple[str, ...]:
+    """Return the tests that a text names, such as "watson-williams,energy"."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+test_names.__test__ = False  # pyright: ignore[reportFunctionMemberAccess]
 
 
 class ComparisonSettings(Settings, group="Uncertainty"):
@@ -14,7 +28,15 @@ class ComparisonSettings(Settings, group="Uncertainty"):
     """Number of bootstrap resamples of rows or groups."""
 
     permutations: Annotated[int, Range(19, 100_000)] = 999
-    """Number of permutations in the test of two data sets; its least p is 1 / (permutations + 1)."""
+    """Number of permutations in tests of data sets; the least p is 1 / (permutations + 1)."""
+
+    tests: Annotated[
+        tuple[TestName, ...] | None,
+        Parsed(test_names, "names such as watson-williams,energy, or all"),
+        DefaultText("all of three data sets or more, none of two"),
+    ] = None
+    """Tests by name of two data sets or more, such as watson-williams,energy, or all that there are on
+    the space. They take the place of the general comparison of two data sets."""
 
     level: Annotated[float, Range(0.5, 0.999)] = 0.95
     """Level of the intervals and of the test."""

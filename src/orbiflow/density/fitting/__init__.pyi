@@ -2,6 +2,9 @@ from .automatic import fit_automatic as fit_automatic
 from .flow import fit_density as fit_density
 from .held_out import LEAST_PLACES as LEAST_PLACES
 from .held_out import lightest_folds as lightest_folds
+from .intervals import SAME as SAME
+from .intervals import concentration as concentration
+from .maximum import highest_log_likelihood as highest_log_likelihood
 from .parameters import Parameter as Parameter
 from .parameters import ParametricFit as ParametricFit
 from .parametric import fit_parametric as fit_parametric

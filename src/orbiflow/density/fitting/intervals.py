@@ -26,6 +26,9 @@ STEP = 1e-5
 CLOSE_CONCENTRATION = 6.0
 """Concentration, for each dimension of the sphere, from which squares of deviations are chi-square."""
 
+MAX_CONCENTRATION, SAME = 1e9, 1e-30
+"""The largest concentration, and how far below 1 the resultant of equal rows is at most."""
+
 QUANTILES = 1_000
 """Even quantiles of the normal distribution in an integral over it."""
 
@@ -146,8 +149,8 @@ def concentration_interval(shortfall: float, rows: float, width: int) -> tuple[f
     if (width - 1) / (2 * shortfall) > CLOSE_CONCENTRATION * (width - 1):
         quantiles = special.chdtri(free, [1 - tail, tail])
         wanted = [2 * rows * shortfall * (width - 1) / (2 * q) for q in quantiles]
-        low, high = (_with_shortfall(min(own, 1.0), width) for own in wanted)
-        return low, high
+        low, high = (concentration(max(0.0, 1 - own), width, own) for own in wanted)
+        return low or 0.0, math.inf if high is None else high
     resultant = 1 - shortfall
 
     def below(kappa: float, at: float) -> float:
@@ -168,17 +171,25 @@ def mean_cosine(kappa: float, width: int) -> float:
     return float(special.ive(width / 2, kappa) / special.ive(width / 2 - 1, kappa))
 
 
-def _with_shortfall(shortfall: float, width: int) -> float:
-    """Return the concentration whose mean resultant length is below 1 by so much."""
-    if shortfall < 1e-6:
-        return (width - 1) / (2 * shortfall)
-    high = width / shortfall + 1.0
+def concentration(resultant: float, width: int, below: float | None = None) -> float | None:
+    """Return the likeliest concentration of a von Mises-Fisher distribution, None if it is infinite.
+
+    `below` is 1 less the resultant, if it is known to more digits.
+
+    >>> round(concentration(0.5, 2), 3), round(concentration(0.5, 3), 3)
+    (1.159, 1.797)
+    """
 
     def excess(kappa: float) -> float:
-        return mean_cosine(kappa, width) - 1 + shortfall
+        return mean_cosine(kappa, width) - resultant
 
-    found: Any = optimize.brentq(excess, 1e-12, high) if shortfall < 1 else 0.0
-    return float(found)
+    if resultant <= 1e-12:
+        return 0.0
+    if below is not None and below < 1 / MAX_CONCENTRATION:
+        return None if below < SAME else (width - 1) / (2 * below)
+    if excess(MAX_CONCENTRATION) <= 0:
+        return None
+    return float(optimize.brentq(excess, 1e-12, MAX_CONCENTRATION, xtol=1e-12, rtol=1e-12))
 
 
 def _resultant_cdf(resultant: float, kappa: float, rows: float, width: int) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.forms import Cloud, Form, Start
+from orbiflow.density.fitting.forms import FORMS, Cloud, Form, Start
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import linalg
 
@@ -101,6 +101,16 @@ def at_maximum(form: Form, cloud: Cloud) -> Local:
     found = [_climbed(Local(form, start, cloud.width), cloud) for start in form.starts(cloud)]
     best = max(found, key=lambda one: float(one.mean_log(one.origin(), cloud)))
     return Local(form, form.ordered(best.at), cloud.width)
+
+
+def highest_log_likelihood(name: str, vectors: Tensor) -> tuple[float, int]:
+    """Return the log-likelihood of a family at its maximum, and how many parameters are free.
+
+    It is per area of the whole sphere, of unit vectors (N, p).
+    """
+    cloud = Cloud(vectors, None)
+    found = at_maximum(FORMS[name], cloud)
+    return len(vectors) * float(found.mean_log(found.origin(), cloud)), len(found.origin())
 
 
 def _climbed(local: Local, cloud: Cloud) -> Local:

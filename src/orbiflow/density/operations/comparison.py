@@ -23,11 +23,14 @@ from orbiflow.settings import DefaultText, Option, Repeated
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
-    from orbiflow.density.comparing import DataComparison, ModelComparison
+    from orbiflow.density.comparing import DataComparison, ModelComparison, SampleTests
     from orbiflow.density.models import Density
     from orbiflow.density.tables import TableRows
 
 Columns = tuple[str, ...] | None
+
+MOST_SAMPLES = 50
+"""Data sets that a column of one table may name."""
 
 FITTED_SHARE, MIN_LOOKED_UP = 0.5, 5
 """Share of the rows that a model knows, and rows that must have been looked up, for a warning."""
@@ -44,29 +47,36 @@ def compare(
     cell: tuple[float, ...] | None = None,
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None,
     group: str | None = None,
+    by: str | None = None,
     out: Annotated[Path | None, Option("-o"), DefaultText("nothing is written")] = None,
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
     """Which model suits held-out rows better, or do two data sets differ? With its uncertainty.
 
-    Models: -m A -m B -d held-out.csv. Data sets: -d a.csv -d b.csv --space sphere.
+    Models: -m A -m B -d held-out.csv. Data sets: -d a.csv -d b.csv --space sphere. Of three or more, or
+    with --tests, tests by name: equal means, concentrations, distributions.
 
     Args:
-        data: Table of held-out rows for models; or give it twice, for two data sets.
+        data: Table of held-out rows for models; or give it twice or more, for so many data sets.
         models: Folder that `fit` wrote; give it twice or more.
         space: Where two data sets live, as `fit` takes it.
         cell: Lengths and angles in degrees of the cell of two data sets on a group's quotient.
         unit: Unit of angles in two data sets.
         group: Column that names what rows belong to (a protein, a station, an event): those of one are
             not independent.
+        by: Column that says which data set each row of one table belongs to, for tests by name.
         out: A .json or .csv for the result.
     """
     models = models or ()
     require_ending(out, (".json", ".csv"))
     asked: dict[str, Any] = {"space": space, "cell": cell, "unit": unit}
     given = {name: value for name, value in asked.items() if value is not None}
-    _check_what_is_compared(data, models, given)
+    named = settings.tests is not None or by is not None or bool(data[2:])
+    if models:
+        _check_models(data, models, {**given, "by": by, "tests": settings.tests})
+    else:
+        _check_data(data, given, by, group if named else None)
     if out is not None:
         runtime.check_output_file(out, *models, *data)
     read = _Reader(table, group, on_event, runtime.progress_events(on_event, cancel))
@@ -74,10 +84,14 @@ def compare(
     with runtime.one_thread():
         if where is None:
             found = _compare_models(data[0], models, read, settings)
+        elif named:
+            found = _test_data(data, by, where, read, settings)
         else:
             found = _compare_data(data, where, read, settings)
     document = found.to_json()
     cancel.check()
+    if isinstance(found, comparing.SampleTests):
+        on_event(_table(found))
     for line in [*found.words(), *found.notes]:
         on_event(runtime.Note(line))
     if out is not None:
@@ -87,27 +101,39 @@ def compare(
     return runtime.Outcome({"file": None if out is None else str(out), "comparison": document})
 
 
-def _check_what_is_compared(
-    data: Sequence[Path], models: Sequence[Path], where: Mapping[str, Any]
+def _check_models(data: Sequence[Path], models: Sequence[Path], others: Mapping[str, Any]) -> None:
+    """Check that there are models and a table, and nothing that is of data sets."""
+    wrong = {
+        "{models} must be given twice or more, to be compared; or give two {data}": not models[1:],
+        "{models} names one folder twice: give each once": len(set(models)) < len(models),
+        "models are compared at one {data}, rows that none was fitted to": len(data) != 1,
+        **{
+            f"{{{name}}} is that of the models: leave it out": value is not None
+            for name, value in others.items()
+        },
+    }
+    _refuse(wrong)
+
+
+def _check_data(
+    data: Sequence[Path], where: Mapping[str, Any], by: str | None, tested_group: str | None
 ) -> None:
-    """Check that there are models and a table, or two tables and a space."""
-    if models:
-        wrong = {
-            "{models} must be given twice or more, to be compared; or give two {data}": not models[
-                1:
-            ],
-            "{models} names one folder twice: give each once": len(set(models)) < len(models),
-            "models are compared at one {data}, rows that none was fitted to": len(data) != 1,
-            **{f"{{{name}}} is that of the models: leave it out": True for name in where},
-        }
-    else:
-        once = data[0].resolve() == data[-1].resolve()
-        wrong = {
-            "give two {models} or more and one {data} to compare models, or two {data} and their "
-            "{space} to compare data": len(data) != 2,
-            "two {data} need their {space}": "space" not in where,
-            "{data} names one file twice: give two data sets": once,
-        }
+    """Check that there are tables, or one with a column that divides it, and a space."""
+    wrong = {
+        "give two {models} or more and one {data} to compare models, or two {data} and their "
+        "{space} to compare data": by is None and len(data) < 2,
+        "{by} divides the rows of one {data}: give one table, or leave it out": by is not None
+        and len(data) > 1,
+        "two {data} need their {space}": "space" not in where,
+        "{data} names one file twice: give two data sets": len({own.resolve() for own in data})
+        < len(data),
+        "{tests} are of independent rows: leave {group} out, or compare two {data} without {tests}":
+        tested_group is not None,
+    }  # fmt: skip
+    _refuse(wrong)
+
+
+def _refuse(wrong: Mapping[str, bool]) -> None:
     for message, is_wrong in wrong.items():
         if is_wrong:
             raise SettingError(message)
@@ -172,26 +198,96 @@ def _compare_data(
 ) -> DataComparison:
     import numpy as np
 
-    columns = read.settings.columns or _common_columns(data, where.space, read)
-    found = {
-        name: read.rows(path, columns, read.tell, where)
-        for name, path in zip(_names(data), data, strict=True)
-    }
+    found = _tables(data, where, read)
     groups = None
     if read.group is not None:
         groups = {name: np.asarray(rows.labels) for name, rows in found.items()}
     values = {name: rows.table.values for name, rows in found.items()}
-    both = next(iter(found.values())).table
-    if len({own.shape[1] for own in values.values()}) == 1:
-        both = replace(both, values=np.concatenate(list(values.values())))
-    unit = tables.angle_unit(where, both, read.tell)
-    if not is_angular(where.space, both.values.shape[1]):
-        unit = where.unit or ("degrees" if where.space in DIRECTIONS else None)
+    unit = _unit_of(found, where, read)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
         return comparing.compare_samples(
             values, space_of(where), settings, unit=unit, groups=groups, progress=read.progress
         )
+
+
+def _test_data(
+    data: Sequence[Path],
+    by: str | None,
+    where: SpaceSettings,
+    read: _Reader,
+    settings: ComparisonSettings,
+) -> SampleTests:
+    import numpy as np
+
+    found = _tables(data, where, read._replace(group=by))
+    values = {name: rows.table.values for name, rows in found.items()}
+    if by is not None:
+        (rows,) = found.values()
+        labels = np.asarray(rows.labels)
+        names = np.unique(labels).tolist()
+        if not 2 <= len(names) <= MOST_SAMPLES:
+            raise SettingError(
+                f"{{by}} must have 2 to {MOST_SAMPLES} values, one for each data set; "
+                f"{literal(by)} has {len(names)}"
+            )
+        values = {str(name): rows.table.values[labels == name] for name in names}
+    unit = _unit_of(found, where, read)
+    columns = next(iter(found.values())).table.columns
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # told already
+        return comparing.named_tests(values, space_of(where), settings, unit=unit, columns=columns)
+
+
+def _tables(data: Sequence[Path], where: SpaceSettings, read: _Reader) -> dict[str, TableRows]:
+    """Return the rows of tables by the tables' names."""
+    columns = read.settings.columns
+    if columns is None and len(data) > 1:
+        columns = next(
+            (
+                c
+                for other in data[1:]
+                if (c := _common_columns((data[0], other), where.space, read))
+            ),
+            None,
+        )
+    return {
+        name: read.rows(path, columns, read.tell, where)
+        for name, path in zip(_names(data), data, strict=True)
+    }
+
+
+def _unit_of(found: Mapping[str, TableRows], where: SpaceSettings, read: _Reader) -> str | None:
+    """Return the unit of several tables' angles."""
+    import numpy as np
+
+    values = [rows.table.values for rows in found.values()]
+    every = next(iter(found.values())).table
+    if len({own.shape[1] for own in values}) == 1:
+        every = replace(every, values=np.concatenate(values))
+    unit = tables.angle_unit(where, every, read.tell)
+    if is_angular(where.space, every.values.shape[1]):
+        return unit
+    return where.unit or ("degrees" if where.space in DIRECTIONS else None)
+
+
+def _table(found: SampleTests) -> runtime.Table:
+    """Return tests by name, a line for each."""
+    return runtime.Table(
+        "Tests by name",
+        ("test", "column", "statistic", "degrees of freedom", "p", "by"),
+        tuple(
+            (
+                one.name,
+                one.column or "all",
+                f"{one.statistic:.5g}",
+                ", ".join(f"{own:g}" for own in one.degrees) or "-",
+                f"{one.p:.2g}",
+                one.by,
+            )
+            for one in found.tests
+        ),
+    )
 
 
 def _columns_of_models(
@@ -291,9 +387,15 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [f"{k}: {path}" for k, path in enumerate(full, 1)]
 
 
-def _csv(found: ModelComparison | DataComparison) -> bytes:
-    """Return the differences of models, or the figures of data sets, a row each."""
+def _csv(found: ModelComparison | DataComparison | SampleTests) -> bytes:
+    """Return the differences of models, the figures of data sets, or their tests, a row each."""
     document = found.to_json()
+    if "tests" in document:
+        lines = [
+            {**own, "degrees": " ".join(f"{k:g}" for k in own["degrees"])}
+            for own in document["tests"]
+        ]
+        return csv_bytes(list(lines[0]), [list(line.values()) for line in lines])
     figures: dict[str, dict[str, Any]] = document.get("divergence") or {}
     rows: list[dict[str, Any]] = document.get("differences") or [
         {"figure": "p", "value": document["test"]["p"], "error": None, "low": None, "high": None},

@@ -1,0 +1,328 @@
+"""Tests by name of two or more samples: equal means, concentrations, distributions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+
+from orbiflow.arrays import Array
+from orbiflow.density.comparing import statistics
+from orbiflow.density.comparing.data_sets import sample_points
+from orbiflow.density.comparing.resampling import MAX_ROWS, Groups, chosen_rows
+from orbiflow.density.comparing.settings import ComparisonSettings
+from orbiflow.density.comparing.statistics import Found, Labels
+from orbiflow.density.fitting import highest_log_likelihood
+from orbiflow.density.models import images_of
+from orbiflow.density.spaces import Space
+from orbiflow.errors import OrbiflowError, SettingError
+
+MIN_SAMPLE = 5
+"""Rows that each sample must have."""
+
+MIN_LARGE, MIN_MEDIAN = 25, 10
+"""Rows of each sample from which tests for large samples, and that of medians, are good."""
+
+
+@dataclass(frozen=True)
+class NamedTest:
+    """A test of several samples.
+
+    - `name`: Its name. `column`: The column of angles that it is about; empty for all together.
+    - `statistic`, `degrees`: The statistic and its degrees of freedom.
+    - `p`: The probability of so large a statistic if there is no difference. `by`: What p is from.
+    - `hypothesis`: What is the same if there is no difference. `assumes`: What else must hold.
+    - `reference`: Where the test is from. `doubt`: Why p may be wrong here, if it may.
+    """
+
+    __test__ = False  # pytest would take it for a test
+
+    name: str
+    column: str
+    statistic: float
+    degrees: tuple[float, ...]
+    p: float
+    by: str
+    hypothesis: str
+    assumes: str
+    reference: str
+    doubt: str = ""
+
+
+@dataclass(frozen=True)
+class SampleTests:
+    """Tests by name of several samples.
+
+    - `names`, `rows`: The samples, and how many rows each has. `tests`: The results.
+    - `permutations`, `seed`: Of p by permutation. `notes`: What the user should know.
+    """
+
+    names: tuple[str, ...]
+    rows: tuple[int, ...]
+    tests: tuple[NamedTest, ...]
+    permutations: int
+    seed: int
+    notes: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> NamedTest:
+        """Return the first test of a name, such as "watson-williams"."""
+        for one in self.tests:
+            if one.name == name:
+                return one
+        raise KeyError(f"{name}; there are {', '.join(one.name for one in self.tests)}")
+
+    def words(self) -> list[str]:
+        """Return what the tests are about, in lines of text."""
+        own = ", ".join(
+            f"{name} ({rows} rows)" for name, rows in zip(self.names, self.rows, strict=True)
+        )
+        lines = [f"samples: {own}"]
+        for one in {one.name: one for one in self.tests}.values():
+            lines.append(f"{one.name}: {one.hypothesis}; {one.assumes} ({one.reference})")
+        for one in self.tests:
+            if one.doubt:
+                where = f" of {one.column}" if one.column else ""
+                lines.append(f"{one.name}{where}: p may be wrong, {one.doubt}")
+        return lines
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an object for `json.dumps`."""
+        return {"kind": "tests", **asdict(self)}
+
+
+Run = Callable[[Array, Labels, ComparisonSettings], Found]
+"""A test of unit vectors (N, p) in samples (N,)."""
+
+
+def _sure(_vectors: Array, _labels: Labels) -> str:
+    return ""
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A test: what it says is equal, what it assumes, its source, and where it can be made.
+
+    - `only`: Where it can be made: on "circles", "means" (circles and spheres), "axes", or anywhere.
+    - `two`: Whether it is of two samples alone.
+    - `doubt`: Says of unit vectors and samples why p may be wrong; empty if it should be right.
+    """
+
+    run: Run
+    hypothesis: str
+    assumes: str
+    reference: str
+    only: str = ""
+    two: bool = False
+    doubt: Callable[[Array, Labels], str] = _sure
+
+    def result(
+        self, name: str, column: str, vectors: Array, labels: Labels, settings: ComparisonSettings
+    ) -> NamedTest:
+        """Make the test."""
+        found, doubt = self.run(vectors, labels, settings), self.doubt(vectors, labels)
+        words = (self.hypothesis, self.assumes, self.reference, doubt)
+        return NamedTest(name, column, found.statistic, found.degrees, found.p, found.by, *words)
+
+
+def _plain(test: Callable[[Array, Labels], Found]) -> Run:
+    def run(vectors: Array, labels: Labels, settings: ComparisonSettings) -> Found:
+        del settings
+        return test(vectors, labels)
+
+    return run
+
+
+def _by_permutation(statistic: Callable[[Array, Labels], Array]) -> Run:
+    def run(vectors: Array, labels: Labels, settings: ComparisonSettings) -> Found:
+        kept = chosen_rows(labels == 0, Groups.of(None, len(labels)), MAX_ROWS, settings.seed)
+        return statistics.permuted(
+            statistic, vectors[kept], labels[kept], settings.permutations, settings.seed
+        )
+
+    return run
+
+
+def _ratio_of_likelihoods(vectors: Array, labels: Labels) -> Found:
+    """Test of equal parameters of a Bingham density, by the ratio of likelihoods."""
+    every, free = highest_log_likelihood("bingham", torch.tensor(vectors))
+    samples = range(int(labels.max()) + 1)
+    own = [
+        highest_log_likelihood("bingham", torch.tensor(vectors[labels == k]))[0] for k in samples
+    ]
+    return statistics.chi_square(2 * (sum(own) - every), free * (len(own) - 1))
+
+
+def _smallest(labels: Labels) -> int:
+    return int(np.bincount(labels).min())
+
+
+def _small(least: int) -> Callable[[Array, Labels], str]:
+    def doubt(_vectors: Array, labels: Labels) -> str:
+        few = _smallest(labels)
+        return f"as a sample has {few} rows, fewer than {least}" if few < least else ""
+
+    return doubt
+
+
+def _scattered(vectors: Array, labels: Labels) -> str:
+    width = vectors.shape[1]
+    lengths = [
+        float(np.linalg.norm(vectors[labels == k].mean(axis=0)))
+        for k in range(int(labels.max()) + 1)
+    ]
+    kappa = statistics.concentration(min(lengths), width)
+    return (
+        f"as a sample's concentration is {kappa:.2g}, below 1"
+        if kappa is not None and kappa < 1
+        else ""
+    )
+
+
+KINDS = {
+    "watson-williams": _Kind(
+        _plain(statistics.watson_williams), "equal mean directions",
+        "assumes von Mises-Fisher samples of one concentration, above 1",
+        "Watson and Williams, 1956", "means", doubt=_scattered,
+    ),
+    "common-mean": _Kind(
+        _plain(statistics.common_mean), "equal mean directions",
+        "assumes 25 rows or more in each sample, no model and no common concentration",
+        "Watson, 1983; Fisher, 1993, section 5.3.4", "means", doubt=_small(MIN_LARGE),
+    ),
+    "common-median": _Kind(
+        _plain(statistics.common_median), "equal median directions",
+        "assumes 10 rows or more in each sample and no model", "Fisher, 1993, section 5.3.2",
+        "circles", doubt=_small(MIN_MEDIAN),
+    ),
+    "common-concentration": _Kind(
+        _plain(statistics.common_concentration), "equal concentrations about the samples' own means",
+        "assumes one mode and a mean direction in each sample", "Fisher, 1993, section 5.4.4", "means",
+    ),
+    "mardia-watson-wheeler": _Kind(
+        _by_permutation(statistics.mardia_watson_wheeler), "equal distributions",
+        "assumes nothing; sees other means or spreads", "Mardia, 1972; Wheeler and Watson, 1964",
+        "circles",
+    ),
+    "watson-u2": _Kind(
+        _by_permutation(statistics.watson_u2), "equal distributions", "assumes nothing",
+        "Watson, 1962", "circles", two=True,
+    ),
+    "kuiper": _Kind(
+        _by_permutation(statistics.kuiper), "equal distributions", "assumes nothing", "Kuiper, 1960",
+        "circles", two=True,
+    ),
+    "bingham": _Kind(
+        _plain(_ratio_of_likelihoods), "equal Bingham densities",
+        "assumes Bingham samples of 25 rows or more", "Wilks, 1938", "axes", doubt=_small(MIN_LARGE),
+    ),
+    "energy": _Kind(
+        _by_permutation(statistics.energy), "equal distributions, of all columns together",
+        "assumes nothing", "Rizzo and Szekely, 2010",
+    ),
+}  # fmt: skip
+"""The tests by name, in the order in which they are shown."""
+
+
+def named_tests(
+    samples: Mapping[str, ArrayLike],
+    space: str | Space = "torus",
+    settings: ComparisonSettings | None = None,
+    *,
+    unit: str | None = None,
+    columns: Sequence[str] | None = None,
+) -> SampleTests:
+    """Test by name whether two or more samples have equal means, concentrations or distributions.
+
+    Angles are tested column by column, and all columns together by "energy". Which test to believe
+    should be settled before they are looked at: each p is that of one test alone.
+
+    Args:
+        samples: Two or more data sets (N, k) by their names, in the space's own units.
+        space: The space, as `DensityEstimator` takes it: a torus, a sphere of any dimension, axes or
+            rotations.
+        settings: The tests (default: all that there are on the space), permutations and seed.
+        unit: Unit of angles, as `DensityEstimator` takes it.
+        columns: Names of the columns of data sets that are arrays.
+
+    Raises:
+        OrbiflowError: If there is one data set alone, data are not on the space, a sample has fewer
+            than five rows, or the space has no such tests.
+
+    >>> rng = np.random.default_rng(0)
+    >>> found = named_tests({k: rng.vonmises(k == "c", 3, (40, 1)) for k in "abc"})
+    >>> found["watson-williams"].p < 0.001
+    True
+    """
+    settings = settings or ComparisonSettings()
+    own, names, called, points = sample_points(samples, space, unit, settings.seed)
+    sizes = tuple(map(len, points))
+    if min(sizes) < MIN_SAMPLE:
+        few = names[sizes.index(min(sizes))]
+        raise OrbiflowError(
+            f"{few} has {min(sizes)} rows: each sample must have {MIN_SAMPLE} or more"
+        )
+    labels = np.repeat(np.arange(len(sizes)), sizes)
+    sides, every, there = _vectors(own, torch.cat(points), tuple(columns or called))
+    asked = _asked(settings, there, own, len(sizes))
+    found: list[NamedTest] = []
+    for name in asked:
+        kind = KINDS[name]
+        for column, vectors in {"": every}.items() if name == "energy" else sides.items():
+            found.append(kind.result(name, column, vectors, labels, settings))
+    notes = ["each p is that of one test alone: settle which one counts before you look"]
+    if sum(sizes) > MAX_ROWS and any(one.by == "permutation" for one in found):
+        notes.append(
+            f"tests by permutations look at {MAX_ROWS} of {sum(sizes)} rows, drawn at random"
+        )
+    return SampleTests(
+        tuple(names), sizes, tuple(found), settings.permutations, settings.seed, tuple(notes)
+    )
+
+
+def _vectors(
+    space: Space, points: torch.Tensor, columns: tuple[str, ...]
+) -> tuple[dict[str, Array], Array, str]:
+    """Return the unit vectors (N, p) of each column, what distances are taken of, and what they are."""
+    if space.is_torus and space.unit is not None:
+        angles = 2 * math.pi * points.numpy()
+        sides = {
+            name: np.stack([np.cos(column), np.sin(column)], axis=1)
+            for name, column in zip(columns, angles.T, strict=True)
+        }
+        return sides, np.concatenate(list(sides.values()), axis=1), "circles"
+    try:
+        images = images_of(space)
+    except OrbiflowError:
+        raise OrbiflowError(
+            f"there are no tests by name on the {space.name}: compare two data sets without {{tests}}"
+        ) from None
+    vectors = space.features(points)[0].numpy()
+    if images == 1:
+        return {"": vectors}, vectors, "means"
+    # either end of an axis has the same products
+    products = (vectors[:, :, None] * vectors[:, None, :]).reshape(len(vectors), -1)
+    return {"": vectors}, products, "axes"
+
+
+def _asked(settings: ComparisonSettings, there: str, space: Space, samples: int) -> list[str]:
+    """Return the tests that can be made, of those asked for."""
+    known = {
+        name: kind
+        for name, kind in KINDS.items()
+        if kind.only in ("", there) or (kind.only == "means" and there == "circles")
+    }
+    if settings.tests is None or "all" in settings.tests:
+        return [name for name, kind in known.items() if samples == 2 or not kind.two]
+    for name in settings.tests:
+        if name not in known:
+            raise SettingError(
+                f"{{tests}}: there is no {name} on the {space.name}, but {', '.join(known)}"
+            )
+        if known[name].two and samples > 2:
+            raise SettingError(f"{{tests}}: {name} is of two samples, there are {samples}")
+    return [name for name in known if name in settings.tests]
