@@ -245,6 +245,15 @@ for file in sys.argv[1:]:
 CODE
     orbiflow density cv "$table" --columns "$columns" --space projective-plane --folds 5 \
         --against kernels --against flow --out "$work/poles-cv"
+    fit poles-gaussian "$table" lat,lon --space projective-plane --components angular-central-gaussian
+    draw density --regions 0.5,0.9
+    orbiflow density cv "$table" --columns "$columns" --space projective-plane --folds 5 \
+        --components angular-central-gaussian --against default --against bingham --against watson \
+        --out "$work/poles-gaussian-cv"
+    awk -F, 'NR == 1 { print $0 ",polarity" }
+        NR > 1 { if ($1 > 0) print $0 ",normal"; else print -$1 "," $2 - 180 ",reversed" }' \
+        "$table" >"$work/poles-turned.csv"
+    orbiflow density compare -d "$work/poles-turned.csv" --by polarity --space sphere --columns lat,lon
 }
 
 for example in ${*:-ramachandran wildfires image-patches poles}; do

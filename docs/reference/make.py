@@ -57,7 +57,7 @@ TOPICS = {
         "highest_density_region DensityLevels outlines to_klein "
     ),
     "Comparing densities, and data": (
-        "compare_models compare_scores compare_samples ComparisonSettings cross_validate "
+        "compare_models compare_scores compare_samples named_tests ComparisonSettings cross_validate "
         "cross_validation_folds summarize_angles summarize_directions summarize_axes "
     ),
     "Figures": (

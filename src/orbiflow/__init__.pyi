@@ -2,6 +2,7 @@ __version__: str
 __all__: list[str]
 
 from .density.comparing.data_sets import compare_samples as compare_samples
+from .density.comparing.named import named_tests as named_tests
 from .density.comparing.paired import compare_models as compare_models
 from .density.comparing.paired import compare_scores as compare_scores
 from .density.comparing.resampling import cross_validation_folds as cross_validation_folds

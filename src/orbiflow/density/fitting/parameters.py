@@ -85,9 +85,10 @@ class ParametricFit:
         if self.goodness is not None:
             found = self.goodness
             verdict = "the rows suit it" if found.p > 0.05 else "the rows do not suit it"
+            p = f"{found.p:.2g}" if found.p > 1e-300 else "< 1e-300"
             lines.append(
                 f"smooth test of the family: {found.statistic:.4g} with {found.degrees} degrees of "
-                f"freedom, p {found.p:.2g} by {found.by}: {verdict}"
+                f"freedom, p {p} by {found.by}: {verdict}"
             )
         return [*lines, *self.notes]
 

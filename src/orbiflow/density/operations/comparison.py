@@ -275,14 +275,14 @@ def _table(found: SampleTests) -> runtime.Table:
     """Return tests by name, a line for each."""
     return runtime.Table(
         "Tests by name",
-        ("test", "column", "statistic", "degrees of freedom", "p", "by"),
+        ("test", "column", "statistic", "df", "p", "by"),
         tuple(
             (
                 one.name,
                 one.column or "all",
                 f"{one.statistic:.5g}",
                 ", ".join(f"{own:g}" for own in one.degrees) or "-",
-                f"{one.p:.2g}",
+                f"{one.p:.2g}" if one.p > 1e-300 else "< 1e-300",
                 one.by,
             )
             for one in found.tests
