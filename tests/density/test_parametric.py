@@ -259,6 +259,33 @@ def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert low < value < high
 
 
+def test_two_modes_and_very_close_rows() -> None:
+    rng, sphere = np.random.default_rng(0), make_space("hypersphere", dim=2)
+    both = rng.normal(0, 0.1, (200, 3)) + np.where(np.arange(200) < 100, 1, -1)[:, None] * [1, 0, 0]
+    both[:, 2] += 0.3
+    both /= np.linalg.norm(both, axis=1, keepdims=True)
+    density, report = fit_parametric(sphere, torch.tensor(both), "kent")
+    assert any("two modes" in note for note in parametric_of(report).notes)
+    drawn_ones = density.sample((2000,), torch.Generator().manual_seed(0)).numpy()
+    assert np.abs(drawn_ones.T @ drawn_ones / 2000 - both.T @ both / 200).max() < 0.05
+    close = np.array([0, 0, 1]) + rng.normal(0, 1e-5, (100, 3))
+    close /= np.linalg.norm(close, axis=1, keepdims=True)
+    found = found_by(sphere, torch.tensor(close), "von-mises-fisher")
+    error, low, high = spread(found["concentration"])
+    assert low < 1e10 < high
+    assert error == pytest.approx(found["concentration"].value / 10, rel=1e-6)  # k sqrt(2 / (2 n))
+    assert spread(found["mean_x1"])[0] == pytest.approx(1e-6, rel=0.2)
+    with pytest.raises(OrbiflowError, match="too few digits"):
+        fit_parametric(sphere, torch.tensor(close), "kent")
+
+
+def test_too_few_groups_have_no_intervals() -> None:
+    space, points, _ = drawn("von-mises-fisher", "sphere", 60, 3)
+    found = found_by(space, points, "von-mises-fisher", groups=np.arange(60) % 3)
+    assert all(one.error is None for one in found.parameters)
+    assert "3 groups are too few for intervals of 3 parameters" in found.notes
+
+
 def test_refusals() -> None:
     sphere = make_space("sphere")
     same = sphere.to_chart([[10.0, 20.0]] * 9)
@@ -272,6 +299,8 @@ def test_refusals() -> None:
         fit_parametric(sphere, flat[:3], "kent")
     with pytest.raises(OrbiflowError, match="choose bingham or"):
         fit_parametric(make_space("projective-plane"), flat, "von-mises-fisher")
+    with pytest.raises(OrbiflowError, match="16 coordinates at most"):
+        fit_parametric(make_space("projective-space", dim=16), torch.eye(17), "bingham")
     with pytest.raises(OrbiflowError, match="there is no parametric family"):
         fit_parametric(make_space("klein-bottle"), flat, "von-mises")
     angles = np.random.default_rng(0).vonmises(0, 1, (50, 2))

@@ -204,26 +204,23 @@ class DensityEstimator(FittedFigures):
         return DensitySettings(**self._changed(entry.name for entry in fields_of(DensitySettings)))
 
     def parameters(self) -> dict[str, Parameter]:
-        """Estimates with their standard errors and intervals, by name, of a parametric family alone.
+        """Estimates with standard errors and intervals, by name, of a parametric family alone.
 
         What else is known of the fit is `report_.parametric`.
 
         Raises:
             OrbiflowError: before `fit`, or for another density.
 
-        >>> directions = np.random.default_rng(0).normal([0, 0, 2], 1, (60, 3))
-        >>> directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        >>> fit = DensityEstimator("sphere", components="von-mises-fisher").fit(directions)
-        >>> found = fit.parameters()["concentration"]
-        >>> found.low < found.value < found.high
-        True
+        >>> angles = np.random.default_rng(0).vonmises(0, 2, (60, 1))
+        >>> fit = DensityEstimator("torus", components="von-mises").fit(angles, columns=["phi"])
+        >>> list(fit.parameters())
+        ['mean_phi', 'concentration_phi']
         """
         self._fitted()
         found = getattr(self, "report_", None)
         if found is None or found.parametric is None:
             raise OrbiflowError(
-                "this density is of no parametric family alone: fit one, such as "
-                'components="von-mises-fisher"'
+                'this density is of no parametric family alone: fit one, such as components="kent"'
             )
         return {one.name: one for one in found.parametric.parameters}
 

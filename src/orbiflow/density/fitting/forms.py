@@ -69,11 +69,13 @@ class Form(ABC):
 
     - `about`: Which rows it is for: "directions", "axes" or "rotations".
     - `positive`: Whether the reported shape parameters are, so that their intervals are of logarithms.
+    - `bounds`: What the reported shape parameters are between.
     """
 
     name: str
     about: str = "axes"
     positive: bool = False
+    bounds: tuple[float, float] = (-math.inf, math.inf)
 
     @abstractmethod
     def logs(self, shape: Tensor, y: Tensor) -> Tensor:
@@ -220,7 +222,7 @@ class Watson(ExponentialForm):
 class Bingham(ExponentialForm):
     """exp(sum of k_i (e_i.x)^2) with 0 = k_1 >= k_2 >= ...: axes about a point, or along a girdle."""
 
-    name = "bingham"
+    name, bounds = "bingham", (-math.inf, 0.0)
 
     def names(self, width: int) -> tuple[str, ...]:
         return tuple(f"concentration_{k}" for k in range(2, width + 1))
@@ -252,6 +254,7 @@ class MatrixFisher(Bingham):
     """exp(trace(F'R)): rotations about a mean, as a Bingham density of quaternions."""
 
     name, about, axis_names = "matrix-fisher", "rotations", ("mean",)
+    bounds = (-math.inf, math.inf)
 
     def names(self, width: int) -> tuple[str, ...]:
         entries = tuple(f"f{i}{j}" for i in "123" for j in "123")
@@ -268,7 +271,7 @@ class MatrixFisher(Bingham):
 class Kent(ExponentialForm):
     """exp(k m.x + b ((e_2.x)^2 - (e_3.x)^2)): directions about a mean, with ovals as contours."""
 
-    name, about = "kent", "directions"
+    name, about, bounds = "kent", "directions", (0.0, math.inf)
     shape_names, axis_names = ("concentration", "ovalness"), ("mean", "major", "minor")
 
     def coefficients(self, shape: Tensor, width: int) -> tuple[Tensor, Tensor]:

@@ -130,6 +130,8 @@ def shape_parameters(local: Local, covariance: Tensor) -> list[Parameter]:
         if error is not None and local.form.positive and value > 0:
             factor = math.exp(quantile() * error / value)
             low, high = value / factor, value * factor
+        elif low is not None and high is not None:
+            low, high = max(low, local.form.bounds[0]), min(high, local.form.bounds[1])
         found.append(Parameter(name, value, error, low, high))
     return found
 
@@ -150,7 +152,7 @@ def concentration_interval(shortfall: float, rows: float, width: int) -> tuple[f
         quantiles = special.chdtri(free, [1 - tail, tail])
         wanted = [2 * rows * shortfall * (width - 1) / (2 * q) for q in quantiles]
         low, high = (concentration(max(0.0, 1 - own), width, own) for own in wanted)
-        return low or 0.0, math.inf if high is None else high
+        return float(low or 0.0), math.inf if high is None else float(high)
     resultant = 1 - shortfall
 
     def below(kappa: float, at: float) -> float:
@@ -169,6 +171,14 @@ def concentration_interval(shortfall: float, rows: float, width: int) -> tuple[f
 def mean_cosine(kappa: float, width: int) -> float:
     """Return the mean resultant length of a von Mises-Fisher density of this concentration."""
     return float(special.ive(width / 2, kappa) / special.ive(width / 2 - 1, kappa))
+
+
+def cosine_variance(kappa: float, width: int) -> float:
+    """Return the variance of the cosine, the slope of `mean_cosine`."""
+    if kappa > 1e5:
+        return (width - 1) / (2 * kappa**2)  # the difference below would lose its digits
+    mean = mean_cosine(kappa, width)
+    return 1 - mean**2 - (width - 1) * mean / kappa
 
 
 def concentration(resultant: float, width: int, below: float | None = None) -> float | None:
@@ -198,8 +208,7 @@ def _resultant_cdf(resultant: float, kappa: float, rows: float, width: int) -> f
         mean, along, across = kappa / width, 1 / width, 1 / width
     else:
         mean = mean_cosine(kappa, width)
-        across = mean / kappa
-        along = 1 - mean**2 - (width - 1) * across
+        across, along = mean / kappa, cosine_variance(kappa, width)
     levels = (np.arange(QUANTILES) + 0.5) / QUANTILES
     first = mean + math.sqrt(along / rows) * special.ndtri(levels)
     rest = np.maximum(resultant**2 - first**2, 0.0) * rows / across

@@ -19,6 +19,9 @@ MOST_STEPS, LEAST_GAIN = 200, 1e-15
 LARGEST_TURN, LARGEST_STEP = 0.5, 1.0
 """Radians by which a step may turn the frame, and by how much it may change a shape parameter of 1."""
 
+MOST_TOLD = 1e7
+"""Concentration about a mean direction from which its information has too few digits."""
+
 SINGULAR = 1e-12
 """Information about a parameter, relative to its own scale, below which there is none."""
 
@@ -155,11 +158,15 @@ def covariance(
 ) -> Tensor:
     """Return the covariance (q, q) of the estimates, infinite where the rows say nothing.
 
-    Of `rows` that are independent and count alike, it is the inverse of Fisher's information;
-    otherwise that of estimating equations with a term for each row or group, which holds whatever the
-    rows' density is (White, Maximum likelihood estimation of misspecified models, 1982).
+    Of `rows` that are independent and count alike, it is the inverse of Fisher's information. Otherwise
+    it is that of estimating equations with a term for each row or group, which holds whatever the rows'
+    density is (White, Maximum likelihood estimation of misspecified models, 1982); it is infinite if
+    there are no more groups than parameters.
     """
     information = local.information(cloud)
+    if local.form.about == "directions" and float(local.at.shape[0]) > MOST_TOLD:
+        shapes = slice(len(local.planes), None)
+        information[shapes] = information[:, shapes] = 0.0
     scale = information.diagonal().clamp_min(1e-300).rsqrt()
     values, axes = linalg.eigh(information * scale[:, None] * scale)
     none = values < SINGULAR**0.5
@@ -170,8 +177,10 @@ def covariance(
         terms = local.scores(cloud.vectors) * cloud.weights[:, None]
         if groups is not None:
             count = int(groups.max()) + 1
+            if count <= terms.shape[1]:
+                return torch.full_like(information, math.inf)
             terms = terms.new_zeros(count, terms.shape[1]).index_add(0, groups, terms)
-            terms = terms * math.sqrt(count / (count - 1)) if count > 1 else terms * math.inf
+            terms = terms * math.sqrt(count / (count - 1))
         found = inverse @ (terms.mT @ terms) @ inverse
     unknown = (axes[:, none].abs() > 1e-6).any(dim=1)
     found[unknown.nonzero(), unknown.nonzero()] = math.inf

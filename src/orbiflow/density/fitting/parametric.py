@@ -18,8 +18,10 @@ from orbiflow.density.fitting.forms import FORMS, Cloud
 from orbiflow.density.fitting.goodness import DRAWS, smooth_test
 from orbiflow.density.fitting.intervals import (
     LEVEL,
+    MAX_CONCENTRATION,
     Writing,
     concentration_interval,
+    cosine_variance,
     direction_parameters,
     shape_parameters,
 )
@@ -50,6 +52,9 @@ MIN_ROWS = 40
 ANGLES, DIRECTIONS = "von-mises", "von-mises-fisher"
 """The families of angles, and of directions in any dimension."""
 
+AXES = ("bingham", "angular-central-gaussian")
+"""The families with a frame of axes."""
+
 
 class Side(NamedTuple):
     """A factor of the space: what it is called, its rows, the family there, and how it is written."""
@@ -74,7 +79,7 @@ def families_of(space: Space) -> tuple[str, ...]:
     except OrbiflowError:
         return ()
     width = space.dim + 1
-    axes = ("bingham", "angular-central-gaussian", "watson") if width <= MOST_WIDTH else ("watson",)
+    axes = (*(AXES if width <= MOST_WIDTH else ()), "watson")
     if isinstance(space, RotationSpace):
         return (*axes, "matrix-fisher")
     if images == 2:
@@ -87,6 +92,8 @@ def require_family(space: Space, name: str) -> None:
     there = families_of(space)
     if name not in there:
         which = f"choose {' or '.join(there)}" if there else "there is no parametric family"
+        if name in AXES and space.is_round and space.dim >= MOST_WIDTH:
+            which = f"it is for unit vectors of {MOST_WIDTH} coordinates at most"
         raise OrbiflowError(f"there is no {name} density on the {space.name}: {which}")
 
 
@@ -177,7 +184,13 @@ def _sides(space: Space, name: str, rows: Rows, columns: Sequence[str] | None) -
                 f"{cloud.width}"
             )
         form = FORMS[DIRECTIONS if name == ANGLES else name]
-        found.append(Side(title, cloud, at_maximum(form, cloud), writing))
+        local = at_maximum(form, cloud)
+        if form.name != DIRECTIONS and float(local.at.shape.abs().max()) > MAX_CONCENTRATION:
+            raise OrbiflowError(
+                f"the rows are so close together that the {name} density would have a concentration "
+                f"above {MAX_CONCENTRATION:g}, for which there are too few digits"
+            )
+        found.append(Side(title, cloud, local, writing))
     return found
 
 
@@ -274,7 +287,7 @@ def _parametric(
     goodness = None
     if even:
         goodness = _goodness(space, sides, density, torch.Generator().manual_seed(seed))
-    notes = _notes(sides, count)
+    notes = _notes(sides, count, rows.groups, free)
     if 2 * count * gain < _chi_square_quantile(free):
         notes.append(
             "the rows cannot tell this density from the uniform one: its directions and intervals mean "
@@ -287,14 +300,21 @@ def _parametric(
     )  # fmt: skip
 
 
-def _notes(sides: list[Side], count: float) -> list[str]:
+def _notes(sides: list[Side], count: float, groups: Tensor | None, free: int) -> list[str]:
     """Return what to keep in mind of the estimates."""
     notes: list[str] = []
     local = sides[0].local
     if local.form.name == "kent" and 2 * float(local.at.shape[1]) > float(local.at.shape[0]):
         notes.append("the ovalness is more than half the concentration: the density has two modes")
-    if count < MIN_ROWS:
-        notes.append(f"intervals are rough with fewer than {MIN_ROWS} rows, there are {count:.0f}")
+    what, units = "rows", count
+    if groups is not None:
+        what, units = "groups", float(groups.max() + 1)
+    if groups is not None and units <= free / len(sides):
+        notes.append(f"{units:.0f} groups are too few for intervals of {free} parameters")
+    elif units < MIN_ROWS:
+        notes.append(
+            f"intervals are rough with fewer than {MIN_ROWS} {what}, there are {units:.0f}"
+        )
     return notes
 
 
@@ -311,7 +331,8 @@ def _inverted(one: Parameter, cloud: Cloud, count: float) -> Parameter:
     length = linalg.vector_norm(cloud.mean)
     chords = cloud.weights @ ((cloud.vectors - cloud.mean / length) ** 2).sum(dim=1)
     low, high = concentration_interval(float(chords) / 2, count, cloud.width)
-    return replace(one, low=low, high=high)
+    error = (count * cosine_variance(one.value, cloud.width)) ** -0.5
+    return replace(one, error=error, low=low, high=high)
 
 
 def _goodness(

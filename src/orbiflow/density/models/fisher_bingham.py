@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
@@ -142,17 +142,31 @@ class FisherBingham(Density, kind="fisher-bingham"):
         vector, matrix = self.vector.cpu().numpy(), self.matrix.cpu().numpy()
         kappa = float(np.linalg.norm(vector))
         mean = vector / kappa if kappa > 0 else vector
-        # kappa c is at most kappa (c^2 + 1) / 2: a Bingham density is an envelope
-        values, axes = np.linalg.eigh(matrix + kappa / 2 * np.outer(mean, mean))
+        # kappa c is at most kappa (c^2 + d^2) / (2 d) for any d: a Bingham density is an envelope
+        nearest = _nearest_envelope(mean, kappa, matrix) if kappa > 0 else 1.0
+        steep = kappa / (2 * nearest)
+        values, axes = np.linalg.eigh(matrix + steep * np.outer(mean, mean))
         found: list[Array] = []
         for _ in range(MOST_TRIES):
             left = count - sum(map(len, found))
             if left <= 0:
                 return self.space.from_features(torch.tensor(np.concatenate(found)[:count]))
             tried = _bingham(values.max() - values, 2 * left + 16, rng) @ axes.T
-            odds = -kappa / 2 * (1 - tried @ mean) ** 2
+            odds = -steep * (tried @ mean - nearest) ** 2
             found.append(tried[np.log(rng.uniform(size=len(tried))) < odds])
         raise OrbiflowError("no samples were accepted: the density's parameters are too large")
+
+
+def _nearest_envelope(mean: Array, kappa: float, matrix: Array) -> float:
+    """Return the cosine d for which the Bingham density that is an envelope has the least mass."""
+    none = torch.zeros(len(mean), dtype=torch.float64)
+
+    def mass(nearest: float) -> float:
+        values = np.linalg.eigvalsh(matrix + kappa / (2 * nearest) * np.outer(mean, mean))
+        return float(log_fisher_bingham(torch.tensor(values), none)) + kappa * nearest / 2
+
+    found: Any = minimize_scalar(mass, bounds=(1e-3, 1.0), method="bounded")
+    return float(found.x)
 
 
 def _bingham(below: Array, tries: int, rng: np.random.Generator) -> Array:
