@@ -40,6 +40,7 @@ from .models.flow import UniformDensity as UniformDensity
 from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
 from .models.network import VonMisesNetwork as VonMisesNetwork
+from .models.sine import VonMisesSine as VonMisesSine
 from .pictures.coastlines import read_coastlines as read_coastlines
 from .pictures.colours import COLOURS as COLOURS
 from .pictures.corner import corner_picture as corner_picture

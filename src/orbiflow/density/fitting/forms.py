@@ -25,7 +25,9 @@ from orbiflow.density.models import (
     AngularCentralGaussian,
     Density,
     FisherBingham,
+    VonMisesSine,
     log_fisher_bingham,
+    log_sine,
 )
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
@@ -67,7 +69,7 @@ class Start(NamedTuple):
 class Form(ABC):
     """A parametric family of densities of unit vectors.
 
-    - `about`: Which rows it is for: "directions", "axes" or "rotations".
+    - `about`: Which rows it is for: "angles", "directions", "axes" or "rotations".
     - `positive`: Whether the reported shape parameters are, so that their intervals are of logarithms.
     - `bounds`: What the reported shape parameters are between.
     """
@@ -104,10 +106,10 @@ class Form(ABC):
         """Return the same density with its axes in their usual order."""
         return at
 
-    def directions(self, width: int) -> dict[str, int]:
-        """Return the axes that are reported, each by its number in the frame."""
+    def directions(self, width: int) -> list[tuple[str, int]]:
+        """Return the names of the axes that are reported, each with its number in the frame."""
         names = self.axis_names or tuple(f"axis_{k + 1}" for k in range(width))
-        return {name: k for k, name in enumerate(names)}
+        return [(name, k) for k, name in enumerate(names)]
 
     def planes(self, width: int) -> Planes:
         """Return the planes in which turning the frame changes the density."""
@@ -296,6 +298,45 @@ class Kent(ExponentialForm):
         return [Start(turned, torch.stack([kappa, beta]))]
 
 
+class VonMisesSineForm(Form):
+    """exp(k cos a + l cos b + d sin a sin b): two angles, as the vector of their cosines and sines."""
+
+    name, about = "von-mises-sine", "angles"
+    shape_names = ("concentration_1", "concentration_2", "dependence")
+
+    def directions(self, width: int) -> list[tuple[str, int]]:
+        del width
+        return [("mean", 0), ("mean", 2)]
+
+    def planes(self, width: int) -> Planes:
+        del width
+        return [(0, 1), (2, 3)]
+
+    def logs(self, shape: Tensor, y: Tensor) -> Tensor:
+        own = shape[0] * y[:, 0] + shape[1] * y[:, 2] + shape[2] * y[:, 1] * y[:, 3]
+        return own - log_sine(shape)
+
+    def mean_log(self, shape: Tensor, frame: Tensor, cloud: Cloud) -> Tensor:
+        mean, both = frame @ cloud.mean, frame[1] @ cloud.tensor @ frame[3]
+        return shape @ torch.stack([mean[0], mean[2], both]) - log_sine(shape)
+
+    def starts(self, cloud: Cloud) -> list[Start]:
+        frame = torch.zeros(4, 4, dtype=torch.float64)
+        kappas: list[Tensor] = []
+        for k in (0, 2):
+            side = Cloud(cloud.vectors[:, k : k + 2], cloud.weights)
+            ((axes, (kappa,)),) = VonMisesFisher().starts(side)
+            x, y = axes[0]
+            frame[k : k + 2, k : k + 2] = torch.stack([x, y, -y, x]).reshape(2, 2)
+            kappas.append(kappa)
+        return [Start(frame, torch.stack([*kappas, torch.zeros_like(kappas[0])]))]
+
+    def density(self, space: Space, at: Start) -> Density:
+        turns = [torch.atan2(at.frame[k, k + 1], at.frame[k, k]) / (2 * math.pi) for k in (0, 2)]
+        means = space.project(torch.stack(turns)[None])[0]
+        return VonMisesSine(space, means, at.shape)
+
+
 class CentralGaussian(Form):
     """The directions of normal vectors with mean 0: axes, with heavier tails than Bingham's."""
 
@@ -347,6 +388,14 @@ def _refuse_if(wrong: bool, why: str) -> None:
 
 FORMS: dict[str, Form] = {
     form.name: form
-    for form in (VonMisesFisher(), Watson(), Bingham(), Kent(), CentralGaussian(), MatrixFisher())
+    for form in (
+        VonMisesFisher(),
+        Watson(),
+        Bingham(),
+        Kent(),
+        CentralGaussian(),
+        MatrixFisher(),
+        VonMisesSineForm(),
+    )
 }
 """The families of unit vectors, by name."""

@@ -86,10 +86,18 @@ def _features(local: Local, vectors: Tensor, drawn: Tensor) -> tuple[Tensor, Ten
     frame = local.at.frame
     rows, draws = vectors @ frame.mT, drawn @ frame.mT
     scale = (draws**2).mean(dim=0).sqrt().clamp_min(1e-150)
-    middle = draws.mean(dim=0) if local.form.about == "directions" else torch.zeros_like(scale)
-    scale = draws.std(dim=0).clamp_min(1e-150) if local.form.about == "directions" else scale
+    middle = (
+        draws.mean(dim=0)
+        if local.form.about in ("angles", "directions")
+        else torch.zeros_like(scale)
+    )
+    scale = (
+        draws.std(dim=0).clamp_min(1e-150)
+        if local.form.about in ("angles", "directions")
+        else scale
+    )
     rows, draws = (rows - middle) / scale, (draws - middle) / scale
-    degrees = (1, 2, 3) if local.form.about == "directions" else (2, 4)
+    degrees = (1, 2, 3) if local.form.about in ("angles", "directions") else (2, 4)
     found: list[tuple[Tensor, Tensor]] = []
     for degree in degrees:
         which = list(combinations_with_replacement(range(local.width), degree))

@@ -164,7 +164,8 @@ def covariance(
     there are no more groups than parameters.
     """
     information = local.information(cloud)
-    if local.form.about == "directions" and float(local.at.shape[0]) > MOST_TOLD:
+    sharp = float(local.at.shape.abs().max()) > MOST_TOLD
+    if local.form.about in ("angles", "directions") and sharp:
         shapes = slice(len(local.planes), None)
         information[shapes] = information[:, shapes] = 0.0
     scale = information.diagonal().clamp_min(1e-300).rsqrt()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -49,20 +50,23 @@ MOST_WIDTH = 16
 MIN_ROWS = 40
 """Rows below which intervals are rough."""
 
-ANGLES, DIRECTIONS = "von-mises", "von-mises-fisher"
-"""The families of angles, and of directions in any dimension."""
+ANGLES, SINE, DIRECTIONS = "von-mises", "von-mises-sine", "von-mises-fisher"
+"""The families of angles, of two that depend on each other, and of directions in any dimension."""
 
 AXES = ("bingham", "angular-central-gaussian")
 """The families with a frame of axes."""
 
 
 class Side(NamedTuple):
-    """A factor of the space: what it is called, its rows, the family there, and how it is written."""
+    """A factor of the space: what it is called, its rows, the family there, and how that is written.
+
+    There are as many `writings` as the family has directions, or one for all.
+    """
 
     name: str
     cloud: Cloud
     local: Local
-    writing: Writing
+    writings: tuple[Writing, ...]
 
 
 def families_of(space: Space) -> tuple[str, ...]:
@@ -73,7 +77,7 @@ def families_of(space: Space) -> tuple[str, ...]:
     ('bingham', 'angular-central-gaussian', 'watson', 'matrix-fisher')
     """
     if isinstance(space, Torus) and not isinstance(space, MixedTorus):
-        return (ANGLES,)
+        return (ANGLES, SINE) if space.dim == 2 else (ANGLES,)
     try:
         images = images_of(space)
     except OrbiflowError:
@@ -176,7 +180,7 @@ def _sides(space: Space, name: str, rows: Rows, columns: Sequence[str] | None) -
     """Return the family at its maximum on each factor of the space: each angle of a torus is one."""
     require_family(space, name)
     found: list[Side] = []
-    for title, vectors, writing in _factors(space, rows.points, columns):
+    for title, vectors, writings in _factors(space, name, rows.points, columns):
         cloud = Cloud(vectors, rows.weights)
         if len(vectors) <= cloud.width:
             raise OrbiflowError(
@@ -190,13 +194,13 @@ def _sides(space: Space, name: str, rows: Rows, columns: Sequence[str] | None) -
                 f"the rows are so close together that the {name} density would have a concentration "
                 f"above {MAX_CONCENTRATION:g}, for which there are too few digits"
             )
-        found.append(Side(title, cloud, local, writing))
+        found.append(Side(title, cloud, local, writings))
     return found
 
 
 def _factors(
-    space: Space, points: Tensor, columns: Sequence[str] | None
-) -> list[tuple[str, Tensor, Writing]]:
+    space: Space, name: str, points: Tensor, columns: Sequence[str] | None
+) -> list[tuple[str, Tensor, tuple[Writing, ...]]]:
     """Return the unit vectors (N, p) of each factor of the space, and how directions are written."""
     names = tuple(columns or space.columns)
     if not isinstance(space, Torus):
@@ -211,14 +215,17 @@ def _factors(
         unit = _unit_of(space)
         limits = tuple(_largest(column, unit) for column in space.columns)
         writing = Writing(partial(_written, space), written, periods, limits, unit)
-        return [("", space.features(points)[0], writing)]
-    found: list[tuple[str, Tensor, Writing]] = []
-    for axis, name in enumerate(names):
+        return [("", space.features(points)[0], (writing,))]
+    found: list[tuple[str, Tensor, tuple[Writing, ...]]] = []
+    for axis, column in enumerate(names):
         angles = 2 * math.pi * points[:, axis]
         vectors = torch.stack([angles.cos(), angles.sin()], dim=1)
-        write = partial(_written_angle, space, axis)
-        writing = Writing(write, (name,), (space.period_of(axis),), (math.inf,), str(space.unit))
-        found.append((name, vectors, writing))
+        write = partial(_written_angle, space, axis, 2 * axis * (name == SINE))
+        writing = Writing(write, (column,), (space.period_of(axis),), (math.inf,), str(space.unit))
+        found.append((column, vectors, (writing,)))
+    if name == SINE:
+        _, vectors, writings = zip(*found, strict=True)
+        return [("", torch.cat(vectors, dim=1), sum(writings, ()))]
     return found
 
 
@@ -240,9 +247,9 @@ def _written(space: Space, vector: Tensor) -> Array:
     return space.from_chart(space.from_features(vector[None]))[0]
 
 
-def _written_angle(space: Torus, axis: int, vector: Tensor) -> Array:
+def _written_angle(space: Torus, axis: int, place: int, vector: Tensor) -> Array:
     row = torch.zeros(1, space.dim, dtype=torch.float64)
-    row[0, axis] = torch.atan2(vector[1], vector[0]) / (2 * math.pi)
+    row[0, axis] = torch.atan2(vector[place + 1], vector[place]) / (2 * math.pi)
     return space.from_chart(space.project(row))[0, axis : axis + 1]
 
 
@@ -271,22 +278,25 @@ def _parametric(
         local = side.local
         spread = covariance(local, side.cloud, count, rows.groups, rows.weights is None)
         free += len(spread)
-        for label, number in local.form.directions(local.width).items():
-            own, cone = direction_parameters(label, number, local, spread, side.writing)
+        for k, (label, number) in enumerate(local.form.directions(local.width)):
+            writing = side.writings[k % len(side.writings)]
+            own, cone = direction_parameters(label, number, local, spread, writing)
             parameters += own
             cones[f"{label}_{side.name}" if side.name else label] = cone
         shapes = shape_parameters(local, spread)
         if local.form.name == DIRECTIONS and even:
             shapes = [_inverted(shapes[0], side.cloud, count)]
         parameters += [_of_side(one, side.name) for one in shapes]
-    if name == ANGLES:
+    if name == SINE:
+        parameters = [_of_columns(one, sides[0].writings) for one in parameters]
+    if name in (ANGLES, SINE):
         cones = {}  # the interval of an angle says it
     mean = float(rows.mean(density.log_prob(rows.points, measure="natural")))
     uniform = -math.log(space.volume)
     gain = mean - uniform
     goodness = None
     if even:
-        goodness = _goodness(space, sides, density, torch.Generator().manual_seed(seed))
+        goodness = _goodness(space, name, sides, density, torch.Generator().manual_seed(seed))
     notes = _notes(sides, count, rows.groups, free)
     if 2 * count * gain < _chi_square_quantile(free):
         notes.append(
@@ -322,6 +332,15 @@ def _chi_square_quantile(free: int) -> float:
     return float(special.chdtri(free, 1 - LEVEL))
 
 
+def _of_columns(one: Parameter, writings: tuple[Writing, ...]) -> Parameter:
+    """Return a parameter named for a column instead of by its number."""
+    for k, writing in enumerate(writings, 1):
+        one = replace(
+            one, name=re.sub(f"^concentration_{k}$", f"concentration_{writing.names[0]}", one.name)
+        )
+    return one
+
+
 def _of_side(one: Parameter, side: str) -> Parameter:
     return replace(one, name=f"{one.name}_{side}") if side else one
 
@@ -336,10 +355,10 @@ def _inverted(one: Parameter, cloud: Cloud, count: float) -> Parameter:
 
 
 def _goodness(
-    space: Space, sides: list[Side], density: Density, generator: torch.Generator
+    space: Space, name: str, sides: list[Side], density: Density, generator: torch.Generator
 ) -> Goodness | None:
     draws = density.sample((DRAWS,), generator)
-    factors = _factors(space, draws, None)
+    factors = _factors(space, name, draws, None)
     seen = [
         (side.local, side.cloud.vectors[:DRAWS], vectors)
         for side, (_, vectors, _) in zip(sides, factors, strict=True)

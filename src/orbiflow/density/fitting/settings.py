@@ -17,8 +17,8 @@ from orbiflow.settings import (
 )
 
 Component = Literal[
-    "flow", "kernels", "mixture", "chains", "network", "von-mises", "von-mises-fisher", "kent",
-    "watson", "bingham", "angular-central-gaussian", "matrix-fisher",
+    "flow", "kernels", "mixture", "chains", "network", "von-mises", "von-mises-sine",
+    "von-mises-fisher", "kent", "watson", "bingham", "angular-central-gaussian", "matrix-fisher",
 ]  # fmt: skip
 Seed = Annotated[int, Range(-(2**63), 2**64 - 1)]
 

@@ -1,0 +1,121 @@
+"""The bivariate von Mises density with sines: constant, samples, marginals, fits."""
+
+import math
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.density import (
+    DensityEstimator,
+    VonMisesSine,
+    conditional,
+    density_to_bytes,
+    fit_parametric,
+    make_space,
+    read_density,
+)
+from orbiflow.density.models import log_sine
+from orbiflow.errors import OrbiflowError
+
+SHAPES = st.tuples(st.floats(0.05, 40), st.floats(0.05, 40), st.floats(-30, 30))
+
+
+def numbers(*values: float) -> torch.Tensor:
+    return torch.tensor(values, dtype=torch.float64)
+
+
+def grid(count: int) -> torch.Tensor:
+    line = (torch.arange(count, dtype=torch.float64) + 0.5) / count
+    return torch.cartesian_prod(line, line)
+
+
+@given(SHAPES)
+@settings(max_examples=20, deadline=None)
+def test_the_integral_is_one_and_marginals_are_integrals(shape: tuple[float, ...]) -> None:
+    density = VonMisesSine(make_space("torus"), numbers(0.1, 0.7), numbers(*shape))
+    heights = density.log_prob(grid(120)).exp().reshape(120, 120)
+    assert float(heights.mean()) == pytest.approx(1, abs=1e-9)
+    line = (torch.arange(120, dtype=torch.float64)[:, None] + 0.5) / 120
+    for axis in (0, 1):
+        own = density.log_marginal(line, [axis]).exp()
+        assert torch.allclose(own, heights.mean(dim=1 - axis), atol=1e-8)
+
+
+def test_constant_is_singhs_series() -> None:
+    for k, m, d in ((2.0, 3.0, 1.0), (10.0, 20.0, 12.0), (1.5, 0.7, -1.1)):
+        terms = [
+            mpmath.binomial(2 * j, j) * (mpmath.mpf(d) ** 2 / (4 * k * m)) ** j
+            * mpmath.besseli(j, k) * mpmath.besseli(j, m)
+            for j in range(120)
+        ]  # fmt: skip
+        exact = float(mpmath.log(4 * mpmath.pi**2 * mpmath.fsum(terms)))
+        assert float(log_sine(numbers(k, m, d))) == pytest.approx(exact, abs=1e-12)
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=8, deadline=None)
+def test_parameters_are_found_again(seed: int) -> None:
+    rng, space = np.random.default_rng(seed), make_space("torus", unit="degrees")
+    shape = [*rng.uniform(1, 20, 2).tolist(), 0.0]
+    shape[2] = float(rng.uniform(-0.9, 0.9) * math.sqrt(shape[0] * shape[1]))
+    density = VonMisesSine(space, torch.tensor(rng.uniform(size=2)), numbers(*shape))
+    points = density.sample((1500,), torch.Generator().manual_seed(seed))
+    found = fit_parametric(space, points, "von-mises-sine", columns=["phi", "psi"])[1].parametric
+    assert found is not None
+    truth = [*space.from_chart(density.means[None])[0].tolist(), *shape]
+    names = ("mean_phi", "mean_psi", "concentration_phi", "concentration_psi", "dependence")
+    assert tuple(one.name for one in found.parameters) == names
+    for one, exact in zip(found.parameters, truth, strict=True):
+        assert one.error is not None
+        off = one.value - exact
+        off -= 360 * round(off / 360) if one.unit else 0
+        assert abs(off) < 5.5 * one.error
+
+
+def test_samples_files_and_what_is_given(tmp_path: Path) -> None:
+    space = make_space("torus")
+    density = VonMisesSine(space, numbers(0.2, 0.9), numbers(3, 5, 6))  # of two modes
+    points = grid(100)
+    weights = density.log_prob(points).exp() / len(points)
+    drawn = density.sample((20_000,), torch.Generator().manual_seed(0))
+    for a, b in ((1, 0), (0, 1), (1, 1), (2, -1)):
+        waves, exact = (
+            torch.polar(torch.ones(len(x), dtype=torch.float64), 2 * math.pi * (x @ numbers(a, b)))
+            for x in (drawn, points)
+        )
+        assert abs(complex(waves.mean()) - complex((weights * exact).sum())) < 0.03
+    (tmp_path / "d.safetensors").write_bytes(density_to_bytes(density))
+    again, _ = read_density(tmp_path / "d.safetensors")
+    assert torch.equal(again.log_prob(drawn[:50]), density.log_prob(drawn[:50]))
+    line = (torch.arange(200, dtype=torch.float64)[:, None] + 0.5) / 200
+    both = torch.cat([line, torch.full_like(line, 0.3)], dim=1)
+    logs = density.log_prob(both) - density.log_marginal(both[:1, 1:], [1])
+    known = conditional(density, {1: 0.3})
+    assert torch.allclose(known.log_prob(line), logs, atol=1e-9)
+
+
+def test_beside_independent_angles_and_refusals() -> None:
+    rng = np.random.default_rng(0)
+    one = rng.vonmises(0, 4, 400)
+    pair = np.stack([one, one + rng.vonmises(1, 6, 400)], axis=1)
+    fits = {
+        name: DensityEstimator("torus", components=name).fit(pair).report_.parametric
+        for name in ("von-mises", "von-mises-sine")
+    }
+    alone, together = fits.values()
+    assert alone is not None
+    assert together is not None
+    assert together.aic < alone.aic - 50
+    assert together["dependence"].low is not None
+    assert together["dependence"].low > 0
+    with pytest.raises(OrbiflowError, match="choose von-mises"):
+        fit_parametric(make_space("torus", dim=3), torch.rand(20, 3), "von-mises-sine")
+    with pytest.raises(OrbiflowError, match="torus of two angles"):
+        VonMisesSine(make_space("sphere"), numbers(0, 0), numbers(1, 1, 0))
+    with pytest.raises(OrbiflowError, match="three shape parameters"):
+        VonMisesSine(make_space("torus"), numbers(0, 0), numbers(1, 1))
