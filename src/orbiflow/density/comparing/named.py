@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import statistics
 from orbiflow.density.comparing.data_sets import sample_points
-from orbiflow.density.comparing.resampling import MAX_ROWS, Groups, chosen_rows
+from orbiflow.density.comparing.resampling import MAX_ROWS
 from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.comparing.statistics import Found, Labels
 from orbiflow.density.fitting import highest_log_likelihood
 from orbiflow.density.models import images_of
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import MixedTorus, Space, Torus
 from orbiflow.errors import OrbiflowError, SettingError
 
 MIN_SAMPLE = 5
@@ -139,12 +139,26 @@ def _plain(test: Callable[[Array, Labels], Found]) -> Run:
 
 def _by_permutation(statistic: Callable[[Array, Labels], Array]) -> Run:
     def run(vectors: Array, labels: Labels, settings: ComparisonSettings) -> Found:
-        kept = chosen_rows(labels == 0, Groups.of(None, len(labels)), MAX_ROWS, settings.seed)
+        kept = _some_of_each(labels, settings.seed)
         return statistics.permuted(
             statistic, vectors[kept], labels[kept], settings.permutations, settings.seed
         )
 
     return run
+
+
+def _some_of_each(labels: Labels, seed: int) -> Labels:
+    """Return the numbers of some `MAX_ROWS` rows at random, of small samples more than their share."""
+    if len(labels) <= MAX_ROWS:
+        return np.arange(len(labels))
+    rng, sizes = np.random.default_rng(seed), np.bincount(labels)
+    fair = np.round(MAX_ROWS * sizes / len(labels)).astype(int)
+    wanted = np.maximum(fair, np.minimum(sizes, MAX_ROWS // (2 * len(sizes))))
+    found = [
+        rng.choice(np.flatnonzero(labels == k), count, replace=False)
+        for k, count in enumerate(wanted)
+    ]
+    return np.sort(np.concatenate(found))
 
 
 def _ratio_of_likelihoods(vectors: Array, labels: Labels) -> Found:
@@ -192,16 +206,16 @@ KINDS = {
     "common-mean": _Kind(
         _plain(statistics.common_mean), "equal mean directions",
         "assumes 25 rows or more in each sample, no model and no common concentration",
-        "Watson, 1983; Fisher, 1993, section 5.3.4", "means", doubt=_small(MIN_LARGE),
+        "Watson, 1983; Fisher, 1993, chapter 5", "means", doubt=_small(MIN_LARGE),
     ),
     "common-median": _Kind(
         _plain(statistics.common_median), "equal median directions",
-        "assumes 10 rows or more in each sample and no model", "Fisher, 1993, section 5.3.2",
+        "assumes 10 rows or more in each sample and no model", "Fisher, 1993, chapter 5",
         "circles", doubt=_small(MIN_MEDIAN),
     ),
     "common-concentration": _Kind(
         _plain(statistics.common_concentration), "equal concentrations about the samples' own means",
-        "assumes one mode and a mean direction in each sample", "Fisher, 1993, section 5.4.4", "means",
+        "assumes one mode and a mean direction in each sample", "Fisher, 1993, chapter 5", "means",
     ),
     "mardia-watson-wheeler": _Kind(
         _by_permutation(statistics.mardia_watson_wheeler), "equal distributions",
@@ -277,7 +291,7 @@ def named_tests(
     notes = ["each p is that of one test alone: settle which one counts before you look"]
     if sum(sizes) > MAX_ROWS and any(one.by == "permutation" for one in found):
         notes.append(
-            f"tests by permutations look at {MAX_ROWS} of {sum(sizes)} rows, drawn at random"
+            f"tests by permutations look at some {MAX_ROWS} of {sum(sizes)} rows, drawn at random"
         )
     return SampleTests(
         tuple(names), sizes, tuple(found), settings.permutations, settings.seed, tuple(notes)
@@ -288,7 +302,7 @@ def _vectors(
     space: Space, points: torch.Tensor, columns: tuple[str, ...]
 ) -> tuple[dict[str, Array], Array, str]:
     """Return the unit vectors (N, p) of each column, what distances are taken of, and what they are."""
-    if space.is_torus and space.unit is not None:
+    if isinstance(space, Torus) and not isinstance(space, MixedTorus):
         angles = 2 * math.pi * points.numpy()
         sides = {
             name: np.stack([np.cos(column), np.sin(column)], axis=1)

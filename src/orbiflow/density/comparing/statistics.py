@@ -4,7 +4,7 @@ All take unit vectors (N, p) of all samples together and the number (N,) of each
 whose p is from permutations take a table (N, B) of such numbers, one column for each permutation.
 
 Sources: Mardia and Jupp, Directional Statistics (2000), chapters 7 and 10; Fisher, Statistical
-Analysis of Circular Data (1993), sections 5.3 and 5.4; Rizzo and Szekely, DISCO analysis (2010).
+Analysis of Circular Data (1993), chapter 5; Rizzo and Szekely, DISCO analysis (2010).
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ from orbiflow.density.fitting import concentration
 
 Labels = NDArray[np.int64]
 """The number of each row's sample, from 0."""
+
+BLOCK_ENTRIES = 1_000_000
+"""Entries of a table of permutations worked on at a time."""
 
 TIED = 1e-12
 """Turns by which angles that count as equal may differ."""
@@ -81,7 +84,7 @@ def common_mean(vectors: Array, labels: Labels) -> Found:
     """Test of equal mean directions of large samples, whatever their densities.
 
     Each sample's mean direction has its own circular standard error (Watson, Statistics on spheres,
-    1983, section 4.3; Fisher, 1993, section 5.3.4, for angles).
+    1983; Fisher, 1993, chapter 5, for angles).
     """
     width = vectors.shape[1]
     sums, sizes = _sums(vectors, labels), _sizes(labels)
@@ -97,7 +100,7 @@ def common_mean(vectors: Array, labels: Labels) -> Found:
 def common_concentration(vectors: Array, labels: Labels) -> Found:
     """Test of equal concentrations: an analysis of variance of the sines of deviations.
 
-    Fisher (1993), section 5.4.4, for angles; on spheres of the lengths across the mean alike.
+    Fisher (1993), chapter 5, for angles; on spheres of the lengths across the mean alike.
     """
     sums, sizes = _sums(vectors, labels), _sizes(labels)
     means = sums / np.linalg.norm(sums, axis=1, keepdims=True)
@@ -111,7 +114,7 @@ def common_concentration(vectors: Array, labels: Labels) -> Found:
 
 
 def common_median(vectors: Array, labels: Labels) -> Found:
-    """Test of equal median directions of angles, whatever their densities (Fisher, 1993, 5.3.2)."""
+    """Test of equal median directions of angles, whatever their densities (Fisher, 1993)."""
     turns = _turns(vectors)
     side = (turns - median_direction(turns) + 0.5) % 1.0 < 0.5
     sizes, below = _sizes(labels), np.bincount(labels, side)
@@ -218,7 +221,12 @@ def permuted(
 ) -> Found:
     """Return a statistic with its p among random permutations of the samples."""
     rng = np.random.default_rng(seed)
-    table = np.stack([labels, *(rng.permutation(labels) for _ in range(permutations))], axis=1)
-    found = statistic(vectors, table)
+    blocks = [statistic(vectors, labels[:, None])]
+    size = max(1, BLOCK_ENTRIES // len(labels))
+    for start in range(0, permutations, size):
+        count = min(size, permutations - start)
+        table = np.stack([rng.permutation(labels) for _ in range(count)], axis=1)
+        blocks.append(statistic(vectors, table))
+    found = np.concatenate(blocks)
     p = float((found >= found[0] * (1 - 1e-12) - 1e-15).mean())
     return Found(float(found[0]), (), "permutation", p)

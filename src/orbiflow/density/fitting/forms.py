@@ -3,7 +3,7 @@
 A family has a frame of axes and a few shape parameters. In the frame's coordinates all but one are
 exp(sum of a_i y_i + l_i y_i^2) / c, so that one constant serves them (`log_fisher_bingham`).
 
-Sources: Mardia and Jupp, Directional Statistics (2000), sections 9.3, 9.4 and 13.2; Kent, The
+Sources: Mardia and Jupp, Directional Statistics (2000), chapters 9 and 13; Kent, The
 Fisher-Bingham distribution on the sphere (1982); Tyler, Statistical analysis for the angular central
 Gaussian distribution on the sphere (1987); Downs, Orientation statistics (1972); Prentice, Orientation
 statistics without parametric assumptions (1986), for rotations as axes.
@@ -215,8 +215,8 @@ class Watson(ExponentialForm):
         found: list[Start] = []
         for end in (0, -1):
             s = squares[end]
-            # Sra and Karp, The multivariate Watson distribution (2013), equation 3.7
-            guess = (width * s - 1) / (2 * s * (1 - s)) * (1 + (1 - s) * 2 / width)
+            # a bound of Sra and Karp, The multivariate Watson distribution (2013)
+            guess = (width * s - 1) / (2 * s * (1 - s)) * (1 + (1 - s) * 2 / (width - 1))
             found.append(Start(_completed(axes[end]), guess[None]))
         return found
 
@@ -292,7 +292,7 @@ class Kent(ExponentialForm):
         squares, axes = linalg.eigh(across)
         _refuse_if(float(squares[0]) < FLAT, "the rows lie on a great circle")
         turned = torch.cat([frame[:1], axes.mT.flip(0) @ frame[1:]])
-        # that of normal directions, with some room to 2 b = k (Kent, 1982, section 4)
+        # that of normal directions, with some room to 2 b = k
         beta = 0.25 * (1 / squares[0] - 1 / squares[1])
         kappa = torch.maximum(kappa, 2.2 * beta)
         return [Start(turned, torch.stack([kappa, beta]))]

@@ -85,19 +85,11 @@ def _features(local: Local, vectors: Tensor, drawn: Tensor) -> tuple[Tensor, Ten
     """Return the moments' polynomials at rows (N, k) and at draws (M, k)."""
     frame = local.at.frame
     rows, draws = vectors @ frame.mT, drawn @ frame.mT
-    scale = (draws**2).mean(dim=0).sqrt().clamp_min(1e-150)
-    middle = (
-        draws.mean(dim=0)
-        if local.form.about in ("angles", "directions")
-        else torch.zeros_like(scale)
-    )
-    scale = (
-        draws.std(dim=0).clamp_min(1e-150)
-        if local.form.about in ("angles", "directions")
-        else scale
-    )
+    degrees, middle = (2, 4), torch.zeros(local.width, dtype=torch.float64)
+    if local.form.about in ("angles", "directions"):
+        degrees, middle = (1, 2, 3), draws.mean(dim=0)
+    scale = ((draws - middle) ** 2).mean(dim=0).sqrt().clamp_min(1e-150)
     rows, draws = (rows - middle) / scale, (draws - middle) / scale
-    degrees = (1, 2, 3) if local.form.about in ("angles", "directions") else (2, 4)
     found: list[tuple[Tensor, Tensor]] = []
     for degree in degrees:
         which = list(combinations_with_replacement(range(local.width), degree))

@@ -35,7 +35,7 @@ def log_fisher_bingham(values: Tensor, vector: Tensor) -> Tensor:
 
     The sphere's area times the density of the squared length of a normal vector at 1 is an inverse
     Laplace transform (Kume and Wood, Saddlepoint approximations for the Bingham and Fisher-Bingham
-    normalising constants, 2005, section 2.2). Here it is no approximation: the trapezoidal rule on a
+    normalising constants, 2005). Here it is no approximation: the trapezoidal rule on a
     parabola through the saddle point, about the cuts, has the error of rounding (Trefethen and
     Weideman, The exponentially convergent trapezoidal rule, 2014). It is differentiable any number of
     times.
