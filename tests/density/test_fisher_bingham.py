@@ -70,6 +70,48 @@ def test_constant_of_kent_is_kents_series() -> None:
         assert float(found) == pytest.approx(exact, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("kappa", "beta"), [(138, 84), (844, 422), (20, 30), (2381, 2798), (1e4, 6e3)]
+)
+def test_constant_of_two_modes(kappa: float, beta: float) -> None:
+    """Where a component of a lies across the highest eigenvalue, another contour may be needed."""
+
+    def density(z: Any) -> Any:
+        return mpmath.exp(kappa * z) * mpmath.besseli(0, beta * (1 - z * z))
+
+    top = kappa / (2 * beta)
+    ends = sorted({-1.0, max(-1, top - 0.2), min(1.0, top), min(1.0, top + 0.2), 1.0})
+    exact = float(mpmath.log(2 * mpmath.pi * mpmath.quad(density, ends)))
+    shape = numbers(kappa, beta)
+
+    def log(k: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+        none = torch.zeros_like(k)
+        return log_fisher_bingham(torch.stack([none, b, -b]), torch.stack([k, none, none]))
+
+    assert float(log(*shape)) == pytest.approx(exact, abs=1e-11)
+    shape.requires_grad_()
+    (slopes,) = torch.autograd.grad(log(*shape), shape)
+    for k in range(2):
+        step = 1e-4 * shape.detach() * torch.eye(2)[k]
+        at = shape.detach()
+        change = log(*(at + step)) - log(*(at - step))
+        assert float(slopes[k]) == pytest.approx(float(change / (2 * step[k])), rel=1e-4)
+
+
+@given(st.lists(st.floats(-1, 1), min_size=6, max_size=6), st.floats(-1, 2.3))
+@settings(max_examples=40, deadline=None)
+def test_constant_of_any_density_on_the_sphere(shares: list[float], power: float) -> None:
+    own = np.array(shares) * 10**power
+    z, weights = np.polynomial.legendre.leggauss(300)
+    turns = 2 * np.pi * np.arange(300) / 300
+    flat = np.sqrt(1 - z**2)[:, None]
+    x = np.stack([flat * np.cos(turns), flat * np.sin(turns), z[:, None] + 0 * turns], axis=-1)
+    logs = x**2 @ own[:3] + x @ own[3:]
+    exact = logs.max() + np.log(2 * np.pi * weights @ np.exp(logs - logs.max()).mean(axis=1))
+    found = log_fisher_bingham(torch.tensor(own[:3]), torch.tensor(own[3:]))
+    assert float(found) == pytest.approx(exact, abs=1e-10)
+
+
 @given(st.lists(st.floats(-50, 50), min_size=3, max_size=5), st.floats(-100, 100), st.floats(0, 20))
 @settings(max_examples=30, deadline=None)
 def test_constant_moves_with_its_eigenvalues(

@@ -96,7 +96,7 @@ def drawn(name: str, space_name: str, rows: int, seed: int) -> tuple[Space, torc
 
 
 @given(st.sampled_from([(n, s) for n, own in SPACES.items() for s in own]), st.integers(0, 10**6))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_parameters_are_found_again(which: tuple[str, str], seed: int) -> None:
     name, where = which
     space, points, truth = drawn(name, where, 800, seed)
@@ -168,11 +168,11 @@ def test_matrix_fisher_is_the_trace_of_a_matrix_times_a_rotation() -> None:
 @pytest.mark.parametrize(("kappa", "rows"), [(0.0, 20), (0.5, 40), (3.0, 15), (25.0, 8)])
 def test_concentration_is_in_its_interval_as_often_as_said(kappa: float, rows: int) -> None:
     rng = np.random.default_rng(5)
-    angles = rng.vonmises(0, kappa, (300, rows))
+    angles = rng.vonmises(0, kappa, (200, rows))
     lengths = abs(np.exp(1j * angles).mean(axis=1))
     ends = np.array([concentration_interval(1 - one, rows, 2) for one in lengths])
     inside = ((ends[:, 0] <= kappa) & (kappa <= ends[:, 1])).mean()
-    assert inside > 0.91  # three standard errors of 300 trials below 0.95
+    assert inside > 0.9  # three standard errors of 200 trials below 0.95
 
 
 @pytest.mark.parametrize("name", ["kent", "bingham"])
@@ -183,7 +183,7 @@ def test_intervals_cover_and_the_smooth_test_keeps_its_level(
     monkeypatch.setattr(goodness, "RESAMPLES", 199)
     inside: list[bool] = []
     cones = small = 0
-    for seed in range(20):
+    for seed in range(14):
         space, points, truth = drawn(name, SPACES[name][0], 100, seed)
         found = found_by(space, points, name)
         shapes = found.parameters[-2:]
@@ -197,9 +197,9 @@ def test_intervals_cover_and_the_smooth_test_keeps_its_level(
         apart = np.degrees(np.arccos(min(1.0, abs(float(axis @ truth.frame[0])))))
         cones += apart <= (found.cones[label] or 90)
         small += p_of(found) < 0.05
-    assert np.mean(inside) > 0.85
-    assert cones >= 16
-    assert small <= 4
+    assert np.mean(inside) > 0.8
+    assert cones >= 11
+    assert small <= 3
 
 
 def test_smooth_test_sees_what_is_not_of_the_family() -> None:

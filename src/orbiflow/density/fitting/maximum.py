@@ -16,6 +16,9 @@ from orbiflow.typed_torch import linalg
 MOST_STEPS, LEAST_GAIN = 200, 1e-15
 """Steps of Newton's method at most, and the relative gain at which it ends."""
 
+LEFT_GAIN = 1e-6
+"""Nats a row that a step may still promise where none is gained, which is rounding."""
+
 LARGEST_TURN, LARGEST_STEP = 0.5, 1.0
 """Radians by which a step may turn the frame, and by how much it may change a shape parameter of 1."""
 
@@ -131,13 +134,15 @@ def _climbed(local: Local, cloud: Cloud) -> Local:
                 break
             size /= 4
         else:
+            if expected > LEFT_GAIN:
+                break
             return local
         gained, local, value = new - value, tried, new
         if max(gained, expected) < LEAST_GAIN * (1 + abs(value)):
             return local
     raise OrbiflowError(
-        f"the {local.form.name} density has no likeliest parameters for these rows: its concentration "
-        "grows without end"
+        f"no likeliest parameters of the {local.form.name} density were found for these rows: its "
+        "concentration may grow without end"
     )
 
 

@@ -20,11 +20,11 @@ from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import linalg
 
-NODES = 160
+NODES = 200
 """Points of the contour on one side of the real axis; half as many change no digit."""
 
-LEAST_LOG = 45.0
-"""By how much the integrand has fallen, in nats, where the contour ends."""
+LEAST_LOG, REACH = 45.0, 400
+"""By how much the integrand has fallen, in nats, where the contour ends, and ends that are tried."""
 
 MOST_TRIES = 10_000
 """Rounds of rejection after which a sampler gives up, which none has reached."""
@@ -51,15 +51,21 @@ def log_fisher_bingham(values: Tensor, vector: Tensor) -> Tensor:
     (4.0, 2.0)
     """
     top, distance = _saddle(values.detach().numpy(), vector.detach().numpy())
-    steps = (torch.arange(NODES, dtype=torch.float64) + 0.5) / NODES
-    width = math.sqrt(LEAST_LOG / distance)
-    root = torch.complex(torch.ones_like(steps), steps * width)
+    focus, end = _parabola(top - values.detach().numpy(), vector.detach().numpy(), distance)
+    # points crowd towards the saddle point, as the highest eigenvalue may be much nearer than the focus
+    nearest = distance / focus / (1 + math.sqrt(max(0.0, 1 - distance / focus)))
+    longest = math.asinh(end / nearest)
+    steps = (torch.arange(NODES, dtype=torch.float64) + 0.5) * (longest / NODES)
+    along = nearest * steps.sinh()
+    root = torch.complex(torch.ones_like(steps), along)
     # differences from the saddle point, where no digit is lost
     gap = top - values
-    at, middle = gap + distance * (root * root)[:, None], gap + distance
-    logs = distance * (root * root - 1) - (at / middle).log().sum(dim=1) / 2
-    logs = logs + (vector**2 * (1 / at - 1 / middle)).sum(dim=1) / 4
-    total = (logs.exp() * root).real.sum() * (2 * distance * width / NODES)
+    away, middle = focus * torch.complex(-(along**2), 2 * along), gap + distance
+    at = middle + away[:, None]
+    logs = away - (at / middle).log().sum(dim=1) / 2
+    logs = logs - (vector**2 * away[:, None] / (at * middle)).sum(dim=1) / 4
+    weights = 2 * focus * (longest / NODES) * nearest * steps.cosh()
+    total = ((logs.exp() * root).real * weights).sum()
     saddle = top + distance - middle.log().sum() / 2 + (vector**2 / middle).sum() / 4
     return saddle + (total / math.pi).log() + math.log(2) + len(values) / 2 * math.log(math.pi)
 
@@ -76,6 +82,25 @@ def _saddle(values: Array, vector: Array) -> tuple[float, float]:
     low = 0.5 - 1e-12
     found: Any = brentq(excess, low, most * (1 + 1e-9), rtol=1e-12)
     return top, float(found)
+
+
+def _parabola(gaps: Array, vector: Array, distance: float) -> tuple[float, float]:
+    """Return how far the focus is from the saddle point, and where the contour ends.
+
+    About the highest eigenvalue the integrand falls fastest, unless a component of a at a lower one
+    lifts it before it has fallen far enough: then the focus is the lowest of these, and no term grows.
+    """
+    lower = (vector != 0) & (gaps > 0)
+    if not lower.any():
+        return distance, math.sqrt(LEAST_LOG / distance)
+    middle, squares = gaps[lower] + distance, vector[lower] ** 2 / 4
+    back = np.linspace(0.0, 0.9 * float(middle.min()), REACH)[:, None]
+    falls = back[:, 0] - (squares * (1 / (middle - back) - 1 / middle)).sum(axis=1)
+    enough = np.flatnonzero(falls >= LEAST_LOG)
+    if len(enough):
+        return distance, math.sqrt(float(back[enough[0], 0]) / distance)
+    focus = float(middle.max())
+    return focus, math.sqrt(LEAST_LOG / focus)
 
 
 def images_of(space: Space, vector: Tensor | None = None) -> int:
