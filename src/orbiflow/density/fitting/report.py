@@ -41,7 +41,7 @@ def silent(_share: float, _what: str) -> None:
 class ComponentEvidence:
     """What a component of a density is worth, by `rows` that were held out.
 
-    - `name`: "flow", "kernels", "mixture", "chains" or "network"; `share`: Its weight in the density.
+    - `name`: One of `KNOWN`; `share`: Its weight in the density.
     - `alone`: Its mean log density at held-out rows, in nats above the uniform one.
     - `gain`, `error`: Nats that the density would lose without it, and their standard error.
     - `others`: As `alone`, of all other components together; None where the rows are those of all. A
