@@ -69,12 +69,23 @@ def test_it_is_what_is_made_and_nothing_is_left_of_it(client: Client, address: s
         ("solid", {"kind": "cutter"}),
         ("animate", {"kind": "grow"}),
         ("art", {"world": "spiral"}),
+        ("art", {"world": "disc", "format": "html"}),
     ],
 )
 def test_all_that_can_be_made_is_shown_small(
     client: Client, address: str, operation: str, settings: dict[str, Any]
 ) -> None:
     assert 200 < max(image_of(preview(client, address, operation, **settings)).size) <= 1200
+
+
+def test_a_world_is_made_to_be_turned(client: Client, address: str) -> None:
+    project, _, number = address.rpartition("/tiles/")
+    body = {"operation": "art", "settings": {"tile": int(number), "world": "disc", "format": "html"}}
+    task = done(client, client.post(f"{project}/tasks", json=body))
+    [file] = task["result"]["files"]
+    assert file["name"].endswith(".html")
+    made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").text
+    assert "showWorld" in made
 
 
 def test_a_drawing_is_on_what_is_printed_in_3d(client: Client, address: str) -> None:

@@ -1,4 +1,4 @@
-/** What can be made of a tile: which settings matter most, and what they are called here. */
+/** What can be made of a tile, and what its settings are called here. */
 
 /** Plain names of settings, whatever is made. */
 const PLAIN = {
@@ -19,13 +19,15 @@ const PLAIN = {
   foot: "Width of the rim for the hand",
   fps: "Pictures per second",
   kerf: "Width of the machine's cut",
+  magnet: "Width of magnets in the sides",
+  magnet_depth: "Height of magnets",
   margin: "Empty edge of the page",
   marks: "Marks for a cutter's eye",
   nozzle: "Width of the printer's line",
   offset: "Cut this far outside",
   outline: "Width of lines between tiles",
   relief: "How far lines stand out",
-  repeat: "Make a piece that repeats, as for wallpaper",
+  repeat: "A piece that repeats, as for wallpaper",
   rotate: "Turn the pattern",
   spacing: "Room between cuts",
   strokes: "Kind of lines",
@@ -118,7 +120,7 @@ export const KINDS = {
   art: {
     title: "Picture",
     image: "picture",
-    first: ["world", "metamorphosis", "area", "tile_size", "palette", "colour"],
+    first: ["world", "metamorphosis", "area", "tile_size", "palette", "colour", "format"],
     words: plain({
       world: {
         about: "",
@@ -145,7 +147,11 @@ export const KINDS = {
       stretch: { title: "How much it may be stretched" },
       area: {
         title: "Width x height",
-        about: "Pixels such as 3000x2000px, a size such as 300x200mm, or A4, square or story.",
+        about: "Such as 3000x2000px, 300x200mm, A4, square or story.",
+      },
+      format: {
+        ...FORMAT,
+        options: { png: "PNG", svg: "SVG", pdf: "PDF", html: "HTML (to turn by hand)" },
       },
     }),
   },
@@ -193,7 +199,7 @@ export const KINDS = {
       seconds: { title: "How long?" },
       area: {
         title: "Width x height",
-        about: "Pixels such as 800x534px, or square or story, as posts and clips have it.",
+        about: "Such as 800x534px, square or story.",
         some: ["800x534px", "square", "story"],
       },
       format: {

@@ -1,8 +1,8 @@
-/** What will be made, drawn small by what makes it, as soon as a setting changes. */
+/** What will be made, drawn small as soon as a setting changes. */
 
 import { h, put, stack } from "../dom.js";
 
-const PATIENCE = 1500; // ms after which a drawing that is no longer wanted is given up
+const PATIENCE = 1500; // ms after which an unwanted drawing is given up
 const SIDES = [480, 1000]; // pixels: soon, then in detail
 const SLOW = 400; // ms after which it is said that one is being drawn
 
@@ -27,7 +27,7 @@ export class Preview {
     this.running = null;
   }
 
-  /** Draw what these settings make; of several that are asked for meanwhile, the last. False if they are drawn already. */
+  /** Draw what these settings make, or the last of several. False if they are drawn already. */
   ask(operation, settings, title) {
     const wanted = JSON.stringify({ operation, settings });
     if (wanted === this.wanted) return false;
