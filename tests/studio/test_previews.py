@@ -80,7 +80,10 @@ def test_all_that_can_be_made_is_shown_small(
 
 def test_a_world_is_made_to_be_turned(client: Client, address: str) -> None:
     project, _, number = address.rpartition("/tiles/")
-    body = {"operation": "art", "settings": {"tile": int(number), "world": "disc", "format": "html"}}
+    body = {
+        "operation": "art",
+        "settings": {"tile": int(number), "world": "disc", "format": "html"},
+    }
     task = done(client, client.post(f"{project}/tasks", json=body))
     [file] = task["result"]["files"]
     assert file["name"].endswith(".html")
