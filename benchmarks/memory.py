@@ -1,6 +1,6 @@
 """The memory of a process and all that it starts, at its peak; on Linux, which knows who shares what.
 
-    python benchmarks/memory.py PROCESS      # until its standard input ends
+python benchmarks/memory.py PROCESS      # until its standard input ends
 """
 
 from __future__ import annotations

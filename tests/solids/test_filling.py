@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 from PIL import Image
@@ -21,7 +22,7 @@ from orbiflow.errors import (
     SettingError,
 )
 from orbiflow.loading import load
-from orbiflow.runtime import Cancel, Cancelled, Note, Progress
+from orbiflow.runtime import Cancel, Cancelled, Event, Note, Progress
 from orbiflow.solids import (
     BuildSettings,
     EscherSolid,
@@ -31,15 +32,21 @@ from orbiflow.solids import (
     fill,
     read_run,
     read_solid,
+    search,
     write_run,
 )
+from orbiflow.solids.assembly import greatest_overlap
+from orbiflow.solids.bodies import as_body, united
 from orbiflow.solids.operations import build
 from orbiflow.solids.operations import fill as fill_operation
 from orbiflow.solids.run_folder import INDEX, OVERVIEW, SOLID_FILES, SOLIDS, folder_name
 from orbiflow.solids.search import Goal, usual_size
+from orbiflow.solids.separable import pieces_with_gap
 from orbiflow.solids.solid import SOLID
 from solids.known_bodies import creature
 from solids.small_fills import SMALL, creature_file, found, small_fills, told
+
+SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "solids.schema.json").read_text())
 
 
 @pytest.fixture(scope="module", name="run")
@@ -105,6 +112,56 @@ def test_a_folder_is_read_again(run: Path) -> None:
     assert one.group_name == solids[1].group_name
     with pytest.raises(OrbiflowError, match="ranks 1 to 2"):
         as_solid(run, "P4")
+
+
+def test_the_document_is_valid_and_says_whether_solids_leave(run: Path) -> None:
+    document = json.loads((run / SOLIDS).read_text())
+    jsonschema.Draft202012Validator(SCHEMA).validate(document)
+    assert document["stopped"] is False
+    for entry, own in zip(document["solids"], read_run(run), strict=True):
+        assert (entry["leaves"], entry["blocked"]) == (own.leaving.is_free, own.leaving.blocked)
+        assert (own.leaving.blocked < 1e-3) == entry["leaves"]
+    # independently: a copy with the gap of a print is drawn out of those below it
+    center, direction = own.tile.centroid, np.array(entry["leaves_along"])
+    piece = pieces_with_gap(own.group, own.tile).piece
+    lower = [
+        as_body(piece.moved(g.linear, g.translation))
+        for g in own.group.elements_near(center, 2.5, source=center)[1:]
+        if (g(center) - center) @ direction < 1e-6
+    ]
+    shared = greatest_overlap(as_body(piece), united(lower), direction, distance=4)
+    assert (shared < 1e-4) == entry["leaves"]
+
+
+def test_what_was_found_is_kept_where_a_search_is_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(search, "_solid", lambda *_: found()[0])
+    cancel, notes = Cancel(), list[str]()
+
+    def listen(event: Event) -> None:
+        if isinstance(event, Progress) and event.what == "closing" and event.share > 0.4:
+            cancel.cancel()
+        elif isinstance(event, Note):
+            notes.append(event.text)
+
+    with small_fills():
+        outcome = fill_operation(
+            creature_file(tmp_path), tmp_path / "out", SMALL, on_event=listen, cancel=cancel
+        )
+    assert outcome.state == "cancelled"
+    document = json.loads((tmp_path / "out" / SOLIDS).read_text())
+    jsonschema.Draft202012Validator(SCHEMA).validate(document)
+    assert document["stopped"] is True
+    (own,) = read_run(tmp_path / "out")
+    assert own.certificate.valid
+    assert "The search was stopped. Solids that were found by then: 1." in notes
+    assert "The search was stopped." in (tmp_path / "out" / INDEX).read_text()
+    home = tmp_path / "out" / folder_name(1, own)
+    assert "The search was stopped." not in (home / "page.html").read_text()
+    with Image.open(tmp_path / "out" / OVERVIEW) as one, Image.open(home / "sheet.png") as two:
+        differing = np.flatnonzero((np.asarray(one) != np.asarray(two)).any(axis=(1, 2)))
+    assert differing.min() > 0.9 * 210  # words below the stack, and no more
 
 
 def test_a_solid_is_saved_bit_for_bit(tmp_path: Path) -> None:

@@ -19,10 +19,14 @@ from orbiflow.runtime import (
     cores,
     ignore,
     operation,
+    read_json,
     write_atomic,
 )
 from orbiflow.settings import DefaultText, InMemory, Option
 from orbiflow.solids.settings import BuildSettings, FillSettings
+
+STOPPED = "The search was stopped."
+"""What results say of a search that did not reach its end."""
 
 if TYPE_CHECKING:
     from orbiflow.solids.run_folder import SolidSource
@@ -31,7 +35,7 @@ else:  # what annotations mean when they are read, without heavy imports
     SolidSource = Annotated[Any, InMemory("the folder of a run, or the folder of a solid in it")]
 
 
-@operation("fill", starts_processes=True)
+@operation("fill", keeps_partial=True, starts_processes=True)
 def fill(
     mesh: Path,
     out: Annotated[Path, Option("-o")] = Path("out"),
@@ -43,7 +47,8 @@ def fill(
     """Find a solid that looks like a mesh and whose copies fill space without a gap, and prove it.
 
     Writes overview.png, index.html, which turns it, and solids.json; and for each solid a folder with
-    tile.stl, sheet.png, stack.gif, page.html and solid.safetensors.
+    tile.stl, sheet.png, stack.gif, page.html and solid.safetensors. Where it is stopped by Ctrl-C, it
+    writes the solids that were found by then.
 
     Args:
         mesh: The mesh: STL, OBJ, PLY, 3MF, glTF or GLB, in mm.
@@ -65,20 +70,25 @@ def fill(
         )
     settings = settings.replace(up=settings.up or usual_up(mesh))
     found = search.fill(read.mesh, settings, name=mesh.stem, on_event=on_event, cancel=cancel)
-    seconds = time.perf_counter() - begin
-    summary = {"mesh": str(mesh), "seconds": seconds}
+    stopped = cancel.cancelled
+    summary = {"mesh": str(mesh), "seconds": time.perf_counter() - begin, "stopped": stopped}
     if not found:
         on_event(Note("no solid was found that is one piece and fills space", warning=True))
         return Outcome({**summary, "solids": []}, "nothing found")
+    remark = STOPPED if stopped else ""
+    if stopped:
+        on_event(Note(f"{STOPPED} Solids that were found by then: {len(found)}.", warning=True))
+    # what was found is written to the end
     workers = settings.workers or cores()
     run_folder.write_run(
-        found, out, workers=workers, summary=summary, on_event=on_event, cancel=cancel
+        found, out, workers=workers, summary=summary, remark=remark, on_event=on_event
     )
     on_event(_table(found))
     where = f"look at {out / run_folder.OVERVIEW} first, or open {out / run_folder.INDEX}"
     on_event(Note(f"written to {out} in {time.perf_counter() - begin:.0f} s; {where}"))
-    entries = [run_folder.measures(rank, own) for rank, own in enumerate(found, 1)]
-    return Outcome({**summary, "folder": str(out), "solids": entries}, "done")
+    document = read_json(out / run_folder.SOLIDS, "a run of orbiflow fill")
+    summary |= {"folder": str(out), "solids": document["solids"]}
+    return Outcome(summary, "cancelled" if stopped else "done")
 
 
 def _table(solids: list[EscherSolid]) -> Table:

@@ -35,19 +35,24 @@ OPENED = 0.75
 """How far the copies of an open stack are moved apart, as a share of their distances."""
 
 
-def solid_sheet(own: EscherSolid, *, width: int = 1600, copies: int = 18) -> Image.Image:
+def solid_sheet(
+    own: EscherSolid, *, width: int = 1600, copies: int = 18, remark: str = ""
+) -> Image.Image:
     """Return a sheet on white: the figure, its bent body, the tile from three sides, and stacks.
 
     Args:
         own: A tile that fills space.
         width: The width in pixels; the height is 7/16 of it.
         copies: How many copies are stacked; colours tell the cosets, and copies side by side, apart.
+        remark: A sentence below the stack.
     """
     side, height = round(0.1875 * width), round(0.4375 * width)
     large, row = width - 3 * side, height // 2
     bodies = [(own.target, TARGET_COLOUR), (own.bent, BENT_COLOUR), (own.tile, TILE_COLOUR)]
     target, bent, tile = (ShadedPart.smooth(m.points, m.faces, c) for m, c in bodies)
     stack = Stack(own, copies, STACK_FACES)
+    words = ", ".join(filter(None, [f"{copies} copies", own.group.name]))
+    words = f"{words}. {remark}" if remark else words
     panels = [
         ([target], SIDES[0], (side, row), (0, 0), "the figure"),
         ([bent], SIDES[0], (side, row), (side, 0), "bent"),
@@ -55,7 +60,7 @@ def solid_sheet(own: EscherSolid, *, width: int = 1600, copies: int = 18) -> Ima
         ([tile], SIDES[1], (side, row), (0, row), "from another side"),
         ([tile], SIDES[2], (side, row), (side, row), "from behind"),
         (stack.parts(OPENED), STACK_SIDE, (side, row), (2 * side, row), "the stack, opened"),
-        (stack.parts(0.0), STACK_SIDE, (large, height), (3 * side, 0), _stack_words(own, copies)),
+        (stack.parts(0.0), STACK_SIDE, (large, height), (3 * side, 0), words),
     ]
     sheet = Image.new("RGB", (width, height), "white")
     letters = font(max(9, round(width / 110)))
@@ -66,10 +71,6 @@ def solid_sheet(own: EscherSolid, *, width: int = 1600, copies: int = 18) -> Ima
         bottom = place[0] + size[0] / 2, place[1] + size[1] - line
         ImageDraw.Draw(sheet).text(bottom, words, fill="#555555", font=letters, anchor="ma")
     return sheet
-
-
-def _stack_words(own: EscherSolid, copies: int) -> str:
-    return f"{copies} copies, {own.group.name}" if own.group.name else f"{copies} copies"
 
 
 def solid_gif(

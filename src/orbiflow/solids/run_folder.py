@@ -74,7 +74,7 @@ def written_files(folder: Path) -> set[str]:
 
 def measures(rank: int, solid: EscherSolid) -> dict[str, Any]:
     """Return what solids.json says of a solid."""
-    proof = solid.certificate
+    proof, leaving = solid.certificate, solid.leaving
     return {
         "folder": folder_name(rank, solid),
         "group": solid.group_name,
@@ -87,6 +87,9 @@ def measures(rank: int, solid: EscherSolid) -> dict[str, Any]:
         "pair_error": proof.pair_error,
         "overlap_with_copies": proof.overlap,
         "uncovered": proof.gap,
+        "leaves": leaving.is_free,
+        "leaves_along": leaving.direction.tolist(),
+        "blocked": leaving.blocked,
         "seconds": solid.seconds,
     }
 
@@ -97,6 +100,7 @@ def write_run(
     *,
     workers: int = 1,
     summary: dict[str, Any] | None = None,
+    remark: str = "",
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> list[Path]:
@@ -107,6 +111,7 @@ def write_run(
         out: The folder.
         workers: Processes that draw them.
         summary: What solids.json says beside them.
+        remark: A sentence on the search for overview and page.
         on_event: Called with `Progress` and `Written`.
         cancel: Checked before each solid.
 
@@ -115,15 +120,15 @@ def write_run(
         Cancelled: If the token was cancelled; nothing is then written.
     """
     folder = result_folder(out)
-    entries = [measures(rank, solid) for rank, solid in enumerate(solids, 1)]
     team = Team(__name__, workers, on_event, cancel, SEARCHED)
-    drawn = team.each(solid_files, solids, "drawing", 1.0)
+    made = team.each(_measured_and_drawn, list(enumerate(solids, 1)), "drawing", 1.0)
+    entries = [entry for entry, _ in made]
     files = {
         f"{entry['folder']}/{name}": content
-        for entry, contents in zip(entries, drawn, strict=True)
+        for entry, contents in made
         for name, content in contents.items()
     }
-    files |= {OVERVIEW: drawn[0]["sheet.png"], INDEX: drawn[0]["page.html"]}
+    files |= _first_looks(solids[0], made[0][1], remark)
     with folder.replaced() as staged:
         for entry in entries:
             (staged / entry["folder"]).mkdir()
@@ -137,9 +142,28 @@ def write_run(
     return paths
 
 
+def _measured_and_drawn(job: tuple[int, EscherSolid]) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Return what solids.json says of a solid of a rank, and its files."""
+    return measures(*job), solid_files(job[1])
+
+
+def _first_looks(best: EscherSolid, files: dict[str, bytes], remark: str) -> dict[str, bytes]:
+    """Return the overview and the page of a run, which show its best solid and perhaps a remark."""
+    if not remark:
+        return {OVERVIEW: files["sheet.png"], INDEX: files["page.html"]}
+    sheet = solid_sheet(best, width=SHEET_WIDTH, remark=remark)
+    page = stack_page(best, title=title_of(best), remark=remark)
+    return {OVERVIEW: png_bytes(sheet), INDEX: page.encode()}
+
+
+def title_of(solid: EscherSolid) -> str:
+    """Return what a solid is of, and its group."""
+    return f"{solid.name}, {solid.group_name}"
+
+
 def solid_files(solid: EscherSolid) -> dict[str, bytes]:
     """Return the content of each of the `SOLID_FILES` of a solid."""
-    title = f"{solid.name}, {solid.group_name}"
+    title = title_of(solid)
     scaled = solid.tile.moved(solid.millimetres * np.eye(3))
     return {
         SOLID: solid.to_bytes(),

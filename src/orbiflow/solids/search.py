@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import naming_extras
-from orbiflow.runtime import NEVER, Cancel, Sink, Team, cores, ignore
+from orbiflow.runtime import NEVER, Cancel, Cancelled, Sink, Team, cores, ignore
 from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
 from orbiflow.solids.body import Body
 from orbiflow.solids.closing import Function, ball_of_cells, box_around
@@ -153,12 +153,12 @@ def fill(
         name: What results call it.
         on_solid: Called with each solid that is found.
         on_event: Called with `Progress`.
-        cancel: Checked before each step.
+        cancel: Checked before each step. Solids that were found by then are returned.
 
     Raises:
         GroupError: For a group that is unknown, or has mirrors, or where none comes apart as asked for.
         OrbiflowError: If the mesh is not closed, or too thin to be followed.
-        Cancelled: If the token was cancelled.
+        Cancelled: If the token was cancelled before a solid was found.
     """
     settings = settings or FillSettings()
     make = _tile_maker(settings)
@@ -181,14 +181,18 @@ def fill(
     order = np.argsort([cost for cost, _ in quick], kind="stable")
     best = [poses[k] for k in order[: effort.full]]
     body = goal.body(effort.fine)
-    closed = team.each(
-        partial(_solid, goal, body, make, effort),
-        best,
-        "closing",
-        0.9,
-        lambda own: None if own is None else on_solid(own),
-    )
-    found: list[EscherSolid] = [own for own in closed if own is not None]
+    found = list[EscherSolid]()
+
+    def keep(own: EscherSolid | None) -> None:
+        if own is not None:
+            found.append(own)
+            on_solid(own)
+
+    try:
+        team.each(partial(_solid, goal, body, make, effort), best, "closing", 0.9, keep)
+    except Cancelled:
+        if not found:
+            raise
     return _varied(sorted(found, key=_rank), settings.tiles)
 
 

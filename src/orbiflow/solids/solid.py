@@ -12,9 +12,11 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError
 from orbiflow.runtime import array_bytes, read_arrays
+from orbiflow.solids.assembly import Leaving
 from orbiflow.solids.certificate import SolidCertificate, certify_solid
 from orbiflow.solids.likeness import SolidLikeness
 from orbiflow.solids.mesh import Mesh
+from orbiflow.solids.separable import pieces_with_gap
 from orbiflow.symmetry import CrystallographicGroup, group_from_header, group_header
 
 SOLID = "solid.safetensors"
@@ -67,6 +69,14 @@ class EscherSolid:
     def certificate(self) -> SolidCertificate:
         """The proof that its copies fill space, made when it is first asked for."""
         return certify_solid(self.group, self.tile)
+
+    @cached_property
+    def leaving(self) -> Leaving:
+        """How it is best drawn out of a stack by a straight move, found when it is first asked for.
+
+        Copies have a small gap, as prints do; where all of them leave by one move, it is that.
+        """
+        return pieces_with_gap(self.group, self.tile).leaving_stack()
 
     def sized(self, longest: float | None) -> EscherSolid:
         """Return the solid with a longest side of so many mm; None leaves it as it is."""

@@ -35,6 +35,7 @@ def stack_page(
     *,
     title: str = "A solid that fills space",
     caption: str = "",
+    remark: str = "",
     copies: int = 24,
     apart: float = 1.2,
 ) -> str:
@@ -47,12 +48,14 @@ def stack_page(
         own: A tile that fills space.
         title: The title.
         caption: A sentence or two below it. Default: how many copies there are, and the group.
+        remark: Another sentence after it.
         copies: How many copies are stacked, a colour for each coset.
         apart: How far the slider takes copies from the middle, as a share of their distances.
     """
     data = stack_data(own, copies=copies, apart=apart)
     group = f" of {own.group.name}" if own.group.name else ""
     caption = caption or f"{copies} copies of one solid{group}: they fill space without gaps."
+    caption = f"{caption} {remark}" if remark else caption
     values = {"title": title, "caption": caption, "kinds": KINDS, "legend": _legend(own, copies)}
     return rendered("orbiflow.solids", "stack.html", **values, data=data)
 

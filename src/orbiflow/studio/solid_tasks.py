@@ -96,7 +96,7 @@ def mesh(
     return Outcome({"triangles": len(found.faces)})
 
 
-@operation("studio fill", starts_processes=True)
+@operation("studio fill", keeps_partial=True, starts_processes=True)
 def fill(
     job: Job,
     settings: FillSettings = FillSettings(),
@@ -132,7 +132,8 @@ def fill(
         write_atomic(job.project / BACKDROP, (best / THUMB).read_bytes())
     else:
         on_event(Note("no solid was found that is one piece and fills space"))
-    return Outcome({"solids": len(found), "gone": gone}, "done" if found else "nothing found")
+    state = "cancelled" if cancel.cancelled else "done" if found else "nothing found"
+    return Outcome({"solids": len(found), "gone": gone}, state)
 
 
 def put_solid(job: Job, solid: EscherSolid, on_event: Sink) -> int:
