@@ -159,7 +159,7 @@ def test_a_body_is_like_itself() -> None:
 
 
 def test_spheres_are_read() -> None:
-    spheres = FillSettings(emphasis=("1,2,3,4", "0 0 0 1 7")).spheres
+    spheres = FillSettings(emphasis=("1,2,3,4", "0 0 0 1 7")).emphasised
     assert spheres == (Sphere((1, 2, 3), 4), Sphere((0, 0, 0), 1, 7))
 
 

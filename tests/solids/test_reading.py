@@ -13,17 +13,18 @@ import trimesh
 from orbiflow.errors import InputFileError
 from orbiflow.solids.mending import MAX_FACES
 from orbiflow.solids.mesh import Mesh, joined
-from orbiflow.solids.reading import ReadMesh, read_mesh
+from orbiflow.solids.reading import read_mesh
 from solids.mesh_files import archive, ball, box, inside_out, obj, stl, stl_text, three_mf
 
 
-def read(folder: Path, name: str, content: bytes) -> ReadMesh:
+def read(folder: Path, name: str, content: bytes) -> tuple[Mesh, list[str]]:
     path = folder / name
     path.write_bytes(content)
-    found = read_mesh(path)
-    assert found.mesh.is_closed
-    assert found.mesh.volume > 0
-    return found
+    mesh, notes, painting = read_mesh(path)
+    assert mesh.is_closed
+    assert mesh.volume > 0
+    assert painting is None
+    return mesh, notes
 
 
 def refused(folder: Path, name: str, content: bytes, words: str) -> None:
@@ -154,7 +155,7 @@ def test_files_that_are_cut_off_or_lie(tmp_path: Path) -> None:
 def test_obj_with_polygons_relative_numbers_and_a_missing_library(tmp_path: Path) -> None:
     quads = b"""mtllib ../../secrets.mtl
 usemtl skin
-v 0 0 0 1 0 0
+v 0 0 0
 v 1 0 0
 v 1 1 0
 v 0 1 0

@@ -211,7 +211,7 @@ def test_a_search_takes_the_settings_of_the_command(client: Client, search: Sear
     )
     asked, name = search.asked, search.name
     assert (asked.effort, asked.groups, asked.size, asked.up) == ("fast", ("P 1", "P -1"), 40, "y")
-    assert (asked.spheres[0].radius, name) == (1, "thing")
+    assert (asked.emphasis, name) == (("0 0 0 1",), "thing")
     for wrong in ({"effort": "endless"}, {"out": "/tmp/x"}, {"emphasis": ["here"]}, {"size": -1}):
         body = {"operation": "fill", "settings": wrong}
         assert client.post(f"{own}/tasks", json=body).status_code == 422

@@ -21,6 +21,7 @@ MAX_NODES = 10_000
 """Nodes of the scene at most."""
 
 GLB_JSON = 0x4E4F534A
+COLOURS = "_OLOR_0"
 MILLIMETRES = 1000.0  # of a metre, the unit of glTF
 
 READ_EXTENSIONS = re.compile(
@@ -55,9 +56,19 @@ def checked_gltf(data: bytes, path: Path) -> dict[str, bytes]:
     return found
 
 
+def with_raw_colours(data: bytes) -> bytes:
+    """Return a file whose colours are called `COLOURS`, so that a reader leaves them as they are.
+
+    trimesh keeps the lower 8 bits of colours of 16, such as Blender's. Names that begin with _ are an
+    application's own, and this one is as long as the usual one.
+    """
+    end = 20 + int.from_bytes(data[12:16], "little") if data[:4] == b"glTF" else len(data)
+    return data[:end].replace(b'"COLOR_0"', f'"{COLOURS}"'.encode()) + data[end:]
+
+
 def from_metres(soup: Soup) -> Soup:
     """Return what is in metres, as glTF has it, in mm."""
-    return Soup(MILLIMETRES * soup.points, soup.faces)
+    return soup._replace(points=MILLIMETRES * soup.points)
 
 
 def _header(data: bytes) -> dict[str, Any]:

@@ -84,7 +84,7 @@ def simplified(body: Manifold, most: int) -> Manifold:
 
 def _cleaned(soup: Soup, notes: list[str]) -> Mesh:
     """Return a mesh whose points are all used and apart, without degenerate and repeated faces."""
-    points, faces = soup
+    points, faces, _ = soup
     if not len(faces):
         raise OrbiflowError("holds no triangles; export the mesh itself, not its points or curves")
     if not np.isfinite(points).all():

@@ -23,7 +23,7 @@ from orbiflow.runtime import (
     write_atomic,
 )
 from orbiflow.settings import DefaultText, InMemory, Option
-from orbiflow.solids.settings import BuildSettings, FillSettings
+from orbiflow.solids.settings import BuildSettings, FillSettings, Painted
 
 STOPPED = "The search was stopped."
 """What results say of a search that did not reach its end."""
@@ -55,6 +55,7 @@ def fill(
         out: Folder for the results, made if need be.
     """
     from orbiflow.solids import run_folder, search
+    from orbiflow.solids.painting import checked_painting
     from orbiflow.solids.reading import read_mesh, usual_up
 
     begin = time.perf_counter()
@@ -68,8 +69,19 @@ def fill(
         on_event(
             Note(f"the file's size is no size to print: the longest side is made {goal_size:g} mm")
         )
-    settings = settings.replace(up=settings.up or usual_up(mesh))
-    found = search.fill(read.mesh, settings, name=mesh.stem, on_event=on_event, cancel=cancel)
+    for own in settings.emphasised:
+        if isinstance(own, Painted):
+            share = f"{100 * checked_painting(read.painting).share:.2g} % of the surface"
+            matters = f"matters {own.weight:g} times as much as the rest"
+            on_event(Note(f"what is painted, {share}, {matters}"))
+    found = search.fill(
+        read.mesh,
+        settings.replace(up=settings.up or usual_up(mesh)),
+        name=mesh.stem,
+        painting=read.painting,
+        on_event=on_event,
+        cancel=cancel,
+    )
     stopped = cancel.cancelled
     summary = {"mesh": str(mesh), "seconds": time.perf_counter() - begin, "stopped": stopped}
     if not found:

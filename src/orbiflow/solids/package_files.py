@@ -6,6 +6,7 @@ trimesh would need two packages more for it, and would take a file's word for it
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 import zlib
 from xml.etree import ElementTree
@@ -35,8 +36,13 @@ MILLIMETRES = {
 }
 """The length of each unit of a 3MF file."""
 
-Objects = dict[tuple[str, str], ElementTree.Element]
-"""Objects by their file and number."""
+Resources = dict[tuple[str, str], ElementTree.Element]
+"""Objects and palettes by their file and number."""
+
+PALETTES = {"colorgroup": "color", "basematerials": "displaycolor"}
+"""Lists of colours, and which attribute of what is in them is the colour."""
+
+_COLOUR = re.compile(r"#([0-9A-Fa-f]{6})(?:[0-9A-Fa-f]{2})?")
 
 
 def read_3mf(data: bytes) -> Soup:
@@ -47,10 +53,11 @@ def read_3mf(data: bytes) -> Soup:
     roots = {name: _parsed(text) for name, text in _models(data).items()}
     if not roots:
         raise OrbiflowError("holds no 3D model; export it again")
-    objects = {
+    known = {
         (name, own.get("id", "")): own
         for name, root in roots.items()
-        for own in root.iter("object")
+        for own in root.iter()
+        if own.tag == "object" or own.tag in PALETTES
     }
     placed = list[Soup]()
     main, root = next(iter(roots.items()))
@@ -58,8 +65,8 @@ def read_3mf(data: bytes) -> Soup:
     if unit is None:
         raise OrbiflowError(f"is in an unknown unit, {root.get('unit')!r}; export it in mm")
     for item in (item for build in root.iter("build") for item in build.iter("item")):
-        _place(item, main, np.diag([unit, unit, unit, 1.0]), objects, placed, 0)
-    return Soup.joined([own.points for own in placed], [own.faces for own in placed])
+        _place(item, main, np.diag([unit, unit, unit, 1.0]), known, placed, 0)
+    return Soup.joined(placed)
 
 
 def _models(data: bytes) -> dict[str, bytes]:
@@ -111,7 +118,7 @@ def _place(
     use: ElementTree.Element,
     file: str,
     outer: Array,
-    objects: Objects,
+    known: Resources,
     placed: list[Soup],
     depth: int,
 ) -> None:
@@ -124,7 +131,7 @@ def _place(
     named = [value for name, value in use.attrib.items() if name.rpartition("}")[2] == "path"]
     file = named[0].lstrip("/").lower() if named else file
     number = use.get("objectid", "")
-    if (own := objects.get((file, number))) is None:
+    if (own := known.get((file, number))) is None or own.tag != "object":
         raise OrbiflowError(f"places object {number!r}, which is not there; export it again")
     if own.get("type", "model") != "model":
         return  # a support of the print, or another thing that is no part of the body
@@ -132,12 +139,52 @@ def _place(
     if (mesh := own.find("mesh")) is not None:
         points = _numbers(mesh, "vertex", ("x", "y", "z"), float)
         faces = _numbers(mesh, "triangle", ("v1", "v2", "v3"), np.int64)
+        if faces.size and not 0 <= faces.min() <= faces.max() < len(points):
+            raise OrbiflowError("has triangles of points that are not there; export it again")
         if np.linalg.det(matrix[:3, :3]) < 0:
             faces = faces[:, ::-1]
-        placed.append(Soup(points @ matrix[:3, :3].T + matrix[:3, 3], faces))
+        soup = Soup(points @ matrix[:3, :3].T + matrix[:3, 3], faces)
+        colours = _colours(own, mesh, file, known)
+        placed.append(soup if colours is None else soup.with_corner_colours(colours))
         check_counts(sum(len(s.points) for s in placed), sum(len(s.faces) for s in placed))
     for component in own.iter("component"):
-        _place(component, file, matrix, objects, placed, depth + 1)
+        _place(component, file, matrix, known, placed, depth + 1)
+
+
+def _colours(
+    own: ElementTree.Element, mesh: ElementTree.Element, file: str, known: Resources
+) -> Array | None:
+    """Return the colours (M, 3, 3) at the triangles' corners, NaN where they have none.
+
+    A triangle names a palette and an entry for each corner, or has those of its object. None if no
+    triangle has a colour.
+    """
+    palettes = {
+        number: [_colour(entry.get(PALETTES[group.tag], "")) for entry in group]
+        for (home, number), group in known.items()
+        if home == file and group.tag in PALETTES
+    }
+    if not palettes:
+        return None
+    usual, first = own.get("pid", ""), own.get("pindex", "")
+    found, none = list[list[list[float]]](), [np.nan] * 3
+    for face in mesh.iter("triangle"):
+        palette = palettes.get(face.get("pid", usual), [])
+        one = face.get("p1", first)
+        entries = [one, face.get("p2", one), face.get("p3", one)]
+        found.append(
+            [
+                palette[int(entry)] if entry.isdecimal() and int(entry) < len(palette) else none
+                for entry in entries
+            ]
+        )
+    colours = np.array(found, float).reshape(-1, 3, 3)
+    return colours if np.isfinite(colours).any() else None
+
+
+def _colour(text: str) -> list[float]:
+    found = _COLOUR.fullmatch(text)
+    return [channel / 255 for channel in bytes.fromhex(found[1])] if found else [np.nan] * 3
 
 
 def _matrix(text: str | None) -> Array:

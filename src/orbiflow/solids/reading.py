@@ -2,7 +2,8 @@
 
 Files may come from anybody. Their size, and the numbers of points and faces that they announce, are
 bounded before anything is decoded. Nothing is run, fetched from a network, or read from another
-folder; materials and textures are left aside. PLY and glTF are read by trimesh.
+folder; materials and textures are left aside, colours of points are kept. PLY and glTF are read by
+trimesh.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import STL_TRIANGLE
 from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.extras import naming_extras
-from orbiflow.solids.gltf_files import checked_gltf, from_metres
+from orbiflow.solids.gltf_files import COLOURS, checked_gltf, from_metres, with_raw_colours
 from orbiflow.solids.mending import mended
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.package_files import read_3mf
+from orbiflow.solids.painting import Painting
 from orbiflow.solids.soup import MAX_BYTES, MAX_FACES_READ, Soup, check_counts
 
 MAX_LINE = 2**16
@@ -37,10 +39,12 @@ class ReadMesh(NamedTuple):
 
     - `mesh`: One closed body in mm, faces counter-clockwise from outside.
     - `notes`: What was mended, left out or simplified, a sentence each.
+    - `painting`: Where it is painted, or None if the file has no colours at its points.
     """
 
     mesh: Mesh
     notes: list[str]
+    painting: Painting | None
 
 
 def usual_up(path: Path) -> Literal["y", "z"]:
@@ -81,13 +85,14 @@ def read_mesh(path: str | Path) -> ReadMesh:
     try:
         soup, notes = reader(data, path), list[str]()
         mesh = mended(soup, notes)
+        painting = Painting.of(soup, mesh)
     except InputFileError:
         raise
     except OrbiflowError as error:
         raise InputFileError(f"{path}: {error}") from error
     except (MemoryError, RecursionError) as error:
         raise InputFileError(f"{path}: is too large to be read; simplify the mesh") from error
-    return ReadMesh(mesh, notes)
+    return ReadMesh(mesh, notes, painting)
 
 
 def _read_stl(data: bytes, _: Path) -> Soup:
@@ -114,14 +119,17 @@ def _read_stl(data: bytes, _: Path) -> Soup:
 
 
 def _read_obj(data: bytes, _: Path) -> Soup:
-    """Read points and polygons of an OBJ; all else, such as the names of materials, is passed over."""
+    """Read points, perhaps with colours, and polygons of an OBJ; all else is passed over."""
     check_counts(data.count(b"\nv ") + 1, data.count(b"\nf ") + 1)
     points, faces = list[list[bytes]](), list[tuple[int, int, int]]()
+    colours = list[list[bytes]]()
     for line in data.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ").splitlines():
         if len(line) > MAX_LINE:
             raise OrbiflowError("has a line that is too long for an OBJ file; export it again")
         if line.startswith((b"v ", b"v\t")):
-            points.append(line.split()[1:4])
+            words = line.split()[1:]
+            points.append(words[:3])
+            colours.append(words[3:6] if len(words) == 6 else [b"nan"] * 3)
         elif line.startswith((b"f ", b"f\t")):
             corners = [_index(word, len(points)) for word in line.split()[1:]]
             faces += zip(corners[:1] * (len(corners) - 2), corners[1:], corners[2:], strict=False)
@@ -129,7 +137,12 @@ def _read_obj(data: bytes, _: Path) -> Soup:
                 check_counts(len(points), len(faces))
     if any(len(point) != 3 for point in points):
         raise OrbiflowError("has a point without three coordinates; export it again")
-    return Soup(_numbers(points, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3))
+    soup = Soup(_numbers(points, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3))
+    found = _numbers(colours, float).reshape(-1, 3)
+    if not np.isfinite(found).any():
+        return soup
+    # some programs write 0 to 255
+    return soup._replace(colours=found / (255 if np.nanmax(found) > 1 else 1))
 
 
 def _index(word: bytes, count: int) -> int:
@@ -145,7 +158,9 @@ def _numbers(words: Any, kind: type) -> Array:
     try:
         return np.array(words, dtype="S32").astype(kind) if len(words) else np.zeros(0)
     except (ValueError, OverflowError):
-        raise OrbiflowError("has a coordinate that is not a number; export it again") from None
+        raise OrbiflowError(
+            "has a coordinate or colour that is not a number; export it again"
+        ) from None
 
 
 def _read_ply(data: bytes, path: Path) -> Soup:
@@ -164,6 +179,7 @@ def _read_ply(data: bytes, path: Path) -> Soup:
 def _read_gltf(data: bytes, path: Path) -> Soup:
     """Read a glTF or GLB by trimesh, once it is known to be within the bounds."""
     files = checked_gltf(data, path)
+    data = with_raw_colours(data)
     return from_metres(_by_trimesh(path.suffix.lower()[1:], data, path, files))
 
 
@@ -175,13 +191,28 @@ def _by_trimesh(kind: str, data: bytes, path: Path, files: Mapping[str, bytes] |
             io.BytesIO(data), file_type=kind, resolver=files, skip_materials=True, process=False
         )
         parts = [own for own in scene.dump(concatenate=False) if hasattr(own, "faces")]
-        points = [np.asarray(own.vertices, float).reshape(-1, 3) for own in parts]
-        faces = [np.asarray(own.faces, np.int64).reshape(-1, 3) for own in parts]
+        soups = [_coloured(own) for own in parts]
     # what a broken file does to a reader is of any kind
     except Exception as error:
         raise OrbiflowError(f"is broken, or of a kind that is not read: {error}") from error
-    check_counts(sum(map(len, points)), sum(map(len, faces)))
-    return Soup.joined(points, faces)
+    check_counts(sum(len(own.points) for own in soups), sum(len(own.faces) for own in soups))
+    return Soup.joined(soups)
+
+
+def _coloured(part: Any) -> Soup:
+    """Return a mesh of trimesh, with the colours of its points or faces."""
+    points = np.asarray(part.vertices, float).reshape(-1, 3)
+    soup = Soup(points, np.asarray(part.faces, np.int64).reshape(-1, 3))
+    if (found := part.vertex_attributes.get(COLOURS)) is not None:
+        colours = np.asarray(found).reshape(len(points), -1)[:, :3]
+        most = np.iinfo(colours.dtype).max if colours.dtype.kind in "iu" else 1
+        return soup._replace(colours=colours / most)
+    if part.visual.kind == "vertex":
+        return soup._replace(colours=part.visual.vertex_colors[:, :3] / 255)
+    if part.visual.kind == "face":
+        colours = part.visual.face_colors[:, None, :3].repeat(3, axis=1) / 255
+        return soup.with_corner_colours(colours)
+    return soup
 
 
 READERS: dict[str, Callable[[bytes, Path], Soup]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -16,15 +16,16 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.extras import naming_extras
 from orbiflow.runtime import NEVER, Cancel, Cancelled, Sink, Team, cores, ignore
 from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
-from orbiflow.solids.body import Body
+from orbiflow.solids.body import Body, Weight
 from orbiflow.solids.closing import Function, ball_of_cells, box_around
 from orbiflow.solids.distance import SignedDistance, points_inside, surface_points
 from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
 from orbiflow.solids.likeness import measured, rigid_motion
 from orbiflow.solids.mesh import Mesh
+from orbiflow.solids.painting import Painting, checked_painting
 from orbiflow.solids.poses import Pose, best_poses
 from orbiflow.solids.separable import SEPARABLE_GROUPS, check_separable, separable_tile
-from orbiflow.solids.settings import FillSettings
+from orbiflow.solids.settings import FillSettings, Sphere
 from orbiflow.solids.solid import EscherSolid
 from orbiflow.solids.surfaces import tile_surface
 from orbiflow.symmetry import CrystallographicGroup
@@ -89,16 +90,22 @@ class Goal:
 
     name: str
     mesh: Mesh
-    weight: Callable[[Array], Array] | None
+    weight: Weight | None
     millimetres: float
     axes: Array
 
     @classmethod
-    def of(cls, mesh: Mesh, settings: FillSettings, name: str = "solid") -> Goal:
-        """Return the goal of a closed mesh in mm.
+    def of(
+        cls,
+        mesh: Mesh,
+        settings: FillSettings,
+        name: str = "solid",
+        painting: Painting | None = None,
+    ) -> Goal:
+        """Return the goal of a closed mesh in mm, on which something may be painted.
 
         Raises:
-            OrbiflowError: If it is not closed or has no volume.
+            OrbiflowError: If it is not closed or has no volume, or lacks the paint that settings need.
         """
         if not mesh.is_closed or mesh.volume <= 0:
             raise OrbiflowError(
@@ -109,7 +116,13 @@ class Goal:
         longest = float(np.ptp(unit.points, axis=0).max())
         size = settings.size or usual_size(mesh)
         millimetres = size / longest if size else side
-        weight = partial(_emphasis, settings, center, side) if settings.emphasis else None
+        weights = [
+            own.weights
+            if isinstance(own, Sphere)
+            else partial(checked_painting(painting).weights, own.weight)
+            for own in settings.emphasised
+        ]
+        weight = partial(_product, weights, center, side) if weights else None
         return cls(name, unit, weight, millimetres, np.array(AXES[settings.up or "z"]).T)
 
     @cached_property
@@ -129,11 +142,9 @@ def usual_size(mesh: Mesh) -> float | None:
     return None if SMALLEST <= longest <= LARGEST else USUAL_SIZE
 
 
-def _emphasis(settings: FillSettings, center: Array, side: float, points: Array) -> Array:
-    found = np.ones(len(points))
-    for own in settings.spheres:
-        found = found * own.weights(center + side * points)
-    return found
+def _product(weights: Sequence[Weight], center: Array, side: float, points: Array) -> Array:
+    """Return the product (n,) of weights that are given in the coordinates of the file."""
+    return np.prod([own(center + side * points) for own in weights], axis=0)
 
 
 def fill(
@@ -141,6 +152,7 @@ def fill(
     settings: FillSettings | None = None,
     *,
     name: str = "solid",
+    painting: Painting | None = None,
     on_solid: Callable[[EscherSolid], object] = lambda _: None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
@@ -151,6 +163,7 @@ def fill(
         mesh: A closed mesh, in mm.
         settings: Which groups are tried, and how much.
         name: What results call it.
+        painting: Where the mesh is painted, as `read_mesh` finds it, for `emphasis` "painted".
         on_solid: Called with each solid that is found.
         on_event: Called with `Progress`.
         cancel: Checked before each step. Solids that were found by then are returned.
@@ -162,7 +175,7 @@ def fill(
     """
     settings = settings or FillSettings()
     make = _tile_maker(settings)
-    effort, goal = EFFORTS[settings.effort], Goal.of(mesh, settings, name)
+    effort, goal = EFFORTS[settings.effort], Goal.of(mesh, settings, name, painting)
     usual = SEPARABLE_GROUPS if settings.separable else USUAL_GROUPS[: effort.groups]
     families = [GroupFamily.named(own) for own in settings.groups or usual]
     if settings.separable:

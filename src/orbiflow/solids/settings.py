@@ -46,28 +46,38 @@ class Sphere(NamedTuple):
         return 1 + (self.weight - 1) / (1 + np.exp((away - 1) / 0.1))
 
 
-def sphere(text: str) -> Sphere:
-    """Return the sphere that a text gives: x, y, z, the radius, and perhaps a weight.
+class Painted(NamedTuple):
+    """What is painted on a mesh, and how much more it matters than the rest."""
 
-    >>> sphere("0, 10, 2, 4")
+    weight: float = DEFAULT_WEIGHT
+
+
+def emphasised(text: str) -> Sphere | Painted:
+    """Return what a text emphasises: x, y, z and the radius of a sphere, or painted; perhaps a weight.
+
+    >>> emphasised("0, 10, 2, 4")
     Sphere(center=(0.0, 10.0, 2.0), radius=4.0, weight=5.0)
+    >>> emphasised("painted, 8")
+    Painted(weight=8.0)
     """
+    words = re.split(r"[,\s]+", text.strip())
+    painted = words[0].lower() == "painted"
     try:
-        values = [float(part) for part in re.split(r"[,\s]+", text.strip())]
+        values = [float(word) for word in words[painted:]]
     except ValueError:
-        values = []
-    if len(values) not in (4, 5) or not all(map(math.isfinite, values)):
+        values = [math.nan]
+    if len(values) not in ((0, 1) if painted else (4, 5)) or not all(map(math.isfinite, values)):
         raise OrbiflowError(
-            f"{text!r} is no sphere; write x,y,z,radius in the file's coordinates, and perhaps a weight"
+            f"{text!r} is neither a sphere nor painted; write x,y,z,radius in the file's coordinates, "
+            "or painted, and perhaps a weight"
         )
-    x, y, z, radius, *more = values
-    weight = more[0] if more else DEFAULT_WEIGHT
-    if radius <= 0 or not 1 / MOST_WEIGHT <= weight <= MOST_WEIGHT:
+    *place, weight = values if len(values) in (1, 5) else [*values, DEFAULT_WEIGHT]
+    if not 1 / MOST_WEIGHT <= weight <= MOST_WEIGHT or (place and place[3] <= 0):
         raise OrbiflowError(
             f"{text!r}: the radius must be above 0, and the weight from {1 / MOST_WEIGHT:g} to "
             f"{MOST_WEIGHT:g}"
         )
-    return Sphere((x, y, z), radius, weight)
+    return Sphere((place[0], place[1], place[2]), place[3], weight) if place else Painted(weight)
 
 
 def group_names(text: str) -> tuple[str, ...]:
@@ -109,8 +119,9 @@ class FillSettings(Settings, group="Search"):
     """Longest side of the target's box."""
 
     emphasis: Annotated[tuple[str, ...], Repeated()] = ()
-    """A sphere x,y,z,radius whose inside matters five times as much as the rest, or as a fifth number
-    says, in the coordinates of the file. May be repeated."""
+    """What matters five times as much as the rest, or as a last number says: the inside of a sphere
+    x,y,z,radius in the coordinates of the file; or painted, all that is painted on the mesh in another
+    colour than most of it. May be repeated."""
 
     up: Annotated[
         Literal["x", "y", "z"] | None, DefaultText("y of an OBJ or glTF, z of other files")
@@ -130,16 +141,16 @@ class FillSettings(Settings, group="Search"):
     """Number of processes."""
 
     @property
-    def spheres(self) -> tuple[Sphere, ...]:
+    def emphasised(self) -> tuple[Sphere | Painted, ...]:
         """What matters more."""
-        return tuple(map(sphere, self.emphasis))
+        return tuple(map(emphasised, self.emphasis))
 
     def check(self) -> None:
         super().check()
         if self.separable and self.method == "flow":
             raise SettingError("{separable} solids are made by {method} 'bending' only")
         try:
-            _ = self.spheres
+            _ = self.emphasised
         except OrbiflowError as error:
             raise SettingError(f"{{emphasis}} {error}") from error
 

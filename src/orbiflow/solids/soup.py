@@ -18,20 +18,37 @@ MAX_FACES_READ = 4_000_000
 
 
 class Soup(NamedTuple):
-    """Triangles that need not be joined: points (N, 3), and three points' numbers of each (M, 3)."""
+    """Triangles that need not be joined.
+
+    - `points`: (N, 3).
+    - `faces`: Three points' numbers of each triangle (M, 3).
+    - `colours`: Red, green and blue of each point (N, 3), from 0 to 1, NaN where it has none; or None.
+    """
 
     points: Array
     faces: Integers
+    colours: Array | None = None
 
     @classmethod
-    def joined(cls, points: Sequence[Array], faces: Sequence[Integers]) -> Soup:
+    def joined(cls, parts: Sequence[Soup]) -> Soup:
         """Return all triangles of several meshes."""
-        starts = np.cumsum([0, *map(len, points)])[:-1]
-        moved = [own + start for own, start in zip(faces, starts, strict=True)]
+        starts = np.cumsum([0, *(len(own.points) for own in parts)])[:-1]
+        moved = [own.faces + start for own, start in zip(parts, starts, strict=True)]
+        colours = [
+            np.full(own.points.shape, np.nan) if own.colours is None else own.colours
+            for own in parts
+        ]
+        coloured = any(own.colours is not None for own in parts)
         return cls(
-            np.concatenate([np.zeros((0, 3)), *points]),
+            np.concatenate([np.zeros((0, 3)), *(own.points for own in parts)]),
             np.concatenate([np.zeros((0, 3), np.int64), *moved]),
+            np.concatenate(colours) if coloured else None,
         )
+
+    def with_corner_colours(self, colours: Array) -> Soup:
+        """Return the triangles apart, each with colours of its own at its corners (M, 3, 3)."""
+        points = self.points[self.faces].reshape(-1, 3)
+        return Soup(points, np.arange(len(points)).reshape(-1, 3), colours.reshape(-1, 3))
 
 
 def check_counts(points: int, faces: int) -> None:

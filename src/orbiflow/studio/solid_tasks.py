@@ -70,7 +70,7 @@ def mesh(
     file = mesh_file(job.project)
     on_event(Progress(0.1, "reading the mesh"))
     try:
-        found, notes = read_mesh(file)
+        found, notes, _ = read_mesh(file)
     except OrbiflowError as error:
         text = str(error).replace(str(file), called)
         for pattern, words in PLAIN_WORDS.items():
@@ -116,10 +116,12 @@ def fill(
     def keep(solid: EscherSolid) -> None:
         numbers[id(solid)] = put_solid(job, solid, on_event)
 
+    read = read_mesh(mesh_file(job.project))
     found = fill(
-        read_mesh(mesh_file(job.project)).mesh,
+        read.mesh,
         settings.replace(up=settings.up or known["up"], workers=cores()),
         name=Path(known["called"]).stem,
+        painting=read.painting,
         on_solid=keep,
         on_event=as_part(on_event),
         cancel=cancel,
