@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError, SettingError
-from orbiflow.solids.bending import QUICK_STAGES, BentBody, bent, contacts
+from orbiflow.solids.bending import QUICK_STAGES, REACH, BentBody, bent, contacts
 from orbiflow.solids.body import Body
 from orbiflow.solids.distance import SignedDistance, points_inside
 from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
@@ -133,6 +133,19 @@ def test_copies_of_a_bent_body_meet(name: str) -> None:
     assert abs(contacts(found).gaps).mean() < abs(contacts(before).gaps).mean()
     assert 0 < found.strain < 0.3
     assert found.surface.is_closed
+
+
+@settings(max_examples=10)
+@given(seed=SEEDS)
+def test_all_that_may_touch_a_body_is_asked(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    nodes = body().rest @ np.diag([1.2, 0.8, 1.0])
+    own = BentBody(body(), GroupFamily.named("P 1"), np.zeros(6), nodes)
+    low, high = own.surface.bounds
+    points = rng.uniform(low - REACH, high + REACH, (4000, 3))
+    asked = own.may_touch(points)
+    assert not (~asked & (own.distance(points) < REACH)).any()
+    assert 0.2 < asked.mean() < 0.98
 
 
 def _placed(found: BentBody) -> tuple[np.ndarray, np.ndarray]:

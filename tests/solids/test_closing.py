@@ -77,6 +77,23 @@ def test_a_small_box_is_widened_until_all_orbits_are_in_it():
     assert tile.is_ball
 
 
+def test_what_is_far_from_a_body_is_not_asked():
+    group = group_named("P 1")
+    _, middle = random_function(group, 0)
+    asked = list[int]()
+
+    def function(points):
+        asked.append(len(points))
+        return -np.linalg.norm((points - middle) * (1, 1, 0.3), axis=1)
+
+    complex = cell_complex(group, 6000)
+    tile = close_tile(function, middle - 2, middle + 2, complex)
+    assert tile.is_ball
+    assert sum(asked) < 0.25 * 4**3 / complex.spacing**3
+    close = close_tile(function, middle - 0.8, middle + 0.8, complex)
+    np.testing.assert_array_equal(tile.cells, close.cells)
+
+
 def test_a_function_that_is_not_a_number_is_refused():
     group = group_named("P 1")
     with pytest.raises(OrbiflowError, match="not a number"):

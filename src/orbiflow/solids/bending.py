@@ -7,11 +7,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.solids.body import Body
-from orbiflow.solids.distance import SignedDistance
+from orbiflow.solids.distance import FAR, SignedDistance
 from orbiflow.solids.families import GroupFamily
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.poses import Pose
@@ -21,6 +22,7 @@ STAGES = ((0.2, 10), (0.6, 10), (2.0, 12), (6.0, 14))
 QUICK_STAGES = ((0.3, 6), (1.0, 6), (3.0, 8))
 
 REACH = 0.12  # the widest gap or overlap that is closed in one step
+INNER_REACH = 3.0  # from any place deep in a body to a node inside it, in spacings of its surface
 OWN_REACH = (0.035, 0.07, 0.11)  # where along its normal a body's own other side is looked for
 DAMPING, MOST_REFIT, REFIT_WIDTH = 0.02, 0.02, 0.06
 
@@ -58,6 +60,23 @@ class BentBody:
     def distance(self) -> SignedDistance:
         """The signed distance to its surface."""
         return SignedDistance(self.surface.points, self.surface.normals, self.body.spacing)
+
+    @cached_property
+    def _inner_tree(self) -> cKDTree:
+        return cKDTree(self.nodes[self.body.size :])
+
+    def may_touch(self, points: Array) -> Array:
+        """Return which points (n, 3) are less than `REACH` from its surface or inside, and some others.
+
+        Bodies with limbs have many copies, most of whose surface is far from them.
+        """
+        spacing = self.body.spacing
+        reach = max(REACH, FAR * spacing)
+        found = np.isfinite(self.distance.tree.query(points, distance_upper_bound=reach)[0])
+        rest = np.flatnonzero(~found)
+        deep = self._inner_tree.query(points[rest], distance_upper_bound=INNER_REACH * spacing)[0]
+        found[rest] = np.isfinite(deep)
+        return found
 
     @property
     def strain(self) -> float:
@@ -127,6 +146,7 @@ def contacts(bent: BentBody) -> Contacts:
         linear = lattice @ bent.family.turns[coset] @ inverse
         back = (points - lattice @ (bent.family.shifts[coset] + cell)) @ linear
         some = np.flatnonzero(((back > low) & (back < high)).all(axis=1))
+        some = some[bent.may_touch(back[some])]
         if len(some):
             away, near = bent.distance.with_nearest(back[some])
             less = away < gaps[some]

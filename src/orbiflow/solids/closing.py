@@ -10,6 +10,7 @@ import numpy as np
 import scipy.ndimage
 import scipy.sparse
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
@@ -30,7 +31,8 @@ and up to how many."""
 
 POLISHING_PASSES, FREEING_PASSES, WIDENINGS, CARVINGS = 6, 1, 1, 8
 POINTS_AT_ONCE = 400_000
-MARGIN = 0.15  # how far from a body its tile may reach
+MARGIN = 0.15  # how far from a body its tile may reach, in sides of a cube of its volume
+COARSE = 3  # blocks between those at which it is asked where a function is large
 FINENESS = (1.0, 0.8)  # cells over those wanted: another grid may close where one does not
 FEW_MISSING = 50  # orbits that a larger box would not let in
 
@@ -87,14 +89,16 @@ def close_tile(
             enough. Orbits that are not in the box widen it.
         complex: The cells.
     """
-    low, high = np.asarray(lower, float), np.asarray(upper, float)
-    found = _closed_in(function, low, high, complex)
+    low, high, reach = np.asarray(lower, float), np.asarray(upper, float), MARGIN
+    found = _closed_in(function, low, high, complex, reach)
     for _ in range(WIDENINGS):
         if found.is_ball or found.missing <= FEW_MISSING:
             break
-        reach = (high - low) / 4  # orbits may touch the ball only outside of the box
-        low, high = low - reach, high + reach
-        found = min(found, _closed_in(function, low, high, complex), key=lambda own: own.missing)
+        # orbits may touch the ball only farther off
+        more = (high - low).max() / 4
+        low, high, reach = low - more, high + more, 3 * reach
+        again = _closed_in(function, low, high, complex, reach)
+        found = min(found, again, key=lambda own: own.missing)
     return found
 
 
@@ -109,10 +113,13 @@ def ball_of_cells(
     return next((own for own in closed if own.is_ball), None)
 
 
-def _closed_in(function: Function, lower: Array, upper: Array, complex: Complex) -> CellTile:
+def _closed_in(
+    function: Function, lower: Array, upper: Array, complex: Complex, reach: float
+) -> CellTile:
     """Return a ball of cells in a box, as `close_tile` does."""
-    box, values = _evaluated(function, lower, upper, complex)
-    orbits = np.where(np.isfinite(values), complex.orbit_of(box.cells(np.arange(len(values)))), -1)
+    box, values = _evaluated(function, lower, upper, complex, reach)
+    orbits, used = np.full(len(values), -1), np.flatnonzero(np.isfinite(values))
+    orbits[used] = complex.orbit_of(box.cells(used))
     unit = _slope(values, orbits, box) * complex.spacing
     rough, best, pieces = _grown(box, orbits, values)
     wanted = _settled(box, orbits, values / unit, rough.members())
@@ -180,11 +187,12 @@ def _settled(box: CellBox, orbits: Integers, values: Array, members: Integers) -
 
 
 def _evaluated(
-    function: Function, lower: Array, upper: Array, complex: Complex
+    function: Function, lower: Array, upper: Array, complex: Complex, reach: float
 ) -> tuple[CellBox, Array]:
     """Return a box of cells in which all orbits are, and the function's values at their centres.
 
-    Cells that must not be used have the value -inf.
+    Cells that must not be used have the value -inf: those outside the corners, and those that are
+    farther than `reach` from where the function is large.
     """
     low, high = lower, upper
     for _ in range(8):
@@ -192,7 +200,7 @@ def _evaluated(
         blocks = np.linalg.solve(complex.steps, corners.reshape(-1, 3).T).T
         start = np.floor(blocks.min(axis=0)).astype(np.int64) - 2
         box = CellBox(complex, start, np.ceil(blocks.max(axis=0)).astype(np.int64) + 2 - start)
-        numbers = np.flatnonzero(box.is_inner())
+        numbers = _near_large(box, function, low, high, reach)
         centers = complex.centers(box.cells(numbers))
         inside = np.all((centers >= low) & (centers <= high), axis=1)
         numbers, centers = numbers[inside], centers[inside]
@@ -205,9 +213,40 @@ def _evaluated(
             if np.isnan(values).any():
                 raise OrbiflowError("the function of the tile is not a number at some points")
             return box, values
-        reach = 0.15 * (high - low).max() + 2 * complex.spacing
-        low, high = low - reach, high + reach
+        more = 0.15 * (high - low).max() + 2 * complex.spacing
+        low, high, reach = low - more, high + more, 2 * reach
     raise OrbiflowError("the box is too small for a tile: choose its corners around the body")
+
+
+def _near_large(
+    box: CellBox, function: Function, lower: Array, upper: Array, reach: float
+) -> Integers:
+    """Return the numbers of inner cells near places where a function is larger than elsewhere.
+
+    These places, some blocks apart, have the volume of the tile. A body with limbs fills little of its
+    box, and to ask what is far from it would take most of the time and memory.
+    """
+    complex, inner = box.complex, box.size - 2
+    number = -(-inner // COARSE)
+    axes = [
+        np.minimum(COARSE * np.arange(count) + COARSE // 2, most - 1)
+        for count, most in zip(number, inner, strict=True)
+    ]
+    blocks = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) + 1 + box.lower
+    centers = complex.centers(np.column_stack([blocks, np.zeros(len(blocks), np.int64)]))
+    inside = np.flatnonzero(np.all((centers >= lower) & (centers <= upper), axis=1))
+    count = max(1, complex.cells_per_tile // (box.kinds * COARSE**3))
+    largest = inside[np.argsort(-function(centers[inside]), kind="stable")[:count]]
+    side = complex.spacing * complex.cells_per_tile ** (1 / 3)
+    half_block = COARSE * float(np.linalg.norm(complex.steps, axis=0).sum()) / 2
+    away = cKDTree(centers[largest]).query(centers, distance_upper_bound=reach * side + half_block)[
+        0
+    ]
+    near = np.isfinite(away).reshape(number)
+    for axis in range(3):
+        near = near.repeat(COARSE, axis=axis)
+    near = np.pad(near[: inner[0], : inner[1], : inner[2]], 1)
+    return np.flatnonzero(np.repeat(near.ravel(), box.kinds))
 
 
 def _largest(values: Array, orbits: Integers, number: int) -> tuple[Integers, Array]:

@@ -14,6 +14,7 @@ from orbiflow.solids.mesh import Mesh
 
 NEIGHBOURS = 8  # points of the surface that a distance is taken from
 AT_ONCE = 200_000  # points that are asked for, so that memory stays small
+FAR = 4.0  # spacings from the surface at which a distance is that to one point
 SLANTED = 0.6  # cosine between normal and direction below which one point may mislead
 EVEN = 1.3  # distance of points on a surface over the mean, to be even
 
@@ -71,7 +72,7 @@ class SignedDistance:
         found = np.copysign(away, plane)
         if self.weights is not None:
             found *= np.where(found < 0, self.weights[near], 1.0)
-        some = np.flatnonzero((away < 4 * self.spacing) | (abs(plane) < SLANTED * away))
+        some = np.flatnonzero((away < FAR * self.spacing) | (abs(plane) < SLANTED * away))
         found[some], _ = self.with_nearest(points[some])
         return found
 
@@ -85,7 +86,7 @@ class SignedDistance:
         share /= share.sum(axis=1, keepdims=True)
         planes = np.einsum("nkj,nkj->nk", points[:, None] - self.points[near], self.normals[near])
         flat = (share * planes).sum(axis=1)
-        far = np.clip(least[:, 0] / (2 * self.spacing) - 1, 0, 1)
+        far = np.clip(2 * least[:, 0] / (FAR * self.spacing) - 1, 0, 1)
         found = (1 - far) * flat + far * np.copysign(least[:, 0], flat)
         if self.weights is not None:
             found *= np.where(found < 0, (share * self.weights[near]).sum(axis=1), 1.0)
