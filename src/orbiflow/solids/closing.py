@@ -95,7 +95,7 @@ def close_tile(
         if found.is_ball or found.missing <= FEW_MISSING:
             break
         # orbits may touch the ball only farther off
-        more = (high - low).max() / 4
+        more = 2 * reach * complex.spacing * complex.cells_per_tile ** (1 / 3)
         low, high, reach = low - more, high + more, 3 * reach
         again = _closed_in(function, low, high, complex, reach)
         found = min(found, again, key=lambda own: own.missing)
@@ -123,6 +123,7 @@ def _closed_in(
     unit = _slope(values, orbits, box) * complex.spacing
     rough, best, pieces = _grown(box, orbits, values)
     wanted = _settled(box, orbits, values / unit, rough.members())
+    del rough  # as large as the box
     ball, largest, _ = _grown(box, orbits, wanted)
     size = SURFACE_WEIGHT * FAITH
     for _ in range(FREEING_PASSES):
@@ -170,7 +171,7 @@ def _settled(box: CellBox, orbits: Integers, values: Array, members: Integers) -
     They are the share of the ball around each cell, and a little of the given values, in spacings.
     """
     spacing, inner = box.complex.spacing, np.flatnonzero(orbits >= 0)
-    points, asked = box.centers(members), box.centers(inner)
+    points = box.centers(members)
     low = points.min(axis=0) - 8 * spacing
     counts = np.ceil((points.max(axis=0) - low) / spacing).astype(int) + 9
     places = (points - low) / spacing
@@ -180,9 +181,11 @@ def _settled(box: CellBox, orbits: Integers, values: Array, members: Integers) -
         share = np.where(offset, places - corner, 1 - places + corner).prod(axis=1)
         np.add.at(density, tuple((corner + offset).T), share)
     density = scipy.ndimage.gaussian_filter(density, BLUR)
-    around = scipy.ndimage.map_coordinates(density, ((asked - low) / spacing).T, order=1)
     found = np.full(len(orbits), -np.inf)
-    found[inner] = around + FAITH * np.clip(values[inner], -MOST_SPACINGS, MOST_SPACINGS)
+    for part in np.array_split(inner, len(inner) // POINTS_AT_ONCE + 1):
+        at = (box.centers(part) - low) / spacing
+        around = scipy.ndimage.map_coordinates(density, at.T, order=1)
+        found[part] = around + FAITH * np.clip(values[part], -MOST_SPACINGS, MOST_SPACINGS)
     return found
 
 

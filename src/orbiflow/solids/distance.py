@@ -13,7 +13,7 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.solids.mesh import Mesh
 
 NEIGHBOURS = 8  # points of the surface that a distance is taken from
-AT_ONCE = 200_000  # points that are asked for, so that memory stays small
+AT_ONCE = 50_000  # points that are asked for, so that memory stays small
 FAR = 4.0  # spacings from the surface at which a distance is that to one point
 SLANTED = 0.6  # cosine between normal and direction below which one point may mislead
 EVEN = 1.3  # distance of points on a surface over the mean, to be even

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from array import array
 from collections.abc import Iterable
 from functools import cached_property
 
@@ -97,7 +98,7 @@ class BallOfCells:
     def __init__(self, box: CellBox, orbits: Integers, number_of_orbits: int) -> None:
         self.box = box
         self.orbit_of = orbits
-        self.orbits: list[int] = orbits.tolist()  # quicker one by one
+        self.orbits = array("i", orbits.astype(np.intc).tobytes())  # quicker one by one
         self.holder = [-1] * number_of_orbits
         self.inside = bytearray(box.number_of_cells)
         shape = box.complex.shape
