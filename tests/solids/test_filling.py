@@ -164,6 +164,28 @@ def test_what_was_found_is_kept_where_a_search_is_stopped(
     assert differing.min() > 0.9 * 210  # words below the stack, and no more
 
 
+def test_what_to_do_is_said_where_no_body_closes(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(search, "_solid", lambda *_: None)
+    out, notes = tmp_path / "out", list[str]()
+    shutil.copytree(run, out)
+    with small_fills():
+        outcome = fill_operation(
+            creature_file(tmp_path),
+            out,
+            SMALL,
+            on_event=lambda e: notes.append(e.text) if isinstance(e, Note) else None,
+        )
+    assert outcome.state == "nothing found"
+    assert notes == [
+        "no solid was found that is one piece and fills space: copies grip one another's thin parts, "
+        "or cut them off; try effort 'normal', which tries more places, or another seed, or no groups, "
+        f"or make thin parts thicker; {out} still holds the solids of an earlier run"
+    ]
+    assert len(read_run(out)) == 2
+
+
 def test_a_solid_is_saved_bit_for_bit(tmp_path: Path) -> None:
     own = found()[0]
     (tmp_path / SOLID).write_bytes(own.to_bytes())

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from orbiflow.errors import Advice, literal
 from orbiflow.runtime import (
     NEVER,
     Cancel,
@@ -85,7 +86,7 @@ def fill(
     stopped = cancel.cancelled
     summary = {"mesh": str(mesh), "seconds": time.perf_counter() - begin, "stopped": stopped}
     if not found:
-        on_event(Note("no solid was found that is one piece and fills space", warning=True))
+        on_event(Note(_nothing_found(settings, out), warning=True))
         return Outcome({**summary, "solids": []}, "nothing found")
     remark = STOPPED if stopped else ""
     if stopped:
@@ -101,6 +102,22 @@ def fill(
     document = read_json(out / run_folder.SOLIDS, "a run of orbiflow fill")
     summary |= {"folder": str(out), "solids": document["solids"]}
     return Outcome(summary, "cancelled" if stopped else "done")
+
+
+def _nothing_found(settings: FillSettings, out: Path) -> Advice:
+    """Return what to do where no body closed."""
+    from orbiflow.solids import run_folder
+
+    ways = ["another {seed}"]
+    if settings.effort == "fast":
+        ways = ["{effort} 'normal', which tries more places", *ways]
+    ways += [f"no {{{name}}}" for name in ("separable", "groups") if getattr(settings, name)]
+    earlier = f"; {literal(str(out))} still holds the solids of an earlier run"
+    return Advice(
+        "no solid was found that is one piece and fills space: copies grip one another's thin parts, or "
+        f"cut them off; try {', or '.join(ways)}, or make thin parts thicker"
+        f"{earlier if run_folder.written_files(out) else ''}"
+    )
 
 
 def _table(solids: list[EscherSolid]) -> Table:
