@@ -136,7 +136,8 @@ def test_the_document_is_valid_and_says_whether_solids_leave(run: Path) -> None:
 def test_what_was_found_is_kept_where_a_search_is_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(search, "_solid", lambda *_: found()[0])
+    first = found()[0]
+    monkeypatch.setattr(search, "_solid", lambda *_: first)
     cancel, notes = Cancel(), list[str]()
 
     def listen(event: Event) -> None:

@@ -114,8 +114,8 @@ def _nothing_found(settings: FillSettings, out: Path) -> Advice:
     ways += [f"no {{{name}}}" for name in ("separable", "groups") if getattr(settings, name)]
     earlier = f"; {literal(str(out))} still holds the solids of an earlier run"
     return Advice(
-        "no solid was found that is one piece and fills space: copies grip one another's thin parts, or "
-        f"cut them off; try {', or '.join(ways)}, or make thin parts thicker"
+        "no solid was found that is one piece and fills space: copies grip one another's thin parts, "
+        f"or cut them off; try {', or '.join(ways)}, or make thin parts thicker"
         f"{earlier if run_folder.written_files(out) else ''}"
     )
 
