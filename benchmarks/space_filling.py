@@ -90,7 +90,7 @@ def _groups(files: list[Path], names: str, workers: int) -> None:
 def _cost(goal: Goal, body: Body, family: GroupFamily) -> float:
     effort = EFFORTS["fast"]
     poses = starting_poses(effort, goal.inner_points, (family, np.random.SeedSequence(0)))
-    return min(quick_bend(body, pose)[0] for pose in poses[: effort.per_group])
+    return min(quick_bend(body, pose)[0] for pose in poses)
 
 
 def _searches(files: list[Path], settings: FillSettings, out: Path | None) -> None:

@@ -24,7 +24,7 @@ def small_fills() -> Iterator[None]:
     """Search for solids from few poses and coarse bodies."""
     with pytest.MonkeyPatch.context() as patch:
         few = search.Effort(
-            groups=2, tried=100, climbed=2, steps=30, per_group=1, quick=2, full=2,
+            groups=2, tried=100, climbed=2, steps=30, per_group=1, polishing=10, quick=2, full=2,
             rough=0.16, fine=0.13, grain=0.05, stages=((0.5, 4), (2.0, 6), (8.0, 4)),
         )  # fmt: skip
         patch.setitem(search.EFFORTS, "fast", few)

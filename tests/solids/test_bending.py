@@ -15,7 +15,7 @@ from orbiflow.solids.body import Body
 from orbiflow.solids.distance import SignedDistance, points_inside
 from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
 from orbiflow.solids.likeness import measured, rigid_motion
-from orbiflow.solids.poses import Cover, Pose, best_poses, orbits_of_bins
+from orbiflow.solids.poses import FINENESS, Cover, Pose, best_poses, orbits_of_bins, polished
 from orbiflow.solids.search import coverage
 from orbiflow.solids.settings import FillSettings, Sphere
 from orbiflow.symmetry import space_group
@@ -98,6 +98,16 @@ def test_a_climb_covers_more() -> None:
     more = best_poses(family, points, np.random.default_rng(0), tried=50, climbed=1, steps=150)[0]
     assert more.cover > few.cover
     assert Cover(family, points).of(more.stretches, more.turn, more.place) == more.cover
+    many = points_inside(creature(), 0.03)
+    again = polished([few, more], many, np.random.default_rng(0), 60)
+    fine = Cover(family, many, FINENESS)
+    assert [fine.of(own.stretches, own.turn, own.place) for own in again] == [
+        own.cover for own in again
+    ]
+    starts = [fine.of(own.stretches, own.turn, own.place) for own in (few, more)]
+    assert min(own.cover for own in again) > min(starts)
+    assert again[0].cover > max(starts)
+    assert again[0].cover >= again[1].cover
 
 
 def test_a_body_at_rest_stays() -> None:

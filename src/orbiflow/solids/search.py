@@ -23,7 +23,7 @@ from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
 from orbiflow.solids.likeness import measured, rigid_motion
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.painting import Painting, checked_painting
-from orbiflow.solids.poses import Pose, best_poses
+from orbiflow.solids.poses import FINENESS, Pose, best_poses, polished
 from orbiflow.solids.separable import SEPARABLE_GROUPS, check_separable, separable_tile
 from orbiflow.solids.settings import FillSettings, Sphere
 from orbiflow.solids.solid import EscherSolid
@@ -52,6 +52,7 @@ class Effort(NamedTuple):
     - `groups`: Number of groups.
     - `tried`, `climbed`, `steps`, `per_group`: Of each, random poses, climbs and their steps, and poses
       that go on.
+    - `polishing`: Steps of a second climb of those, with finer bins.
     - `quick`, `full`: Of all, quick bends, and solids.
     - `rough`, `fine`: Spacings of a body's nodes in quick bends and in others.
     - `grain`: Spacing of the points on the bent surface that a solid is made of.
@@ -63,6 +64,7 @@ class Effort(NamedTuple):
     climbed: int
     steps: int
     per_group: int
+    polishing: int
     quick: int
     full: int
     rough: float = 0.085
@@ -72,8 +74,8 @@ class Effort(NamedTuple):
 
 
 EFFORTS = {
-    "fast": Effort(4, 1000, 8, 250, 3, 12, 2),
-    "normal": Effort(len(USUAL_GROUPS), 1500, 24, 500, 4, 36, 8),
+    "fast": Effort(4, 1000, 8, 250, 4, 300, 16, 4),
+    "normal": Effort(len(USUAL_GROUPS), 1500, 24, 500, 4, 400, 40, 12),
 }
 
 
@@ -126,9 +128,9 @@ class Goal:
         return cls(name, unit, weight, millimetres, np.array(AXES[settings.up or "z"]).T)
 
     @cached_property
-    def inner_points(self) -> Array:
-        """Points (n, 3) evenly inside."""
-        return points_inside(self.mesh, GRAIN)
+    def inner_points(self) -> tuple[Array, Array]:
+        """Points (n, 3) evenly inside, and more of them, for a second climb of poses."""
+        return points_inside(self.mesh, GRAIN), points_inside(self.mesh, GRAIN / FINENESS)
 
     def body(self, spacing: float) -> Body:
         """Return the body that bends, with nodes so far from each other."""
@@ -179,15 +181,14 @@ def fill(
     usual = SEPARABLE_GROUPS if settings.separable else USUAL_GROUPS[: effort.groups]
     families = [GroupFamily.named(own) for own in settings.groups or usual]
     if settings.separable:
-        # of few groups more poses, of which fewer give solids
-        effort = effort._replace(per_group=effort.quick, full=2 * effort.full)
+        effort = effort._replace(per_group=effort.quick)  # of few groups more poses
         for family in families:
             check_separable(family.base)
     team = Team(__name__, settings.workers or cores(), on_event, cancel)
     seeds = np.random.SeedSequence(settings.seed).spawn(len(families))
     jobs = list(zip(families, seeds, strict=True))
     placed = team.each(partial(starting_poses, effort, goal.inner_points), jobs, "placing", 0.1)
-    poses = [pose for some in placed for pose in some[: effort.per_group]]
+    poses = [pose for some in placed for pose in some]
     poses.sort(key=lambda pose: -pose.cover)
     rough = goal.body(effort.rough)
     quick = team.each(partial(quick_bend, rough), poses[: effort.quick], "bending", 0.35)
@@ -221,14 +222,15 @@ def _varied(solids: list[EscherSolid], count: int) -> list[EscherSolid]:
 
 
 def starting_poses(
-    effort: Effort, points: Array, job: tuple[GroupFamily, np.random.SeedSequence]
+    effort: Effort, points: tuple[Array, Array], job: tuple[GroupFamily, np.random.SeedSequence]
 ) -> list[Pose]:
-    """Return the poses of points (n, 3) of a body in a family that cover most, the best first."""
+    """Return the poses of a body in a family that cover most, the best first, by a goal's points."""
     family, seed = job
-    random = np.random.default_rng(seed)
-    return best_poses(
-        family, points, random, tried=effort.tried, climbed=effort.climbed, steps=effort.steps
+    random, (few, many) = np.random.default_rng(seed), points
+    poses = best_poses(
+        family, few, random, tried=effort.tried, climbed=effort.climbed, steps=effort.steps
     )
+    return polished(poses[: effort.per_group], many, random, effort.polishing)
 
 
 def quick_bend(body: Body, pose: Pose) -> tuple[float, Pose]:
