@@ -9,6 +9,7 @@ import io
 import re
 import zipfile
 import zlib
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -36,8 +37,16 @@ MILLIMETRES = {
 }
 """The length of each unit of a 3MF file."""
 
-Resources = dict[tuple[str, str], ElementTree.Element]
-"""Objects and palettes by their file and number."""
+Palette = dict[str, list[float]]
+"""Colours by their place in a list, as triangles name it."""
+
+
+class Resources(NamedTuple):
+    """What objects are placed by, and colours taken from: each by its file and number."""
+
+    objects: dict[tuple[str, str], ElementTree.Element]
+    palettes: dict[tuple[str, str], Palette]
+
 
 PALETTES = {"colorgroup": "color", "basematerials": "displaycolor"}
 """Lists of colours, and which attribute of what is in them is the colour."""
@@ -53,12 +62,15 @@ def read_3mf(data: bytes) -> Soup:
     roots = {name: _parsed(text) for name, text in _models(data).items()}
     if not roots:
         raise OrbiflowError("holds no 3D model; export it again")
-    known = {
-        (name, own.get("id", "")): own
-        for name, root in roots.items()
-        for own in root.iter()
-        if own.tag == "object" or own.tag in PALETTES
-    }
+    known = Resources({}, {})
+    for name, root in roots.items():
+        for own in root.iter():
+            number = name, own.get("id", "")
+            if own.tag == "object":
+                known.objects[number] = own
+            elif own.tag in PALETTES:
+                colours = [_colour(one.get(PALETTES[own.tag], "")) for one in own]
+                known.palettes[number] = {str(k): colour for k, colour in enumerate(colours)}
     placed = list[Soup]()
     main, root = next(iter(roots.items()))
     unit = MILLIMETRES.get(root.get("unit", "millimeter"))
@@ -131,7 +143,7 @@ def _place(
     named = [value for name, value in use.attrib.items() if name.rpartition("}")[2] == "path"]
     file = named[0].lstrip("/").lower() if named else file
     number = use.get("objectid", "")
-    if (own := known.get((file, number))) is None or own.tag != "object":
+    if (own := known.objects.get((file, number))) is None:
         raise OrbiflowError(f"places object {number!r}, which is not there; export it again")
     if own.get("type", "model") != "model":
         return  # a support of the print, or another thing that is no part of the body
@@ -141,43 +153,37 @@ def _place(
         faces = _numbers(mesh, "triangle", ("v1", "v2", "v3"), np.int64)
         if faces.size and not 0 <= faces.min() <= faces.max() < len(points):
             raise OrbiflowError("has triangles of points that are not there; export it again")
-        if np.linalg.det(matrix[:3, :3]) < 0:
-            faces = faces[:, ::-1]
         soup = Soup(points @ matrix[:3, :3].T + matrix[:3, 3], faces)
-        colours = _colours(own, mesh, file, known)
-        placed.append(soup if colours is None else soup.with_corner_colours(colours))
+        if (colours := _colours(own, mesh, file, known.palettes)) is not None:
+            soup = soup.with_corner_colours(colours)
+        if np.linalg.det(matrix[:3, :3]) < 0:
+            soup = soup._replace(faces=soup.faces[:, ::-1])
+        placed.append(soup)
         check_counts(sum(len(s.points) for s in placed), sum(len(s.faces) for s in placed))
     for component in own.iter("component"):
         _place(component, file, matrix, known, placed, depth + 1)
 
 
 def _colours(
-    own: ElementTree.Element, mesh: ElementTree.Element, file: str, known: Resources
+    own: ElementTree.Element,
+    mesh: ElementTree.Element,
+    file: str,
+    palettes: dict[tuple[str, str], Palette],
 ) -> Array | None:
     """Return the colours (M, 3, 3) at the triangles' corners, NaN where they have none.
 
     A triangle names a palette and an entry for each corner, or has those of its object. None if no
     triangle has a colour.
     """
-    palettes = {
-        number: [_colour(entry.get(PALETTES[group.tag], "")) for entry in group]
-        for (home, number), group in known.items()
-        if home == file and group.tag in PALETTES
-    }
     if not palettes:
         return None
     usual, first = own.get("pid", ""), own.get("pindex", "")
     found, none = list[list[list[float]]](), [np.nan] * 3
     for face in mesh.iter("triangle"):
-        palette = palettes.get(face.get("pid", usual), [])
+        palette = palettes.get((file, face.get("pid", usual)), {})
         one = face.get("p1", first)
-        entries = [one, face.get("p2", one), face.get("p3", one)]
-        found.append(
-            [
-                palette[int(entry)] if entry.isdecimal() and int(entry) < len(palette) else none
-                for entry in entries
-            ]
-        )
+        entries = one, face.get("p2", one), face.get("p3", one)
+        found.append([palette.get(entry, none) for entry in entries])
     colours = np.array(found, float).reshape(-1, 3, 3)
     return colours if np.isfinite(colours).any() else None
 

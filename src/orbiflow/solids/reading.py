@@ -31,6 +31,7 @@ from orbiflow.solids.soup import MAX_BYTES, MAX_FACES_READ, Soup, check_counts
 MAX_LINE = 2**16
 """Bytes of a line of an OBJ file at most: a polygon of some thousand corners."""
 
+NO_COLOUR = [b"nan"] * 3
 _CORNER = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
@@ -129,7 +130,7 @@ def _read_obj(data: bytes, _: Path) -> Soup:
         if line.startswith((b"v ", b"v\t")):
             words = line.split()[1:]
             points.append(words[:3])
-            colours.append(words[3:6] if len(words) == 6 else [b"nan"] * 3)
+            colours.append(words[3:6] if len(words) == 6 else NO_COLOUR)
         elif line.startswith((b"f ", b"f\t")):
             corners = [_index(word, len(points)) for word in line.split()[1:]]
             faces += zip(corners[:1] * (len(corners) - 2), corners[1:], corners[2:], strict=False)
@@ -138,9 +139,9 @@ def _read_obj(data: bytes, _: Path) -> Soup:
     if any(len(point) != 3 for point in points):
         raise OrbiflowError("has a point without three coordinates; export it again")
     soup = Soup(_numbers(points, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3))
-    found = _numbers(colours, float).reshape(-1, 3)
-    if not np.isfinite(found).any():
+    if all(own is NO_COLOUR for own in colours):
         return soup
+    found = _numbers(colours, float).reshape(-1, 3)
     # some programs write 0 to 255
     return soup._replace(colours=found / (255 if np.nanmax(found) > 1 else 1))
 
@@ -203,10 +204,10 @@ def _coloured(part: Any) -> Soup:
     """Return a mesh of trimesh, with the colours of its points or faces."""
     points = np.asarray(part.vertices, float).reshape(-1, 3)
     soup = Soup(points, np.asarray(part.faces, np.int64).reshape(-1, 3))
-    if (found := part.vertex_attributes.get(COLOURS)) is not None:
-        colours = np.asarray(found).reshape(len(points), -1)[:, :3]
-        most = np.iinfo(colours.dtype).max if colours.dtype.kind in "iu" else 1
-        return soup._replace(colours=colours / most)
+    found = np.asarray(part.vertex_attributes.get(COLOURS, ()))
+    if found.shape in ((len(points), 3), (len(points), 4)):
+        most = np.iinfo(found.dtype).max if found.dtype.kind in "iu" else 1
+        return soup._replace(colours=found[:, :3] / most)
     if part.visual.kind == "vertex":
         return soup._replace(colours=part.visual.vertex_colors[:, :3] / 255)
     if part.visual.kind == "face":
