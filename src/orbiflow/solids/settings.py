@@ -105,7 +105,7 @@ class FillSettings(Settings, group="Search"):
     cut each solid flat."""
 
     effort: Literal["fast", "normal"] = "normal"
-    """How long the search takes: a minute, or some five."""
+    """How long the search takes: a minute or two, or some five."""
 
     method: Literal["bending", "flow"] = "bending"
     """How what is left between bent copies is divided: cell by cell, or by a symmetric flow of a simple
