@@ -139,7 +139,7 @@ function words({ usual_size: usual, low, high }) {
       about:
         `The middle and radius of a ball, as x,y,z,radius: its inside bends five times less. The file has ${
           reach.join(", ")
-        }. Or painted: what has another colour than most of the mesh.`,
+        }. Or painted: what has another colour than most.`,
     },
     tiles: { title: "How many solids to keep", about: "" },
   };

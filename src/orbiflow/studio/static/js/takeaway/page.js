@@ -262,7 +262,7 @@ class TakeawayPage {
     this.paint();
   }
 
-  /** The picture is laid on what shows its colours, as the look says; else if that is wished, where it can be. */
+  /** The picture is laid on what shows its colours, as the look says; else if that is wished. */
   fitLayers() {
     const [drawing, box] = [this.layer("drawing"), this.layer("picture")];
     const may = (own, can) => {

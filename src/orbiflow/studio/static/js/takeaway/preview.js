@@ -4,7 +4,7 @@ import { h, put, stack } from "../dom.js";
 
 const PATIENCE = 1500; // ms after which an unwanted drawing is given up
 const SIDES = [480, 1000]; // pixels: soon, then in detail
-const SLOW = 400; // ms after which it is said that one is being drawn
+const SLOW = 400; // ms after which the page says so
 
 const SAYS = { animate: "One moment of the animation." };
 
@@ -12,7 +12,7 @@ export class Preview {
   /**
    * @param {Api} api
    * @param {string} place the address of the tile
-   * @param {HTMLElement} meanwhile what is shown until the first one is there
+   * @param {HTMLElement} meanwhile shown until the first one is there
    * @param {(error: import("../api.js").Refusal | null, notes: string[]) => void} told
    */
   constructor(api, place, meanwhile, told) {
