@@ -31,9 +31,9 @@ from .density.regions.levels import DensityLevels as DensityLevels
 from .density.regions.levels import highest_density_region as highest_density_region
 from .density.spaces.patches import to_klein as to_klein
 from .density.spaces.quotient import QuotientSpace as QuotientSpace
+from .density.spaces.rotations import RotationSpace as RotationSpace
 from .density.spaces.space import Space as Space
 from .density.spaces.space import make_space as make_space
-from .density.spaces.unit_vectors import RotationSpace as RotationSpace
 from .density.spaces.unit_vectors import UnitVectorSpace as UnitVectorSpace
 from .density.summaries import summarize_angles as summarize_angles
 from .density.summaries import summarize_axes as summarize_axes

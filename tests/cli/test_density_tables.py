@@ -234,7 +234,18 @@ def test_quaternions_are_read_by_name(tmp_path: Path, orbiflow: Any) -> None:
     assert means == pytest.approx([means[0]] * 3, abs=1e-3)
     (tmp_path / "turns.csv").write_text(text("a,b,c,d", turns))
     done = fit(orbiflow, tmp_path / "turns.csv", tmp_path / "m", "--space", "rotation-space")
-    assert "took a, b, c, d as x, y, z, w: the quaternion's scalar is the last" in done.out
+    assert "a, b, c, d: names do not say which is the quaternion's scalar; give --form" in done.err
+    done = fit(
+        orbiflow,
+        tmp_path / "turns.csv",
+        tmp_path / "m",
+        "--space",
+        "rotation-space",
+        "--form",
+        "quaternion",
+    )
+    report = json.loads((tmp_path / "m" / "report.json").read_text())
+    assert report["log_likelihood"]["natural"] == pytest.approx(means[0], abs=1e-3)
 
 
 def test_theta_is_first_on_the_klein_bottle(tmp_path: Path, orbiflow: Any) -> None:

@@ -79,8 +79,6 @@ MUST_BE_CONVERTED = {
     ("sphere", "lat_rad,lon_rad"): "is in radians: convert it to degrees",
     ("sphere", "dec,ra_hours"): "15 for each hour",
     ("sphere", "lat,lon,mag"): "'lat,lon' alone",
-    ("rotation-space", "phi1,Phi,phi2"): "are Euler angles",
-    ("rotation-space", "roll,pitch,yaw"): "are Euler angles",
 }
 
 

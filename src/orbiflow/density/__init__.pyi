@@ -72,6 +72,9 @@ from .spaces.flat import Torus as Torus
 from .spaces.mixed import MixedTorus as MixedTorus
 from .spaces.patches import to_klein as to_klein
 from .spaces.quotient import QuotientSpace as QuotientSpace
+from .spaces.rotations import CubicOrientations as CubicOrientations
+from .spaces.rotations import HexagonalOrientations as HexagonalOrientations
+from .spaces.rotations import RotationSpace as RotationSpace
 from .spaces.round import ProjectivePlane as ProjectivePlane
 from .spaces.round import RoundSpace as RoundSpace
 from .spaces.round import Sphere as Sphere
@@ -81,11 +84,8 @@ from .spaces.space import MEASURES as MEASURES
 from .spaces.space import SPACES as SPACES
 from .spaces.space import Space as Space
 from .spaces.space import make_space as make_space
-from .spaces.unit_vectors import CubicOrientations as CubicOrientations
-from .spaces.unit_vectors import HexagonalOrientations as HexagonalOrientations
 from .spaces.unit_vectors import Hypersphere as Hypersphere
 from .spaces.unit_vectors import ProjectiveSpace as ProjectiveSpace
-from .spaces.unit_vectors import RotationSpace as RotationSpace
 from .spaces.unit_vectors import UnitVectorSpace as UnitVectorSpace
 from .summaries import AngleSummary as AngleSummary
 from .summaries import AxisSummary as AxisSummary

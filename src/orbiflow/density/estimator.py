@@ -18,11 +18,13 @@ from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
     OUTPUTS,
+    ROTATIONS,
     check_columns,
     data_of,
     frame_of,
     is_angular,
     require_values,
+    rotation_form,
     unit_of,
 )
 from orbiflow.density.fitting import (
@@ -49,8 +51,15 @@ from orbiflow.density.inference import (
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
-from orbiflow.density.spaces import MixedTorus, QuotientSpace, Space, check_measure, space_for
-from orbiflow.errors import DataWarning, OrbiflowError, SettingError
+from orbiflow.density.spaces import (
+    MixedTorus,
+    QuotientSpace,
+    RotationSpace,
+    Space,
+    check_measure,
+    space_for,
+)
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError, literal
 from orbiflow.settings import check_names, fields_of
 
 RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
@@ -393,16 +402,33 @@ class DensityEstimator(FittedFigures):
         space, unit = self._space_name(), self.unit
         if self.linear or isinstance(own, MixedTorus):
             return self._mixed_space(data, names)
-        if own is not None and is_angular(own.name, data.shape[1]):
+        form = None
+        if self._space_name() in ROTATIONS:
+            form = self._form_of(data.shape[1], names)
+        if own is not None and is_angular(own.name, data.shape[1], form):
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):
                 raise SettingError(f"{{unit}} {self.unit} is not the space's, {unit}: leave it out")
-        found = unit_of(space, data, names, unit, stacklevel=4)
+        found = unit_of(space, data, names, unit, form=form, stacklevel=4)
         if isinstance(self.space, QuotientSpace):
             self.space.warn_of_fractions(data, stacklevel=4)
         if isinstance(self.space, Space):
             return self.space
-        return space_for(self.space, data, unit=found, seed=self.settings().seed)
+        return space_for(self.space, data, unit=found, seed=self.settings().seed, form=form)
+
+    def _form_of(self, width: int, names: tuple[str, ...] | None) -> str | None:
+        """Return how columns write rotations, None if nothing says it."""
+        if not isinstance(self.space, RotationSpace):
+            return rotation_form(self._space_name(), names, width)
+        own = self.space.form_of(width)
+        known = check_columns(self.space.name, names) if names else None
+        are_euler = known is not None and known.form == "ZXZ" and len(own) == len("ZXZ")
+        if known is not None and known.form != own and not are_euler:
+            raise SettingError(
+                f"the columns {literal(', '.join(names or ()))} are {known.words}, by their names, and "
+                f"the space's form is {own}: take a RotationSpace of the form {known.form}"
+            )
+        return own
 
     def _mixed_space(self, data: Array, names: tuple[str, ...] | None) -> Space:
         """Return the space of data some of whose columns are real."""

@@ -212,6 +212,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     angles = len(split.rows.table.columns)
     weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
     density, space = asked.density, asked.where.space
+    form = asked.where.rotation_form(split.rows.table.columns)
     given: dict[str, Any] = {
         "data": Path("rows.npy"),
         "space": space,
@@ -224,7 +225,11 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         # a flow alone has no components to choose
         "group": str(angles + weighted + 1) if grouped and fit.components != ("flow",) else None,
         "missing": asked.rows.kept_missing,
-        "unit": split.rows.unit if is_angular(space, angles) else None,
+        "unit": split.rows.unit if is_angular(space, angles, form) else None,
+        "form": form,
+        "crystal": asked.where.crystal,
+        "specimen": asked.where.specimen,
+        "passive": asked.where.passive or None,
         "components": fit.components,
         "repeats": density.repeats,
         "seed": density.seed,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
-from orbiflow.density import comparing
+from orbiflow.density import comparing, operations
 from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
@@ -116,8 +116,9 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     if real:
         space: Space = MixedTorus.for_columns(table.values, real, table.columns, unit=unit)
     else:
-        how: dict[str, Any] = {"cell": where.cell, "fractional": where.fractional}
-        space = space_for(where.space, table.values, unit=unit, seed=asked.density.seed, **how)
+        own = operations.space_of(where, table.columns, unit)
+        seed = asked.density.seed
+        space = space_for(own, table.values, unit=unit, seed=seed) if isinstance(own, str) else own
     may_lack = asked.rows.missing == "marginalise"
     counts, place = places(chart_of_rows(space, table.values, may_lack=may_lack))
     if len(counts) <= LEAST_PLACES:

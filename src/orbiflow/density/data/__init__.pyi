@@ -14,6 +14,7 @@ from .columns import Arrangement as Arrangement
 from .columns import arrangements as arrangements
 from .columns import check_columns as check_columns
 from .columns import chosen_arrangement as chosen_arrangement
+from .columns import rotation_form as rotation_form
 from .doubts import CODES as CODES
 from .doubts import Doubt as Doubt
 from .doubts import codes_among as codes_among

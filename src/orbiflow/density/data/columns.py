@@ -32,12 +32,14 @@ class Arrangement(NamedTuple):
     - `words`: What they are, as in "latitude and longitude".
     - `is_sure`: Whether the names can hardly mean anything else.
     - `note`: What to keep in mind of such data.
+    - `form`: How they write rotations, as `RotationSpace` names it.
     """
 
     columns: tuple[int, ...]
     words: str
     is_sure: bool = True
     note: str = ""
+    form: str = ""
 
 
 def arrangements(space: str, names: Sequence[str], width: int | None = None) -> list[Arrangement]:
@@ -56,9 +58,7 @@ def arrangements(space: str, names: Sequence[str], width: int | None = None) -> 
     if space in DIRECTIONS:
         return _directions(names)
     if space in ROTATIONS:
-        euler = _euler(names) if space in CRYSTALS else []
-        vector = _lettered(names, ("xyz",), "a rotation vector")
-        return euler or _quaternions(names) or _matrices(names) or vector
+        return _rotations(names)
     if space == "klein-bottle":
         return _named_so(names, ("theta", "phi"), "theta and phi")
     if space == "torus" or space in VECTORS:
@@ -129,6 +129,29 @@ def _lettered(names: Sequence[str], letters: Sequence[str], words: str) -> list[
     return []
 
 
+def _rotations(names: Sequence[str]) -> list[Arrangement]:
+    """Return the columns that are rotations, by the first form that names say."""
+    vector = _lettered(names, ("xyz",), "a rotation vector")
+    every = {
+        "ZXZ": _euler(names),
+        "rodrigues": _rodrigues(names),
+        "quaternion": _quaternions(names),
+        "matrix": _matrices(names),
+        "vector": vector,
+    }
+    return next(
+        ([one._replace(form=form) for one in own] for form, own in every.items() if own),
+        list[Arrangement](),
+    )
+
+
+def _rodrigues(names: Sequence[str]) -> list[Arrangement]:
+    """Return Rodrigues' vectors: rodrigues1 to 3, or rodrigues_x, y, z."""
+    words = "Rodrigues' vector"
+    every = (_named_so(names, [f"rodrigues{e}" for e in ends], words) for ends in ("123", "xyz"))
+    return next(filter(None, every), list[Arrangement]())
+
+
 def _quaternions(names: Sequence[str]) -> list[Arrangement]:
     """Return quaternions: w,x,y,z, q0..q3, qw.., scalar,i,j,k, in any order of the columns."""
     found: list[Arrangement] = []
@@ -158,8 +181,9 @@ def _matrices(names: Sequence[str]) -> list[Arrangement]:
 def _euler(names: Sequence[str]) -> list[Arrangement]:
     """Return Bunge's Euler angles: phi1, Phi, phi2, or three numbered ones."""
     words = "Bunge's Euler angles"
-    found = _named_so(names, ("phi1", "phi", "phi2"), words)
-    return found or _named_so(names, ("euler1", "euler2", "euler3"), words)
+    wanted = [("phi1", "phi", "phi2")]
+    wanted += [tuple(f"{stem}{k}" for k in "123") for stem in ("euler", "eulerangle", "bunge")]
+    return next(filter(None, (_named_so(names, own, words) for own in wanted)), list[Arrangement]())
 
 
 def _named_so(names: Sequence[str], wanted: Sequence[str], words: str) -> list[Arrangement]:
@@ -232,16 +256,67 @@ def _check_forms(space: str, names: Sequence[str]) -> None:
                 wrong.append((name, f"is in {unit_named(name)}: convert it to degrees"))
             if words & HOURS:
                 wrong.append((name, "is in hours: convert it to degrees (15 for each hour)"))
-    airborne = all(words & {"roll", "pitch", "yaw", "heading"} for words in split)
-    if space == "rotation-space" and len(names) == 3 and (_euler(names) or airborne):
-        how = (
-            "are Euler angles, and three columns on the rotation-space are a rotation vector: convert "
-            "them (scipy.spatial.transform.Rotation.from_euler), or take cubic-orientations or "
-            "hexagonal-orientations for crystals"
-        )
-        wrong.append((", ".join(names), how))
     if space in DIRECTIONS and len(names) > 2 and (pairs := pairs_of(names)):
         pair = f"{names[pairs[0].north]},{names[pairs[0].east]}"
         wrong.append((", ".join(names), f"are too many columns: give '{pair}' alone"))
     for name, how in wrong:
         raise SettingError(literal(f"{name} {how}"))
+
+
+COUNTS_OF_COLUMNS = {"quaternion": 4, "scalar-first": 4, "matrix": 9}
+"""Columns of rotations in each form; others have three."""
+
+
+def rotation_form(
+    space: str, names: Sequence[str] | None, width: int, form: str | None = None
+) -> str | None:
+    """Return in which form columns write rotations; None if nothing says it.
+
+    Quaternions whose names say which is the scalar are "quaternion": they are read with it last.
+
+    Args:
+        space: The name of a space of rotations.
+        names: Names of the columns, if they have names.
+        width: The number of columns.
+        form: The form that was asked for.
+
+    Raises:
+        SettingError: For a form of another number of columns, and if names leave it open.
+
+    >>> rotation_form("rotation-space", ["Euler1", "Euler2", "Euler3"], 3)
+    'ZXZ'
+    >>> rotation_form("rotation-space", ["q1", "q2", "q3", "q4"], 4)
+    Traceback (most recent call last):
+    ...
+    orbiflow.errors.SettingError: q1, q2, q3, q4: names do not say which is the quaternion's scalar; \
+give form quaternion if it is the last, or scalar-first
+    """
+    if form is not None and COUNTS_OF_COLUMNS.get(form, 3) != width:
+        count = COUNTS_OF_COLUMNS.get(form, 3)
+        text = f"{{form}} {literal(form)} takes {count} columns, and there are {width}; choose "
+        raise SettingError(text + "{columns}, or another form")
+    named = names is not None and not all(re.fullmatch(r"column\d+", name) for name in names)
+    known = [one for one in arrangements(space, names or ()) if len(one.columns) == width]
+    if known and known[0].form == "quaternion":
+        return "quaternion"
+    if form is not None or known:
+        return form or known[0].form
+    if not named or width == 9:
+        return None
+    listed = literal(", ".join(names or ()))
+    if width == 4:
+        raise SettingError(
+            f"{listed}: names do not say which is the quaternion's scalar; give {{form}} quaternion if "
+            "it is the last, or scalar-first"
+        )
+    if any(
+        {"roll", "pitch", "yaw", "heading"}.intersection(words_of(name)) for name in names or ()
+    ):
+        raise SettingError(
+            f"{listed} are Euler angles: give {{form}} with the axes in the order of the columns, such "
+            "as ZYX for yaw, pitch, roll"
+        )
+    raise SettingError(
+        f"{listed}: names do not say how they write rotations; give {{form}} bunge (phi1, Phi, phi2), "
+        "vector (axis times angle) or rodrigues"
+    )

@@ -15,9 +15,12 @@ TURN_TOLERANCE = 1e-4
 """Share by which rounding may take an angle beyond a turn: 6.2832 is 2 pi."""
 
 
-def is_angular(space: str, columns: int) -> bool:
-    """Return whether data of so many columns are angles, which have a unit."""
-    return space in ANGULAR or (space in ROTATIONS and columns == 3)
+def is_angular(space: str, columns: int, form: str | None = None) -> bool:
+    """Return whether data of so many columns are angles, which have a unit.
+
+    `form` says how rotations are written: Rodrigues' vectors are no angles.
+    """
+    return space in ANGULAR or (space in ROTATIONS and columns == 3 and form != "rodrigues")
 
 
 def check_unit(space: str, unit: str | None) -> None:

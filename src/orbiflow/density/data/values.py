@@ -22,7 +22,13 @@ from orbiflow.density.data.column_names import (
     unit_named,
     words_of,
 )
-from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
+from orbiflow.density.data.columns import (
+    DIRECTIONS,
+    ROTATIONS,
+    Arrangement,
+    check_columns,
+    rotation_form,
+)
 from orbiflow.density.data.doubts import (
     FEW_ROWS,
     FULL_SHARE_OF_TURN,
@@ -48,6 +54,9 @@ CURES = {
 """What to do with angles in other units than those that are read."""
 
 HOURS_PER_DAY = 24.0
+
+FOUR_PI_TOLERANCE = 1e-3
+"""How far from 4 pi is what .ang files write where there is no orientation."""
 
 
 def refuse_foreign_units(names: Sequence[str], values: Array, unit: str | None) -> None:
@@ -83,7 +92,12 @@ def _unit_to_convert(name: str, least: float, most: float, unit: str | None) -> 
 
 
 def check_values(
-    space: str, values: Array, names: Sequence[str] | None, unit: str | None, cure: str
+    space: str,
+    values: Array,
+    names: Sequence[str] | None,
+    unit: str | None,
+    cure: str,
+    form: str | None = None,
 ) -> tuple[Unit, list[Doubt]]:
     """Return the unit of data (N, k), and doubts; NaN are missing values.
 
@@ -93,24 +107,32 @@ def check_values(
         names: Names of their columns, if they have names.
         unit: The unit that was given, if one was.
         cure: What to do with codes for missing values, after "...: ".
+        form: How rotations are written, if it was said.
 
     Raises:
         SettingError: For a unit that does not apply or is not known, columns in another order than the
-            space's, codes for missing values among angles, and radians in the place of degrees.
+            space's, codes for missing values among angles, radians in the place of degrees, and
+            rotations of which nothing says how they are written.
     """
     check_unit(space, unit)
     called = list(names) if names else [f"column{k}" for k in range(1, values.shape[1] + 1)]
     found = check_columns(space, names) if names else None
     doubts = [Doubt(found.note, False)] if found and found.note else []
-    doubts += _doubts_of_names(space, values, called, found)
+    doubts += _doubts_of_names(space, values, called, found if form is None else found or _SAID)
     doubts += _doubts_of_identifiers(space, values, called)
-    if is_angular(space, values.shape[1]):
+    if space in ROTATIONS:
+        form = rotation_form(space, names, values.shape[1], form)
+        doubts += _unindexed(values) if form == "ZXZ" else []
+    if is_angular(space, values.shape[1], form):
         own, more = _angles(space, values, called, unit, cure)
         return own, doubts + more
     if space in DIRECTIONS and values.shape[1] == 2:
         refuse_codes(space, values, called, "degrees", cure)
         doubts += place_doubts(space, values, called, unit)
     return "radians", doubts
+
+
+_SAID = Arrangement((), "what was said")
 
 
 def doubts_of_other_columns(
@@ -156,6 +178,18 @@ def _doubts_of_names(
     return []
 
 
+def _unindexed(values: Array) -> list[Doubt]:
+    """Return a doubt if Euler angles (N, 3) are 0 in several rows, as microscopes write what failed."""
+    rows = int((values == 0).all(axis=1).sum())
+    if rows < 2:
+        return []
+    text = (
+        f"all three angles are exactly 0 in {rows} rows: points without an orientation are written so; "
+        "if these are such, leave them out"
+    )
+    return [Doubt(text, True)]
+
+
 def _may_be_from_pole(names: Sequence[str]) -> bool:
     """Return whether the first of two columns is an angle from the pole or the vertical, as a rule."""
     first, other = (set(words_of(name)) for name in names)
@@ -180,14 +214,20 @@ NAN_CURE = "replace them by NaN, which `missing` treats, or leave their rows out
 
 
 def unit_of(
-    space: str, values: Array, names: Sequence[str] | None, unit: str | None, *, stacklevel: int = 3
+    space: str,
+    values: Array,
+    names: Sequence[str] | None,
+    unit: str | None,
+    *,
+    form: str | None = None,
+    stacklevel: int = 3,
 ) -> Unit:
     """Return the unit of data (N, k) as `check_values` does, and warn of what is doubtful.
 
     Warns:
         DataWarning: Of serious doubts, at so many calls from here.
     """
-    found, doubts = check_values(space, values, names, unit, NAN_CURE)
+    found, doubts = check_values(space, values, names, unit, NAN_CURE, form)
     for doubt in doubts:
         if doubt.is_serious:
             warnings.warn(doubt.text, DataWarning, stacklevel=stacklevel)
@@ -270,10 +310,13 @@ def _radians(values: Array, names: Sequence[str]) -> Unit:
     if beyond.any():
         column = int(beyond.argmax())
         value = values[np.nanargmax(np.abs(values[:, column])), column]
-        raise SettingError(
-            literal(f"column {names[column]!r} has {value:g}, beyond 2 pi")
-            + "; give {unit} degrees, radians or turns"
-        )
+        text = literal(f"column {names[column]!r} has {value:g}, beyond 2 pi")
+        if abs(value - 4 * math.pi) < FOUR_PI_TOLERANCE:
+            text += (
+                ": .ang files have 4 pi where there is no orientation; if this is one, give "
+                f"{{missing_codes}} {value:.10g} and {{drop_missing}}"
+            )
+        raise SettingError(text + "; give {unit} degrees, radians or turns")
     return "radians"
 
 

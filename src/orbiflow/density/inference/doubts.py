@@ -111,7 +111,7 @@ def given_doubts(space: Space, given: Mapping[str, float], names: Sequence[str])
 
 def data_unit(space: Space, width: int) -> str | None:
     """Return the unit of a space's data of so many columns, None if they have none."""
-    if is_angular(space.name, width):
+    if is_angular(space.name, width, getattr(space, "form", None)):
         return str(getattr(space, "angle_unit", space.unit))
     return "degrees" if space.name in DIRECTIONS and width == 2 else None
 

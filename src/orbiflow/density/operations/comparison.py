@@ -204,10 +204,16 @@ def _compare_data(
         groups = {name: np.asarray(rows.labels) for name, rows in found.items()}
     values = {name: rows.table.values for name, rows in found.items()}
     unit = _unit_of(found, where, read)
+    columns = next(iter(found.values())).table.columns
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
         return comparing.compare_samples(
-            values, space_of(where), settings, unit=unit, groups=groups, progress=read.progress
+            values,
+            space_of(where, columns, unit),
+            settings,
+            unit=unit,
+            groups=groups,
+            progress=read.progress,
         )
 
 
@@ -236,7 +242,9 @@ def _test_data(
     columns = next(iter(found.values())).table.columns
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
-        return comparing.named_tests(values, space_of(where), settings, unit=unit, columns=columns)
+        return comparing.named_tests(
+            values, space_of(where, columns, unit), settings, unit=unit, columns=columns
+        )
 
 
 def _tables(data: Sequence[Path], where: SpaceSettings, read: _Reader) -> dict[str, TableRows]:
@@ -266,7 +274,8 @@ def _unit_of(found: Mapping[str, TableRows], where: SpaceSettings, read: _Reader
     if len({own.shape[1] for own in values}) == 1:
         every = replace(every, values=np.concatenate(values))
     unit = tables.angle_unit(where, every, read.tell)
-    if is_angular(where.space, every.values.shape[1]):
+    form = where.rotation_form(every.columns)
+    if is_angular(where.space, every.values.shape[1], form):
         return unit
     return where.unit or ("degrees" if where.space in DIRECTIONS else None)
 

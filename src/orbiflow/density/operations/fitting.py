@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -114,8 +114,11 @@ def parameter_table(found: ParametricFit) -> runtime.Table:
     )
 
 
-def space_of(where: SpaceSettings) -> str | Space:
-    """Return the space if its cell is known, otherwise its name: data tell the rest."""
+def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> str | Space:
+    """Return the space of columns, if settings tell it, otherwise its name: data tell the rest."""
+    if (form := where.rotation_form(names)) is not None:
+        own = {"symmetry": where.crystal, "specimen": where.specimen, "passive": where.passive}
+        return spaces.make_space(where.space, form=form, unit=unit or "radians", **own)
     if not where.cell:
         return where.space
     return spaces.make_space(where.space, cell=where.cell, fractional=where.fractional)
@@ -134,12 +137,14 @@ def fit_rows(
 
     values, labels = rows.table.values, rows.labels
     unit = tables.angle_unit(where, rows.table, tell)
-    unit = unit if is_angular(where.space, values.shape[1]) else where.unit
+    form = where.rotation_form(rows.table.columns)
+    unit = unit if is_angular(where.space, values.shape[1], form) else where.unit
     given = {name: getattr(settings, name) for name in settings.fields_given}
     names = tables.linear_among(rows.table.columns, where.linear)
     if names:
         given["linear"] = [rows.table.columns.index(name) for name in names]
-    estimator = DensityEstimator(space_of(where), unit=unit, missing=reading.kept_missing, **given)
+    space = space_of(where, rows.table.columns, unit)
+    estimator = DensityEstimator(space, unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # notes say the same, with names of columns

@@ -4,7 +4,13 @@ from .flat import whole_turn as whole_turn
 from .frame import Frame as Frame
 from .mixed import MixedTorus as MixedTorus
 from .patches import to_klein as to_klein
+from .point_groups import international_name as international_name
+from .point_groups import rotation_group_name as rotation_group_name
+from .point_groups import rotations_of as rotations_of
 from .quotient import QuotientSpace as QuotientSpace
+from .rotations import CubicOrientations as CubicOrientations
+from .rotations import HexagonalOrientations as HexagonalOrientations
+from .rotations import RotationSpace as RotationSpace
 from .round import ProjectivePlane as ProjectivePlane
 from .round import RoundSpace as RoundSpace
 from .round import Sphere as Sphere
@@ -19,9 +25,6 @@ from .space import check_measure as check_measure
 from .space import make_space as make_space
 from .space import row_count as row_count
 from .space import space_for as space_for
-from .unit_vectors import CubicOrientations as CubicOrientations
-from .unit_vectors import HexagonalOrientations as HexagonalOrientations
 from .unit_vectors import Hypersphere as Hypersphere
 from .unit_vectors import ProjectiveSpace as ProjectiveSpace
-from .unit_vectors import RotationSpace as RotationSpace
 from .unit_vectors import UnitVectorSpace as UnitVectorSpace

@@ -348,7 +348,7 @@ def space_class(name: str) -> type[Space]:
     from orbiflow.density import spaces  # whose classes import this file
 
     # whose files hold all classes
-    _ = spaces.MixedTorus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace
+    _ = spaces.MixedTorus, spaces.Sphere, spaces.RotationSpace, spaces.QuotientSpace
     if not is_a(name, str) or name not in SPACE_CLASSES:
         raise OrbiflowError(
             f"unknown space {name!r}; there are {', '.join(SPACE_CLASSES)}, and groups such as p4m, "
@@ -384,8 +384,14 @@ def space_for(
     seed: int = 0,
     cell: Any = None,
     fractional: bool = False,
+    form: str | None = None,
 ) -> Space:
-    """Return the space of a name that suits data (N, k); `cell` and `fractional` are of a group."""
+    """Return the space of a name that suits data (N, k).
+
+    `cell` and `fractional` are of a group, and `form` says how rotations are written.
+    """
+    if form is not None:
+        return make_space(name, form=form, unit=unit)
     if name in SPACE_CLASSES or not is_group_name(name):
         return space_class(name).for_data(data, unit=unit, seed=seed)
     return make_space(name, cell=cell, fractional=fractional)

@@ -52,6 +52,13 @@ SEPARATOR = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 """Excel's first line, which says what separates cells."""
 
 
+CHANNEL_TEXT = "Channel Text File"
+"""First line of a .ctf file, whose header is the first line that names Euler angles."""
+
+ANG_NAMES = ("phi1", "Phi", "phi2", "x", "y", "iq", "ci", "phase", "sem", "fit")
+"""First columns of an .ang file, which has no header; its angles are in radians."""
+
+
 def is_utf16(head: bytes) -> bool:
     """Return whether a file's first bytes are the byte-order mark of UTF-16, and not of UTF-32."""
     return head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and head[2:4] != b"\0\0"
@@ -66,8 +73,9 @@ def encoding_of(path: Path) -> str:
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
     """Yield the number and text of every line that is not blank, and whether it is a comment.
 
-    Excel's first line "sep=;" counts as one.
+    Excel's first line "sep=;" counts as one, and so do the lines above the header of a .ctf file.
     """
+    is_above = False
     try:
         with path.open(encoding=encoding_of(path), errors="surrogateescape") as file:
             for number, line in enumerate(iter(partial(file.readline, MAX_LINE), ""), start=1):
@@ -81,9 +89,13 @@ def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
                         "a table of numbers, or its line ends are lost"
                     )
                 text = line.strip()
+                is_above = (number == 1 and text == CHANNEL_TEXT) or is_above
+                is_above = is_above and "euler1" not in text.casefold()
                 if text:
-                    is_comment = (text[0] == "#" and not _SHEET_ERROR.match(text)) or (
-                        number == 1 and SEPARATOR.fullmatch(line.rstrip("\r\n"))
+                    is_comment = (
+                        is_above
+                        or (text[0] == "#" and not _SHEET_ERROR.match(text))
+                        or (number == 1 and SEPARATOR.fullmatch(line.rstrip("\r\n")))
                     )
                     yield number, line.rstrip("\n"), bool(is_comment)
     except UnicodeError as exc:
@@ -226,6 +238,9 @@ def layout_of(
         if len(rows) == 1:
             raise InputFileError(f"{path}: line {first} is a header and no row follows; add rows")
         classes = [column[1:] for column in classes]
+    if header is None and path.suffix.lower() == ".ang" and len(classes) >= len(ANG_NAMES):
+        more = (f"column{i}" for i in range(len(ANG_NAMES) + 1, len(classes) + 1))
+        header = (*ANG_NAMES, *more)
     names = tuple(name or f"column{i}" for i, name in enumerate(header or [""] * len(classes), 1))
     numeric = _numeric(names, written, units, classes)
     spoiled = _spoiled(names, written, classes, numeric)

@@ -382,7 +382,8 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
         tell(
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
         )
-    unit, doubts = check_values(space, table.values, table.columns, _asked_unit(where, table), CURE)
+    asked, form = _asked_unit(where, table), where.rotation_form(table.columns)
+    unit, doubts = check_values(space, table.values, table.columns, asked, CURE, form)
     doubts += _doubts_of_units(table)
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
-from orbiflow.density.data import Unit, check_unit
+from orbiflow.density.data import ROTATIONS, Unit, check_unit, rotation_form
 from orbiflow.errors import literal
 from orbiflow.settings import DefaultText, Needs, SettingError, Settings
 
@@ -29,6 +30,11 @@ SpaceName = Literal[
     "rotation-space", "cubic-orientations", "hexagonal-orientations",
 ]  # fmt: skip
 SPACES: tuple[str, ...] = get_args(SpaceName)
+
+RotationForm = Literal[
+    "bunge", "vector", "rodrigues", "quaternion", "scalar-first", "matrix",
+    "ZXZ", "ZYZ", "XYZ", "ZYX", "xyz", "zyx",
+]  # fmt: skip
 
 
 class SpaceSettings(Settings, group="Density"):
@@ -57,6 +63,22 @@ class SpaceSettings(Settings, group="Density"):
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
     """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
 
+    crystal: Annotated[str | None, DefaultText("that of the space, or none")] = None
+    """Symmetry of the crystals whose orientations a rotation-space has: a point group or Laue class
+    such as 432, m-3m or 6/mmm, or a system such as cubic. Of a group with reflections, the rotations of
+    its Laue class count."""
+
+    specimen: Annotated[str | None, DefaultText("none")] = None
+    """Symmetry of the specimen in which they are, such as 222 or orthotropic."""
+
+    form: Annotated[RotationForm | None, DefaultText("what the columns' names say")] = None
+    """How columns write rotations: Bunge's angles phi1, Phi, phi2; a vector (axis times angle) or
+    Rodrigues' vector; a quaternion with its scalar last or scalar-first; a matrix, row by row; or Euler
+    angles about the axes named, which turn along if they are capitals."""
+
+    passive: bool = False
+    """The columns write the inverse rotations, from the specimen's coordinates to the crystal's."""
+
     def check(self) -> None:
         """Check that there is such a space, and that only angles have a unit."""
         if self.cell is not None and self.space in SPACES:
@@ -65,8 +87,44 @@ class SpaceSettings(Settings, group="Density"):
             raise SettingError(
                 f"{{linear}} is for columns beside angles on a torus, not on the {self.space}"
             )
+        self._check_rotations()
         _ = self.width  # which makes the group
         check_unit(self.space, self.unit)
+
+    def _check_rotations(self) -> None:
+        """Check that what is of rotations is asked of rotations, and that there are such symmetries."""
+        asked = {name: getattr(self, name) for name in ("crystal", "specimen", "form", "passive")}
+        given = [name for name, value in asked.items() if value]
+        if not given:
+            return
+        if self.space not in ROTATIONS:
+            raise SettingError(
+                f"{{{given[0]}}} is for rotations, not for the {literal(self.space)}: take {{space}} "
+                "rotation-space"
+            )
+        if self.crystal is not None and self.space != ROTATIONS[0]:
+            raise SettingError(
+                f"{{crystal}} is for the rotation-space: the {self.space} have a symmetry of their own"
+            )
+        from orbiflow.density.spaces import make_space
+
+        own = {"symmetry": self.crystal, "specimen": self.specimen, "passive": self.passive}
+        try:
+            make_space(self.space, form=self.form or "quaternion", **own)
+        except SettingError as error:
+            raise SettingError(error.template.replace("{symmetry}", "{crystal}")) from error
+
+    def rotation_form(self, names: Sequence[str]) -> str | None:
+        """Return how columns of these names write rotations; None of no rotations.
+
+        Three columns without names are Bunge's angles if there are crystals, else a vector.
+        """
+        if self.space not in ROTATIONS:
+            return None
+        width, form = len(names), "ZXZ" if self.form == "bunge" else self.form
+        crystals = self.space != ROTATIONS[0] or self.crystal is not None
+        default = {3: "ZXZ" if crystals else "vector", 9: "matrix"}.get(width, "quaternion")
+        return rotation_form(self.space, names, width, form) or default
 
     @property
     def width(self) -> int | None:

@@ -106,8 +106,8 @@ def _notes(layout: Layout, reading: Reading, names: Sequence[str], comments: int
             f"WARNING: left out {name!r}, whose name is an angle's: {quote(cell)} is no number"
             for name, cell in layout.spoiled.items()
         ]
-    if layout.header is not None:
-        is_comment = layout.header_line is not None and layout.header_line < layout.first
+    if layout.header is not None and layout.header_line is not None:
+        is_comment = layout.header_line < layout.first
         where = "comment line" if is_comment else "line"
         notes.append(f"took {where} {layout.header_line} as the header: {listing(layout.header)}")
     if comments:

@@ -1,0 +1,97 @@
+"""Orientations through the commands: files of microscopes, symmetries, options that contradict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial.transform import Rotation
+
+from orbiflow.density import RotationSpace
+
+
+def channel_text(angles: np.ndarray) -> str:
+    head = "Channel Text File\nPrj\ttest\nJobMode\tGrid\nEuler angles refer to Sample Coordinate "
+    head += "system (CS0)!\tMag\t300\nPhases\t1\n3.6;3.6;3.6\t90;90;90\tCopper\t11\t225\n"
+    head += "Phase\tX\tY\tBands\tError\tEuler1\tEuler2\tEuler3\tMAD\tBC\tBS\n"
+    rows = (f"1\t0\t0\t8\t0\t{a}\t{b}\t{c}\t0.5\t100\t90\n" for a, b, c in angles.tolist())
+    return head + "".join(rows)
+
+
+def ang(angles: np.ndarray) -> str:
+    head = "# TEM_PIXperUM 1.0\n# Phase 1\n# Symmetry 43\n#\n"
+    rows = (f" {a} {b} {c} 0.0 0.0 3000.0 0.9 1 20 1.2\n" for a, b, c in angles.tolist())
+    return head + "".join(rows)
+
+
+def test_files_of_microscopes_are_read(tmp_path: Path, orbiflow: Any) -> None:
+    turns = Rotation.from_rotvec(np.random.default_rng(0).normal(0, 0.1, (80, 3)))
+    space = RotationSpace(form="bunge", unit="degrees")
+    angles = space.from_chart(torch.tensor((turns * Rotation.from_euler("x", 1)).as_quat())).round(
+        4
+    )
+    (tmp_path / "a.ctf").write_text(channel_text(angles))
+    (tmp_path / "a.ang").write_text(ang(np.radians(angles)))
+    means = []
+    for name in ("a.ctf", "a.ang"):
+        unit = "degrees" if name == "a.ctf" else "radians"
+        done = orbiflow(
+            "density", "fit", tmp_path / name, "--space", "rotation-space", "--crystal", "m-3m",
+            "--specimen", "222", "--unit", unit, "--components", "kernels", "-o", tmp_path / "m",
+        )  # fmt: skip
+        assert done.status == 0, done.err
+        scored = orbiflow(
+            "density", "score", tmp_path / name, "-m", tmp_path / "m", "-o", tmp_path / "s.csv"
+        )
+        means.append(float(scored.out.split("mean log density ")[1].split()[0]))
+        assert "took " in done.out
+    assert means[0] == pytest.approx(means[1], abs=1e-2)
+
+
+def test_points_without_an_orientation_are_doubted(tmp_path: Path, orbiflow: Any) -> None:
+    angles = np.random.default_rng(0).uniform(1, 80, (60, 3)).round(3)
+    angles[:7] = 0
+    (tmp_path / "a.ctf").write_text(channel_text(angles))
+    how = ("--space", "cubic-orientations", "--components", "kernels", "-o", tmp_path / "m")
+    done = orbiflow("density", "fit", tmp_path / "a.ctf", *how, "--unit", "degrees")
+    assert "all three angles are exactly 0 in 7 rows" in done.out
+    angles = np.radians(angles)
+    angles[:7] = 12.56637
+    (tmp_path / "a.ang").write_text(ang(angles))
+    done = orbiflow("density", "fit", tmp_path / "a.ang", *how)
+    assert "--missing-codes 12.56637 and --drop-missing" in done.err
+    codes = ("--missing-codes", "12.56637", "--drop-missing")
+    done = orbiflow("density", "fit", tmp_path / "a.ang", *how, *codes)
+    assert done.status == 0, done.err
+
+
+WRONG = {
+    ("torus", "--crystal", "432"): "--crystal is for rotations, not for the torus",
+    ("cubic-orientations", "--crystal", "622"): "have a symmetry of their own",
+    ("rotation-space", "--crystal", "2/m"): "--crystal 2/m does not say its axis",
+    ("rotation-space", "--specimen", "cube"): "--specimen must be a point group such as 432",
+    ("rotation-space", "--form", "matrix"): "--form matrix takes 9 columns, and there are 3",
+}
+
+
+@pytest.mark.parametrize("options", WRONG)
+def test_wrong_options_name_their_cure(
+    options: tuple[str, str, str], tmp_path: Path, orbiflow: Any
+) -> None:
+    (tmp_path / "a.csv").write_text("phi1,Phi,phi2\n" + "10,20,30\n" * 20)
+    done = orbiflow(
+        "density",
+        "fit",
+        tmp_path / "a.csv",
+        "--unit",
+        "degrees",
+        "--space",
+        *options,
+        "-o",
+        tmp_path / "m",
+    )
+    assert done.status == 2
+    assert WRONG[options] in done.err
