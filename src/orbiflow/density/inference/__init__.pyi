@@ -12,5 +12,9 @@ from .doubts import given_doubts as given_doubts
 from .fitted import FittedFigures as FittedFigures
 from .partial import conditional as conditional
 from .partial import marginal as marginal
+from .textures import fraction_near as fraction_near
+from .textures import misorientations as misorientations
+from .textures import pole_density as pole_density
+from .textures import texture_index as texture_index
 from .trends import Trend as Trend
 from .trends import trend as trend

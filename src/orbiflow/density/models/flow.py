@@ -222,6 +222,14 @@ class UniformDensity(Density, kind="uniform"):
         del axes, seed
         return torch.zeros(len(points), dtype=torch.float64)
 
+    def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor:
+        del crystal
+        return torch.ones(len(specimen), dtype=torch.float64)
+
+    def mean_product(self, other: Density) -> float:
+        del other
+        return 1.0
+
     def restricted(self, split: Split, space: Torus) -> Restriction:
         del split
         return Restriction([(0.0, UniformDensity(space))], [])

@@ -15,8 +15,9 @@ from torch import Tensor
 from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
+from orbiflow.density.models.rotation_kernels import RotationKernels
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
-from orbiflow.density.spaces import Space, Torus
+from orbiflow.density.spaces import RotationSpace, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import fft, special
 
@@ -169,6 +170,24 @@ class AdaptiveKernels(Density, kind="kernels"):
             sine = (own[:, None] - middle).sin_()
             found = torch.addcmul(found, sine * sharp, sine, value=-2)
         return found
+
+    def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor | None:
+        own = self._on_rotations()
+        return None if own is None else own.fibre_means(crystal, specimen)
+
+    def mean_product(self, other: Density) -> float | None:
+        own = self._on_rotations()
+        if own is None or not isinstance(other, AdaptiveKernels):
+            return None if own is None else other.mean_product(self)
+        others = other._on_rotations()
+        return None if others is None else own.mean_product(others)
+
+    def _on_rotations(self) -> RotationKernels | None:
+        """Return the kernels of a space of rotations, None on other spaces."""
+        if not isinstance(self.space, RotationSpace):
+            return None
+        kappa = self.concentrations[:, 0]
+        return RotationKernels(self.space, self._center_features, kappa, self.weights)
 
     def header(self) -> dict[str, Any]:
         if len(self.centers) > MOST_KERNELS:

@@ -1,0 +1,176 @@
+"""Figures of textures, which are densities of orientations: pole densities, index, volume fractions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from orbiflow.arguments import as_instance, as_number
+from orbiflow.arrays import Array
+from orbiflow.density.models import Density, Estimate
+from orbiflow.density.spaces import RotationSpace
+from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import linalg
+
+FIRST_NODES, MOST_NODES = 64, 4096
+"""Points of a circle of rotations over which a density without a closed form is averaged."""
+
+FIBRE_ERROR = 1e-6
+"""Difference of two averages, in multiples of the uniform density, that is small enough."""
+
+BLOCK = 2**15
+"""Rotations at which a density is evaluated at a time."""
+
+DRAWS = 2**16
+"""Draws from which shares are estimated, always the same ones."""
+
+
+@torch.no_grad()
+def pole_density(
+    density: Density, crystal: ArrayLike, specimen: ArrayLike, *, axial: bool = True
+) -> tuple[Array, float]:
+    """Return how often a direction of the crystal lies along directions of the specimen: (N,).
+
+    It is the mean over all orientations that take one to the other, in multiples of the random
+    density, which has 1. As a function of the specimen's direction it is a pole figure, as one of the
+    crystal's an inverse pole figure. Kernels and mixtures have it in closed form.
+
+    Args:
+        density: A density on a space of rotations.
+        crystal: A direction (3,) in the crystal's coordinates; any length.
+        specimen: Directions (N, 3) in the specimen's.
+        axial: Whether a direction and its opposite are one, as for the normals of lattice planes.
+
+    Returns:
+        The pole densities, and what their error is below: the largest difference of two numerical
+        integrals where the density has no closed form, 0 where all is exact.
+
+    Raises:
+        OrbiflowError: If the density is none of rotations, or a direction is 0.
+
+    Reference: Bunge, Texture Analysis in Materials Science (1982), section 4.2.
+
+    >>> from orbiflow.density import UniformDensity
+    >>> pole_density(UniformDensity(RotationSpace()), [0, 0, 1], [[0, 1, 0]])
+    (array([1.]), 0.0)
+    """
+    rotations_only(density)
+    first, places = _directions(crystal)[0], _directions(specimen)
+    ways = (first, -first) if axial else (first,)
+    total, error = torch.zeros(len(places), dtype=torch.float64), 0.0
+    for weight, part in density.parts():
+        for way in ways:
+            found = part.fibre_means(torch.tensor(way), torch.tensor(places))
+            if found is None:
+                found, off = _by_quadrature(part, way, places)
+                error += weight * off / len(ways)
+            total += weight / len(ways) * found
+    return total.numpy(), error
+
+
+def _by_quadrature(density: Density, crystal: Array, specimen: Array) -> tuple[Tensor, float]:
+    """Return means (N,) over circles of rotations, and the largest change by half of the nodes."""
+    # any rotation that takes one direction to the other, after a turn about the first
+    aligned = torch.tensor(np.stack([_onto(crystal, way).as_quat() for way in specimen]))
+    last, nodes = None, FIRST_NODES
+    while True:
+        turns = Rotation.from_rotvec(np.outer(2 * math.pi * np.arange(nodes) / nodes, crystal))
+        parts: list[Tensor] = []
+        for some in torch.split(aligned, max(1, BLOCK // nodes)):
+            every = Rotation.from_quat(np.repeat(some.numpy(), nodes, axis=0))
+            every = every * Rotation.concatenate([turns] * len(some))
+            values = density.log_prob(torch.tensor(every.as_quat()), measure="uniform").exp()
+            parts.append(values.reshape(len(some), nodes).mean(dim=1))
+        found = torch.cat(parts)
+        off = math.inf if last is None else float((found - last).abs().max())
+        if off < FIBRE_ERROR or nodes >= MOST_NODES:
+            return found, off
+        last, nodes = found, 2 * nodes
+
+
+def _onto(start: Array, end: Array) -> Rotation:
+    """Return a rotation that takes a unit vector to another."""
+    axis, cosine = np.cross(start, end), float(start @ end)
+    if np.linalg.norm(axis) < 1e-12 and cosine < 0:  # half a turn about anything across
+        axis = np.cross(start, np.eye(3)[np.abs(start).argmin()])
+        return Rotation.from_rotvec(math.pi * axis / np.linalg.norm(axis))
+    return Rotation.from_quat([*axis, 1 + cosine])
+
+
+def _directions(vectors: ArrayLike) -> Array:
+    """Return unit vectors (N, 3)."""
+    table = np.atleast_2d(np.asarray(vectors, dtype=np.float64))
+    length = np.linalg.norm(table, axis=1, keepdims=True)
+    if table.shape[1] != 3 or not np.isfinite(table).all() or (length == 0).any():
+        raise OrbiflowError("directions are vectors of three finite numbers, not all 0")
+    return table / length
+
+
+def rotations_only(density: Density) -> RotationSpace:
+    """Return the space of a density, which must be one of rotations."""
+    space = as_instance(density, Density, "density").space
+    if not isinstance(space, RotationSpace):
+        raise OrbiflowError(
+            f"textures are densities of rotations or orientations, not of the {space.name}"
+        )
+    return space
+
+
+@torch.no_grad()
+def texture_index(density: Density) -> Estimate:
+    """Return the mean of the squared density in multiples of the random one, which has 1.
+
+    It is exact, with error 0, for kernels and mixtures; otherwise, and where there are too many kernels
+    for all their pairs, it is the mean density of draws with its standard error.
+
+    Reference: Bunge, Texture Analysis in Materials Science (1982), section 4.7.
+    """
+    rotations_only(density)
+    parts, total = list(density.parts()), 0.0
+    for weight, one in parts:
+        for other_weight, other in parts:
+            product = one.mean_product(other)
+            if product is None:
+                return _estimated_index(density)
+            total += weight * other_weight * product
+    return Estimate(total, 0.0)
+
+
+def _estimated_index(density: Density) -> Estimate:
+    draws = density.sample((DRAWS,), torch.Generator().manual_seed(0))
+    values = density.log_prob(draws, measure="uniform").exp()
+    return Estimate(float(values.mean()), float(values.std()) / math.sqrt(DRAWS))
+
+
+def misorientations(space: RotationSpace, points: Tensor, reference: Tensor) -> Tensor:
+    """Return the angles (N,) in radians between orientations (N, 4) and one (4,).
+
+    Of all rotations that take one of the images to the other, they are the smallest.
+    """
+    images = space.features(reference[None])[:, 0]
+    near = images[(images @ points.mT).argmax(dim=0)]
+    # half the chord is the sine of a quarter of the angle: an arc cosine would lose small ones
+    chord = linalg.vector_norm(points - near, dim=1)
+    return 4 * torch.asin((chord / 2).clamp_max(1))
+
+
+@torch.no_grad()
+def fraction_near(density: Density, orientation: Tensor, angle: float) -> Estimate:
+    """Return the share of a texture within an angle of an orientation, with its standard error.
+
+    Args:
+        density: A density on a space of rotations.
+        orientation: A unit quaternion (4,), the scalar last: a chart point of the space.
+        angle: The largest misorientation, in radians.
+    """
+    space = rotations_only(density)
+    reach = as_number(angle, "angle", above=0, most=math.pi)
+    draws = density.sample((DRAWS,), torch.Generator().manual_seed(0))
+    inside = misorientations(space, draws, orientation.double()) <= reach
+    share = float(inside.double().mean())
+    return Estimate(share, math.sqrt(max(share * (1 - share), 1 / DRAWS) / DRAWS))
