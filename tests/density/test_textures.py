@@ -95,6 +95,11 @@ def test_pole_densities_have_the_mean_one_and_the_symmetry(
     left, right = space.specimen_rotations[-1], space.crystal_rotations[-1]
     moved = pole_density(density, right.apply(h), left.apply(grid[:20]))[0]
     assert moved == pytest.approx(values[:20], abs=1e-9)
+    # an inverse pole figure: other directions of the crystal along one of the specimen
+    several = np.random.default_rng(seed + 1).normal(size=(5, 3))
+    inverse = pole_density(density, several, grid[7])[0]
+    one_by_one = [pole_density(density, way, grid[7])[0][0] for way in several]
+    assert inverse == pytest.approx(one_by_one, abs=1e-9)
 
 
 @settings(max_examples=5)

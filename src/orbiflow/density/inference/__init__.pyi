@@ -15,6 +15,7 @@ from .partial import marginal as marginal
 from .textures import fraction_near as fraction_near
 from .textures import misorientations as misorientations
 from .textures import pole_density as pole_density
+from .textures import rotations_only as rotations_only
 from .textures import texture_index as texture_index
 from .trends import Trend as Trend
 from .trends import trend as trend

@@ -34,7 +34,7 @@ DRAWS = 2**16
 def pole_density(
     density: Density, crystal: ArrayLike, specimen: ArrayLike, *, axial: bool = True
 ) -> tuple[Array, float]:
-    """Return how often a direction of the crystal lies along directions of the specimen: (N,).
+    """Return how often directions of the crystal lie along directions of the specimen: (N,).
 
     It is the mean over all orientations that take one to the other, in multiples of the random
     density, which has 1. As a function of the specimen's direction it is a pole figure, as one of the
@@ -42,8 +42,8 @@ def pole_density(
 
     Args:
         density: A density on a space of rotations.
-        crystal: A direction (3,) in the crystal's coordinates; any length.
-        specimen: Directions (N, 3) in the specimen's.
+        crystal: Directions in the crystal's coordinates, (3,) or (N, 3), of any length.
+        specimen: Directions in the specimen's, (3,) or (N, 3).
         axial: Whether a direction and its opposite are one, as for the normals of lattice planes.
 
     Returns:
@@ -59,31 +59,54 @@ def pole_density(
     >>> pole_density(UniformDensity(RotationSpace()), [0, 0, 1], [[0, 1, 0]])
     (array([1.]), 0.0)
     """
-    rotations_only(density)
-    first, places = _directions(crystal)[0], _directions(specimen)
-    ways = (first, -first) if axial else (first,)
-    total, error = torch.zeros(len(places), dtype=torch.float64), 0.0
+    space = rotations_only(density)
+    here, there = map(np.array, np.broadcast_arrays(_directions(crystal), _directions(specimen)))
+    # images have the same pole density
+    there = _canonical(there, space.specimen_rotations, axial=axial)
+    here = _canonical(here, space.crystal_rotations, axial=axial)
+    pairs, place = np.unique(np.hstack([here, there]), axis=0, return_inverse=True)
+    first, second = torch.tensor(pairs[:, :3]), torch.tensor(pairs[:, 3:])
+    opposite = _canonical(-pairs[:, :3], space.crystal_rotations, axial=False)
+    is_even = bool(
+        np.allclose(opposite, _canonical(pairs[:, :3], space.crystal_rotations, axial=False))
+    )
+    ways = (first, -first) if axial and not is_even else (first,)
+    total, error = torch.zeros(len(pairs), dtype=torch.float64), 0.0
     for weight, part in density.parts():
         for way in ways:
-            found = part.fibre_means(torch.tensor(way), torch.tensor(places))
+            found = part.fibre_means(way, second)
             if found is None:
-                found, off = _by_quadrature(part, way, places)
+                found, off = _by_quadrature(part, way.numpy(), second.numpy())
                 error += weight * off / len(ways)
             total += weight / len(ways) * found
-    return total.numpy(), error
+    return total.numpy()[place.reshape(-1)], error
+
+
+def _canonical(vectors: Array, group: Rotation, *, axial: bool) -> Array:
+    """Return the greatest images (N, 3), coordinate by coordinate, to twelve digits."""
+    images = np.stack([turn.apply(vectors) for turn in group]).round(12) + 0.0
+    if axial:
+        images = np.concatenate([images, 0.0 - images])
+    best = images[0]
+    for image in images[1:]:
+        first = np.argmax(image != best, axis=1)[:, None]
+        greater = np.take_along_axis(image, first, 1) > np.take_along_axis(best, first, 1)
+        best = np.where(greater, image, best)
+    return best
 
 
 def _by_quadrature(density: Density, crystal: Array, specimen: Array) -> tuple[Tensor, float]:
     """Return means (N,) over circles of rotations, and the largest change by half of the nodes."""
     # any rotation that takes one direction to the other, after a turn about the first
-    aligned = torch.tensor(np.stack([_onto(crystal, way).as_quat() for way in specimen]))
+    aligned = np.stack([_onto(*pair).as_quat() for pair in zip(crystal, specimen, strict=True)])
     last, nodes = None, FIRST_NODES
     while True:
-        turns = Rotation.from_rotvec(np.outer(2 * math.pi * np.arange(nodes) / nodes, crystal))
+        angles: Array = 2 * math.pi * np.arange(nodes) / nodes
         parts: list[Tensor] = []
-        for some in torch.split(aligned, max(1, BLOCK // nodes)):
-            every = Rotation.from_quat(np.repeat(some.numpy(), nodes, axis=0))
-            every = every * Rotation.concatenate([turns] * len(some))
+        for some in np.array_split(np.arange(len(aligned)), -(-len(aligned) * nodes // BLOCK)):
+            turns = angles[None, :, None] * crystal[some, None, :]
+            every = Rotation.from_quat(np.repeat(aligned[some], nodes, axis=0))
+            every = every * Rotation.from_rotvec(turns.reshape(-1, 3))
             values = density.log_prob(torch.tensor(every.as_quat()), measure="uniform").exp()
             parts.append(values.reshape(len(some), nodes).mean(dim=1))
         found = torch.cat(parts)

@@ -215,7 +215,7 @@ class Density(WithFigures):
     # Rotations and orientations: see orbiflow.density.inference.textures.
 
     def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor | None:
-        """Return means (N,) over the rotations that take a crystal's direction (3,) to others (N, 3).
+        """Return means (N,) over the rotations that take directions of the crystal to others (N, 3).
 
         They are in multiples of the uniform density. None if they have no closed form.
         """

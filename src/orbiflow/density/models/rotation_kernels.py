@@ -29,31 +29,26 @@ class RotationKernels(NamedTuple):
     weights: Tensor
 
     def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor:
-        """Return means (N,) over the rotations that take a crystal's direction (3,) to others (N, 3).
+        """Return means (N,) over the rotations that take directions of the crystal to others (N, 3).
 
         They are in multiples of the uniform density. The quaternions of such rotations are a great
         circle, over which exp(kappa q . c) has the mean I_0(kappa rho). Here rho = cos(w / 2) is the
         largest q . c, and w the angle from where c takes the crystal's direction.
         """
-        turned = self.space.crystal_rotations.apply(crystal.numpy())
-        directions, counts = np.unique(turned.round(9), axis=0, return_counts=True)
-        seen: Tensor = torch.tensor(
-            np.stack([Rotation.from_quat(self.centers.numpy()).apply(d) for d in directions])
-        )
-        shares = torch.tensor(counts / counts.sum())
-        turns = self.space.specimen_rotations
-        images = torch.tensor(np.stack([turn.apply(specimen.numpy()) for turn in turns]))
+        matrices = torch.tensor(Rotation.from_quat(self.centers.numpy()).as_matrix())
+        flat = matrices.reshape(-1, 9).mT.contiguous()
         # one image of a kernel at its largest, in multiples of the uniform density
         peak = 2 * math.pi**2 * self._log_peaks().exp() * self.weights
-        found = specimen.new_zeros(images.shape[:2], dtype=torch.float64)
+        found = torch.zeros(len(specimen), dtype=torch.float64)
         step = max(1, BLOCK_ENTRIES // len(self.kappa))
-        for direction, share in zip(seen, shares, strict=True):
-            for number, image in enumerate(images):
-                parts = [
-                    self._means(part @ direction.mT) @ peak for part in torch.split(image, step)
-                ]
-                found[number] += share * torch.cat(parts)
-        return found.mean(dim=0)
+        lefts, rights = self.space.specimen_rotations, self.space.crystal_rotations
+        for there, left in zip(*_distinct(lefts, specimen), strict=True):
+            for here, right in zip(*_distinct(rights, crystal), strict=True):
+                # r . R h for all R is a product of two tables
+                pairs = (there[:, :, None] * here[:, None, :]).reshape(-1, 9)
+                parts = [self._means(part @ flat) @ peak for part in torch.split(pairs, step)]
+                found += left * right * torch.cat(parts)
+        return found
 
     def _means(self, cosines: Tensor) -> Tensor:
         """Return means (N, K) over circles, relative to the kernels' largest values."""
@@ -88,6 +83,14 @@ class RotationKernels(NamedTuple):
                 exponent = logs[0][rows, None] + logs[1] - fall - _log_peaks(length)
                 total += float(exponent.exp().sum())
         return self.space.volume * total
+
+
+def _distinct(group: Rotation, directions: Tensor) -> tuple[Tensor, list[float]]:
+    """Return different images (G, N, 3) of directions (N, 3) under a group, and the share of each."""
+    images = np.stack([one.apply(directions.numpy()) for one in group])
+    flat = images.reshape(len(images), -1).round(9)
+    _, first, counts = np.unique(flat, axis=0, return_index=True, return_counts=True)
+    return torch.tensor(images[first]), (counts / len(images)).tolist()
 
 
 def _log_peaks(kappa: Tensor) -> Tensor:

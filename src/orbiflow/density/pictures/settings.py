@@ -25,6 +25,7 @@ MAX_REGIONS = 4
 """Number of styles of lines that can be told apart."""
 
 MAPS, POINTS = Group("Maps"), Group("Points and regions")
+TEXTURES = Group("Textures")
 
 
 def read_center(text: str) -> tuple[float, ...]:
@@ -101,6 +102,20 @@ class PlotSettings(Settings, group="Figures"):
 
     earth: Annotated[bool, Option("--earth", off="--no-coastlines"), MAPS] = True
     """Draw the Earth's coastlines where the data are lat,lon, unless there are others."""
+
+    pole: Annotated[tuple[str, ...] | None, TEXTURES, DefaultText("planes of low indices")] = None
+    """Lattice planes of orientations, by Miller indices such as 001,1-11, whose pole figures are drawn;
+    four indices, such as 10-10, are of hexagonal crystals."""
+
+    inverse: Annotated[tuple[str, ...] | None, TEXTURES, DefaultText("x,y,z")] = None
+    """Directions of the specimen whose inverse pole figures are drawn: x, y, z, RD, TD, ND or three
+    numbers such as 110."""
+
+    sections: Annotated[tuple[float, ...] | None, TEXTURES, DefaultText("0,45,65")] = None
+    """Angles phi2, in degrees, at which sections through the space of Bunge's angles are drawn."""
+
+    lattice: Annotated[tuple[float, ...] | None, TEXTURES, DefaultText("not known")] = None
+    """Lengths a,b,c of the crystal's axes, for planes inclined to axes of different lengths."""
 
     regions: Annotated[tuple[Mass, ...] | None, POINTS] = None
     """Masses such as 0.5,0.9: lines are drawn around the smallest regions that hold them."""

@@ -1,3 +1,11 @@
+from .crystals import HEXAGONAL as HEXAGONAL
+from .crystals import ORIENTATIONS as ORIENTATIONS
+from .crystals import Sector as Sector
+from .crystals import fundamental_sector as fundamental_sector
+from .crystals import indices_of as indices_of
+from .crystals import named_orientation as named_orientation
+from .crystals import plane_normal as plane_normal
+from .crystals import specimen_direction as specimen_direction
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
