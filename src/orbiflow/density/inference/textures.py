@@ -66,9 +66,13 @@ def pole_density(
     here = _canonical(here, space.crystal_rotations, axial=axial)
     pairs, place = np.unique(np.hstack([here, there]), axis=0, return_inverse=True)
     first, second = torch.tensor(pairs[:, :3]), torch.tensor(pairs[:, 3:])
-    opposite = _canonical(-pairs[:, :3], space.crystal_rotations, axial=False)
-    is_even = bool(
-        np.allclose(opposite, _canonical(pairs[:, :3], space.crystal_rotations, axial=False))
+    # where either direction and its opposite are images, both ways are one
+    is_even = any(
+        np.allclose(_canonical(own, group, axial=False), _canonical(-own, group, axial=False))
+        for own, group in (
+            (pairs[:, :3], space.crystal_rotations),
+            (pairs[:, 3:], space.specimen_rotations),
+        )
     )
     ways = (first, -first) if axial and not is_even else (first,)
     total, error = torch.zeros(len(pairs), dtype=torch.float64), 0.0
@@ -87,7 +91,8 @@ def _canonical(vectors: Array, group: Rotation, *, axial: bool) -> Array:
     images = np.stack([turn.apply(vectors) for turn in group]).round(12) + 0.0
     if axial:
         images = np.concatenate([images, 0.0 - images])
-    best = images[0]
+    best: Array = images[0]
+    image: Array
     for image in images[1:]:
         first = np.argmax(image != best, axis=1)[:, None]
         greater = np.take_along_axis(image, first, 1) > np.take_along_axis(best, first, 1)

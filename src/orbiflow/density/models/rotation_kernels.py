@@ -16,6 +16,9 @@ from orbiflow.typed_torch import special
 BLOCK_ENTRIES = 2**19
 """Entries of a table worked on at a time."""
 
+LEAST_EXPONENT = -45.0
+"""Exponent of what is left out: below 1e-19 of the kernel's largest value."""
+
 MOST_PAIRS = 2**28
 """The most pairs of images of kernels whose products are summed one by one."""
 
@@ -52,9 +55,13 @@ class RotationKernels(NamedTuple):
 
     def _means(self, cosines: Tensor) -> Tensor:
         """Return means (N, K) over circles, relative to the kernels' largest values."""
-        # the circle of minus q has the same mean
         radius = ((1 + cosines) / 2).clamp(0, 1).sqrt()
-        return (self.kappa * (radius - 1)).exp() * special.i0e(self.kappa * radius)
+        exponent = self.kappa * (radius - 1)
+        near = exponent > LEAST_EXPONENT
+        found = torch.zeros_like(exponent)
+        # Bessel functions are slow, and most kernels are far from most circles
+        found[near] = exponent[near].exp() * special.i0e((self.kappa * radius)[near])
+        return found
 
     def _log_peaks(self) -> Tensor:
         return _log_peaks(self.kappa)

@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LABEL = "multiples of a random texture"
-ACROSS = 121
-"""Pixels across a pole figure or an inverse one."""
+ACROSS, INVERSE_ACROSS = 101, 61
+"""Pixels across a pole figure, and an inverse one."""
 
 SECTION_STEP = 1.5
 """Degrees between the pixels of a section."""
@@ -53,8 +53,10 @@ UPWARDS = (90.0, -90.0)
 MOST_PANELS = 12
 """The most pole figures or sections in a picture."""
 
-_NET = {"auto": Lambert, "lambert": Lambert, "schmidt": Lambert}
-_NET |= {"stereographic": Stereographic, "wulff": Stereographic}
+_NETS: dict[str, type[Azimuthal]] = {
+    **dict.fromkeys(("auto", "lambert", "schmidt"), Lambert),
+    **dict.fromkeys(("stereographic", "wulff"), Stereographic),
+}
 
 
 class Panel(NamedTuple):
@@ -76,7 +78,7 @@ class Panel(NamedTuple):
 
 def check_texture(space: RotationSpace, settings: PlotSettings) -> None:
     """Check that settings of a texture fit its space."""
-    if settings.projection not in _NET:
+    if settings.projection not in _NETS:
         raise SettingError(
             f"{{projection}} of a pole figure must be schmidt or lambert (equal areas) or wulff or "
             f"stereographic (equal angles), got {settings.projection}"
@@ -132,8 +134,8 @@ def poles_picture(
         settings: How they are drawn.
         sheet: The sheet. Default: that of the settings.
     """
-    space, net = rotations_only(density), _NET[settings.projection](UPWARDS)
-    smooth, note = _averaged(density, math.pi / ACROSS)
+    space, net = rotations_only(density), _NETS[settings.projection](UPWARDS)
+    smooth, note = _averaged(density, math.pi / (2 * ACROSS))
     places, extent = _pixels(net.outline(), ACROSS)
     ways = to_vectors(net.inverse(_within(places, net.rim)))
     panels, error = list[Panel](), 0.0
@@ -161,11 +163,11 @@ def inverse_picture(
 
     They are drawn in the crystal's fundamental sector. Arguments are those of `poles_picture`.
     """
-    space, net = rotations_only(density), _NET[settings.projection](UPWARDS)
-    smooth, note = _averaged(density, math.pi / (2 * ACROSS))
+    space, net = rotations_only(density), _NETS[settings.projection](UPWARDS)
+    smooth, note = _averaged(density, math.pi / (4 * INVERSE_ACROSS))
     sector = fundamental_sector(space.symmetry)
     outline = net.outline() if sector.whole else _edge(net, sector.corners)
-    places, extent = _pixels(outline, ACROSS)
+    places, extent = _pixels(outline, INVERSE_ACROSS)
     ways = to_vectors(net.inverse(_within(places, net.rim)))
     corners = net.forward(to_latlon(sector.corners)) if len(sector.corners) else np.zeros((0, 2))
     middle = outline.mean(axis=0)
@@ -181,7 +183,7 @@ def inverse_picture(
         if points is not None:
             dots = _sector_dots(space, points, way, net, middle)
         head = f"{name}   {turned.min():.2g} to {turned.max():.3g}"
-        panels.append(Panel(head, turned.reshape(ACROSS, -1), extent, outline, texts, dots))
+        panels.append(Panel(head, turned.reshape(INVERSE_ACROSS, -1), extent, outline, texts, dots))
     where = "the upper hemisphere" if sector.whole else "the fundamental sector"
     words = [
         f"The crystal's directions along those of the specimen, in {where}, in {net.title}",
@@ -323,11 +325,11 @@ def _picture(
     left, right, top, bottom = panels[0].extent
     shape = abs(bottom - top) / abs(right - left)
     is_plain = panels[0].outline is None
-    gap, above = (3.4 if is_plain else 1.6) * sheet.em, (4.6 if is_plain else 3.2) * sheet.em
-    room = frames.Room(4.2 if is_plain else 1.6, 2.6, 1.6, 0.4, 1.6, 1.2)
+    gap, above = (3.4 if is_plain else 4.2) * sheet.em, (4.2 if is_plain else 3.8) * sheet.em
+    room = frames.Room(4.2 if is_plain else 2.4, 2.6, 1.6, 0.4, 2.0, 1.2)
     room = frames.room_for_bar_beside(sheet, room, LABEL, [tick.text for tick in bar_ticks(shade)])
     if not sheet.printed:
-        room = room._replace(above=3.4).with_words(caption, sheet)
+        room = room._replace(above=2.6).with_words(caption, sheet)
     inner = sheet.width - sheet.em * (room.left + room.right)
     side = min((inner - (columns - 1) * gap) / columns, 0.5 * sheet.width)
     high = side * shape
@@ -363,7 +365,12 @@ def _decorate(axes: Axes, panel: Panel, sheet: Sheet, side: float) -> None:
     left, right, low, high = panel.extent
     axes.set_xlim(left, right)
     axes.set_ylim(low, high)
-    axes.set_title(panel.head, fontsize=sheet.text, pad=1.5 * sheet.text, parse_math=False)
+    axes.set_title(
+        panel.head,
+        fontsize=sheet.text,
+        pad=(0.6 if panel.outline is None else 1.5) * sheet.text,
+        parse_math=False,
+    )
     if panel.outline is None:
         axes.tick_params(labelsize=sheet.small, width=sheet.pen(0.8), length=0.3 * sheet.text)
         for along, axis in ((right - left, axes.xaxis), (low - high, axes.yaxis)):

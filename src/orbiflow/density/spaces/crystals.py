@@ -33,8 +33,8 @@ def indices_of(text: str, what: str = "pole") -> tuple[int, ...]:
     found = tuple(int(part) for part in parts)
     if len(found) not in (3, 4) or not any(found) or (len(found) == 4 and sum(found[:3])):
         raise SettingError(
-            f"{{{what}}} must be Miller indices such as 001, 1-11 or, of hexagonal crystals, 10-11 (whose "
-            f"first three have the sum 0), got {literal(repr(text))}"
+            f"{{{what}}} must be Miller indices such as 001, 1-11 or, of hexagonal crystals, 10-11 "
+            f"(whose first three have the sum 0), got {literal(repr(text))}"
         )
     return found
 
@@ -73,8 +73,8 @@ def plane_normal(
     }
     if lattice is None and uneven.get(symmetry, False):
         raise SettingError(
-            f"{{pole}} {text} is inclined to axes of different lengths: give {{lattice}} a,b,c, such as "
-            "1,1,1.587 for titanium"
+            f"{{pole}} {text} is inclined to axes of different lengths: give {{lattice}} a,b,c, such "
+            "as 1,1,1.587 for titanium"
         )
     if lattice is not None and symmetry in HEXAGONAL | {"C4", "D4"} and a != b:
         raise SettingError("{lattice} of such crystals must have a equal to b")
@@ -87,8 +87,11 @@ def plane_normal(
     return normal / np.linalg.norm(normal)
 
 
-SPECIMEN = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
-SPECIMEN |= {"rd": SPECIMEN["x"], "td": SPECIMEN["y"], "nd": SPECIMEN["z"]}
+SPECIMEN = {
+    **dict.fromkeys(("x", "rd"), (1, 0, 0)),
+    **dict.fromkeys(("y", "td"), (0, 1, 0)),
+    **dict.fromkeys(("z", "nd"), (0, 0, 1)),
+}
 """Directions of a specimen: its axes, and what a rolled sheet calls them."""
 
 
