@@ -34,6 +34,7 @@ DENSITY += [
     "comparing",
     "regions",
     "summaries",
+    "orientations",
     "tables",
     "pictures",
     "run_folder",

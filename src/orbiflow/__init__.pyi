@@ -11,6 +11,8 @@ from .density.cross_validation.operations import cross_validate as cross_validat
 from .density.estimator import DensityEstimator as DensityEstimator
 from .density.inference.partial import conditional as conditional
 from .density.inference.partial import marginal as marginal
+from .density.inference.textures import pole_density as pole_density
+from .density.inference.textures import texture_index as texture_index
 from .density.models.chains import VonMisesChains as VonMisesChains
 from .density.models.density import Density as Density
 from .density.models.evaluation import log_density_gradient as log_density_gradient
@@ -20,6 +22,7 @@ from .density.models.flow import FlowDensity as FlowDensity
 from .density.models.kernels import AdaptiveKernels as AdaptiveKernels
 from .density.models.mixture import Mixture as Mixture
 from .density.models.network import VonMisesNetwork as VonMisesNetwork
+from .density.orientations import summarize_orientations as summarize_orientations
 from .density.pictures.corner import corner_picture as corner_picture
 from .density.pictures.figures import density_picture as density_picture
 from .density.pictures.figures import flow_picture as flow_picture

@@ -85,10 +85,10 @@ def test_what_little_tells_is_said(tmp_path: Path, orbiflow) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--space", "klein-bottle"), "--space must be torus, sphere or projective-plane"),
+        (("--space", "klein-bottle"), "--space must be torus, sphere, projective-plane"),
         (
             ("--space", "hypersphere"),
-            "summaries are of angles, directions and axes; got 'hypersphere'",
+            "summaries are of angles, directions, axes and orientations; got 'hypersphere'",
         ),
         (("--space", "sphere", "--picture", "a.png"), "--picture is for angles on a torus"),
         (("--space", "sphere", "--missing", "marginalise"), "use --missing drop"),

@@ -22,7 +22,7 @@ from orbiflow.density import (
     Sphere,
     UniformDensity,
 )
-from orbiflow.density.inference import fraction_near, misorientations, pole_density, texture_index
+from orbiflow.density.inference import fractions_near, misorientations, pole_density, texture_index
 from orbiflow.errors import OrbiflowError
 from strategies import seeds
 
@@ -159,15 +159,16 @@ def test_fractions_near_an_orientation() -> None:
     space = RotationSpace(symmetry="O")
     even, cube = UniformDensity(space), torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64)
     reach = math.radians(15)
-    found = fraction_near(even, cube, reach)
+    found = fractions_near(even, [cube[None]], reach)[0]
     # 24 balls, each of the measure (w - sin w) / pi of SO(3)
     assert found.value == pytest.approx(
         24 * (reach - math.sin(reach)) / math.pi, abs=5 * found.error
     )
     one = torch.ones(1, dtype=torch.float64)
+    other = torch.tensor([[0.5, 0.1, 0.1, 0.8]], dtype=torch.float64) / 0.91**0.5
     sharp = AdaptiveKernels(space, cube[None], 1e4 * one[:, None], one)
-    assert fraction_near(sharp, cube, reach).value == 1
-    assert fraction_near(sharp, torch.tensor([0.5, 0.1, 0.1, 0.8]) / 0.91**0.5, reach).value == 0
+    assert fractions_near(sharp, [cube[None]], reach)[0].value == 1
+    assert fractions_near(sharp, [other], reach)[0].value == 0
 
 
 def test_what_is_no_texture_is_refused() -> None:

@@ -389,11 +389,9 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(tmp_path: P
     assert np.loadtxt(tmp_path / "drawn.csv", delimiter=",", skiprows=1).shape == (30, 3)
     found = run("region", model=folder, out=tmp_path / "regions.json", samples=1000)
     assert len(found["regions"]) == 2  # pyright: ignore[reportArgumentType]
-    for name, message in (("plot", "maps are of the sphere"), ("marginal", "angles on a torus")):
-        more = {"columns": ("rx",)} if name == "marginal" else {}
-        with pytest.raises(OrbiflowError, match=message):
-            find(f"density {name}").call({"model": folder, "out": tmp_path / name, **more}).run()
-    with pytest.raises(OrbiflowError, match="directions and axes; got 'rotation-space'"):
-        run("summary", data=table, space="rotation-space")
+    with pytest.raises(OrbiflowError, match="angles on a torus"):
+        run("marginal", model=folder, out=tmp_path / "marginal", columns=("rx",))
+    with pytest.raises(OrbiflowError, match="axes and orientations; got 'hypersphere'"):
+        run("summary", data=table, space="hypersphere")
     with pytest.raises(OrbiflowError, match="GeoJSON is for places on a globe"):
         run("region", model=folder, out=tmp_path / "regions.geojson")

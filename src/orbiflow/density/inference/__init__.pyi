@@ -12,7 +12,7 @@ from .doubts import given_doubts as given_doubts
 from .fitted import FittedFigures as FittedFigures
 from .partial import conditional as conditional
 from .partial import marginal as marginal
-from .textures import fraction_near as fraction_near
+from .textures import fractions_near as fractions_near
 from .textures import misorientations as misorientations
 from .textures import pole_density as pole_density
 from .textures import rotations_only as rotations_only

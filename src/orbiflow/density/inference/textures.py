@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import torch
@@ -180,7 +181,7 @@ def misorientations(space: RotationSpace, points: Tensor, reference: Tensor) -> 
 
     Of all rotations that take one of the images to the other, they are the smallest.
     """
-    images = space.features(reference[None])[:, 0]
+    images, points = space.features(reference[None].double())[:, 0], points.double()
     near = images[(images @ points.mT).argmax(dim=0)]
     # half the chord is the sine of a quarter of the angle: an arc cosine would lose small ones
     chord = linalg.vector_norm(points - near, dim=1)
@@ -188,17 +189,25 @@ def misorientations(space: RotationSpace, points: Tensor, reference: Tensor) -> 
 
 
 @torch.no_grad()
-def fraction_near(density: Density, orientation: Tensor, angle: float) -> Estimate:
-    """Return the share of a texture within an angle of an orientation, with its standard error.
+def fractions_near(
+    density: Density, orientations: Sequence[Tensor], angle: float
+) -> list[Estimate]:
+    """Return the shares of a texture within an angle of orientations, with their standard errors.
 
     Args:
         density: A density on a space of rotations.
-        orientation: A unit quaternion (4,), the scalar last: a chart point of the space.
+        orientations: For each share unit quaternions (V, 4), the scalar last: variants of one
+            orientation, near any of which one is near.
         angle: The largest misorientation, in radians.
     """
     space = rotations_only(density)
     reach = as_number(angle, "angle", above=0, most=math.pi)
-    draws = density.sample((DRAWS,), torch.Generator().manual_seed(0))
-    inside = misorientations(space, draws, orientation.double()) <= reach
-    share = float(inside.double().mean())
-    return Estimate(share, math.sqrt(max(share * (1 - share), 1 / DRAWS) / DRAWS))
+    draws = density.sample((DRAWS,), torch.Generator().manual_seed(0)) if orientations else None
+    found: list[Estimate] = []
+    for variants in orientations:
+        assert draws is not None
+        apart = torch.stack([misorientations(space, draws, one) for one in variants])
+        share = float((apart.amin(dim=0) <= reach).double().mean())
+        error = math.sqrt(max(share * (1 - share), 1 / DRAWS) / DRAWS)
+        found.append(Estimate(share, error))
+    return found

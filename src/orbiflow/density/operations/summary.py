@@ -13,10 +13,11 @@ from orbiflow import runtime
 from orbiflow.arguments import is_a
 from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
+from orbiflow.density.data import ROTATIONS
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import CountedRowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError, literal
-from orbiflow.settings import DefaultText, Ending, Option, Range, Settings
+from orbiflow.settings import DefaultText, Ending, Option, Range, Settings, Unit
 
 if TYPE_CHECKING:
     from orbiflow.density.tables import TableRows
@@ -24,11 +25,22 @@ if TYPE_CHECKING:
 File = Annotated[Path | None, DefaultText("none")]
 
 
+WIDE_DEGREES = 15.0
+"""Misorientation of half of the rows from which a mean says little."""
+
+
 class SummarySettings(Settings, group="Summary"):
     """How sure a summary is."""
 
     level: Annotated[float, Range(0.5, 0.999)] = 0.95
     """Level of the intervals and cones."""
+
+    near: Annotated[tuple[str, ...] | None, DefaultText("all of them for cubic crystals")] = None
+    """Ideal orientations, of cube, goss, brass, copper and s, of which the shares of rows near them are
+    told."""
+
+    within: Annotated[float, Range(above=0, most=60), Unit("degrees")] = 15.0
+    """Angle within which a row is near an ideal orientation."""
 
 
 @runtime.operation("density summary")
@@ -43,7 +55,7 @@ def summary(
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
-    """Summarise angles, directions or axes: means with intervals, spread, correlations, tests.
+    """Summarise angles, directions, axes or orientations: means with intervals, spread, tests.
 
     Nothing is fitted.
 
@@ -59,7 +71,7 @@ def summary(
         data, reading, on_event, space=where.space, width=where.width, group=reading.group
     )
     unit = tables.angle_unit(where, rows.table, on_event)
-    found = _summarised(rows, where.space, unit, settings.level)
+    found = _summarised(rows, where, unit, settings)
     cancel.check()
     for event in _tables(found, settings.level):
         on_event(event)
@@ -91,10 +103,10 @@ def _csv(found: dict[str, Any]) -> bytes:
 
 def _check(where: SpaceSettings, reading: CountedRowSettings, picture: Path | None) -> None:
     """Refuse what has no summary before the table is read."""
-    if where.space not in ("torus", "sphere", "projective-plane"):
+    if where.space not in ("torus", "sphere", "projective-plane", *ROTATIONS):
         raise SettingError(
-            "{space} must be torus, sphere or projective-plane: summaries are of angles, directions "
-            f"and axes; got {literal(repr(where.space))}"
+            f"{{space}} must be torus, sphere, projective-plane, {', '.join(ROTATIONS)}: summaries are "
+            f"of angles, directions, axes and orientations; got {literal(repr(where.space))}"
         )
     if where.linear:
         raise SettingError("{linear} is for densities: a summary is of angles; leave it out")
@@ -105,12 +117,22 @@ def _check(where: SpaceSettings, reading: CountedRowSettings, picture: Path | No
             raise SettingError("{picture} is for angles on a torus: `density plot` draws maps")
 
 
-def _summarised(rows: TableRows, space: str, unit: str, level: float) -> dict[str, Any]:
+def _summarised(
+    rows: TableRows, where: SpaceSettings, unit: str, settings: SummarySettings
+) -> dict[str, Any]:
     """Return the summaries of rows as JSON has them."""
-    from orbiflow.density import summaries
+    from orbiflow.density import orientations, summaries
+    from orbiflow.density.operations.fitting import space_of
 
-    values = rows.table.values
-    how: dict[str, Any] = {"weights": rows.weights, "groups": rows.labels, "level": level}
+    values, space = rows.table.values, where.space
+    how: dict[str, Any] = {
+        "weights": rows.weights, "groups": rows.labels, "level": settings.level,
+    }  # fmt: skip
+    if space in ROTATIONS:
+        own: Any = space_of(where, rows.table.columns, unit)
+        how |= {"near": settings.near, "within": settings.within}
+        whole, near = orientations.summarize_orientations(own, values, **how)
+        return {"orientations": [asdict(whole)], "near": [asdict(one) for one in near]}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
         if space == "torus":
@@ -140,14 +162,21 @@ def _tables(found: dict[str, Any], level: float) -> list[runtime.Table]:
         "sine": "Jammalamadaka-SenGupta", "sine_p": "p", "rayleigh_p": "Rayleigh p",
         "kuiper_p": "Kuiper p", "watson_p": "Watson p", "bingham_p": "Bingham p", "name": "column",
         "cone": f"cone ({sure}), degrees", "fisher_cone": f"Fisher's cone ({sure}), degrees",
-        "k": "k = (n - 1)/(n - R)",
+        "k": "k = (n - 1)/(n - R)", "spread": "mean misorientation, degrees",
+        "half": "half of the rows within, degrees",
     }  # fmt: skip
     if "columns" not in found:
         (name, (entry,)), *_ = found.items()
         lines = tuple(
             (str(words.get(key, key)), _shown(key, value)) for key, value in entry.items()
         )
-        return [runtime.Table(name.capitalize(), ("figure", "value"), lines)]
+        near = tuple(
+            (one["name"], *(f"{100 * one[key]:.2f}" for key in ("share", "low", "high", "random")))
+            for one in found.get("near", ())
+        )
+        heads = ("near", "% of rows", f"from ({sure})", "to", "% of a random texture")
+        made = [runtime.Table(name.capitalize(), ("figure", "value"), lines)]
+        return [*made, runtime.Table("Ideal orientations", heads, near)] if near else made
     of = dict(zip(TABLES, (found["columns"], found["columns"], found["correlations"]), strict=True))
     return [
         runtime.Table(
@@ -193,6 +222,11 @@ def _notes(found: dict[str, Any], rows: TableRows) -> list[str]:
     peaks = [one for one in entries if "name" in one and one["rows"] > 1]
     if constant := [one["name"] for one in peaks if one["concentration"] is None]:
         notes.append(f"all rows have the same value of {', '.join(constant)}")
+    if (half := entries[0].get("half", 0.0)) > WIDE_DEGREES:
+        notes.append(
+            f"half of the rows are {half:.0f} degrees and more from the mean, which says little: "
+            "`density fit` and `density texture` find several orientations"
+        )
     undetermined = [entry["name"] for entry in entries if entry.get("half_width", 0) is None]
     if undetermined:
         notes.append(

@@ -1,0 +1,225 @@
+"""Summaries of orientations: their mean modulo symmetry, its cone, and shares near named ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from scipy import special
+from torch import Tensor
+
+from orbiflow.arguments import as_instance, as_number
+from orbiflow.arrays import Array
+from orbiflow.density.data import as_data, as_numbers
+from orbiflow.density.inference import misorientations
+from orbiflow.density.spaces import ORIENTATIONS, RotationSpace, named_orientation, rotations_of
+from orbiflow.errors import OrbiflowError, SettingError
+
+STARTS, STEPS, MOST_LOOKED_AT = 16, 100, 2_000
+"""Rows from which a mean is looked for, the most steps of each, and the most rows of a first look."""
+
+
+@dataclass(frozen=True)
+class OrientationSummary:
+    """Orientations modulo the symmetry of their space; angles are in degrees.
+
+    - `mean`: The orientation of the least mean square of misorientations, by quaternions, in the
+      columns of the space.
+    - `cone`: The misorientation within which the true mean is, at the level asked for, for any
+      distribution about one mean; None if rows spread too much to tell.
+    - `spread`: The mean misorientation of rows from the mean.
+    - `half`: The misorientation within which half of the rows are.
+    """
+
+    rows: int
+    mean: tuple[float, ...]
+    cone: float | None
+    spread: float
+    half: float
+
+
+@dataclass(frozen=True)
+class NearSummary:
+    """The share of rows within an angle of an ideal orientation, and its interval (Wilson, 1927).
+
+    - `random`: The share of a random texture there.
+    """
+
+    name: str
+    share: float
+    low: float
+    high: float
+    random: float
+
+
+def summarize_orientations(
+    space: RotationSpace,
+    data: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    groups: ArrayLike | None = None,
+    level: float = 0.95,
+    near: Sequence[str] | None = None,
+    within: float = 15.0,
+) -> tuple[OrientationSummary, list[NearSummary]]:
+    """Summarise orientations.
+
+    Args:
+        space: Their space, which says how rows write them, and their symmetry.
+        data: Rows (N, k) of the space.
+        weights: How much each row counts (N,); only ratios matter.
+        groups: What each row belongs to, (N,); rows of one group are not independent.
+        level: Level of the intervals.
+        near: Names of ideal orientations (cube, goss, brass, copper, s) with all their variants in a
+            rolled sheet. Default: all of them for cubic crystals, else none.
+        within: The angle in degrees within which rows are counted as near.
+
+    Raises:
+        OrbiflowError: If rows or weights do not fit, or names are unknown.
+
+    >>> space = RotationSpace(form="bunge", unit="degrees", symmetry="432")
+    >>> found, shares = summarize_orientations(space, [[1, 0, 0], [89, 0, 0], [90, 1, 0], [0, 45, 0]])
+    >>> shares[0].name, shares[0].share
+    ('cube', 0.75)
+    """
+    as_instance(space, RotationSpace, "space")
+    points = space.to_chart(as_data(data).values)
+    shares = np.ones(len(points)) if weights is None else as_numbers(weights, "weights")
+    if shares.shape != (len(points),) or not (np.isfinite(shares).all() and (shares >= 0).all()):
+        raise OrbiflowError(f"weights must be {len(points)} numbers, none below 0")
+    if not shares.any():
+        raise OrbiflowError("there is no row with a weight")
+    shares = shares / shares.sum()
+    labels = np.arange(len(points))
+    if groups is not None:
+        labels = np.unique(np.asarray(groups), return_inverse=True)[1].reshape(-1)
+    level = as_number(level, "level", 0.5, 0.999)
+    mean, images = _mean(space, points, torch.tensor(shares))
+    angles = np.degrees(misorientations(space, points, mean).numpy())
+    order = np.argsort(angles)
+    half = float(angles[order][np.searchsorted(np.cumsum(shares[order]), 0.5 - 1e-12)])
+    written = space.from_chart(mean[None])[0]
+    found = OrientationSummary(
+        len(points),
+        tuple(float(v) for v in written),
+        _cone(images, shares, labels, level),
+        float(shares @ angles),
+        half,
+    )
+    return found, _near(space, points, shares, labels, level, near, within)
+
+
+def _mean(space: RotationSpace, points: Tensor, shares: Tensor) -> tuple[Tensor, Array]:
+    """Return the mean (4,), and the image (N, 4) of each row that is nearest to it.
+
+    From several rows on, each row takes its image nearest to the mean, and the mean is the principal
+    axis of these, until nothing changes.
+    """
+    some = torch.linspace(0, len(points) - 1, min(MOST_LOOKED_AT, len(points))).round().long()
+    begin = some[torch.linspace(0, len(some) - 1, min(STARTS, len(some))).round().long()]
+    found = [_settled(space, points[some], shares[some], start) for start in points[begin]]
+    best = max(found, key=lambda one: one[0])[1]
+    _, mean, near = _settled(space, points, shares, best)
+    return space.project(mean[None])[0], near.numpy()
+
+
+def _settled(
+    space: RotationSpace, points: Tensor, shares: Tensor, mean: Tensor
+) -> tuple[float, Tensor, Tensor]:
+    """Return the share of rows' squares along a mean that no step changes, it, and nearest images."""
+    last, near = -1.0, points
+    for _ in range(STEPS):
+        around = space.features(mean[None])[:, 0]
+        chosen = (around @ points.mT).argmax(dim=0)
+        # what takes the mean to its image takes the row back along
+        near = torch.einsum("nji,nj->ni", space.elements[chosen], points)
+        tensor = torch.einsum("n,ni,nj->ij", shares, near, near)
+        values, axes = np.linalg.eigh(tensor.numpy())
+        mean = torch.tensor(axes[:, -1])
+        if values[-1] - last < 1e-15:
+            break
+        last = float(values[-1])
+    return last, mean, near
+
+
+def _cone(images: Array, shares: Array, labels: Array, level: float) -> float | None:
+    """Return the misorientation in degrees that holds the true mean, by the errors of an axis.
+
+    The principal axis of quaternions is that of Fisher, Lewis and Embleton (1987), section 6.3.1, in
+    four dimensions; of groups the sums of their rows take the place of rows.
+    """
+    tensor = np.einsum("n,ni,nj->ij", shares, images, images)
+    values, axes = np.linalg.eigh(tensor)
+    along, gaps = images @ axes[:, ::-1], values[-1] - values[-2::-1]
+    units = int(labels.max()) + 1
+    if gaps.min() < 1e-12 or units < 5:
+        return None
+    errors = shares[:, None] * along[:, :1] * along[:, 1:] / gaps
+    sums = np.zeros((units, 3))
+    np.add.at(sums, labels, errors)
+    variance = float((sums**2).sum()) / 3
+    if units == len(labels):
+        quantile = float(special.chdtri(3, 1 - level))
+    else:
+        variance *= units / (units - 1)
+        quantile = 3 * float(special.fdtri(3, units - 1, level))
+    sine = math.sqrt(quantile * variance)
+    # the angle of a rotation is twice that of quaternions
+    return math.degrees(2 * math.asin(sine)) if sine < math.sin(math.pi / 4) else None
+
+
+def _near(
+    space: RotationSpace,
+    points: Tensor,
+    shares: Array,
+    labels: Array,
+    level: float,
+    near: Sequence[str] | None,
+    within: float,
+) -> list[NearSummary]:
+    """Return the shares of rows near ideal orientations."""
+    reach = math.radians(as_number(within, "within", above=0, most=60))
+    names = near_names(space, near)
+    even = space.uniform(2**14 if names else 1, torch.Generator().manual_seed(0))
+    sums = np.zeros(int(labels.max()) + 1)
+    np.add.at(sums, labels, shares)
+    count = 1 / float((sums**2).sum())
+    z = math.sqrt(float(special.chdtri(1, 1 - level)))
+    found: list[NearSummary] = []
+    for name in names:
+        variants = ideal_variants(name)
+        share = float(shares @ (nearest(space, points, variants) <= reach))
+        middle = (share + z * z / (2 * count)) / (1 + z * z / count)
+        half = z / (1 + z * z / count)
+        half *= math.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+        by_chance = float((nearest(space, even, variants) <= reach).mean())
+        low, high = max(0.0, middle - half), min(1.0, middle + half)
+        found.append(NearSummary(name, share, low, high, by_chance))
+    return found
+
+
+def near_names(space: RotationSpace, near: Sequence[str] | None) -> list[str]:
+    """Return the names of ideal orientations that are asked for, by default those of cubic crystals."""
+    if near is None:
+        return list(ORIENTATIONS) if space.symmetry in ("T", "O") else []
+    names = [name.strip().casefold() for name in near]
+    for name in names:
+        if name not in ORIENTATIONS:
+            raise SettingError(f"{{near}} must be among {', '.join(ORIENTATIONS)}, got {name}")
+    if space.symmetry not in ("T", "O"):
+        raise SettingError("{near} names orientations of cubic crystals")
+    return names
+
+
+def ideal_variants(name: str) -> Tensor:
+    """Return an ideal orientation and its images in a rolled sheet (4, 4), unit quaternions."""
+    return torch.tensor((rotations_of("D2") * named_orientation(name)).as_quat())
+
+
+def nearest(space: RotationSpace, points: Tensor, variants: Tensor) -> Array:
+    """Return the angles (N,) in radians from orientations (N, 4) to the nearest of several (V, 4)."""
+    return np.min([misorientations(space, points, one).numpy() for one in variants], axis=0)
