@@ -307,8 +307,9 @@ def _sector_dots(
     return net.forward(to_latlon(best))
 
 
-MOST_ACROSS = 3
-"""Panels side by side at most."""
+MOST_ACROSS, LEAST_EMS, WIDE = 3, 15.0, 0.5
+"""Panels side by side at most, the ems that each takes at least, and height over width of those that
+are too wide to lie side by side."""
 
 
 def _picture(
@@ -320,8 +321,6 @@ def _picture(
     shade = shading(every, log=log)
     scale = "logarithmic" if shade.log else "linear"
     caption = frames.sentences([*words, f"Colours are {scale}, the same in all panels"])
-    columns = min(MOST_ACROSS if sheet.width > frames.NARROW_INCHES else 2, len(panels))
-    rows = -(-len(panels) // columns)
     left, right, top, bottom = panels[0].extent
     shape = abs(bottom - top) / abs(right - left)
     is_plain = panels[0].outline is None
@@ -331,7 +330,11 @@ def _picture(
     if not sheet.printed:
         room = room._replace(above=2.6).with_words(caption, sheet)
     inner = sheet.width - sheet.em * (room.left + room.right)
-    side = min((inner - (columns - 1) * gap) / columns, 0.5 * sheet.width)
+    columns = max(1, min(MOST_ACROSS, len(panels), int(inner / (LEAST_EMS * sheet.em))))
+    columns = 1 if shape < WIDE else columns
+    rows = -(-len(panels) // columns)
+    side = (inner - (columns - 1) * gap) / columns
+    side = side if shape < WIDE else min(side, 0.5 * sheet.width)
     high = side * shape
     figure = sheet.figure(rows * (high + above) + sheet.em * (room.above + room.below))
     base, image = sheet.em * room.below, None
