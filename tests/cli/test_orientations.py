@@ -137,3 +137,34 @@ def test_textures_are_summarised_fitted_and_drawn(tmp_path: Path, orbiflow: Any)
     }  # fmt: skip
     done = orbiflow("density", "plot", "-m", model, "--pole", "1-101", "-o", tmp_path / "q")
     assert "--pole 1-101 has four indices" in done.err
+
+
+def test_rotations_of_another_form_than_the_model_are_refused(
+    tmp_path: Path, orbiflow: Any
+) -> None:
+    turns = Rotation.from_rotvec(np.random.default_rng(0).normal(0, 0.5, (60, 3)))
+    half = turns.as_quat()[:, :3] / turns.as_quat()[:, 3:]
+    tables = {"phi1,Phi,phi2": turns.as_euler("ZXZ"), "rodrigues1,rodrigues2,rodrigues3": half}
+    for number, (header, values) in enumerate(tables.items()):
+        name = tmp_path / f"{number}.csv"
+        np.savetxt(name, values, delimiter=",", header=header, comments="")
+    how = ("--space", "rotation-space", "--crystal", "222", "--components", "kernels")
+    done = orbiflow("density", "fit", tmp_path / "0.csv", *how, "-o", tmp_path / "m")
+    assert done.status == 0, done.err
+    done = orbiflow(
+        "density", "score", tmp_path / "1.csv", "-m", tmp_path / "m", "-o", tmp_path / "s.csv",
+        "--columns", "rodrigues1,rodrigues2,rodrigues3",
+    )  # fmt: skip
+    assert "are Rodrigues' vector, by their names, and the model was fitted" in done.err
+    both = ("-d", tmp_path / "0.csv", "-d", tmp_path / "2.csv", "--space", "rotation-space")
+    np.savetxt(
+        tmp_path / "2.csv",
+        turns.inv().as_euler("ZXZ"),
+        delimiter=",",
+        header="phi1,Phi,phi2",
+        comments="",
+    )
+    symmetry = ("--crystal", "cubic", "--specimen", "222", "-o", tmp_path / "c.json")
+    done = orbiflow("density", "compare", *both, *symmetry)
+    assert done.status == 0, done.err
+    assert (tmp_path / "c.json").exists()

@@ -16,7 +16,7 @@ from orbiflow.density import AdaptiveKernels, CubicOrientations, DensityEstimato
 from orbiflow.density.data import rotation_form
 from orbiflow.density.spaces import rotation_group_name, rotations_of
 from orbiflow.density.spaces.point_groups import NAMES
-from orbiflow.errors import SettingError
+from orbiflow.errors import OrbiflowError, SettingError
 from strategies import seeds
 
 ORDERS = {"C1": 1, "C2": 2, "C2x": 2, "C2y": 2, "C3": 3, "C4": 4, "C6": 6, "D2": 4, "D3": 6}
@@ -253,3 +253,12 @@ def test_a_space_of_another_form_than_the_names_is_refused() -> None:
     frame = pandas.DataFrame(turns, columns=["x", "y", "z", "w"])
     with pytest.raises(SettingError, match="the space's form is scalar-first"):
         DensityEstimator(RotationSpace(form="scalar-first")).fit(frame)
+
+
+def test_families_without_the_symmetry_are_refused() -> None:
+    from orbiflow.density.models import images_of
+
+    assert images_of(RotationSpace()) == 2
+    for own in (RotationSpace(symmetry="D2"), RotationSpace(specimen="D2")):
+        with pytest.raises(OrbiflowError, match="there is no such thing on the"):
+            images_of(own)

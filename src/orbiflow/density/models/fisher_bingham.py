@@ -108,10 +108,10 @@ def images_of(space: Space, vector: Tensor | None = None) -> int:
 
     Raises `OrbiflowError` for other spaces, and for axes with a `vector` that tells their ends apart.
     """
-    count = space.kernel_images if space.is_round else 0
-    if count == 2:
-        some = space.features(space.uniform(1, torch.Generator().manual_seed(0)))
-        count = 2 if torch.allclose(some[1], -some[0]) else 0
+    some = space.features(space.uniform(1, torch.Generator().manual_seed(0)))
+    count = len(some) if space.is_round else 0
+    if count == 2 and not torch.allclose(some[1], -some[0]):
+        count = 0
     if count not in (1, 2) or (count == 2 and vector is not None and bool(vector.any())):
         what = "this density" if vector is None or count != 2 else "a density with a mean direction"
         raise OrbiflowError(f"there is no such thing on the {space!r}: {what} is for other spaces")

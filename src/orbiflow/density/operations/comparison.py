@@ -17,7 +17,7 @@ from orbiflow.density.data import DIRECTIONS, Unit, arrangements, is_angular
 from orbiflow.density.operations.drawing import require_ending
 from orbiflow.density.operations.fitting import space_of
 from orbiflow.density.run_folder import write_file
-from orbiflow.density.tables import SpaceSettings, TableSettings
+from orbiflow.density.tables import RotationForm, SpaceSettings, TableSettings
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError, literal
 from orbiflow.settings import DefaultText, Option, Repeated
 
@@ -46,6 +46,10 @@ def compare(
     space: str | None = None,
     cell: tuple[float, ...] | None = None,
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None,
+    crystal: str | None = None,
+    specimen: str | None = None,
+    form: RotationForm | None = None,
+    passive: bool = False,
     group: str | None = None,
     by: str | None = None,
     out: Annotated[Path | None, Option("-o"), DefaultText("nothing is written")] = None,
@@ -63,6 +67,10 @@ def compare(
         space: Where two data sets live, as `fit` takes it.
         cell: Lengths and angles in degrees of the cell of two data sets on a group's quotient.
         unit: Unit of angles in two data sets.
+        crystal: Symmetry of the crystals whose orientations two data sets have, as `fit` takes it.
+        specimen: Symmetry of their specimen.
+        form: How columns of two data sets write rotations, as `fit` takes it.
+        passive: Whether they are the inverse rotations.
         group: Column that names what rows belong to (a protein, a station, an event): those of one are
             not independent.
         by: Column that says which data set each row of one table belongs to, for tests by name.
@@ -70,7 +78,8 @@ def compare(
     """
     models = models or ()
     require_ending(out, (".json", ".csv"))
-    asked: dict[str, Any] = {"space": space, "cell": cell, "unit": unit}
+    asked: dict[str, Any] = {"space": space, "cell": cell, "unit": unit, "crystal": crystal}
+    asked |= {"specimen": specimen, "form": form, "passive": passive or None}
     given = {name: value for name, value in asked.items() if value is not None}
     named = settings.tests is not None or by is not None or bool(data[2:])
     if models:

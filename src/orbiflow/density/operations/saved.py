@@ -17,11 +17,11 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import doubts_of_other_columns
+from orbiflow.density.data import check_columns, doubts_of_other_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.run_folder import SAMPLES, write_files
-from orbiflow.density.spaces import MixedTorus, Space, Torus
+from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
 from orbiflow.density.tables import Table, TableError, TableSettings, column_names, listing, to_csv
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
@@ -98,6 +98,8 @@ def check_fits(
             f"{data}: the model was fitted to {', '.join(wanted)}, in this order; give "
         )
         raise TableError(listed + "{columns} " + literal(f"'{','.join(wanted)}'"))
+    if isinstance(space, RotationSpace):
+        _check_form(data, table, space)
     unit, own = table.unit, inference.data_unit(space, len(table.columns))
     if unit is not None and own not in (None, unit):
         text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"
@@ -107,6 +109,20 @@ def check_fits(
         doubts += doubts_of_other_columns(space.data_name, table.values, table.columns, own)
     for doubt in doubts:
         tell(Note(f"WARNING: {data}: {doubt}"))
+
+
+def _check_form(data: Path, table: Table, space: RotationSpace) -> None:
+    """Refuse rotations whose names say another form than that of the model's data."""
+    found, own = check_columns(space.name, table.columns), space.form_of(len(table.columns))
+    are_euler = found is not None and found.form == "ZXZ" and len(own) == len("ZXZ")
+    if found is None or found.form == own or are_euler:
+        return
+    raise TableError(
+        literal(
+            f"{data}: {', '.join(table.columns)} are {found.words}, by their names, and the model was "
+            f"fitted to rotations of the form {own}: convert them"
+        )
+    )
 
 
 PICTURE = "density.png"

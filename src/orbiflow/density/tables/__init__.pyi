@@ -17,6 +17,7 @@ from .rows import linear_among as linear_among
 from .rows import read_rows as read_rows
 from .settings import CountedRowSettings as CountedRowSettings
 from .settings import GroupedRowSettings as GroupedRowSettings
+from .settings import RotationForm as RotationForm
 from .settings import RowSettings as RowSettings
 from .settings import SpaceSettings as SpaceSettings
 from .settings import TableSettings as TableSettings
