@@ -155,7 +155,7 @@ def test_rotations_of_another_form_than_the_model_are_refused(
         "density", "score", tmp_path / "1.csv", "-m", tmp_path / "m", "-o", tmp_path / "s.csv",
         "--columns", "rodrigues1,rodrigues2,rodrigues3",
     )  # fmt: skip
-    assert "are Rodrigues' vector, by their names, and the model was fitted" in done.err
+    assert "are Rodrigues' vector, by their names, and rotations of the form ZXZ" in done.err
     both = ("-d", tmp_path / "0.csv", "-d", tmp_path / "2.csv", "--space", "rotation-space")
     np.savetxt(
         tmp_path / "2.csv",

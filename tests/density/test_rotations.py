@@ -247,11 +247,13 @@ def test_a_space_of_another_form_than_the_names_is_refused() -> None:
     frame = pandas.DataFrame(
         np.random.default_rng(0).normal(0, 0.1, (40, 3)), columns=["rx", "ry", "rz"]
     )
-    with pytest.raises(SettingError, match="are a rotation vector, by their names, and the space"):
+    with pytest.raises(
+        SettingError, match="are a rotation vector, by their names, and rotations of the form ZXZ"
+    ):
         DensityEstimator(CubicOrientations(form="bunge")).fit(frame)
     turns = Rotation.random(40, random_state=0).as_quat()
     frame = pandas.DataFrame(turns, columns=["x", "y", "z", "w"])
-    with pytest.raises(SettingError, match="the space's form is scalar-first"):
+    with pytest.raises(SettingError, match="rotations of the form scalar-first are wanted"):
         DensityEstimator(RotationSpace(form="scalar-first")).fit(frame)
 
 

@@ -20,9 +20,11 @@ from orbiflow.density.data import (
     OUTPUTS,
     ROTATIONS,
     check_columns,
+    check_form,
     data_of,
     frame_of,
     is_angular,
+    require_table,
     require_values,
     rotation_form,
     unit_of,
@@ -37,6 +39,7 @@ from orbiflow.density.fitting import (
     fit_density,
     fit_parametric,
     mean_of,
+    refuse_flow_settings,
     weighed,
 )
 from orbiflow.density.inference import (
@@ -59,7 +62,7 @@ from orbiflow.density.spaces import (
     check_measure,
     space_for,
 )
-from orbiflow.errors import DataWarning, OrbiflowError, SettingError, literal
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
 RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
@@ -181,7 +184,7 @@ class DensityEstimator(FittedFigures):
         self.space_ = self._space_for(data, names)
         points = self._chart(data)
         if flow_obstacle(self.space_):
-            _refuse_flows(settings, self.space_)
+            refuse_flow_settings(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
         how: dict[str, Any] = {"weights": sample_weight, "progress": progress}
         if settings.parametric:
@@ -395,16 +398,18 @@ class DensityEstimator(FittedFigures):
 
     def _space_for(self, data: Array, names: tuple[str, ...] | None) -> Space:
         """Return the space of data, once they are known to be of it, and warn of what is doubtful."""
-        if data.ndim != 2:
-            raise _not_a_table(data)
+        require_table(data)
         require_values(data, names)
         own = self.space if isinstance(self.space, Space) else None
         space, unit = self._space_name(), self.unit
         if self.linear or isinstance(own, MixedTorus):
             return self._mixed_space(data, names)
         form = None
-        if self._space_name() in ROTATIONS:
-            form = self._form_of(data.shape[1], names)
+        if isinstance(own, RotationSpace):
+            form = own.form_of(data.shape[1])
+            check_form(space, names or (), form)
+        elif space in ROTATIONS:
+            form = rotation_form(space, names, data.shape[1])
         if own is not None and is_angular(own.name, data.shape[1], form):
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):
@@ -415,20 +420,6 @@ class DensityEstimator(FittedFigures):
         if isinstance(self.space, Space):
             return self.space
         return space_for(self.space, data, unit=found, seed=self.settings().seed, form=form)
-
-    def _form_of(self, width: int, names: tuple[str, ...] | None) -> str | None:
-        """Return how columns write rotations, None if nothing says it."""
-        if not isinstance(self.space, RotationSpace):
-            return rotation_form(self._space_name(), names, width)
-        own = self.space.form_of(width)
-        known = check_columns(self.space.name, names) if names else None
-        are_euler = known is not None and known.form == "ZXZ" and len(own) == len("ZXZ")
-        if known is not None and known.form != own and not are_euler:
-            raise SettingError(
-                f"the columns {literal(', '.join(names or ()))} are {known.words}, by their names, and "
-                f"the space's form is {own}: take a RotationSpace of the form {known.form}"
-            )
-        return own
 
     def _mixed_space(self, data: Array, names: tuple[str, ...] | None) -> Space:
         """Return the space of data some of whose columns are real."""
@@ -456,8 +447,7 @@ class DensityEstimator(FittedFigures):
     def _checked(self, X: ArrayLike) -> Array:
         """Return data in the order of the fit; warn of those that seem to be in another unit."""
         density, data = self._fitted(), self._in_order(X)
-        if data.ndim != 2:
-            raise _not_a_table(data)
+        require_table(data)
         names = getattr(self, "feature_names_in_", None)
         for doubt in data_doubts(density, data, names, NAN_CURE):
             warnings.warn(doubt, DataWarning, stacklevel=3)
@@ -505,22 +495,3 @@ class DensityEstimator(FittedFigures):
         if not hasattr(self, "density_"):
             raise OrbiflowError("this estimator is not fitted yet: call fit first")
         return self.density_
-
-
-def _not_a_table(data: Array) -> OrbiflowError:
-    """Return what to say of data that are no rows and columns."""
-    cure = ""
-    if data.ndim == 1:
-        cure = "; of one row write [[...]], of one column data.reshape(-1, 1) (NumPy)"
-    return OrbiflowError(f"expected data of shape (N, k), got {data.shape}{cure}")
-
-
-def _refuse_flows(settings: DensitySettings, space: Space) -> None:
-    given = list(settings.of_flow)
-    if given:
-        where = f"a torus of {space.dim} angles" if space.is_torus else f"the {space.name}"
-        names = ", ".join(f"{{{name}}}" for name in given)
-        raise SettingError(
-            f"{names} would have no effect on {where}, where there is no flow; leave "
-            f"{'it' if len(given) == 1 else 'them'} out"
-        )

@@ -13,6 +13,7 @@ from .columns import ROTATIONS as ROTATIONS
 from .columns import Arrangement as Arrangement
 from .columns import arrangements as arrangements
 from .columns import check_columns as check_columns
+from .columns import check_form as check_form
 from .columns import chosen_arrangement as chosen_arrangement
 from .columns import rotation_form as rotation_form
 from .doubts import CODES as CODES
@@ -25,6 +26,7 @@ from .frames import OUTPUTS as OUTPUTS
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
 from .frames import frame_of as frame_of
+from .frames import require_table as require_table
 from .frames import require_values as require_values
 from .strikes import DIP_DIRECTION as DIP_DIRECTION
 from .strikes import data_of as data_of

@@ -320,3 +320,17 @@ give form quaternion if it is the last, or scalar-first
         f"{listed}: names do not say how they write rotations; give {{form}} bunge (phi1, Phi, phi2), "
         "vector (axis times angle) or rodrigues"
     )
+
+
+def check_form(space: str, names: Sequence[str], form: str) -> None:
+    """Refuse columns whose names say that they write rotations in another form than `form`.
+
+    Three Euler angles may be about any axes.
+    """
+    found = check_columns(space, names)
+    are_euler = found is not None and found.form == "ZXZ" and len(form) == len("ZXZ")
+    if found is not None and found.form != form and not are_euler:
+        raise SettingError(
+            literal(f"{', '.join(names)} are {found.words}, by their names, and ")
+            + f"rotations of the form {form} are wanted: convert them"
+        )

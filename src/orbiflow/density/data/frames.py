@@ -144,6 +144,15 @@ def _of_objects(array: NDArray[Any], what: str) -> Array:
     return values
 
 
+def require_table(data: Array) -> None:
+    """Refuse data that are no rows and columns."""
+    if data.ndim != 2:
+        cure = ""
+        if data.ndim == 1:
+            cure = "; of one row write [[...]], of one column data.reshape(-1, 1) (NumPy)"
+        raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}{cure}")
+
+
 def require_values(values: Array, names: Sequence[str] | None) -> None:
     """Refuse columns (N, k) of which no row has a value, and values that are infinite."""
     rows = np.flatnonzero(np.isinf(values).any(axis=1))

@@ -1,5 +1,6 @@
 from .automatic import fit_automatic as fit_automatic
 from .flow import fit_density as fit_density
+from .flow import refuse_flow_settings as refuse_flow_settings
 from .held_out import LEAST_PLACES as LEAST_PLACES
 from .held_out import lightest_folds as lightest_folds
 from .intervals import SAME as SAME

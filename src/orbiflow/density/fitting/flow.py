@@ -35,10 +35,10 @@ from orbiflow.density.fitting.report import (
     steps_note,
 )
 from orbiflow.density.fitting.rows import Rows, effective_rows, weighed, weights_note
-from orbiflow.density.fitting.settings import FlowSettings
+from orbiflow.density.fitting.settings import DensitySettings, FlowSettings
 from orbiflow.density.models import FlowDensity, UniformDensity, flow_obstacle
 from orbiflow.density.spaces import Space
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.fields import FourierField, InvariantField, SplineField, has_even_grid
 from orbiflow.flows import Flow
 
@@ -360,3 +360,15 @@ def conjugate_gradients(
         new = residual @ z
         direction, old = z + new / old * direction, new
     return x
+
+
+def refuse_flow_settings(settings: DensitySettings, space: Space) -> None:
+    """Refuse settings of a flow on a space that has none."""
+    given = list(settings.of_flow)
+    if given:
+        where = f"a torus of {space.dim} angles" if space.is_torus else f"the {space.name}"
+        names = ", ".join(f"{{{name}}}" for name in given)
+        raise SettingError(
+            f"{names} would have no effect on {where}, where there is no flow; leave "
+            f"{'it' if len(given) == 1 else 'them'} out"
+        )

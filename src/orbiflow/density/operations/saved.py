@@ -17,7 +17,7 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import check_columns, doubts_of_other_columns
+from orbiflow.density.data import check_form, doubts_of_other_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.run_folder import SAMPLES, write_files
@@ -99,7 +99,10 @@ def check_fits(
         )
         raise TableError(listed + "{columns} " + literal(f"'{','.join(wanted)}'"))
     if isinstance(space, RotationSpace):
-        _check_form(data, table, space)
+        try:
+            check_form(space.name, table.columns, space.form_of(len(table.columns)))
+        except SettingError as error:
+            raise TableError(literal(f"{data}: ") + error.template) from error
     unit, own = table.unit, inference.data_unit(space, len(table.columns))
     if unit is not None and own not in (None, unit):
         text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"
@@ -109,20 +112,6 @@ def check_fits(
         doubts += doubts_of_other_columns(space.data_name, table.values, table.columns, own)
     for doubt in doubts:
         tell(Note(f"WARNING: {data}: {doubt}"))
-
-
-def _check_form(data: Path, table: Table, space: RotationSpace) -> None:
-    """Refuse rotations whose names say another form than that of the model's data."""
-    found, own = check_columns(space.name, table.columns), space.form_of(len(table.columns))
-    are_euler = found is not None and found.form == "ZXZ" and len(own) == len("ZXZ")
-    if found is None or found.form == own or are_euler:
-        return
-    raise TableError(
-        literal(
-            f"{data}: {', '.join(table.columns)} are {found.words}, by their names, and the model was "
-            f"fitted to rotations of the form {own}: convert them"
-        )
-    )
 
 
 PICTURE = "density.png"
