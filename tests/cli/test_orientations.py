@@ -60,6 +60,11 @@ def test_points_without_an_orientation_are_doubted(tmp_path: Path, orbiflow: Any
     how = ("--space", "cubic-orientations", "--components", "kernels", "-o", tmp_path / "m")
     done = orbiflow("density", "fit", tmp_path / "a.ctf", *how, "--unit", "degrees")
     assert "all three angles are exactly 0 in 7 rows" in done.out
+    assert "Phase has" not in done.out
+    mixed = (tmp_path / "a.ctf").read_text().replace("\n1\t0", "\n2\t0", 5)
+    (tmp_path / "b.ctf").write_text(mixed)
+    done = orbiflow("density", "fit", tmp_path / "b.ctf", *how, "--unit", "degrees")
+    assert "WARNING: Phase has 1 (55 rows), 2 (5 rows): keep the rows of one phase" in done.out
     angles = np.radians(angles)
     angles[:7] = 12.56637
     (tmp_path / "a.ang").write_text(ang(angles))

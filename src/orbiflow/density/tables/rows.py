@@ -16,6 +16,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.data import (
     DIP_DIRECTION,
     DIRECTIONS,
+    ROTATIONS,
     Doubt,
     Unit,
     check_values,
@@ -132,6 +133,8 @@ def read_rows(
     _check_width(path, table, space, width, others)
     if space in DIRECTIONS:
         check_hemispheres(path, table, rows.header)
+    if space in ROTATIONS:
+        _tell_of_phases(path, table, rows.header, tell)
     angles = without_linear(table, linear, path)
     if space == "torus" and angles.columns:
         tell_of_calm(path, angles, rows, tell)
@@ -302,6 +305,22 @@ def _tell_of_names(table: Table, tell: Sink) -> None:
     unknown = [name for name in table.columns if not is_angle_named(name)]
     if named and any(re.fullmatch(r"column\d+", name) is None for name in unknown):
         tell(Note(f"took {listing(unknown)} as angle{'s' * (len(unknown) > 1)}"))
+
+
+def _tell_of_phases(path: Path, table: Table, header: bool | None, tell: Sink) -> None:
+    """Warn of orientations of several phases, whose crystals may have other symmetries."""
+    names = column_names(path, has_header=header) or ()
+    column = next((name for name in names if name.casefold() == "phase"), None)
+    if column is None:
+        return
+    phases, counts = np.unique(
+        read_labels(path, column, table, has_header=header), return_counts=True
+    )
+    if len(phases) > 1:
+        pairs = zip(phases.tolist(), counts.tolist(), strict=True)
+        listed = ", ".join(f"{phase} ({count} rows)" for phase, count in pairs)
+        text = f"WARNING: {column} has {listed}: keep the rows of one phase, and of none that is 0"
+        tell(Note(text))
 
 
 def _tell_of_weights(weighing: Table, tell: Sink) -> None:
