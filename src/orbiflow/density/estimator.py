@@ -27,6 +27,7 @@ from orbiflow.density.data import (
     require_table,
     require_values,
     rotation_form,
+    runs_of_draws,
     unit_of,
 )
 from orbiflow.density.fitting import (
@@ -163,14 +164,16 @@ class DensityEstimator(FittedFigures):
         """Fit to data (N, k) in the space's own units; `y` is ignored.
 
         Data are an array or a data frame (pandas, polars, pyarrow, xarray) with as many columns as the
-        space takes. Of a frame whose columns have names, later frames are read by these names. What
-        is doubtful is a `DataWarning`.
+        space takes, or draws of a sampler (ArviZ's InferenceData, an xarray.Dataset along chain and
+        draw). Of a frame whose columns have names, later frames are read by these names. What is
+        doubtful is a `DataWarning`.
 
         Args:
             sample_weight: of the rows (N,), at least 0: how much each counts in everything that is
                 fitted and judged. Only ratios count, equal ones are none.
             groups: a label (N,) a row: rows of one are held out together where parts are chosen, for
-                densities of new groups (proteins, stations, fires).
+                densities of new groups (proteins, stations, fires). Default: none, of draws in chains
+                the tenths of each chain, because neighbouring draws are alike.
             columns: names of an array's columns, for those of a parametric family's parameters.
 
         Raises:
@@ -186,6 +189,8 @@ class DensityEstimator(FittedFigures):
         if flow_obstacle(self.space_):
             refuse_flow_settings(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
+        if groups is None and not settings.flow_alone:
+            groups = runs_of_draws(X)
         how: dict[str, Any] = {"weights": sample_weight, "progress": progress}
         if settings.parametric:
             how = {"weights": sample_weight, "groups": groups, "columns": names or columns}

@@ -22,6 +22,7 @@ from .doubts import codes_among as codes_among
 from .doubts import is_identifier as is_identifier
 from .doubts import place_doubts as place_doubts
 from .doubts import refuse_codes as refuse_codes
+from .draws import runs_of_draws as runs_of_draws
 from .frames import OUTPUTS as OUTPUTS
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers

@@ -112,7 +112,7 @@ OTHERS = frozenset((
     "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
     "timestamp", "hour", "hours", "day", "weekday", "doy", "age", "probability", "pvalue",
     "density", "log_prob", "hdr", "id", "ids", "idx", "index", "resid", "resi", "resseq", "resnum",
-    "residue", "serial",
+    "residue", "serial", "chain", "draw", "iteration", "lp",
 ))
 # fmt: on
 """Words for quantities and numbers that do not come back to themselves after a turn."""

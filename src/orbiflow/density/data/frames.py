@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arguments import described, is_a, is_tensor
 from orbiflow.arrays import Array
+from orbiflow.density.data.draws import columns_of_draws, has_draws, posterior_of
 from orbiflow.errors import OrbiflowError
 
 
@@ -29,7 +30,8 @@ def as_data(data: Any, what: str = "data") -> Data:
 
     Args:
         data: An array or nested lists, masked or structured ones too, a tensor, or a data frame: of
-            pandas or polars, a table of pyarrow, or an xarray.Dataset of columns along one dimension.
+            pandas or polars, a table of pyarrow, an xarray.Dataset of columns along one dimension, or
+            draws of a sampler: ArviZ's InferenceData, or what xarray holds along chain and draw.
         what: What they are, for messages.
 
     Raises:
@@ -56,6 +58,9 @@ def _columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
     """Return the names and columns of a frame, or None for what is not one."""
     if hasattr(data, "collect_schema") and hasattr(data, "collect"):
         raise OrbiflowError(f"{what}: a lazy frame holds no numbers yet; call its collect() first")
+    data = posterior_of(data)
+    if has_draws(data):
+        return columns_of_draws(data, what)
     if hasattr(data, "data_vars"):  # xarray
         if len(data.dims) != 1:
             raise OrbiflowError(
