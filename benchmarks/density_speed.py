@@ -8,19 +8,27 @@ all cores that `taskset` leaves. Then evaluations a second of processor time, si
 of `log_prob`; of its gradient in the points; and of all kernels for all points. Off: the largest
 difference in nats of the exact one to that of all kernels, which knows the narrowest ones to 1e-9.
 --components: of the density, such as kernels. --search: `GridSearchCV` over five settings of 2,000
-points in five folds.
+points in five folds. --commands: instead of the table, what a user types, `orbiflow density fit`, for
+10,000 rows of two angles and a length and for a million places on the sphere, start included: seconds
+by the clock, of processor time, and the most memory.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import os
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import torch
+from density_mixed import SETS
 from numpy.typing import NDArray
 
 from orbiflow.density import AdaptiveKernels, DensityEstimator, Mixture, log_density_gradient
@@ -127,6 +135,50 @@ def search() -> str:
     )
 
 
+def arcs(rows: int) -> NDArray[np.float64]:
+    """Unit vectors (N, 3) along sixty arcs, within a quarter of a degree or a degree: like faults."""
+    rng = np.random.default_rng(1)
+    ends = np.linalg.qr(rng.normal(size=(60, 3, 2)))[0]
+    which, along = rng.integers(60, size=rows), rng.uniform(0, 1.2, rows)
+    middles = (
+        ends[which, :, 0] * np.cos(along)[:, None] + ends[which, :, 1] * np.sin(along)[:, None]
+    )
+    data = middles + rng.choice([0.004, 0.02], rows)[:, None] * rng.normal(size=(rows, 3))
+    return data / np.linalg.norm(data, axis=1, keepdims=True)
+
+
+def commands(scale: float) -> None:
+    """Print what the command takes for tables of so many rows, in the sizes that the docs promise."""
+    mixed, many = int(10_000 * scale), int(1_000_000 * scale)
+    rng = np.random.default_rng(0)
+    tables = (
+        (
+            "phi,psi,length",
+            SETS["backbone"].draw(mixed, rng),
+            "torus --unit radians --linear length",
+        ),
+        ("x,y,z", clustered("sphere", many), "sphere"),
+        ("x,y,z", arcs(many), "sphere"),
+    )
+    print(f"{'columns':18}{'rows':>10}{'wall, s':>10}{'processor, s':>14}{'memory, GB':>12}")
+    with tempfile.TemporaryDirectory() as folder:
+        for columns, rows, options in tables:
+            table = Path(folder, "table.csv")
+            np.savetxt(table, rows, "%.6f", ",", header=columns, comments="")
+            call = [sys.executable, "-m", "orbiflow", "density", "fit", str(table), "--space"]
+            call += [*options.split(), "--columns", columns, "--out", str(Path(folder, "fit"))]
+            begin = time.perf_counter()
+            process = subprocess.Popen(call, stdout=subprocess.DEVNULL)
+            _, status, used = os.wait4(process.pid, 0)  # with its workers, once they have ended
+            wall, seconds = time.perf_counter() - begin, used.ru_utime + used.ru_stime
+            if status:
+                raise SystemExit(f"{' '.join(call)} ended with {os.waitstatus_to_exitcode(status)}")
+            memory = used.ru_maxrss * 1024 / 1e9
+            print(
+                f"{columns:18}{len(rows):10,}{wall:10.1f}{seconds:14.1f}{memory:12.2f}", flush=True
+            )
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -135,8 +187,12 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=1_000_000, help="evaluated")
     parser.add_argument("--components", default="auto")
     parser.add_argument("--search", action="store_true", help="a grid search, too")
+    parser.add_argument("--commands", action="store_true", help="what a user types, instead")
     parser.add_argument("--quick", action="store_true", help="one small fit")
     options = parser.parse_args()
+    if options.commands:
+        commands(0.03 if options.quick else 1)
+        return
     torch.set_num_threads(1)
     rows = [300] if options.quick else options.rows
     spaces = ["torus"] if options.quick else options.spaces or SPACES
