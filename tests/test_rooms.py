@@ -31,6 +31,7 @@ TILES += ["run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
     "estimator",
+    "categories",
     "comparing",
     "regions",
     "summaries",

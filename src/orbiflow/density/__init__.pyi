@@ -1,3 +1,5 @@
+from .categories import CategoryDensity as CategoryDensity
+from .categories import fit_categories as fit_categories
 from .comparing.data_sets import DataComparison as DataComparison
 from .comparing.data_sets import Divergence as Divergence
 from .comparing.data_sets import compare_samples as compare_samples

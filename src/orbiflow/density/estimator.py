@@ -36,9 +36,7 @@ from orbiflow.density.fitting import (
     Parameter,
     Progress,
     check_missing,
-    fit_automatic,
-    fit_density,
-    fit_parametric,
+    fit_chosen,
     mean_of,
     refuse_flow_settings,
     weighed,
@@ -191,17 +189,9 @@ class DensityEstimator(FittedFigures):
         settings.check_rows(self.missing, None if groups is None else "groups")
         if groups is None and not settings.flow_alone:
             groups = runs_of_draws(X)
-        how: dict[str, Any] = {"weights": sample_weight, "progress": progress}
-        if settings.parametric:
-            how = {"weights": sample_weight, "groups": groups, "columns": names or columns}
-            found = fit_parametric(
-                self.space_, points, settings.parametric, **how, seed=settings.seed
-            )
-        elif settings.flow_alone:
-            found = fit_density(self.space_, points, settings.flow, **how)
-        else:
-            how |= {"missing": self.missing, "groups": groups}
-            found = fit_automatic(self.space_, points, settings, **how)
+        how: dict[str, Any] = {"weights": sample_weight, "groups": groups, "progress": progress}
+        how |= {"missing": self.missing, "columns": names or columns}
+        found = fit_chosen(self.space_, points, settings, **how)
         self._keep(found, data.shape[1], names)
         return self
 
@@ -314,7 +304,11 @@ class DensityEstimator(FittedFigures):
                 codes for missing values.
         """
         check_measure(measure, self._fitted().space)
-        return self._log_densities(self._checked(X), measure)
+        return at_observed(self.density_, self.points_of(X), measure=measure).numpy()
+
+    def points_of(self, X: ArrayLike) -> torch.Tensor:
+        """Points (N, d) of the chart at data (N, k), which are read as `score_samples` reads them."""
+        return self._chart(self._checked(X))
 
     def score_gradient(self, X: ArrayLike) -> Array:
         """Gradients (N, k) of the log density in natural measure, in the data's own coordinates.
@@ -329,7 +323,7 @@ class DensityEstimator(FittedFigures):
     ) -> float:
         """Mean log density of data (N, k), weighted, in natural measure."""
         del y
-        scores = torch.tensor(self._log_densities(self._checked(X), "natural"))
+        scores = at_observed(self._fitted(), self.points_of(X), measure="natural")
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
 
@@ -457,9 +451,6 @@ class DensityEstimator(FittedFigures):
         for doubt in data_doubts(density, data, names, NAN_CURE):
             warnings.warn(doubt, DataWarning, stacklevel=3)
         return data
-
-    def _log_densities(self, data: Array, measure: str) -> Array:
-        return at_observed(self.density_, self._chart(data), measure=measure).numpy()
 
     def _in_order(self, X: ArrayLike) -> Array:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""

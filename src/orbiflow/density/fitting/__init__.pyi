@@ -1,8 +1,11 @@
 from .automatic import fit_automatic as fit_automatic
+from .automatic import fit_chosen as fit_chosen
 from .flow import fit_density as fit_density
 from .flow import refuse_flow_settings as refuse_flow_settings
 from .held_out import LEAST_PLACES as LEAST_PLACES
 from .held_out import lightest_folds as lightest_folds
+from .held_out import stacked as stacked
+from .held_out import stacking_weights as stacking_weights
 from .intervals import SAME as SAME
 from .intervals import concentration as concentration
 from .maximum import highest_log_likelihood as highest_log_likelihood
@@ -12,6 +15,7 @@ from .parametric import fit_parametric as fit_parametric
 from .repeats import places as places
 from .report import FitReport as FitReport
 from .report import Progress as Progress
+from .report import silent as silent
 from .rows import check_missing as check_missing
 from .rows import group_numbers as group_numbers
 from .rows import lone_groups_note as lone_groups_note

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -30,6 +30,7 @@ from orbiflow.density.fitting.families import (
     NetworkFamily,
     ParametricFamily,
 )
+from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.flow_trial import (
     FittedFlow,
     Rivals,
@@ -47,7 +48,7 @@ from orbiflow.density.fitting.held_out import (
 )
 from orbiflow.density.fitting.kernels import limit_notes, narrowest_for
 from orbiflow.density.fitting.likelihood import Budget, training
-from orbiflow.density.fitting.parametric import require_family
+from orbiflow.density.fitting.parametric import fit_parametric, require_family
 from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
 from orbiflow.density.fitting.report import (
     ComponentEvidence,
@@ -74,7 +75,7 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, PARAMETRIC, DensitySettings
-from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
+from orbiflow.density.models import MOST_DIM, Density, Mixture, flow_obstacle
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.runtime import SideBySide
@@ -93,6 +94,30 @@ FLOW_WORK = 4.0
 
 BEFORE_END = 0.95
 """Of the work told, before all is put together."""
+
+
+def fit_chosen(
+    space: Space,
+    points: Tensor,
+    settings: DensitySettings,
+    *,
+    missing: str = "refuse",
+    weights: Any = None,
+    groups: ArrayLike | None = None,
+    columns: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> tuple[Density, FitReport]:
+    """Fit what the settings ask for: a parametric family, a flow alone, or what suits the data best.
+
+    Arguments are those of `fit_automatic`, and `columns` those of `fit_parametric`.
+    """
+    if settings.parametric:
+        how: dict[str, Any] = {"groups": groups, "columns": columns, "seed": settings.seed}
+        return fit_parametric(space, points, settings.parametric, weights=weights, **how)
+    if settings.flow_alone:
+        return fit_density(space, points, settings.flow, weights=weights, progress=progress)
+    how = {"missing": missing, "weights": weights, "groups": groups, "progress": progress}
+    return fit_automatic(space, points, settings, **how)
 
 
 @training()
@@ -168,7 +193,7 @@ def fit_automatic(
     parts = (*tried.evidence, *(replace(one, share=one.share * rest) for one in others))
     report = _report(density, folds, candidates, weights, tried, parts, found)
     for note in (*found.warnings(settings.repeats), *limited):
-        warnings.warn(note, DataWarning, stacklevel=4)
+        warnings.warn(note, DataWarning, stacklevel=5)
     after = (
         *weights_note(folds.rows),
         *lone_groups_note(folds.rows.groups),

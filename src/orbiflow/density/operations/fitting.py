@@ -14,10 +14,11 @@ from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
 from orbiflow.density.data import is_angular
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
+from orbiflow.density.operations import categories
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning
-from orbiflow.settings import Hidden, Option, SettingError
+from orbiflow.settings import DefaultText, Hidden, Option, SettingError
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
@@ -43,6 +44,7 @@ def fit(
     settings: DensitySettings = DensitySettings(),
     reading: CountedRowSettings = CountedRowSettings(),
     *,
+    given: Annotated[str | None, DefaultText("none")] = None,
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
     picture: Annotated[bool, Hidden()] = False,
     on_event: runtime.Sink = runtime.ignore,
@@ -54,6 +56,7 @@ def fit(
 
     Args:
         data: CSV, TSV, NPY or Parquet.
+        given: Column of words, such as residue: a density where each is known, too.
         out: Folder for the results, made if need be.
         picture: Also draw a small picture, thumbnail.png.
     """
@@ -68,6 +71,7 @@ def fit(
             width=where.width,
             group=reading.group,
             linear=where.linear,
+            given=given,
         )
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
@@ -75,13 +79,17 @@ def fit(
         estimator = fit_rows(rows, where, settings, reading, on_event, cancel)
         asked = {**settings.values(), **reading.values()}
         document = _document(estimator, rows, asked, settings.seed)
+        words: dict[str, bytes] = {}
+        if given is not None:
+            words, said = categories.fit_words(estimator, rows, given, on_event, cancel)
+            document |= said
         document["seconds"] = time.perf_counter() - begin
         known = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()
         model = models.density_to_bytes(
             estimator.density_, columns=list(rows.table.columns), fitted_rows=known
         )
         report = json.dumps(document, allow_nan=False, indent=1)
-        files = {pictures.MODEL: model, pictures.REPORT: report}
+        files = {pictures.MODEL: model, pictures.REPORT: report, **words}
         if picture:
             files[pictures.THUMBNAIL] = pictures.density_thumbnail(estimator.density_, values)
     write_files(folder, files, on_event)

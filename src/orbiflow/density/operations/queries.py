@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow import runtime
 from orbiflow.density import comparing, fitting, models, regions, spaces, tables
+from orbiflow.density.operations.categories import score_words, word_column
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import Advice, literal
@@ -32,7 +34,8 @@ class ScoreSettings(Settings, group="Scores"):
     chance."""
 
     given: Annotated[tuple[str, ...], DefaultText("none")] = ()
-    """Columns that are known: the log density of the others where these are, p(others | given)."""
+    """Columns that are known: the log density of the others where these are, p(others | given). Or the
+    column of words that was given to the fit."""
 
     region: bool = False
     """Add a column hdr: the mass of the smallest region of highest density that holds the row."""
@@ -83,14 +86,23 @@ def score(
         density, extra = model_at(model)
         spaces.check_measure(settings.measure, density.space)
         read = with_columns_of(reading, data, extra, on_event)
-        rows = tables.read_rows(data, read, on_event, model_space=density.space.name)
+        column = word_column(model, settings.given)
+        space = density.space.name
+        rows = tables.read_rows(data, read, on_event, model_space=space, given=column)
         check_fits(data, rows.table, density, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)
         names = [*rows.table.columns]
-        known = axes_of(settings.given, names, on_event) if settings.given else ()
-        if len(known) == len(names):
-            raise SettingError("{given} names all columns: nothing is left to have a density")
-        columns, mean, over, notes = score_rows(density, rows, settings, progress, may_lack, known)
+        if column is not None:
+            score_some = partial(_log_densities, settings=settings, progress=progress)
+            logs = score_words(model, rows, column, score_some, may_lack)
+            columns, over, notes = {"log_prob_given": logs}, f"{rows.whole.sum()} rows", []
+            mean = mean_of_whole(logs, rows.weights, rows.whole)
+        else:
+            known = axes_of(settings.given, names, on_event) if settings.given else ()
+            if len(known) == len(names):
+                raise SettingError("{given} names all columns: nothing is left to have a density")
+            found = score_rows(density, rows, settings, progress, may_lack, known)
+            columns, mean, over, notes = found
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
     table = tables.append_columns(rows.table, data, columns)

@@ -104,21 +104,23 @@ def read_rows(
     group: str | None = None,
     model_space: str | None = None,
     linear: Sequence[str] = (),
+    given: str | None = None,
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
     Without `columns` in the settings, those are taken whose names say that they are what the `space`
     takes, in its order. If no name says so, all columns of numbers are taken but those that number
-    the rows, those of weights, counts and groups and, on a torus, those that are no angles by name and
-    are not among the `linear` ones.
+    the rows, those of weights, counts, groups and what is `given` and, on a torus, those that are no
+    angles by name and are not among the `linear` ones.
     Strikes beside dips become directions of dip on this space or on `model_space`, that of a model.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     reader = _Reader(path, rows, tell, space, width, tuple(linear))
     weighing, counting = map(reader.column, (rows.weights, getattr(rows, "counts", None)))
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
-    if group is not None and rows.columns is None:
-        others.append(_name(path, group, rows.header))
+    for name in (group, given):
+        if name is not None and rows.columns is None:
+            others.append(_name(path, name, rows.header))
     try:
         table = reader.data(others)
     except MissingCellsError as error:
