@@ -3,7 +3,7 @@
 A field is any callable from points (..., d) to vectors of the same shape: a function, a lambda, a torch
 module. Nothing else is required. What else it offers is found by name; a method of one of these names
 must do what is described here. `jacobian` returns dV_i / dp_j (..., d, d), `divergence` (...,), and
-`lipschitz_bound` an upper bound of the Jacobian's spectral norm anywhere, () or (S,).
+`lipschitz_bound` an upper bound of the Jacobian's spectral norm anywhere, () or (S,), or None.
 
 | the field has | then |
 |---|---|
@@ -26,6 +26,7 @@ import torch
 from torch import Tensor, nn
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.fields.layers import bound_of_layers
 from orbiflow.typed_torch import is_old_batch, transformed
 
 VectorField = Callable[[Tensor], Tensor]
@@ -77,9 +78,12 @@ def prepared_with_jacobian(field: VectorField) -> Callable[[Tensor], tuple[Tenso
 
 
 def lipschitz_bound(field: object) -> float | None:
-    """Return the field's own bound of its Jacobian's spectral norm, or None if it has none."""
+    """Return the field's own bound of its Jacobian's spectral norm, that of its layers, or None."""
     own: Any = getattr(field, "lipschitz_bound", None)
-    return float(own().max()) if own else None
+    if own is None:
+        return bound_of_layers(field, lipschitz_bound)
+    found = own()
+    return None if found is None else float(found.max())
 
 
 def _values(field: VectorField, points: Tensor) -> Tensor:

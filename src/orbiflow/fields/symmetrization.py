@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from orbiflow.arguments import as_tensor, as_whole, described, is_tensor, refusal
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.protocol import VectorField, prepared_with_divergence
+from orbiflow.fields.protocol import VectorField, lipschitz_bound, prepared_with_divergence
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,
@@ -93,6 +93,15 @@ class Symmetrized(nn.Module):
             return self._mean(values, points), divergence.mean(dim=0)
 
         return both
+
+    def lipschitz_bound(self) -> Tensor | None:
+        """Return an upper bound () of the Jacobian's spectral norm, or None if it is not known.
+
+        A mean over isometries is no steeper than the given field: that of a `torch.nn.Sequential` is
+        known by its layers. A field that is blended has no bound, as values may grow without limit.
+        """
+        bound = None if self._blended else lipschitz_bound(self.field)
+        return None if bound is None else torch.tensor(bound, dtype=torch.float64)
 
     @contextlib.contextmanager
     def _explaining(self, points: Tensor) -> Generator[None]:
@@ -275,6 +284,10 @@ class PeriodicFeatures(nn.Module):
     def size(self) -> int:
         """Number of features 2 M."""
         return 2 * self.frequencies.shape[0]
+
+    def lipschitz_bound(self) -> Tensor:
+        """Return the spectral norm () of the Jacobian, which is the same at all points."""
+        return 2.0 * math.pi * linalg.matrix_norm(self.frequencies.double(), ord=2)
 
     def forward(self, points: Tensor) -> Tensor:
         """Return features of shape (..., 2 M)."""

@@ -172,7 +172,9 @@ class Flow(nn.Module):
         if bound is None:
             raise OrbiflowError(
                 f"a bijective flow needs fields that bound their slope, and {field!r} has no "
-                "lipschitz_bound(): use a FourierField, give it that method, or leave out bijective"
+                "lipschitz_bound(): use a FourierField or a Sequential of linear layers and "
+                "activations (symmetrized with periodic=True), give it that method, or leave out "
+                "bijective"
             )
         needed = abs(self.duration) * bound / self.integrator.injective_below
         if not needed < MAX_INJECTIVE_STEPS:
