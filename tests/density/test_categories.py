@@ -126,6 +126,9 @@ def test_commands_fit_and_score_where_a_word_is_known(tmp_path: Path) -> None:
     find("density fit").call({"data": table, "out": model, **options}).run(told.append)
     shown = next(one for one in told if isinstance(one, Table))
     assert shown.columns == ("residue", "rows", "own", "nats", "error", "mean phi")
+    said = json.loads((model / "report.json").read_text())["categories"]
+    for word in ("ALA", "P/O"):
+        assert said[word]["mean"] == [pytest.approx(MEANS[word], abs=0.2)]
     files = category_files(model)
     assert files == {"ALA": "category-ALA.safetensors", "P/O": "category-P_O.safetensors"}
     asked = {"data": table, "out": scores, "model": model, "given": ["residue"]}

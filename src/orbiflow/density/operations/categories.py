@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from orbiflow.density.tables import TableRows
 
 
+DRAWS = 2**14
+"""Draws of which a mean is taken: integrals over the marginal density of a flow take long."""
+
 FIGURES = {"own": ("weight", ".2f"), "nats": ("gain", ".3f"), "error": ("gain_error", ".3f")}
 """Figures of a category in the table: the weight of its own density, and what it gains."""
 
@@ -83,11 +86,23 @@ def fit_words(
 
 
 def _mean(own: CategoryDensity) -> list[float] | None:
-    """Return the mean of each column, or None on spaces whose points have none."""
-    try:
-        return [round(value, 10) for value in own.estimator.mean().tolist()]
-    except OrbiflowError:
-        return None
+    """Return the mean of each column, on tori of draws, or None where points have none."""
+    import numpy as np
+
+    from orbiflow.density.spaces import Torus
+
+    space = own.estimator.space_
+    if not isinstance(space, Torus):
+        try:
+            return own.estimator.mean().tolist()
+        except OrbiflowError:
+            return None
+    found: list[float] = []
+    for axis, drawn in enumerate(own.estimator.sample(DRAWS, random_state=0).T):
+        period = space.period_of(axis)
+        around = np.exp(2j * np.pi * drawn / period).mean() if period else 0
+        found.append(float(np.angle(around) / (2 * np.pi) * period if period else drawn.mean()))
+    return found
 
 
 def _free_name(word: str, taken: Mapping[str, bytes]) -> str:
@@ -111,7 +126,7 @@ def _table(column: str, names: Sequence[str], said: Mapping[str, Any]) -> runtim
             word,
             str(own["rows"]),
             *(shown(own[key], form) for key, form in FIGURES.values()),
-            *(shown(value, ".5g") for value in own["mean"] or [None] * len(names)),
+            *(shown(value, ".3g") for value in own["mean"] or [None] * len(names)),
         )
         for word, own in said.items()
     ]
