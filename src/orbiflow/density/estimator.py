@@ -304,7 +304,8 @@ class DensityEstimator(FittedFigures):
                 codes for missing values.
         """
         check_measure(measure, self._fitted().space)
-        return at_observed(self.density_, self.points_of(X), measure=measure).numpy()
+        points = self._chart(self._checked(X))
+        return at_observed(self.density_, points, measure=measure).numpy()
 
     def points_of(self, X: ArrayLike) -> torch.Tensor:
         """Points (N, d) of the chart at data (N, k), which are read as `score_samples` reads them."""
@@ -323,7 +324,8 @@ class DensityEstimator(FittedFigures):
     ) -> float:
         """Mean log density of data (N, k), weighted, in natural measure."""
         del y
-        scores = at_observed(self._fitted(), self.points_of(X), measure="natural")
+        points = self._chart(self._checked(X))
+        scores = at_observed(self.density_, points, measure="natural")
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
 
