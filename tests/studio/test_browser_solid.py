@@ -40,7 +40,7 @@ def test_from_a_mesh_to_a_solid_and_a_file(page: Any, made: list[str]) -> None:
     page.locator(".wishes").get_by_text("More", exact=True).click()
     page.get_by_label("A part that matters most").fill("nowhere")
     page.get_by_role("button", name="Find solids").click()
-    page.get_by_role("alert").get_by_text("is no sphere").wait_for()
+    page.get_by_role("alert").get_by_text("is neither a sphere nor painted").wait_for()
     page.get_by_label("A part that matters most").fill("")
     page.get_by_label("Space groups").fill("P-1, P21")
     assert untidy_parts(page, 1440, 360, 1280) == []

@@ -83,6 +83,11 @@ def test_edges_match_and_areas_add_up(tile: Any, data: Any) -> None:
         )
 
 
+def test_cones_that_are_nearly_vertices_are_vertices() -> None:
+    found = world(swirled_tile("IH2", 0, 3.1415926e-07), (2,))
+    assert area(found) == pytest.approx(np.pi, rel=1e-8)
+
+
 @settings(max_examples=8)
 @given(tiles, st.sampled_from([(2, 3, 3), (2, 3, 4), (2, 3, 5), (3, 3, 4), (2, 3, 7)]))
 def test_neighbours_have_other_colours(tile: Any, orders: Any) -> None:
