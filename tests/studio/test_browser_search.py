@@ -426,3 +426,22 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, searched, scheme) -
         assert serious_issues(page) == []
         page.set_viewport_size({"width": 360, "height": 700})
         assert untidy_parts(page) == []
+
+
+def test_a_world_is_turned_in_a_page_of_its_own(
+    page: Any, studio: RunningStudio, searched: str
+) -> None:
+    tile = studio.found(searched)[0]["id"]
+    page.goto(f"/#/p/{searched}/take/{tile}")
+    page.get_by_role("radio", name="Picture", exact=True).check(force=True)
+    page.get_by_label("In another world?").select_option("disc")
+    page.get_by_label("Kind of file").select_option("html")
+    page.get_by_role("button", name="Make it").click()
+    opened = page.get_by_role("link", name="Open")
+    opened.wait_for()
+    with page.context.expect_page() as found:
+        opened.click()
+    world = found.value
+    world.wait_for_function("document.querySelector('#view').dataset.drawn")
+    assert world.get_by_role("button", name="Fit").is_visible()
+    world.close()

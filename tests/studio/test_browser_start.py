@@ -345,9 +345,7 @@ def test_a_picture_that_failed_before_says_so_and_leads_back(page, studio) -> No
 
 def test_an_animal_is_taken_by_keyboard_and_the_project_renamed(page, studio) -> None:
     page.goto("/")
-    first = page.locator(".animal").first
-    first.focus()
-    page.keyboard.press("Enter")
+    page.locator(".animal").first.press("Enter")
     page.wait_for_selector(READ)
     own = own_project(page)
     page.get_by_label("Name of the project").fill("My beast")

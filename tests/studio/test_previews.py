@@ -87,8 +87,11 @@ def test_a_world_is_made_to_be_turned(client: Client, address: str) -> None:
     task = done(client, client.post(f"{project}/tasks", json=body))
     [file] = task["result"]["files"]
     assert file["name"].endswith(".html")
-    made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").text
-    assert "showWorld" in made
+    made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}")
+    assert "showWorld" in made.text
+    assert made.headers["content-type"].startswith("text/html")
+    assert "content-disposition" not in made.headers
+    assert "sandbox allow-scripts" in made.headers["content-security-policy"]
 
 
 def test_a_drawing_is_on_what_is_printed_in_3d(client: Client, address: str) -> None:

@@ -19,7 +19,7 @@ from starlette.responses import FileResponse, Response, StreamingResponse
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import naming_extras
 from orbiflow.runtime import is_object
-from orbiflow.studio.guard import Refused
+from orbiflow.studio.guard import PAGE, SANDBOX, Refused
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
 from orbiflow.studio.routes import Routes, Studio, body_object, save_body, whole
@@ -368,9 +368,6 @@ def get_picture(project: str, picture: str, here: Studio) -> Response:
     return whole(file, "image/png")
 
 
-SANDBOX = {"content-security-policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'"}
-
-
 def stage_of(here: Studio, project: str, tile: int) -> Path:
     """Return the folder of a tile's last stage."""
     here.store.card(project, tile)
@@ -466,7 +463,9 @@ def _made(here: Studio, task: int, name: str) -> Path:
 
 @routes("GET", "/takeaways/{task}/files/{name}")
 async def download(task: int, name: str, here: Studio) -> FileResponse:
-    """Return a file to keep."""
+    """Return a file to keep; a page also to look at, which may do no more than on a disk."""
+    if name.endswith(".html"):
+        return FileResponse(_made(here, task, name), headers=PAGE)
     return FileResponse(_made(here, task, name), filename=name, headers=SANDBOX)
 
 

@@ -1,6 +1,6 @@
 /** What can be made of a tile, and what its settings are called here. */
 
-/** Plain names of settings, whatever is made. */
+/** Plain names of settings. */
 const PLAIN = {
   area: "How large is the tray at most?",
   assembled: "Leave the pieces in the tray",

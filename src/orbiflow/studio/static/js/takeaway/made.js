@@ -1,11 +1,11 @@
-/** What is made of a tile: the button, its files, a picture of it, what is to be said, what was made before. */
+/** What is made of a tile: the button, files, a picture, words, and what was made before. */
 
 import { button, h, icon, put, row, section, soft, trying } from "../dom.js";
 import { LATE } from "../steering.js";
 import { ago, alive, bytes, capital, sentence } from "../words.js";
 import { EVERY_KIND as KINDS, lengthIn } from "./kinds.js";
 
-const SEEN = /\.(png|gif|svg)$/; // files that browsers show
+const SEEN = /\.(png|gif|svg)$/;
 
 const address = ({ result }, name) =>
   `api/takeaways/${result.takeaway}/files/${encodeURIComponent(name)}`;
@@ -20,15 +20,17 @@ export const isMade = (task) =>
 
 /** Links to the files that a task has made. */
 function files(task, kind) {
-  return task.result.files.map(({ name, bytes: size }) =>
+  return task.result.files.flatMap(({ name, bytes: size }) => [
     h(
       "a",
       { class: `button ${kind}`, href: address(task, name), download: name },
       icon("download"),
       name,
       kind && size && h("span", { class: "small" }, bytes(size)),
-    )
-  );
+    ),
+    name.endsWith(".html") &&
+    h("a", { class: "button", href: address(task, name), target: "_blank" }, "Open"),
+  ]);
 }
 
 /**

@@ -149,7 +149,7 @@ class TakeawayPage {
     this.shared.close();
   }
 
-  /** What the preview has to say: why it cannot be made, or what is to be known of it. */
+  /** What the preview has to say. */
   heard(error, notes) {
     this.noted.classList.remove("past");
     if (error && this.form.refuse(error.setting, error.message, false)) return;
@@ -281,7 +281,7 @@ class TakeawayPage {
     may(box, !plain && (holds || this.project.input?.type === "svg"));
   }
 
-  /** Show the size at once; what was said or made before is no longer what is asked for. */
+  /** Show the size at once; what was said or made before is past. */
   changed() {
     this.fitLayers();
     const size = lengthIn(this.form.now("tile_size"));
