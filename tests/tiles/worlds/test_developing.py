@@ -110,7 +110,7 @@ def test_the_map_is_a_quotient_of_hypergeometric_functions(
     length = mpmath.beta(1 / a, 1 / b)
     point = complex(first + complex(z / length) * (second - first))
     (upper, lower), _ = Development.of(pattern, orders).reached(point).T
-    assert abs(upper / lower - expected) < 1e-11 * max(1, abs(expected))
+    assert abs(upper / lower - expected) < 1e-12 * max(1, abs(expected))
 
 
 def check_turns(found: Development) -> None:
