@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -66,39 +67,6 @@ def _taken(
     read = (result,) if isinstance(result, str | Path) else ()
     check_output_file(out, *map(Path, read), *pictures)
     return given, out
-
-
-def _best_there(
-    orders: Sequence[int] | None, sign: int
-) -> Callable[[list[EscherTile]], EscherTile | None]:
-    """Return what chooses the tile whose image in another world looks best."""
-
-    def best(tiles: list[EscherTile]) -> EscherTile | None:
-        from orbiflow.tiles.worlds import best_in_world
-
-        return best_in_world(tiles, orders, sign)
-
-    return best
-
-
-def _best_to_become(begin: Path) -> Callable[[list[EscherTile]], EscherTile | None]:
-    """Return what chooses the tile that a tile of another run becomes best."""
-
-    def best(tiles: list[EscherTile]) -> EscherTile | None:
-        from orbiflow.tiles.result_file import read_tiles
-        from orbiflow.tiles.worlds import best_to_become
-
-        return best_to_become(tiles, read_tiles(begin))
-
-    return best
-
-
-def _of_class(path: Path, name: str) -> EscherTile:
-    """Return a run's best tile of a class, or the best one if there is none of it."""
-    from orbiflow.tiles.result_file import read_tiles
-
-    tiles = read_tiles(path)
-    return next((own for own in tiles if own.isohedral_class == name), tiles[0])
 
 
 @operation("export")
@@ -197,21 +165,23 @@ def art(
     if begin is not None and settings.metamorphosis is None:
         raise SettingError("{begin} is where a {metamorphosis} begins; give both or neither")
 
-    from orbiflow.tiles import make, motifs
+    from orbiflow.tiles import make, motifs, worlds
+    from orbiflow.tiles.result_file import read_tiles
 
-    pictures = picture, second_picture
+    pictures, begins = (picture, second_picture), [] if begin is None else read_tiles(begin)
     best = None
     if settings.world in CURVED:
-        best = _best_there(settings.order, CURVED[settings.world])
-    elif begin is not None:
-        best = _best_to_become(begin)
+        best = partial(worlds.best_in_world, orders=settings.order, sign=CURVED[settings.world])
+    elif begins:
+        best = partial(worlds.best_to_become, begins=begins)
     given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures, best=best)
     given.require_certified(
         force=force, otherwise="so it is not drawn; {force} draws it all the same"
     )
     on_event(Progress(0.0, "laying out"))
     given = motifs.with_map(given)
-    first = None if begin is None else _of_class(begin, given.isohedral_class)
+    alike = (own for own in begins if own.isohedral_class == given.isohedral_class)
+    first = next(alike, begins[0] if begins else None)
     if first is None:
         motifs.require_figures(given, settings, 1 + (second_picture is not None))
         overs = motifs.read_overs(pictures, given)
@@ -219,8 +189,6 @@ def art(
         both = zip(pictures, (given, first), strict=True)
         overs = [own for over, figure in both for own in motifs.read_overs((over,), figure)]
     if settings.world or settings.metamorphosis:
-        from orbiflow.tiles import worlds
-
         made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs, begin=first)
         content = worlds.world_file(made, settings.file_format, cancel=cancel)
     else:
@@ -269,12 +237,15 @@ def solid(
         settings = settings.replace(format="3mf")  # with a second colour
     settings = settings.for_file(out)
 
+    from orbiflow.tiles import worlds
     from orbiflow.tiles.make import sheet_names
     from orbiflow.tiles.solids import make_solid, solid_files
 
     pictures = picture, second_picture
     name = f"{{}}-{settings.kind}.{settings.format}"
-    best = _best_there(settings.order, 1) if settings.kind in BALLS else None
+    best = None
+    if settings.kind in BALLS:
+        best = partial(worlds.best_in_world, orders=settings.order, sign=1)
     given, out = _taken(result, tile, out, name, *pictures, best=best)
     own = {"picture": picture, "second_picture": second_picture}
     made = make_solid(given, settings, **own, force=force)

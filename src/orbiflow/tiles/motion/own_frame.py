@@ -93,8 +93,7 @@ class OwnFrame:
         parts: list[Array] = []
         for k in range(len(corners)):
             edge = self.edge(k)
-            steps = np.linalg.norm(np.diff(edge, axis=0), axis=1)
-            share = np.concatenate([[0], np.cumsum(steps)[:-1]]) / steps.sum()
+            share = _along(edge)[:-1]
             start, end = corners[k], corners[(k + 1) % len(corners)]
             parts.append(start + share[:, None] * (end - start))
         turn, stretch = polar(self.linear)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import complex_points, resampled, signed_area
 from orbiflow.tiles.likeness import Measures, Rating, kept_of
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.worlds.curved import disc_of, facing, undone
-from orbiflow.tiles.worlds.unfolding import Unfolding, unfolded, usual_orders
+from orbiflow.tiles.worlds.curved import disc_of, facing
+from orbiflow.tiles.worlds.unfolding import Unfolding, distortion, unfolded, usual_orders
 
 POINTS = 240  # of a silhouette's outline
 BETTER = 0.5  # marks, of 10, that an image has beyond its tile's in the plane at most
@@ -39,7 +39,11 @@ class Seen:
 
     def mark(self, found: Unfolding) -> float:
         """Return the mark of the image, in the stereographic picture about its middle."""
-        return self._mark(disc_of(found.vectors(self._bent) @ _to_middle(found).T))
+        vectors = found.vectors(self._bent)
+        if found.sign > 0:
+            return self._mark(disc_of(vectors @ facing(found.middle).T))
+        z, middle = disc_of(vectors), complex(disc_of(found.middle))
+        return self._mark((z - middle) / (1 - np.conj(middle) * z))
 
     def _mark(self, outline: Complex) -> float:
         return kept_of(self._measures, outline, 0.0).mark
@@ -48,18 +52,6 @@ class Seen:
 def flip_of(tile: EscherTile) -> Array:
     """Return what makes a tile's coordinates (..., 2) those of a world, whose y points upwards."""
     return np.array([1.0, -1.0 if tile.y_down else 1.0])
-
-
-def _to_middle(found: Unfolding) -> Array:
-    """Return the motion (3, 3) that takes the tile's middle to (0, 0, 1)."""
-    if found.sign > 0:
-        return facing(found.middle)
-    x, y, t = found.middle
-    far = np.hypot(x, y)
-    turn = np.eye(3)
-    turn[:2, :2] = np.array([[x, -y], [y, x]]) / far if far > 0 else np.eye(2)
-    boost = np.array([[t, 0.0, far], [0.0, 1.0, 0.0], [far, 0.0, t]])
-    return undone(turn @ boost, -1)
 
 
 def in_world(
@@ -72,14 +64,19 @@ def in_world(
     Raises:
         OrbiflowError: As `unfolded` and `usual_orders`.
     """
-    tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
-    orders = orders or usual_orders(tiling.group, sign)
     if tile.parts or tile.bending is None:
-        return unfolded(tiling, orders, sign), ()
+        return _unfolded(tile, orders, sign, distortion), ()
     seen = Seen(tile)
-    found = unfolded(tiling, orders, sign, lambda own: -seen.mark(own))
+    found = _unfolded(tile, orders, sign, lambda own: -seen.mark(own))
     here, there = (Rating.of_mark(mark) for mark in (seen.plane, seen.mark(found)))
     return found, (f"likeness {there} there, {here} in the plane",)
+
+
+def _unfolded(
+    tile: EscherTile, orders: Sequence[int] | None, sign: int, cost: Callable[[Unfolding], float]
+) -> Unfolding:
+    tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
+    return unfolded(tiling, orders or usual_orders(tiling.group, sign), sign, cost)
 
 
 def best_in_world(
@@ -94,10 +91,8 @@ def best_in_world(
         seen = Seen(tile)
         if seen.plane + BETTER < highest:
             break
-        tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
         try:
-            own = orders or usual_orders(tiling.group, sign)
-            found = unfolded(tiling, own, sign, lambda one, seen=seen: -seen.mark(one))
+            found = _unfolded(tile, orders, sign, lambda own, seen=seen: -seen.mark(own))
         except OrbiflowError:  # it stays in the plane
             continue
         if (mark := seen.mark(found)) > highest:

@@ -189,10 +189,8 @@ def _kept_form(matrices: Complex) -> tuple[Complex, int]:
     if sizes[-1] > WIDEST * sizes[0]:
         raise OrbiflowError("the turns about the centres keep no form; this is a bug")
     form = np.einsum("k,kij->ij", rows[-1], basis)
-    if (
-        form[0, 0].real < 0
-    ):  # at the middle, a point of the world, the first solution is 1, the second 0
-        form = -form
+    # at the middle, a point of the world, the first solution is 1 and the second 0
+    form = form if form[0, 0].real > 0 else -form
     sizes, axes = np.linalg.eigh(form)  # the greater value last
     return np.sqrt(np.abs(sizes))[:, None] * np.conj(axes.T), 1 if sizes[0] > 0 else -1
 

@@ -43,10 +43,8 @@ USUAL: dict[tuple[str, int], tuple[int, ...]] = {
     ("p1", -1): (2,),
     ("pg", -1): (2,),
 }
-"""The orders of the sphere, 1, and of the disc, -1, that bend the tiles of a group least."""
-
-COUNTS = {"p3": 3, "p4": 3, "p6": 3, "p2": 4, "pgg": 2, "p1": 1, "pg": 1}
-"""How many orders each group's tiles take: its kinds of centres, or one of a vertex."""
+"""The orders of the sphere, 1, and of the disc, -1, that bend the tiles of a group least: one for each
+of its kinds of centres, or one for a point of the edge."""
 
 SPACING = 0.04  # of triangles inside, in sizes of the tile
 FINEST = 0.002  # where centres are near to each other
@@ -134,7 +132,7 @@ class Unfolding:
     def words(self) -> str:
         """How many copies meet where."""
         pattern, orders = self.development.potential.pattern, self.development.orders
-        if COUNTS[self.tiling.group.name] == 1:
+        if len(USUAL[self.tiling.group.name, -1]) == 1:
             return (
                 f"at one point of a tile's edge meet {orders[0] // 2} times as many as in the plane"
             )
@@ -214,7 +212,7 @@ class Unfolding:
     @property
     def generators(self) -> tuple[Array, tuple[int, ...]] | None:
         """Rotations (k, 3, 3) with the product 1, and their orders, if they generate the group."""
-        if self.tiling.group.name in ("p1", "pg", "pgg"):
+        if len(USUAL[self.tiling.group.name, -1]) < len(self.development.orders):
             return None
         return self.development.rotations, self.development.orders
 
@@ -264,7 +262,7 @@ def _check_group(group: CrystallographicGroup, sign: int) -> None:
     if (group.name, -1) not in USUAL:
         raise OrbiflowError(
             f"tiles of {group.name or 'this group'} stay in the plane, or go around a spiral: other "
-            f"worlds take tiles of the groups {', '.join(COUNTS)}"
+            f"worlds take tiles of the groups {', '.join(name for name, own in USUAL if own < 0)}"
         )
     if sign > 0 and (group.name, 1) not in USUAL:
         raise OrbiflowError(
@@ -290,7 +288,7 @@ def unfolded(
     """
     group, ring = tiling.group.primitive(), ring_of(tiling)
     _check_group(group, sign)
-    count = COUNTS[group.name]
+    count = len(USUAL[group.name, -1])
     if len(orders) != count:
         raise OrbiflowError(
             f"tiles of {group.name} take {count} order{'s' * (count > 1)}, such as "
@@ -299,21 +297,21 @@ def unfolded(
     _check_inside(tiling, ring)
     if count == 1:
         lattice, points = cone_points(tiling, ring)
-        every = [(Pattern.about(lattice, point), (2 * orders[0], 2, 2, 2)) for point in points]
+        every = [(Pattern.about(lattice, point), [(2 * orders[0], 2, 2, 2)]) for point in points]
     else:
         pattern, chosen = Pattern.near(group, tiling.center), sorted(set(permutations(orders)))
-        every = [(pattern, tuple(own[k] for k in pattern.kinds)) for own in chosen]
-    found = 0 if min(orders) < 2 else curvature(every[0][1])
+        every = [(pattern, [tuple(own[k] for k in pattern.kinds) for own in chosen])]
+    found = 0 if min(orders) < 2 else curvature(every[0][1][0])
     if not found or sign not in (0, found):
         where = {0: "a sphere or a disc", 1: "the sphere", -1: "the hyperbolic plane"}[sign]
         raise OrbiflowError(
             f"the orders {', '.join(map(str, orders))} are not of {where}: the sphere has 2,3,3, "
             "2,3,4, 2,3,5 and 2,2,n, the hyperbolic plane larger ones, such as 3,3,4 or 2,3,7"
         )
-    meshes = {id(own): TileMesh.of(tiling, ring, own) for own, _ in every}
-    worlds = (
-        Unfolding(tiling, Development.of(own, chosen), meshes[id(own)]) for own, chosen in every
-    )
+    worlds = list[Unfolding]()
+    for pattern, assignments in every:
+        tile = TileMesh.of(tiling, ring, pattern)
+        worlds += [Unfolding(tiling, Development.of(pattern, own), tile) for own in assignments]
     return min(worlds, key=lambda own: round(cost(own), 9))
 
 
