@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import ArtSettings, art
 from orbiflow.tiles.result_file import read_result, read_tiles
 from orbiflow.tiles.worlds import Unfolding, best_in_world, in_world, unfolded
@@ -64,3 +65,9 @@ def test_nothing_else_of_a_run_goes_to_a_sphere(run: Path) -> None:
     tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
     least = unfolded(tiling, (2, 3, 5), 1)
     assert Seen(tile).mark(least) <= Seen(tile).mark(in_world(tile, (2, 3, 5), 1)[0]) + 1e-9
+
+
+def test_orders_that_no_tile_takes_are_refused_for_what_they_are(run: Path, tmp_path: Path) -> None:
+    with pytest.raises(OrbiflowError, match="4, 4, 2 are not of the hyperbolic plane"):
+        art(run, tmp_path / "a.svg", ArtSettings(world="disc", order=(4, 4, 2)))
+    assert best_in_world([read_result(run, "IH4")], (4, 4, 2), -1) is None

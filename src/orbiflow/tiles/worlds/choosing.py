@@ -12,7 +12,13 @@ from orbiflow.tiles.geometry import complex_points, resampled, signed_area
 from orbiflow.tiles.likeness import Measures, Rating, kept_of
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.worlds.curved import disc_of, facing
-from orbiflow.tiles.worlds.unfolding import Unfolding, distortion, unfolded, usual_orders
+from orbiflow.tiles.worlds.unfolding import (
+    Unfolding,
+    distortion,
+    order_count,
+    unfolded,
+    usual_orders,
+)
 
 POINTS = 240  # of a silhouette's outline
 BETTER = 0.5  # marks, of 10, that an image has beyond its tile's in the plane at most
@@ -82,9 +88,12 @@ def _unfolded(
 def best_in_world(
     tiles: Iterable[EscherTile], orders: Sequence[int] | None, sign: int
 ) -> EscherTile | None:
-    """Return the tile, of some with the best in the plane first, whose image looks best; None if none
-    goes there."""
-    best, highest = None, -np.inf
+    """Return the tile, of some with the best in the plane first, whose image looks best.
+
+    If none goes there, the first that takes so many orders is returned, so that what is wrong with them
+    is told of it; else None.
+    """
+    best, highest, spare = None, -np.inf, None
     for tile in tiles:
         if tile.parts or tile.bending is None:
             continue
@@ -94,7 +103,9 @@ def best_in_world(
         try:
             found = _unfolded(tile, orders, sign, lambda own, seen=seen: -seen.mark(own))
         except OrbiflowError:  # it stays in the plane
+            if spare is None and orders and order_count(tile.tiling.group) == len(orders):
+                spare = tile
             continue
         if (mark := seen.mark(found)) > highest:
             best, highest = tile, mark
-    return best
+    return best or spare

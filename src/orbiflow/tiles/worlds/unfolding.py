@@ -132,7 +132,7 @@ class Unfolding:
     def words(self) -> str:
         """How many copies meet where."""
         pattern, orders = self.development.potential.pattern, self.development.orders
-        if len(USUAL[self.tiling.group.name, -1]) == 1:
+        if order_count(self.tiling.group) == 1:
             return (
                 f"at one point of a tile's edge meet {orders[0] // 2} times as many as in the plane"
             )
@@ -212,7 +212,7 @@ class Unfolding:
     @property
     def generators(self) -> tuple[Array, tuple[int, ...]] | None:
         """Rotations (k, 3, 3) with the product 1, and their orders, if they generate the group."""
-        if len(USUAL[self.tiling.group.name, -1]) < len(self.development.orders):
+        if order_count(self.tiling.group) < len(self.development.orders):
             return None
         return self.development.rotations, self.development.orders
 
@@ -258,8 +258,13 @@ def usual_orders(group: CrystallographicGroup, sign: int) -> tuple[int, ...]:
     return USUAL[group.name, sign]
 
 
+def order_count(group: CrystallographicGroup) -> int:
+    """Return how many orders a group's tiles take, 0 for a group that stays in the plane."""
+    return len(USUAL.get((group.name, -1), ()))
+
+
 def _check_group(group: CrystallographicGroup, sign: int) -> None:
-    if (group.name, -1) not in USUAL:
+    if not order_count(group):
         raise OrbiflowError(
             f"tiles of {group.name or 'this group'} stay in the plane, or go around a spiral: other "
             f"worlds take tiles of the groups {', '.join(name for name, own in USUAL if own < 0)}"
@@ -288,7 +293,7 @@ def unfolded(
     """
     group, ring = tiling.group.primitive(), ring_of(tiling)
     _check_group(group, sign)
-    count = len(USUAL[group.name, -1])
+    count = order_count(group)
     if len(orders) != count:
         raise OrbiflowError(
             f"tiles of {group.name} take {count} order{'s' * (count > 1)}, such as "
