@@ -291,7 +291,7 @@ def _on_page(ends: Sequence[Changing], settings: ArtSettings, scale: float) -> M
             )
         )
     rings = made[0].moved(np.arange(len(motions)))[:, : made[0].vertices]
-    seen = (rings.max(axis=1) > 0).all(axis=1) & (rings.min(axis=1) < page.size).all(axis=1)
+    seen = made[0].view.meets(rings)
     near = [replace(own, motions=motions[seen], colours=own.colours[seen]) for own in made]
     return near[0] if len(near) == 1 else replace(near[0], before=near[1])
 

@@ -45,8 +45,7 @@ def spiral(
         return np.column_stack([points @ flip, np.ones(len(points))])
 
     rings = [vectors(own.polygon) for own in given.prototiles]
-    seen = view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings)))
-    near = (seen.max(axis=1) > 0).all(axis=1) & (seen.min(axis=1) < view.size).all(axis=1)
+    near = view.meets(view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings))))
     motions = motions[near]
     numbers = _around(motions, rings, period, size)
     if settings.colour == "one":
@@ -80,8 +79,7 @@ def cylinder(
     steps = np.array([period.real, period.imag]) * np.array([[-1.0], [0.0], [1.0]])
     motions = np.concatenate([motions_of(once[:, :2, :2], once[:, :2, 2] + step) for step in steps])
     view = View("cylinder", settings.page, np.eye(3), period)
-    seen = view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings)))
-    near = (seen.max(axis=1) > 0).all(axis=1) & (seen.min(axis=1) < view.size).all(axis=1)
+    near = view.meets(view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings))))
     colours = np.tile(numbers, 3)[near] * (settings.colour != "one")
     said = f"the left and the right edge meet, {arms[0]},{arms[1]} lattice vectors around"
     return World(given, vectors, motions[near], colours, view), [said]

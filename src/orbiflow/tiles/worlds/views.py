@@ -56,6 +56,11 @@ class View:
         z, scale = self._plane(moved)
         return self.middle + scale * np.stack([z.real, -z.imag], axis=-1)
 
+    def meets(self, places: Array) -> Any:
+        """Return which shapes (M,), of places (M, N, 2), come onto the page, by their boxes."""
+        low, high = places.min(axis=1), places.max(axis=1)
+        return (high > 0).all(axis=1) & (low < self.size).all(axis=1)
+
     def _plane(self, moved: Array) -> tuple[Any, float]:
         """Return complex numbers about the page's middle, and the mm of their unit."""
         if self.model == "spiral":

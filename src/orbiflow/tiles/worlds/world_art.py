@@ -193,9 +193,8 @@ def world_of(
         if sign > 0:
             return np.ones(len(motions), dtype=bool)
         places = view.places(np.einsum("mij,nj->mni", motions, ring))
-        low, high = places.min(axis=1), places.max(axis=1)
-        inside = (high > 0).all(axis=1) & (low < view.size).all(axis=1)
-        return inside & ((high - low).max(axis=1) > LEAST_COPY) & np.isfinite(high).all(axis=1)
+        large = np.ptp(places, axis=1).max(axis=1) > LEAST_COPY
+        return view.meets(places) & large & np.isfinite(places.max(axis=1)).all(axis=1)
 
     motions = copies(found, shown, MOST_COPIES)
     numbers, _ = colours(found, motions)
