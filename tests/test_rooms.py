@@ -30,6 +30,7 @@ TILES += [
 TILES += ["run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
+    "data_space",
     "estimator",
     "categories",
     "comparing",

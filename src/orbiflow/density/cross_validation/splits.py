@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,12 +17,11 @@ from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density import comparing, operations
 from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
-from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_rows, uniform_logs
-from orbiflow.density.spaces import MixedTorus, Space, space_for
-from orbiflow.density.tables import TableRows, angle_unit, linear_among, read_rows, read_table
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.density.spaces import Space
+from orbiflow.density.tables import TableRows, read_rows, read_table
+from orbiflow.errors import DataWarning, InputFileError, OrbiflowError
 from orbiflow.runtime import Note, Sink, one_blas_thread
 
 MOST_BYTES = 256 * 2**20
@@ -38,7 +38,7 @@ class CvRows(TableRows):
 
     together: NDArray[Any] | None
     space: Space
-    unit: Unit
+    unit: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,21 +104,17 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
         space=where.space,
         width=where.width,
         group=group,
-        linear=where.linear,
+        beside=where.beside,
     )
     if rows.weights is not None:
         weighed(torch.zeros(len(rows.weights), 1), rows.weights)  # refuses what is no weight
         rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
-    unit = angle_unit(asked.where, table, tell)
-    names = linear_among(table.columns, where.linear)
-    real = [table.columns.index(name) for name in names]
-    if real:
-        space: Space = MixedTorus.for_columns(table.values, real, table.columns, unit=unit)
-    else:
-        own = operations.space_of(where, table.columns, unit)
-        seed = asked.density.seed
-        space = space_for(own, table.values, unit=unit, seed=seed) if isinstance(own, str) else own
+    columns = operations.columns_asked(where, rows, tell)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # notes say the same, with names of columns
+        seeded = replace(columns, seed=asked.density.seed)
+        space = seeded.of(table.values, None).space
     may_lack = asked.rows.missing == "marginalise"
     counts, place = places(chart_of_rows(space, table.values, may_lack=may_lack))
     if len(counts) <= LEAST_PLACES:
@@ -132,7 +128,7 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     elif asked.density.repeats == "rounding":
         tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
     read = (rows.path, table, rows.weights, rows.group, rows.header)
-    return CvRows(*read, together, space, unit)
+    return CvRows(*read, together, space, columns.unit)
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:

@@ -22,7 +22,7 @@ from orbiflow.density.models import (
     AdaptiveKernels,
     kernel_rows,
 )
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import Space, by_sphere
 from orbiflow.typed_torch import linalg, special
 
 NEIGHBOURS = (2, 4, 8, 16)
@@ -71,7 +71,7 @@ def _near_concentrations(
 ) -> Iterator[tuple[str, Tensor]]:
     """Yield concentrations as wide as shares of the distances to neighbours, by name, of all shapes."""
     neighbours = [m for m in NEIGHBOURS if m < len(centers)]
-    shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
+    shrinkage = (1.0,) if len(space.spheres) == 1 else ISOTROPY
     for number, spread in zip(neighbours, spreads(space, centers, neighbours), strict=True):
         mean = spread.mean(dim=1, keepdim=True)
         for scale, share in itertools.product(SCALES, shrinkage):
@@ -93,7 +93,7 @@ def limit_notes(space: Space, crowded: bool) -> list[str]:
 def spreads(
     space: Space, centers: Tensor, neighbours: list[int], most: int | None = None
 ) -> list[Tensor]:
-    """Return mean square distances to the nearest neighbours, per axis: (N, 1) or (N, d) each.
+    """Return mean square distances to the nearest neighbours, per axis of each sphere: (N, F) each.
 
     They are of all centers, or of the first `most`.
     """
@@ -102,11 +102,9 @@ def spreads(
     tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
     _, nearest = tree.query(own.numpy(), k=neighbours[-1] + 1)
     near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
-    square = (near - own[:, None]) ** 2
-    if space.is_round:
-        square = square.sum(dim=-1, keepdim=True) / space.dim
-    else:  # a chord's square is nearly the angle's
-        square = square[..., : space.dim] + square[..., space.dim :]
+    # a chord's square is nearly the angle's
+    square = by_sphere((near - own[:, None]) ** 2, len(space.spheres)).sum(dim=-2)
+    square /= square.new_tensor(space.spheres)
     return [square[:, :m].mean(dim=1) + 1 / MAX_CONCENTRATION for m in neighbours]
 
 
@@ -171,8 +169,8 @@ def kernel_estimates(
 
 def even_kernels(space: Space, centers: Tensor, kappa: float, weights: Tensor) -> AdaptiveKernels:
     """Return kernels of one concentration about centers (N, d)."""
-    width = 1 if space.is_round else space.dim
-    return AdaptiveKernels(space, centers, centers.new_full((len(centers), width), kappa), weights)
+    wide = centers.new_full((len(centers), len(space.spheres)), kappa)
+    return AdaptiveKernels(space, centers, wide, weights)
 
 
 MAX_ITERATIONS, MIN_GAIN_NATS = 60, 1e-4
@@ -223,17 +221,15 @@ def fit_mixture(
 
     chosen = far_apart(away, seen.shape[1], components, generator, train[whole].weights)
     mean = seen[0, chosen].clone()
-    width = 1 if space.is_round else space.dim
-    kappa = mean.new_full((components, width), 10.0)
+    kappa = mean.new_full((components, len(space.spheres)), 10.0)
     weights = mean.new_full((components,), 1 / components)
-    sphere = space.dim if space.is_round else 1
     last = -math.inf
     for _ in range(iterations):
         count, known, total, score = _expectation(space, every, mean, kappa, weights)
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
         resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (known + PRIOR_POINTS)
-        kappa = concentration(resultant, sphere).clamp(WIDEST / 100, narrowest)
+        kappa = _concentrations(resultant, space.spheres).clamp(WIDEST / 100, narrowest)
         if score - last < MIN_GAIN_NATS * len(train):
             break
         last = score
@@ -278,8 +274,16 @@ def _expectation(
 
 
 def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
-    """Return unit vectors of sums (K, m), and their lengths: of the whole, or of each angle."""
-    parts = total[:, None] if space.is_round else torch.stack(total.chunk(2, dim=1), dim=-1)
-    length = linalg.vector_norm(parts, dim=-1)
-    unit = parts / length.clamp_min(1e-300)[..., None]
-    return (unit[:, 0] if space.is_round else torch.cat(unit.unbind(dim=-1), dim=1)), length
+    """Return unit vectors (K, m) of sums on each sphere, and their lengths (K, F)."""
+    parts = by_sphere(total, len(space.spheres))
+    length = linalg.vector_norm(parts, dim=1)
+    return (parts / length.clamp_min(1e-300)[:, None]).flatten(1), length
+
+
+def _concentrations(resultant: Tensor, spheres: Sequence[int]) -> Tensor:
+    """Return the concentrations (K, F) of mean cosines on spheres of these dimensions."""
+    found = torch.empty_like(resultant)
+    for dim in set(spheres):
+        own = [k for k, sphere in enumerate(spheres) if sphere == dim]
+        found[:, own] = concentration(resultant[:, own], dim)
+    return found

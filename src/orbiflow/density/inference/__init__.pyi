@@ -2,6 +2,7 @@ from .angles import at_observed as at_observed
 from .angles import axes_named as axes_named
 from .angles import chart_of_rows as chart_of_rows
 from .angles import check_torus as check_torus
+from .angles import chosen_columns as chosen_columns
 from .angles import given_named as given_named
 from .angles import log_prob_observed as log_prob_observed
 from .angles import observed_rows as observed_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -18,6 +18,30 @@ from orbiflow.density.spaces import CHART, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed, unique
+
+
+class Chosen(NamedTuple):
+    """Some of a density's columns, by their numbers from 0, and their coordinates in the chart.
+
+    Of a space beside other columns they are all of its own, first, or none.
+    """
+
+    columns: list[int]
+    axes: list[int]
+
+
+def chosen_columns(space: Space, columns: Sequence[int], width: int) -> Chosen:
+    """Return some of so many columns with their coordinates.
+
+    Raises `OrbiflowError` if these have no meaning without the others.
+    """
+    first = space.together and width - space.chart_dim + space.together
+    own = sorted(column for column in columns if column < first)
+    rest = [column for column in columns if column >= first]
+    if own and (own != list(range(first)) or first == width):
+        space.of_axes([0])  # which says why not
+    every = range(space.together) if own else ()
+    return Chosen([*own, *rest], [*every, *(c - first + space.together for c in rest)])
 
 
 def check_torus(space: Space, what: str) -> Torus:
@@ -86,35 +110,46 @@ def _named_axis(wanted: Any, names: Sequence[str]) -> int:
 def given_named(
     space: Space, given: Iterable[tuple[str | int, float]], names: Sequence[str]
 ) -> dict[int, float]:
-    """Return values in turns by numbers of angles, from values in the space's unit by columns."""
-    torus = check_torus(space, "conditional densities")
-    found: dict[int, float] = {}
+    """Return chart coordinates by their numbers, from values in the data's units by columns."""
+    known: dict[int, float] = {}
     for key, value in given:
-        axis = _named_axis(key, names)
-        if axis in found:
-            raise OrbiflowError(f"{names[axis]!r} is given twice")
-        number = torch.tensor(as_number(value, repr(names[axis])), dtype=torch.float64)
-        found[axis] = float(torus.turns(axis, number))
+        column = _named_axis(key, names)
+        if column in known:
+            raise OrbiflowError(f"{names[column]!r} is given twice")
+        known[column] = as_number(value, repr(names[column]))
+    columns, axes = chosen_columns(space, list(known), len(names))
+    values = [known[column] for column in columns]
+    found: dict[int, float] = {}
+    if axes[0] < space.together:
+        whole = values[: len(values) - len(axes) + space.together]
+        found |= enumerate(listed(space.parts[0].cover([whole])[0]))
+    for axis, value in zip(axes[::-1], values[::-1], strict=False):
+        if axis >= space.together:
+            number = torch.tensor(value, dtype=torch.float64)
+            found[axis] = float(lines_of(space).turns(axis - space.together, number))
     return found
 
 
-def log_prob_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Tensor:
-    """Return log densities (N,) at points (N, d) of a torus some of whose angles are missing (NaN).
+def lines_of(space: Space) -> Torus:
+    """Return the torus of the columns that have a meaning alone."""
+    return check_torus(space.parts[-1] if space.parts else space, "marginal densities")
 
-    The density of a row is that of the angles that it has, integrated over the others, with respect to
-    `measure` of those. Of a row that has none its logarithm is 0.
+
+def log_prob_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Tensor:
+    """Return log densities (N,) at chart points (N, d) some of whose coordinates are missing (NaN).
+
+    The density of a row is that of the coordinates that it has, such as angles of a torus, integrated
+    over the others, with respect to `measure` of those. Of a row that has none its logarithm is 0.
     """
-    space = check_torus(
-        as_instance(density, Density, "density").space, "densities at missing angles"
-    )
+    space = as_instance(density, Density, "density").space
     return at_observed(density, observed_rows(points, "points", space), measure=measure)
 
 
 def observed_rows(values: Any, name: str, space: Space) -> Tensor:
-    """Return a float64 table of angles (N, d), some of which may be missing."""
+    """Return a float64 table of coordinates (N, d), some of which may be missing."""
     rows = as_tensor(values, name).double()
-    if rows.dim() != 2 or rows.shape[1] != space.dim:
-        raise OrbiflowError(f"expected {name} (N, {space.dim}), got {tuple(rows.shape)}")
+    if rows.dim() != 2 or rows.shape[1] != space.chart_dim:
+        raise OrbiflowError(f"expected {name} (N, {space.chart_dim}), got {tuple(rows.shape)}")
     if bool(rows.isinf().any()):
         raise OrbiflowError("angles may be missing (NaN), but not infinite")
     return rows
@@ -134,8 +169,8 @@ def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Te
         if not observed:
             continue
         some = points[rows][:, observed]
-        own = check_torus(density.space, "densities at missing angles").of_axes(observed)
-        whole = len(observed) == density.space.dim
+        own = density.space.of_axes(observed)
+        whole = len(observed) == density.space.chart_dim
         value = density.log_prob(some) if whole else density.log_marginal(some, observed)
         found[rows] = value + own.log_density_factor(some, measure)
     return found
@@ -159,5 +194,5 @@ def uniform_logs(space: Space, data: ArrayLike) -> Tensor:
     table = np.asarray(data, dtype=np.float64)
     if math.isfinite(space.volume):
         return torch.full((len(table),), -math.log(space.volume), dtype=torch.float64)
-    points = chart_of_rows(space, table, may_lack=True)
+    points = chart_of_rows(space, table, may_lack=isinstance(space, Torus))
     return at_observed(UniformDensity(space), points, measure="natural")

@@ -20,7 +20,7 @@ from orbiflow.density.data import (
 )
 from orbiflow.density.inference.angles import at_observed
 from orbiflow.density.models import Density
-from orbiflow.density.spaces import MixedTorus, Space
+from orbiflow.density.spaces import MixedTorus, ProductSpace, Space, Torus
 from orbiflow.errors import OrbiflowError, SettingError, literal
 
 FEW_ROWS = 10
@@ -46,8 +46,11 @@ def data_doubts(
     """
     space, width = density.space, values.shape[1] if values.ndim == 2 else 0
     called = [f"column{k}" for k in range(1, width + 1)] if names is None else list(names)
-    if isinstance(space, MixedTorus) and width == len(space.lines):
+    if isinstance(space, MixedTorus) and width == space.dim:
         return _mixed_doubts(density, space, values, called, cure)
+    if isinstance(space, ProductSpace):
+        is_place = space.base.name in DIRECTIONS and width - space.beside.dim == 2
+        return _places(space.base, values[:, :2], called[:2], cure) if is_place else []
     unit = data_unit(space, width)
     if unit is None or not values.size:
         return []
@@ -71,18 +74,24 @@ def data_doubts(
     return [_beyond(called[int(most.argmax())], float(most.max()), unit, other)]
 
 
+def _places(base: Space, values: Array, names: Sequence[str], cure: str) -> list[str]:
+    """Return doubts about latitudes and longitudes (N, 2) beside other columns."""
+    refuse_codes(base.name, values, names, "degrees", cure)
+    return [doubt.text for doubt in place_doubts(base.name, values, names, "degrees")]
+
+
 def _mixed_doubts(
     density: Density, space: MixedTorus, values: Array, names: Sequence[str], cure: str
 ) -> list[str]:
     """Return doubts about the angles among columns of which some are real."""
-    angles: list[int] = np.flatnonzero(~space.is_real).tolist()
+    angles: list[int] = np.flatnonzero(space.is_angle).tolist()
     own, unit = values[:, angles], str(space.unit)
     called = [names[k] for k in angles]
     refuse_codes("torus", own, called, unit if len(own) >= FEW_ROWS else "degrees", cure)
     other = seeming_unit(own, unit) if own.size else None
     if other is None or len(values) < FEW_ROWS:
         return []
-    factors = np.where(space.is_real, 1.0, TURNS[unit] / TURNS[other])
+    factors = np.where(space.is_angle, TURNS[unit] / TURNS[other], 1.0)
     if not _is_likelier(density, values, factors):
         return []
     return [
@@ -96,10 +105,12 @@ def given_doubts(space: Space, given: Mapping[str, float], names: Sequence[str])
     Raises:
         SettingError: For a code for missing values.
     """
-    unit, real = str(space.unit), set[str]()
-    if isinstance(space, MixedTorus):
-        real = {name for name, own in zip(names, space.is_real, strict=True) if own}
-    given = {name: value for name, value in given.items() if name not in real}
+    if not isinstance(space, Torus):
+        return []
+    unit = str(space.unit)
+    angles = space.is_angle if isinstance(space, MixedTorus) else [True] * space.dim
+    called = {name for name, own in zip(names, angles, strict=True) if own}
+    given = {name: value for name, value in given.items() if name in called}
     for name, value in given.items():
         if codes_among(np.array([value]), TURNS["degrees"]):
             text = f"{name!r} is {value:g}, which seems to stand for a missing value: leave it out"

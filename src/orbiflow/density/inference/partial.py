@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_number
-from orbiflow.density.inference.angles import check_torus, given_axes, kept_axes
+from orbiflow.density.inference.angles import given_axes, kept_axes
 from orbiflow.density.models import (
     LEVELS,
     Density,
@@ -23,7 +23,7 @@ from orbiflow.density.models import (
     kernels_for,
     mixture_of,
 )
-from orbiflow.density.spaces import Torus
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed
@@ -85,8 +85,8 @@ def marginal(
     >>> marginal(fit.density_, [0]).space
     Torus(dim=1, unit='radians')
     """
-    space = check_torus(as_instance(density, Density, "density").space, "marginal densities")
-    split = Split(space.dim, kept_axes(axes, space.dim))
+    space = as_instance(density, Density, "density").space
+    split = Split(space.chart_dim, kept_axes(axes, space.chart_dim))
     return _restricted(density, split, space, accuracy, progress)
 
 
@@ -114,21 +114,23 @@ def conditional(
         OrbiflowError: for other spaces, no such angles, all angles, or an error of more than half a
             nat.
     """
-    space = check_torus(as_instance(density, Density, "density").space, "conditional densities")
-    known, values = given_axes(given, space.dim)
-    left = [axis for axis in range(space.dim) if axis not in known]
-    kept = kept_axes(left if axes is None else axes, space.dim)
+    space = as_instance(density, Density, "density").space
+    known, values = given_axes(given, space.chart_dim)
+    space.of_axes(known)
+    left = [axis for axis in range(space.chart_dim) if axis not in known]
+    kept = kept_axes(left if axes is None else axes, space.chart_dim)
     if set(kept) & set(known):
         raise OrbiflowError(f"axes {sorted(set(kept) & set(known))} are given and cannot be kept")
-    return _restricted(density, Split(space.dim, kept, known, values), space, accuracy, progress)
+    split = Split(space.chart_dim, kept, known, values)
+    return _restricted(density, split, space, accuracy, progress)
 
 
 @one_thread()
 @torch.no_grad()
 def _restricted(
-    density: Density, split: Split, torus: Torus, accuracy: float, progress: Progress | None
+    density: Density, split: Split, everywhere: Space, accuracy: float, progress: Progress | None
 ) -> Mixture:
-    space = torus.of_axes(split.kept)
+    space = everywhere.of_axes(split.kept)
     accuracy = as_number(accuracy, "accuracy")
     if not 0 < accuracy <= MOST_OFF:
         raise OrbiflowError(f"accuracy must be above 0 and at most {MOST_OFF}, got {accuracy}")
@@ -212,7 +214,7 @@ class _Left:
         whole = torch.cat([points, given], dim=1)
         return self.log + self.density.log_marginal(whole, list(self.split.observed))
 
-    def refine(self, space: Torus, tick: Callable[[], None]) -> list[tuple[float, Density]]:
+    def refine(self, space: Space, tick: Callable[[], None]) -> list[tuple[float, Density]]:
         """Find kernels of the next level, and return those of the level before."""
         before = self.found
         more = kernels_for(self.density, self.split, space, self.levels, tick)
@@ -230,7 +232,7 @@ class _Left:
 def _refined(
     closed: list[tuple[float, Density]],
     left: list[_Left],
-    space: Torus,
+    space: Space,
     accuracy: float,
     say: Progress,
 ) -> tuple[Mixture, Error]:

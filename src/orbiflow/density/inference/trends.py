@@ -108,6 +108,7 @@ def _about_mean(space: Torus, weights: Tensor, masses: Sequence[float]) -> tuple
         return float(weights.numpy() @ values), np.interp(tails, below, values)
     angle = 2 * np.pi * turns
     mean = float(torch.atan2(weights @ angle.sin(), weights @ angle.cos())) / (2 * np.pi)
+    mean += mean < space.first_turn(0)
     away = ((turns - mean + 0.5) % 1 - 0.5).numpy()
     order = np.argsort(away)
     mass = weights.numpy()[order]

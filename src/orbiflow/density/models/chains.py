@@ -26,7 +26,7 @@ from orbiflow.density.models.density import Density, Restriction, Split, Weighte
 from orbiflow.density.models.kernels import lattice_kernels
 from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.spaces import Space, Torus
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, special, unique
 
@@ -183,7 +183,7 @@ class VonMisesChains(Density, kind="chains"):
             count += int(sizes.sum())
         return count
 
-    def restricted(self, split: Split, space: Torus) -> Restriction:
+    def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep the chains in which all that is given comes first and all that is hidden last."""
         place = self.order.argsort(dim=1)
         kept, given = list(split.kept), list(split.given)
@@ -202,7 +202,7 @@ class VonMisesChains(Density, kind="chains"):
         return Restriction(parts, [(log, some, split) for log, some in self._some(~closed)])
 
     def approximated(
-        self, split: Split, space: Torus, level: int, tick: Callable[[], None]
+        self, split: Split, space: Space, level: int, tick: Callable[[], None]
     ) -> list[Weighted]:
         start = level * SHIFT_PER_LEVEL % 1
         log_scale, tables = chain_tables(self, split, level, start, tick)
@@ -218,7 +218,7 @@ class VonMisesChains(Density, kind="chains"):
         parts = (self.means[chosen], self.concentrations[chosen], self.order[chosen])
         return [(total, VonMisesChains(self.space, logs - total, *parts))]
 
-    def _closed(self, split: Split, space: Torus) -> tuple[float, VonMisesChains]:
+    def _closed(self, split: Split, space: Space) -> tuple[float, VonMisesChains]:
         """Return the log density of what is given, and chains of the angles kept.
 
         Their constants are moved and their weights changed by what is given.

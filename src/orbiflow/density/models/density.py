@@ -16,7 +16,7 @@ from torch.distributions import constraints
 from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.models.figures import WithFigures
 from orbiflow.density.models.tensors import destination, moved, shape_of, source_of
-from orbiflow.density.spaces import CHART, Space, Torus, check_measure
+from orbiflow.density.spaces import CHART, Space, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import SideBySide, Tell, one_thread
 
@@ -101,7 +101,7 @@ class Density(WithFigures):
         round: a subclass gives one of them.
         """
         values = self.log_density(points)
-        return values + self.space.log_area(points) if self.space.is_round else values
+        return values + self.space.log_kernel_factor(points, CHART)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         """Return `count` random canonical points (count, d), the same on every device."""
@@ -115,7 +115,7 @@ class Density(WithFigures):
         """
         del beside
         values = self.log_chart(points)
-        return values - self.space.log_area(points) if self.space.is_round else values
+        return values - self.space.log_kernel_factor(points, CHART)
 
     @property
     def log_floor(self) -> float:
@@ -179,13 +179,13 @@ class Density(WithFigures):
         del axes
         return None
 
-    def restricted(self, split: Split, space: Torus) -> Restriction:
+    def restricted(self, split: Split, space: Space) -> Restriction:
         """Return the density of the angles kept, given others, as far as there is a closed form."""
         del space
         return Restriction([], [(0.0, self, split)])
 
     def approximated(
-        self, split: Split, space: Torus, level: int, tick: Callable[[], None]
+        self, split: Split, space: Space, level: int, tick: Callable[[], None]
     ) -> list[Weighted] | None:
         """Return kernels that together stand for the density of the angles kept and those given.
 
@@ -307,10 +307,7 @@ class Density(WithFigures):
         check_measure(measure)
         if measure == CHART:
             return self.log_chart(points)
-        values = self.log_density(points)
-        if self.space.is_round:
-            return values + (math.log(self.space.volume) if measure == "uniform" else 0.0)
-        return values if measure == "uniform" else values - self.space.log_area(points)
+        return self.log_density(points) + self.space.log_kernel_factor(points, measure)
 
     def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, sample_shape: Any = (), generator: torch.Generator | None = None

@@ -110,7 +110,7 @@ class WithFigures(Distribution):
         values, slopes = self._slopes(at)
         for _ in range(STEPS):
             scale = linalg.vector_norm(slopes, dim=1, keepdim=True).clamp_min(1e-300)
-            tried = self._at_chart(at + step * slopes / scale)
+            tried = self.space.retracted(at + step * slopes / scale)
             new, tilts = self._slopes(tried)
             better = (new > values)[:, None]
             at = torch.where(better, tried, at)
@@ -121,18 +121,11 @@ class WithFigures(Distribution):
                 break
         return self.space.project(at[values.argmax()][None])[0]
 
-    def _at_chart(self, points: Tensor) -> Tensor:
-        if self.space.has_chart:
-            return points
-        return points / linalg.vector_norm(points, dim=1, keepdim=True)
-
     def _slopes(self, points: Tensor) -> tuple[Tensor, Tensor]:
         with torch.enable_grad():
             own = points.detach().clone().requires_grad_()
             values = self.log_prob(own, measure="natural")
             (slopes,) = torch.autograd.grad(values.sum(), own)
-        if not self.space.has_chart:  # along the sphere
-            slopes = slopes - (slopes * points).sum(dim=1, keepdim=True) * points
         return values.detach(), slopes.nan_to_num()
 
     @torch.no_grad()

@@ -15,7 +15,7 @@ from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.spaces import Space, Torus
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow, flow_from, flow_parts
 from orbiflow.runtime import one_thread
@@ -209,7 +209,8 @@ class UniformDensity(Density, kind="uniform"):
 
     @property
     def log_floor(self) -> float:
-        return -math.log(self.space.volume) if self.space.is_round else 0.0
+        round_parts = (own for own in self.space.parts or (self.space,) if own.is_round)
+        return -sum(math.log(own.volume) for own in round_parts)
 
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         del beside
@@ -219,8 +220,10 @@ class UniformDensity(Density, kind="uniform"):
         return self.space.uniform(count, generator)
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        del axes, seed
-        return torch.zeros(len(points), dtype=torch.float64)
+        del seed
+        if not self.space.parts:
+            return torch.zeros(len(points), dtype=torch.float64)
+        return UniformDensity(self.space.of_axes(axes)).log_chart(points.double())
 
     def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor:
         del crystal
@@ -230,6 +233,9 @@ class UniformDensity(Density, kind="uniform"):
         del other
         return 1.0
 
-    def restricted(self, split: Split, space: Torus) -> Restriction:
-        del split
-        return Restriction([(0.0, UniformDensity(space))], [])
+    def restricted(self, split: Split, space: Space) -> Restriction:
+        given = 0.0
+        if split.given and self.space.parts:
+            at = torch.tensor([split.values], dtype=torch.float64)
+            given = float(self.log_marginal(at, list(split.given)))
+        return Restriction([(given, UniformDensity(space))], [])

@@ -17,7 +17,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
 from orbiflow.density.models.rotation_kernels import RotationKernels
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
-from orbiflow.density.spaces import RotationSpace, Space, Torus
+from orbiflow.density.spaces import CHART, RotationSpace, Space, by_sphere
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import fft, special
 
@@ -40,12 +40,13 @@ class AdaptiveKernels(Density, kind="kernels"):
 
     Products of von Mises kernels in the coordinates of the space's frame on flat spaces, summed over
     images under the group; von Mises-Fisher kernels on spheres of any dimension and their quotients,
-    summed over the images of a unit vector, such as both ends of an axis.
+    summed over the images of a unit vector, such as both ends of an axis; products of both on products.
 
     Args:
         space: Any space.
         centers: The chart points (N, d) that the kernels are about.
-        concentrations: Concentrations kappa > 0, (N, d) on flat spaces and (N, 1) on round ones.
+        concentrations: Concentrations kappa > 0, one for each of the space's `spheres`: (N, d) on flat
+            spaces and (N, 1) on round ones.
         weights: Weights (N,) of sum 1.
     """
 
@@ -57,7 +58,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         super().__init__(space)
         given = zip(self.stored, (centers, concentrations, weights), strict=True)
         centers, concentrations, weights = (as_tensor(value, name) for name, value in given)
-        width = 1 if space.is_round else space.dim
+        width = len(space.spheres)
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
         count = len(centers) if centers.dim() else 0
         if shapes != [(count, space.chart_dim), (count, width), (count,)] or not count:
@@ -114,15 +115,8 @@ class AdaptiveKernels(Density, kind="kernels"):
         rng = np.random.default_rng(seed)
         weights = self.weights.cpu().numpy()
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
-        kappa = self.concentrations.cpu().numpy()[chosen]
-        if self.space.is_round:
-            centers = self._center_features.cpu().numpy()[chosen]
-            vectors = _von_mises_fisher(centers, kappa[:, 0], rng)
-            return self.space.from_features(torch.tensor(vectors))
-        angle = torch.tensor(rng.vonmises(0.0, kappa))
-        return self.space.project(
-            self.centers.cpu()[chosen] + self.space.from_turns(angle / (2 * math.pi))
-        )
+        kappa = self.concentrations.cpu()[chosen]
+        return _drawn(self.space, self.centers.cpu()[chosen], kappa, rng)
 
     @classmethod
     def joined(cls, components: Sequence[Any], weights: Tensor) -> Self:
@@ -139,6 +133,11 @@ class AdaptiveKernels(Density, kind="kernels"):
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         del seed
+        if self.space.parts:
+            (_, own), *_ = self.restricted(
+                Split(self.space.chart_dim, tuple(axes)), self.space.of_axes(axes)
+            ).closed
+            return own.log_chart(points)
         logs = self.weights.log()
         block = max(1, BLOCK_ENTRIES // len(self.weights))
         parts = [
@@ -146,22 +145,24 @@ class AdaptiveKernels(Density, kind="kernels"):
         ]
         return torch.cat(parts)
 
-    def restricted(self, split: Split, space: Torus) -> Restriction:
+    def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep the kernels' own marginals.
 
         A kernel weighs as much more as it has the given values more likely.
         """
-        kept, given = list(split.kept), list(split.given)
+        kept, given, some = list(split.kept), list(split.given), self.space.factors_of(split.kept)
         weights, evidence = self.weights, 0.0
         if given:
             at = torch.tensor([split.values], dtype=torch.float64)
             logs = self.log_each(at, given)[0] + weights.log()
             evidence, weights = float(log_sum_exp(logs)), shares_of(logs)
-        some = AdaptiveKernels(space, self.centers[:, kept], self.concentrations[:, kept], weights)
-        return Restriction([(evidence, some)], [])
+        own = AdaptiveKernels(space, self.centers[:, kept], self.concentrations[:, some], weights)
+        return Restriction([(evidence, own)], [])
 
     def log_each(self, points: Tensor, axes: list[int]) -> Tensor:
         """Return the log density (N, K) of each kernel of some angles, at points (N, len(axes))."""
+        if self.space.parts:
+            return self._each_on(self.space.of_axes(axes), points, axes)
         kappa = self.concentrations[:, axes]
         angle, center = math.pi * points.double(), math.pi * self.centers[:, axes]
         found = -special.i0e(kappa).log().sum(dim=1).expand(len(points), -1)
@@ -170,6 +171,17 @@ class AdaptiveKernels(Density, kind="kernels"):
             sine = (own[:, None] - middle).sin_()
             found = torch.addcmul(found, sine * sharp, sine, value=-2)
         return found
+
+    def _each_on(self, space: Space, points: Tensor, axes: list[int]) -> Tensor:
+        """Return what `log_each` does where some coordinates of a product have a space of their own."""
+        kappa = self.concentrations[:, self.space.factors_of(axes)]
+        centers = space.features(self.centers[:, axes], slice(space.kernel_images))
+        features = centers.flatten(0, 1).mT.contiguous()
+        terms = _terms(space, features, kappa, torch.ones_like(self.weights))
+        images = space.features(points, slice(None, None, space.kernel_images))
+        logs = torch.stack([terms.each(own.mT) for own in images])
+        logs = by_sphere(logs, len(kappa)).logsumexp(dim=(0, 2))
+        return logs + space.log_kernel_factor(points, CHART)[:, None]
 
     def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor | None:
         own = self._on_rotations()
@@ -199,18 +211,34 @@ class AdaptiveKernels(Density, kind="kernels"):
 
 def _terms(space: Space, features: Tensor, kappa: Tensor, weights: Tensor) -> Terms:
     """Return kernels about all E images (m, E * N) of their centers: then points need no images."""
-    images = features.shape[1] // len(kappa)
+    moves = torch.as_tensor(space.moves).to(kappa)
+    every = torch.cat([move @ kappa.mT for move in moves], dim=1)
+    return Terms(features, every, (_peaks(space, kappa) + weights.log()).repeat(len(moves)))
+
+
+def _peaks(space: Space, kappa: Tensor) -> Tensor:
+    """Return logarithms (N,) of the largest values of kernels of concentrations (N, F)."""
+    if space.parts:
+        widths = [len(part.spheres) for part in space.parts]
+        own = zip(space.parts, torch.split(kappa, widths, dim=1), strict=True)
+        return torch.stack([_peaks(part, some) for part, some in own]).sum(dim=0)
     if space.is_round:
-        every = kappa.mT.repeat(1, images)
-        peaks = _round_peaks(kappa[:, 0], space.dim)
-    else:
-        # these images permute and flip the axes of the frame
-        own, frame = space.frame.own, space.frame.group
-        moved = np.abs(frame.inverse_lattice @ frame.linear_parts[:own] @ frame.lattice).round()
-        turns = torch.as_tensor(moved).to(kappa)
-        every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
-        peaks = -(special.i0e(kappa) * space.sides.to(kappa)).log().sum(dim=1)
-    return Terms(features, every, (peaks + weights.log()).repeat(images))
+        return _round_peaks(kappa[:, 0], space.dim)
+    return -(special.i0e(kappa) * space.sides.to(kappa)).log().sum(dim=1)
+
+
+def _drawn(space: Space, centers: Tensor, kappa: Tensor, rng: np.random.Generator) -> Tensor:
+    """Return a draw (N, d) of each of N kernels."""
+    if space.parts:
+        widths = [len(part.spheres) for part in space.parts]
+        places = torch.split(centers, [part.chart_dim for part in space.parts], dim=1)
+        every = zip(space.parts, places, torch.split(kappa, widths, dim=1), strict=True)
+        return torch.cat([_drawn(*one, rng) for one in every], dim=1)
+    if space.is_round:
+        vectors = _von_mises_fisher(space.features(centers)[0].numpy(), kappa[:, 0].numpy(), rng)
+        return space.from_features(torch.tensor(vectors))
+    angle = torch.tensor(rng.vonmises(0.0, kappa.numpy()))
+    return space.project(centers + space.from_turns(angle / (2 * math.pi)))
 
 
 def _round_peaks(kappa: Tensor, dim: int) -> Tensor:
@@ -239,11 +267,8 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
 
     They are with respect to the chart's area on flat spaces and to the round area on round ones.
     """
-    if space.is_round:
-        k = kappa[:, 0]
-        return kappa * centers, _round_peaks(k, space.dim) - k
-    scaled = special.i0e(kappa) * space.sides.to(kappa)
-    return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
+    rows = kappa.repeat(1, centers.shape[1] // kappa.shape[1]) * centers
+    return rows, _peaks(space, kappa) - kappa.sum(dim=1)
 
 
 def _von_mises_fisher(centers: Array, kappa: Array, rng: np.random.Generator) -> Array:
@@ -290,7 +315,7 @@ FIRST_GRID, GRID_BLOCK = {1: 256, 2: 48}, 2**12
 
 
 def kernels_for(
-    density: Density, split: Split, space: Torus, level: int, tick: Callable[[], None]
+    density: Density, split: Split, space: Space, level: int, tick: Callable[[], None]
 ) -> list[Weighted]:
     """Return kernels as `Density.approximated` does, if need be through marginals on a grid."""
     known = density.approximated(split, space, level, tick)
@@ -316,7 +341,7 @@ def sharpest_on(count: int, step: float = KERNEL_STEP) -> float:
 
 
 def lattice_kernels(
-    values: Tensor, space: Torus, start: float = 0.0
+    values: Tensor, space: Space, start: float = 0.0
 ) -> tuple[float, AdaptiveKernels]:
     """Return kernels through values (n,) or (n, m) on an even grid that begins at `start`, in turns.
 

@@ -117,7 +117,7 @@ class Mixture(Density, kind="mixture"):
         table = [own.log_marginal(points, axes, seed) + log for log, own in self._weighted()]
         return torch.stack(table).logsumexp(dim=0)
 
-    def restricted(self, split: Split, space: Torus) -> Restriction:
+    def restricted(self, split: Split, space: Space) -> Restriction:
         found = Restriction([], [])
         for log, own in self._weighted():
             closed, left = own.restricted(split, space)
@@ -261,7 +261,7 @@ class PartialDensity(Density, kind="partial"):
         points, logs = self.whole.draw_given(size, given, generator)
         return points, torch.softmax(logs, dim=0)
 
-    def restricted(self, split: Split, space: Torus) -> Restriction:
+    def restricted(self, split: Split, space: Space) -> Restriction:
         own = self._split_of(split)
         closed, left = self.whole.restricted(own, space)
         return Restriction(
@@ -270,7 +270,7 @@ class PartialDensity(Density, kind="partial"):
         )
 
     def approximated(
-        self, split: Split, space: Torus, level: int, tick: Callable[[], None]
+        self, split: Split, space: Space, level: int, tick: Callable[[], None]
     ) -> list[Weighted] | None:
         found = self.whole.approximated(self._split_of(split), space, level, tick)
         return found and [(log - self.log_given, part) for log, part in found]

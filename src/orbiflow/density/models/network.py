@@ -133,7 +133,7 @@ class VonMisesNetwork(Density, kind="network"):
         return _Draws(points, means, sharp, logs)
 
     def approximated(
-        self, split: Split, space: Torus, level: int, tick: Callable[[], None]
+        self, split: Split, space: Space, level: int, tick: Callable[[], None]
     ) -> list[Weighted]:
         """Eliminate the hidden angles on grids, or draw them where too many depend on each other."""
         factors = self._leading_to(list(split.observed))
@@ -148,7 +148,7 @@ class VonMisesNetwork(Density, kind="network"):
         self,
         factors: Sequence[Factor],
         split: Split,
-        space: Torus,
+        space: Space,
         level: int,
         tick: Callable[[], None],
     ) -> Weighted:

@@ -103,7 +103,7 @@ class VonMisesSine(Density, kind="von-mises-sine"):
         del axes
         return 1
 
-    def restricted(self, split: Split, space: Torus) -> Restriction:
+    def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep an angle's von Mises density where the other is given."""
         if not split.given or len(split.kept) != 1:
             return Restriction([], [(0.0, self, split)])

@@ -162,13 +162,15 @@ class Terms(NamedTuple):
 
         Nothing cancels and no result is needed in between: for devices where arithmetic is cheap.
         """
-        found: list[Tensor] = []
-        for part in torch.split(features, max(1, PLAIN_ENTRIES // self.size), dim=1):
-            table = self.peaks
-            for k, (x, center) in enumerate(zip(part, self.centers, strict=True)):
-                table = table - self.kappa[k % self.factors] / 2 * (x[:, None] - center) ** 2
-            found.append(table.logsumexp(dim=1))
-        return torch.cat(found)
+        parts = torch.split(features, max(1, PLAIN_ENTRIES // self.size), dim=1)
+        return torch.cat([self.each(part).logsumexp(dim=1) for part in parts])
+
+    def each(self, features: Tensor) -> Tensor:
+        """Return the logarithms (N, K) of the terms at features (m, N); differentiable."""
+        table = self.peaks
+        for k, (x, center) in enumerate(zip(features, self.centers, strict=True)):
+            table = table - self.kappa[k % self.factors] / 2 * (x[:, None] - center) ** 2
+        return table
 
     def _about(
         self, features: Tensor, middle: Tensor

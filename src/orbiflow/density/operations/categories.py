@@ -101,7 +101,9 @@ def _mean(own: CategoryDensity) -> list[float] | None:
     for axis, drawn in enumerate(own.estimator.sample(DRAWS, random_state=0).T):
         period = space.period_of(axis)
         around = np.exp(2j * np.pi * drawn / period).mean() if period else 0
-        found.append(float(np.angle(around) / (2 * np.pi) * period if period else drawn.mean()))
+        turn = np.angle(around) / (2 * np.pi)
+        turn += turn < space.first_turn(axis)
+        found.append(float(turn * period if period else drawn.mean()))
     return found
 
 

@@ -22,6 +22,7 @@ from orbiflow.settings import DefaultText, Hidden, Option, SettingError
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
+    from orbiflow.density.data_space import DataColumns
     from orbiflow.density.estimator import DensityEstimator
     from orbiflow.density.fitting import ParametricFit
     from orbiflow.density.spaces import Space
@@ -70,7 +71,7 @@ def fit(
             space=where.space,
             width=where.width,
             group=reading.group,
-            linear=where.linear,
+            beside=where.beside,
             given=given,
         )
         values = rows.table.values
@@ -132,6 +133,22 @@ def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> st
     return spaces.make_space(where.space, cell=where.cell, fractional=where.fractional)
 
 
+def columns_asked(where: SpaceSettings, rows: TableRows, tell: runtime.Sink) -> DataColumns:
+    """Return what settings and names say of a table's columns."""
+    from orbiflow.density.data_space import DataColumns
+
+    table = rows.table
+    unit: str | None = tables.angle_unit(where, table, tell)
+    own = tables.without_columns(table, where.beside, rows.path).columns
+    unit = unit if is_angular(where.space, len(own), where.rotation_form(own)) else where.unit
+
+    def number(name: str) -> int:
+        return table.columns.index(tables.columns_among(table.columns, [name])[0])
+
+    periods: dict[str | int, float] = {number(name): value for name, value in where.periods.items()}
+    return DataColumns(space_of(where, own, unit), unit, [*map(number, where.linear)], periods)
+
+
 def fit_rows(
     rows: TableRows,
     where: SpaceSettings,
@@ -144,15 +161,10 @@ def fit_rows(
     from orbiflow.density.estimator import DensityEstimator
 
     values, labels = rows.table.values, rows.labels
-    unit = tables.angle_unit(where, rows.table, tell)
-    form = where.rotation_form(rows.table.columns)
-    unit = unit if is_angular(where.space, values.shape[1], form) else where.unit
-    given = {name: getattr(settings, name) for name in settings.fields_given}
-    names = tables.linear_among(rows.table.columns, where.linear)
-    if names:
-        given["linear"] = [rows.table.columns.index(name) for name in names]
-    space = space_of(where, rows.table.columns, unit)
-    estimator = DensityEstimator(space, unit=unit, missing=reading.kept_missing, **given)
+    columns = columns_asked(where, rows, tell)
+    given: dict[str, Any] = {name: getattr(settings, name) for name in settings.fields_given}
+    given |= {"unit": columns.unit, "linear": columns.linear, "period": columns.period}
+    estimator = DensityEstimator(columns.space, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # notes say the same, with names of columns

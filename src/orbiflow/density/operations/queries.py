@@ -146,6 +146,7 @@ def score_rows(
     notes: list[str] = []
     columns = {name: _log_densities(density, points, settings, progress)}
     if given:
+        given = inference.chosen_columns(space, given, len(rows.table.columns)).axes
         of_given = _log_densities(density, _only(points, given), settings, progress)
         columns, name = {"log_prob_given": columns[name] - of_given}, "log_prob_given"
     if settings.gradient:
@@ -330,14 +331,15 @@ def marginal(
     with runtime.one_thread():
         density, extra = model_at(model)
         names = names_of(density, extra)
-        axes = axes_of(columns, names, on_event)
+        asked = axes_of(columns, names, on_event)
+        numbers, axes = inference.chosen_columns(density.space, asked, len(names))
         folder = runtime.ResultFolder(out, written_files)
         progress = runtime.progress_events(on_event, cancel)
         progress(0.0, "integrating")
         found = inference.marginal(
             density, axes, accuracy=settings.accuracy, progress=in_first_part(progress)
         )
-        kept = [names[axis] for axis in axes]
+        kept = [names[number] for number in numbers]
         origin = {"marginal": kept, "model": str(model)}
         return write_derived(found, kept, origin, folder, settings, progress, on_event)
 
@@ -375,14 +377,16 @@ def conditional(
     with runtime.one_thread():
         density, extra = saved.model_at(model)
         names = saved.names_of(density, extra)
-        known, turns, kept = saved.condition_of(density.space, names, pairs, columns, on_event)
+        known, given_at, left = saved.condition_of(density.space, names, pairs, columns, on_event)
+        kept, axes = inference.chosen_columns(density.space, left, len(names))
         folder = runtime.ResultFolder(out, written_files)
         progress = runtime.progress_events(on_event, cancel)
         progress(0.0, "integrating")
         found = inference.conditional(
-            density, turns, kept, accuracy=settings.accuracy, progress=saved.in_first_part(progress)
-        )
-        evidence = saved.evidence_of(density, turns)
+            density, given_at, axes,
+            accuracy=settings.accuracy, progress=saved.in_first_part(progress),
+        )  # fmt: skip
+        evidence = saved.evidence_of(density, given_at)
         rare = "; few data lie there, or none" if evidence < -3 else ""
         words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
         ratio = f"{math.exp(evidence):.3g} times that of the uniform density{rare}"
@@ -488,7 +492,8 @@ def _values(density: models.Density, axis: int, settings: TrendSettings) -> Arra
 
     space = inference.check_torus(density.space, "trends")
     period = space.period_of(axis)
-    low, high = -period / 2, period / 2
+    low = space.first_turn(axis) * period
+    high = low + period
     if not period:
         alone = inference.marginal(density, [axis])
         masses = torch.tensor([0.02, 0.98], dtype=torch.float64)

@@ -20,10 +20,11 @@ from orbiflow.density import inference, pictures, tables
 from orbiflow.density.data import check_form, doubts_of_other_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
+from orbiflow.density.regions import size_unit
 from orbiflow.density.run_folder import SAMPLES, write_files
 from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
 from orbiflow.density.tables import Table, TableError, TableSettings, column_names, listing, to_csv
-from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
+from orbiflow.errors import InputFileError, SettingError, literal
 from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def condition_of(
     columns: Sequence[str] | None,
     tell: Sink,
 ) -> tuple[dict[str, float], dict[int, float], list[int]]:
-    """Return the known angles by name in the torus' unit and by number in turns, and which to keep.
+    """Return what is known by name in the data's unit and by chart coordinate, and columns to keep.
 
     All others are kept, or those of `columns`. The user is warned of angles that seem to be in another
     unit.
@@ -165,10 +166,10 @@ def condition_of(
     values = list(zip(axes, (value for _, value in pairs), strict=True))
     given = inference.given_named(space, values, names)
     known = {names[axis]: value for axis, value in values}
-    kept = [axis for axis in range(len(names)) if axis not in given]
+    kept = [axis for axis in range(len(names)) if axis not in axes]
     if columns is not None:
         kept = axes_of(columns, names, tell)
-        both = [names[axis] for axis in kept if axis in given]
+        both = [names[axis] for axis in kept if axis in axes]
         if both:
             raise SettingError(
                 literal(repr(both[0]))
@@ -180,8 +181,8 @@ def condition_of(
 
 
 def evidence_of(density: Density, given: dict[int, float]) -> float:
-    """Return the log density of known angles, in turns, relative to the uniform one."""
-    at = [[given.get(axis, math.nan) for axis in range(density.space.dim)]]
+    """Return the log density of known chart coordinates relative to the uniform one."""
+    at = [[given.get(axis, math.nan) for axis in range(density.space.chart_dim)]]
     points = torch.tensor(at, dtype=torch.float64)
     return float(inference.log_prob_observed(density, points, measure="uniform"))
 
@@ -217,9 +218,10 @@ def write_derived(
         files[SAMPLES] = to_csv(names, space.from_chart(drawn))
         for text in _sample_notes(density):
             tell(Note(text))
-    if space.dim in TABLE_ROWS:
-        progress(0.8, "drawing")
-        files[pictures.TABLE] = to_csv((*names, "density"), _table(density))
+    progress(0.8, "drawing")
+    if space.dim in TABLE_ROWS and isinstance(space, Torus):
+        files[pictures.TABLE] = to_csv((*names, "density"), _table(density, space))
+    if space.has_square and space.dim in TABLE_ROWS:
         progress(0.9, "drawing")
         files[PICTURE] = _picture(density, names)
     progress(1.0, "writing")
@@ -257,16 +259,13 @@ def _words(density: Density, names: list[str], out: Path) -> str:
         )
     per = f"per {str(density.space.unit).removesuffix('s')}"
     power = "" if len(names) == 1 else f"^{len(names)}"
-    if isinstance(density.space, MixedTorus):
-        per, power = "per unit of each column", ""
+    if not isinstance(density.space, Torus) or isinstance(density.space, MixedTorus):
+        per, power = f"per {size_unit(density.space).removesuffix('s')}", ""
     return f"the density of {', '.join(names)}, {per}{power}, {exact}; written to {out}"
 
 
-def _table(density: Density) -> Array:
+def _table(density: Density, space: Torus) -> Array:
     """Return angles from minus half a turn on, and the density in their unit: (N, d + 1)."""
-    space = density.space
-    if not isinstance(space, Torus):
-        raise OrbiflowError(f"a table of angles needs a torus, not the {space.name}")
     count = TABLE_ROWS[space.dim]
     lines = [space.even_line(axis, count) for axis in range(space.dim)]
     data = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, space.dim)

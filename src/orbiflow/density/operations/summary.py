@@ -108,8 +108,10 @@ def _check(where: SpaceSettings, reading: CountedRowSettings, picture: Path | No
             f"{{space}} must be torus, sphere, projective-plane, {', '.join(ROTATIONS)}: summaries are "
             f"of angles, directions, axes and orientations; got {literal(repr(where.space))}"
         )
-    if where.linear:
-        raise SettingError("{linear} is for densities: a summary is of angles; leave it out")
+    for name in ("linear", "period"):
+        if getattr(where, name):
+            text = f"{{{name}}} is for densities: a summary is of columns of one unit; leave it out"
+            raise SettingError(text)
     if where.space != "torus":
         if reading.missing == "marginalise":
             raise SettingError("{missing} marginalise is for angles on a torus; use {missing} drop")

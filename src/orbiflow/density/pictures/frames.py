@@ -70,11 +70,12 @@ class View(NamedTuple):
     @property
     def volume(self) -> float:
         """The natural measure of the window: of a torus all of it."""
-        sides = [most - least for least, most in real_spans(self.space).values()]
-        if not sides:
+        spans = real_spans(self.space)
+        if not spans:
             return self.space.volume
-        turns = len(self.space.columns) - len(sides)
-        return math.prod(sides) * whole_turn(str(self.space.unit)) ** turns
+        periods = map(cast(MixedTorus, self.space).period_of, range(self.space.dim))
+        sides = [most - least for least, most in spans.values()]
+        return math.prod([*sides, *filter(None, periods)])
 
 
 def real_spans(space: Space) -> dict[int, tuple[float, float]]:
@@ -83,6 +84,12 @@ def real_spans(space: Space) -> dict[int, tuple[float, float]]:
         return {}
     lines = {axis: space.even_line(axis, 2) for axis in np.flatnonzero(space.is_real).tolist()}
     return {axis: (float(ends[0]), float(ends[1])) for axis, ends in lines.items()}
+
+
+def _own_axes(space: Space) -> list[int]:
+    """Return the numbers of columns with periods of their own, and of real ones."""
+    axes = space.axes if isinstance(space, MixedTorus) else ()
+    return [axis for axis, own in enumerate(axes) if own is not None]
 
 
 def chart_points(space: Space, points: Tensor) -> Tensor:
@@ -114,7 +121,7 @@ def view_of(
     # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
     even = np.round(24 * turns) / 24
     turns = np.where(abs(turns - even) < 1e-3, even, turns)
-    turns[[*real_spans(space)]] = 0.5
+    turns[_own_axes(space)] = 0.5
     return View(space, names, turns - 0.5)
 
 
@@ -167,9 +174,7 @@ def axis_label(view: View, column: int) -> str:
     name = cut(view.names[column], MAX_NAME)
     has_unit = re.search(r"[(\[](deg|rad|turn|°)", name)
     return (
-        name
-        if has_unit or column in real_spans(view.space)
-        else f"{name} ({view.space.unit or ''})"
+        name if has_unit or column in _own_axes(view.space) else f"{name} ({view.space.unit or ''})"
     )
 
 
@@ -208,7 +213,14 @@ def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
         places = [k / 4 for k in range(5)]
         turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
         label = axis_label(view, 1 - axis)
-    return label, places, [angle_text(t, view.space.unit) for t in turns]
+    return label, places, [turn_text(view.space, axis, t) for t in turns]
+
+
+def turn_text(space: Space, axis: int, turns: float) -> str:
+    """Return a value of a periodic column as text: an angle in its unit, or a number."""
+    if axis not in _own_axes(space):
+        return angle_text(turns, space.unit)
+    return f"{turns * cast(MixedTorus, space).period_of(axis):g}"
 
 
 def _ticks(least: float, most: float) -> tuple[list[float], list[str]]:

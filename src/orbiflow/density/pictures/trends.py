@@ -65,14 +65,13 @@ def trend_picture(
         turned = [
             k / 4 for k in range(math.ceil(4 * first - 1e-9), math.floor(4 * last + 1e-9) + 1)
         ]
-        texts = [frames.angle_text(turn, space.unit) for turn in turned]
+        texts = [frames.turn_text(space, 1, turn) for turn in turned]
         axes.set_xticks([turn * around for turn in turned], texts)
     if turns:
-        axes.set_ylim(-turns / 2, turns / 2)
-        ticks = [k / 4 for k in range(-2, 3)]
-        axes.set_yticks(
-            [t * turns for t in ticks], [frames.angle_text(t, space.unit) for t in ticks]
-        )
+        ticks = [space.first_turn(0) + k / 4 for k in range(5)]
+        axes.set_ylim(ticks[0] * turns, ticks[-1] * turns)
+        texts = [frames.turn_text(space, 0, turn) for turn in ticks]
+        axes.set_yticks([turn * turns for turn in ticks], texts)
     axes.tick_params(labelsize=sheet.small)
     shares = " and ".join(f"{100 * level:g} %" for level in found.levels)
     title = f"{frames.cut(names[0], 40)} along {frames.cut(names[1], 40)}"

@@ -18,7 +18,7 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
 from orbiflow.density.regions.grid import Block, filled, refined, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
-from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
+from orbiflow.density.spaces import MixedTorus, RoundSpace, Space, to_latlon, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import unique
@@ -390,4 +390,8 @@ def size_unit(space: Space) -> str:
     """
     if space.is_round:
         return "steradians" if space.dim == 2 else f"radians^{space.dim} of the unit sphere"
+    if isinstance(space, MixedTorus):
+        return "units of each column" if space.dim > 1 else "units"
+    if space.parts:
+        return f"{size_unit(space.parts[0])} times {size_unit(space.parts[1])}"
     return str(space.unit) if space.dim == 1 else f"{space.unit}^{space.dim}"

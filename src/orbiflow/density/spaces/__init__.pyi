@@ -15,6 +15,7 @@ from .patches import to_klein as to_klein
 from .point_groups import international_name as international_name
 from .point_groups import rotation_group_name as rotation_group_name
 from .point_groups import rotations_of as rotations_of
+from .product import ProductSpace as ProductSpace
 from .quotient import QuotientSpace as QuotientSpace
 from .rotations import CubicOrientations as CubicOrientations
 from .rotations import HexagonalOrientations as HexagonalOrientations
@@ -29,6 +30,7 @@ from .space import CHART as CHART
 from .space import MEASURES as MEASURES
 from .space import SPACES as SPACES
 from .space import Space as Space
+from .space import by_sphere as by_sphere
 from .space import check_measure as check_measure
 from .space import make_space as make_space
 from .space import row_count as row_count

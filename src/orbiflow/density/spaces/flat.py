@@ -95,12 +95,20 @@ class Torus(_AngleSpace):
         del axis
         return self.period
 
+    def first_turn(self, axis: int) -> float:
+        """Return the turn at which a column of the data begins."""
+        del axis
+        return -0.5
+
     def even_line(self, axis: int, count: int) -> Array:
-        """Return even values (count,) of a column, from minus half a turn on."""
-        return (np.arange(count) / count - 0.5) * self.period_of(axis)
+        """Return even values (count,) of a column, from its first turn on."""
+        return (np.arange(count) / count + self.first_turn(axis)) * self.period_of(axis)
+
+    @property
+    def together(self) -> int:
+        return 0
 
     def of_axes(self, axes: Sequence[int]) -> Torus:
-        """Return the space of some columns alone, by their numbers from 0."""
         return Torus(len(axes), unit=str(self.unit))
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:

@@ -1,9 +1,9 @@
-"""Angles beside real columns: a torus, of which some circles are lines that close at infinity."""
+"""Angles beside columns with periods of their own, and real ones: lines that close at infinity."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -11,7 +11,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_array
+from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
 from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import checked_table
@@ -52,13 +52,26 @@ class Line(NamedTuple):
         return cls(float(middle), SCALES * spread)
 
 
+Axis = Sequence[float] | float | None
+"""A column: an angle (None), one with a period of its own, or the centre and scale of a real one."""
+
+
+def _checked_axis(own: Any) -> Line | float | None:
+    if own is None or isinstance(own, str) or np.ndim(own):
+        return None if own is None else Line.checked(own)
+    period = as_number(own, "the period of a column")
+    if not 0 < period < math.inf:
+        raise OrbiflowError(f"a period must be above 0, got {period}")
+    return period
+
+
 def _share(turns: Tensor) -> Tensor:
     """Return v = z / sqrt(4 + z^2) for u = F(z) in [0, 1): the root of 3 v - v^3 = 2 (2 u - 1)."""
     return 2 * ((2 * turns - 1).asin() / 3).sin()
 
 
 class MixedTorus(Torus):
-    """Several columns, each an angle or a real number; the natural measure is the product of all.
+    """Several columns, each periodic or a real number; the natural measure is the product of all.
 
     A real column y becomes the point F((y - centre) / scale) of a circle, with F the distribution
     function of Student's t with four degrees of freedom, so that all that is there for tori is there
@@ -67,7 +80,8 @@ class MixedTorus(Torus):
     heavy enough for most data and whose variance is finite; `measure="uniform"` compares with it.
 
     Args:
-        axes: For each column None, if it is an angle, or the centre and scale of a real one.
+        axes: For each column None, if it is an angle, its period, such as 24 of hours, or the centre
+            and scale of a real one.
         unit: The unit of the angles, "radians", "degrees" or "turns".
 
     >>> space = MixedTorus([None, (10.0, 2.0)], unit="degrees")
@@ -79,11 +93,13 @@ class MixedTorus(Torus):
 
     name = "mixed"
 
-    def __init__(self, axes: Sequence[Sequence[float] | None], *, unit: str = "radians") -> None:
-        lines = [None if own is None else Line.checked(own) for own in axes]
-        super().__init__(len(lines), unit=unit)
+    def __init__(self, axes: Sequence[Axis], *, unit: str = "radians") -> None:
+        self.axes = tuple(map(_checked_axis, axes))
+        super().__init__(len(self.axes), unit=unit)
+        lines = [own if isinstance(own, Line) else None for own in self.axes]
         self.lines = tuple(lines)
         self.is_real = np.array([own is not None for own in lines])
+        self.is_angle = np.array([own is None for own in self.axes])
         self._centre, self._scale = (
             torch.tensor([own[k] for own in lines if own is not None], dtype=torch.float64)
             for k in (0, 1)
@@ -91,11 +107,23 @@ class MixedTorus(Torus):
 
     @classmethod
     def for_columns(
-        cls, data: Array, real: Sequence[int], names: Sequence[str], *, unit: str = "radians"
+        cls,
+        data: Array,
+        periods: Mapping[int, float | None],
+        names: Sequence[str],
+        *,
+        unit: str = "radians",
     ) -> Self:
-        """Return the space of data (N, k), of which the columns with these numbers are real."""
-        axes = [Line.of(data[:, k], names[k]) if k in real else None for k in range(data.shape[1])]
-        return cls(axes, unit=unit)
+        """Return the space of data (N, k), of which columns have periods by their numbers.
+
+        None is that of a real column; those without one are angles.
+        """
+
+        def axis(k: int) -> Axis:
+            own = periods.get(k)
+            return Line.of(data[:, k], names[k]) if k in periods and own is None else own
+
+        return cls([axis(k) for k in range(data.shape[1])], unit=unit)
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -113,11 +141,11 @@ class MixedTorus(Torus):
     @property
     def volume(self) -> float:
         """Infinite where a column is real."""
-        return math.inf if self.is_real.any() else super().volume
+        return math.prod(self.period_of(axis) or math.inf for axis in range(self.dim))
 
     def log_area(self, points: Tensor) -> Tensor:
-        angles = int((~self.is_real).sum()) * math.log(self.period)
-        return self._log_stretch(points).sum(dim=-1) + angles
+        periods = [self.period_of(axis) for axis in np.flatnonzero(~self.is_real).tolist()]
+        return self._log_stretch(points).sum(dim=-1) + sum(map(math.log, periods))
 
     def _log_stretch(self, points: Tensor) -> Tensor:
         """Return the logarithms (..., R) of the derivatives of real columns by their turns."""
@@ -138,30 +166,41 @@ class MixedTorus(Torus):
     def turns(self, axis: int, values: Tensor) -> Tensor:
         line = self.lines[axis]
         if line is None:
-            return super().turns(axis, values)
+            return values / self.period_of(axis)
         away = (values - line.centre) / line.scale
         share = away / (4 + away**2).sqrt()
         return 0.5 + (3 * share - share**3) / 4
 
     def from_chart(self, points: Tensor) -> Array:
-        """Return angles in [-1/2, 1/2) turns, and real columns in their own units: (N, dim)."""
+        """Return angles in [-1/2, 1/2) turns, and other columns in their own units: (N, dim).
+
+        Those of a period of their own are from 0 up to it.
+        """
         found = super().from_chart(points)
         x = self._checked(points).detach().double().cpu().numpy()
-        for axis, line in enumerate(self.lines):
-            if line is not None:
-                share = _share(torch.tensor(x[..., axis] - np.floor(x[..., axis]))).numpy()
+        turns = x - np.floor(x)
+        for axis, own in enumerate(self.axes):
+            if isinstance(own, Line):
+                share = _share(torch.tensor(turns[..., axis])).numpy()
                 away = 2 * share / np.sqrt(np.maximum(1 - share**2, LEAST_REST))
-                found[..., axis] = line.centre + line.scale * away
+                found[..., axis] = own.centre + own.scale * away
+            elif own is not None:
+                found[..., axis] = own * turns[..., axis]
         return found
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
-        found = super().data_gradient(data, points, gradient)
+        del data
+        found = gradient.numpy() / [self.period_of(axis) or 1.0 for axis in range(self.dim)]
         real = torch.as_tensor(self.is_real)
         found[..., self.is_real] = (gradient[..., real] / self._log_stretch(points).exp()).numpy()
         return found
 
     def period_of(self, axis: int) -> float:
-        return self.period if self.lines[axis] is None else 0.0
+        own = self.axes[axis]
+        return self.period if own is None else 0.0 if isinstance(own, Line) else own
+
+    def first_turn(self, axis: int) -> float:
+        return 0.0 if self.axes[axis] is not None else super().first_turn(axis)
 
     def even_line(self, axis: int, count: int) -> Array:
         """Return even values (count,) of a column; of a real one, over four deviations on each side."""
@@ -171,13 +210,14 @@ class MixedTorus(Torus):
         return line.centre + 4 * line.scale / SCALES * np.linspace(-1, 1, count)
 
     def of_axes(self, axes: Sequence[int]) -> Torus:
-        kept = [self.lines[axis] for axis in axes]
+        kept = [self.axes[axis] for axis in axes]
         return MixedTorus(kept, unit=str(self.unit)) if any(kept) else super().of_axes(axes)
 
     def step_angle(self, step: float) -> float:
-        sides = [self.period if own is None else 8 / 3 * own.scale for own in self.lines]
+        lines = enumerate(self.lines)
+        sides = [self.period_of(k) if own is None else 8 / 3 * own.scale for k, own in lines]
         return 2 * math.pi * step / max(sides)
 
     def settings(self) -> dict[str, Any]:
-        axes = [None if own is None else list(own) for own in self.lines]
+        axes = [list(own) if isinstance(own, Line) else own for own in self.axes]
         return {"axes": axes, "unit": self.unit}

@@ -6,7 +6,7 @@ import inspect
 import itertools
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
@@ -78,6 +78,7 @@ class Space(ABC):
     - `has_square`: Whether the domain is the unit cube, with the site (1/2, ..., 1/2).
     - `has_chart`: Whether chart points are in R^d. On spheres of any dimension they are unit vectors
       (`UnitVectorSpace`).
+    - `parts`: The spaces of a product, otherwise none.
 
     Spaces of the same class, settings and group are equal.
     """
@@ -90,6 +91,7 @@ class Space(ABC):
     is_round: ClassVar[bool] = False
     has_square: ClassVar[bool] = False
     has_chart: ClassVar[bool] = True
+    parts: tuple[Space, ...] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -217,6 +219,39 @@ class Space(ABC):
         shift = math.log(self.volume) if measure == "uniform" else 0.0
         return shift - self.log_area(points)
 
+    def log_kernel_factor(self, points: Tensor, measure: str) -> Tensor:
+        """Return what to add to a log density per area of kernels: of the chart, or round area."""
+        if not self.is_round:
+            return self.log_density_factor(points, measure)
+        if measure == CHART:
+            return self.log_area(points)
+        shift = math.log(self.volume) if measure == "uniform" else 0.0
+        return torch.full_like(points[..., 0], shift)
+
+    def retracted(self, points: Tensor) -> Tensor:
+        """Return chart points (..., d) for points that were moved a little off the chart."""
+        return points
+
+    def of_axes(self, axes: Sequence[int]) -> Space:
+        """Return the space of some chart coordinates alone, by their numbers from 0.
+
+        Raises `OrbiflowError` if these have no meaning without the others.
+        """
+        del axes
+        raise OrbiflowError(
+            f"on the {self.name} no coordinate has a meaning without the others: marginal and "
+            "conditional densities are of angles on a torus, or of columns beside another space"
+        )
+
+    @property
+    def together(self) -> int:
+        """How many of the first chart coordinates have a meaning together alone."""
+        return self.chart_dim
+
+    def factors_of(self, axes: Sequence[int]) -> list[int]:
+        """Return which concentrations of kernels are of some chart coordinates."""
+        return list(axes)
+
     def displacement(self, start: Tensor, end: Tensor) -> Tensor:
         """Return the shortest flat displacement (..., d) from `start` to an image of `end`."""
         found: tuple[Tensor, Tensor] | None = None
@@ -267,6 +302,22 @@ class Space(ABC):
         images = points @ linear.mT + shift[:, None]
         angles = 2 * math.pi * (images @ inverse.T)
         return torch.cat([angles.cos(), angles.sin()], dim=-1)
+
+    @property
+    def spheres(self) -> tuple[int, ...]:
+        """The dimensions of the spheres on which kernels are products: circles, unless it is round.
+
+        Feature i is a coordinate of sphere i modulo their number.
+        """
+        return (self.dim,) if self.is_round else (1,) * self.dim
+
+    @property
+    def moves(self) -> Array:
+        """How the images that kernels have permute these spheres: (E, F, F)."""
+        if self.is_round:
+            return np.ones((self.kernel_images, 1, 1))
+        own, frame = self.frame.own, self.frame.group
+        return np.abs(frame.inverse_lattice @ frame.linear_parts[:own] @ frame.lattice).round()
 
     @property
     def kernel_images(self) -> int:
@@ -339,6 +390,11 @@ class Space(ABC):
         return f"{type(self).__name__}({options})"
 
 
+def by_sphere(features: Tensor, count: int) -> Tensor:
+    """Return features (..., m) of kernels as the coordinates (..., m / F, F) on each of F spheres."""
+    return features.reshape(*features.shape[:-1], -1, count)
+
+
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 """Names of the four spaces with a canonical square."""
 
@@ -348,7 +404,7 @@ def space_class(name: str) -> type[Space]:
     from orbiflow.density import spaces  # whose classes import this file
 
     # whose files hold all classes
-    _ = spaces.MixedTorus, spaces.Sphere, spaces.RotationSpace, spaces.QuotientSpace
+    _ = spaces.ProductSpace, spaces.Sphere, spaces.RotationSpace, spaces.QuotientSpace
     if not is_a(name, str) or name not in SPACE_CLASSES:
         raise OrbiflowError(
             f"unknown space {name!r}; there are {', '.join(SPACE_CLASSES)}, and groups such as p4m, "

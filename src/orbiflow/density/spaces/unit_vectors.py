@@ -73,6 +73,9 @@ class UnitVectorSpace(Space):
             best = torch.where((image @ height > best @ height)[..., None], image, best)
         return best
 
+    def retracted(self, points: Tensor) -> Tensor:
+        return points / linalg.vector_norm(points, dim=-1, keepdim=True)
+
     def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         own = self._unit(points)
         return torch.stack([own @ element.mT for element in self.elements.to(own)[which]])

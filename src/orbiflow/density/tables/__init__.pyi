@@ -12,9 +12,10 @@ from .guesses import seen_columns as seen_columns
 from .rows import CURE as CURE
 from .rows import TableRows as TableRows
 from .rows import angle_unit as angle_unit
+from .rows import columns_among as columns_among
 from .rows import columns_in as columns_in
-from .rows import linear_among as linear_among
 from .rows import read_rows as read_rows
+from .rows import without_columns as without_columns
 from .settings import CountedRowSettings as CountedRowSettings
 from .settings import GroupedRowSettings as GroupedRowSettings
 from .settings import RotationForm as RotationForm

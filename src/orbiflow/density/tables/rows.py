@@ -103,7 +103,7 @@ def read_rows(
     width: int | None = None,
     group: str | None = None,
     model_space: str | None = None,
-    linear: Sequence[str] = (),
+    beside: Sequence[str] = (),
     given: str | None = None,
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
@@ -111,11 +111,12 @@ def read_rows(
     Without `columns` in the settings, those are taken whose names say that they are what the `space`
     takes, in its order. If no name says so, all columns of numbers are taken but those that number
     the rows, those of weights, counts, groups and what is `given` and, on a torus, those that are no
-    angles by name and are not among the `linear` ones.
+    angles by name. Columns `beside` these, real ones or with periods of their own, are taken as well;
+    on other spaces than tori they come last.
     Strikes beside dips become directions of dip on this space or on `model_space`, that of a model.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
-    reader = _Reader(path, rows, tell, space, width, tuple(linear))
+    reader = _Reader(path, rows, tell, space, width, tuple(beside))
     weighing, counting = map(reader.column, (rows.weights, getattr(rows, "counts", None)))
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
     for name in (group, given):
@@ -132,14 +133,16 @@ def read_rows(
     for note in table.notes:
         tell(Note(note))
     table = _with_dip_directions(table, rows, space or model_space, tell)
-    _check_width(path, table, space, width, others)
+    own = without_columns(table, beside, path)
+    _check_width(path, own, space, width, others)
+    if beside and space != "torus":
+        table = table.in_order([*own.columns, *columns_among(table.columns, beside)])
     if space in DIRECTIONS:
-        check_hemispheres(path, table, rows.header)
+        check_hemispheres(path, own, rows.header)
     if space in ROTATIONS:
         _tell_of_phases(path, table, rows.header, tell)
-    angles = without_linear(table, linear, path)
-    if space == "torus" and angles.columns:
-        tell_of_calm(path, angles, rows, tell)
+    if space == "torus" and own.columns:
+        tell_of_calm(path, own, rows, tell)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
@@ -156,7 +159,7 @@ class _Reader:
     tell: Sink
     space: str | None
     width: int | None
-    linear: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
 
     @property
     def missing(self) -> dict[str, Any]:
@@ -177,7 +180,10 @@ class _Reader:
         """Return the columns that were asked for, or those that the space takes beside `others`."""
         names, columns = self.names(), self.rows.columns
         if columns is None and self.space is not None:
-            columns = self._by_name(self.space, [name for name in names if name not in others])
+            more = columns_among(names, self.beside)
+            left = [name for name in names if name not in others and name not in more]
+            columns = self._by_name(self.space, left)
+            columns = columns and (*columns, *more)
         if columns is None:
             return self._all(others)
         codes = self.rows.missing_codes
@@ -189,7 +195,7 @@ class _Reader:
 
     def _all(self, others: Sequence[str]) -> Table:
         """Return all columns of numbers but those that are no data; then look at what is missing."""
-        width = None if others else self.width
+        width = None if others or self.beside else self.width
         try:
             table = self.read(None, width, keep_missing=True)
         except TableError as error:
@@ -203,8 +209,8 @@ class _Reader:
         if width is None:
             table = self._data_alone(table)
         if self.space == "torus":
-            table = _angles_alone(table, self.tell, self.linear)
-            _tell_of_names(without_linear(table, self.linear, self.path), self.tell)
+            table = _angles_alone(table, self.tell, self.beside)
+            _tell_of_names(without_columns(table, self.beside, self.path), self.tell)
         return table.complete(self.path, **self.missing, missing_codes=self.rows.missing_codes)
 
     def _by_name(self, space: str, names: Sequence[str]) -> tuple[str, ...] | None:
@@ -227,7 +233,7 @@ class _Reader:
             # what the header leaves empty is called "column1" by now
             given = name if table.header is None or name in table.header else ""
             known = table.values[~np.isnan(table.values[:, column]), column]
-            real = name in linear_among(table.columns, self.linear)
+            real = name in columns_among(table.columns, self.beside)
             if len(table.columns) > 1 and not real and is_identifier(given, known):
                 table = table.without(column)
                 text = f"left out the column {name!r}, which numbers the rows; name all to keep it"
@@ -260,24 +266,24 @@ def _with_dip_directions(table: Table, rows: RowSettings, space: str | None, tel
     return replace(table, values=values, columns=columns)
 
 
-def linear_among(names: Sequence[str], linear: Sequence[str]) -> list[str]:
-    """Return the columns, by their names, that are to be real numbers.
+def columns_among(names: Sequence[str], asked: Sequence[str]) -> list[str]:
+    """Return the columns, by their names, that were asked for by name or number.
 
-    >>> linear_among(["Phi", "Length", "column3"], ["length", "3"])
+    >>> columns_among(["Phi", "Length", "column3"], ["length", "3"])
     ['Length', 'column3']
     """
-    wanted = {own.casefold() for own in linear} | {f"column{own}" for own in linear}
+    wanted = {own.casefold() for own in asked} | {f"column{own}" for own in asked}
     return [name for name in names if name.casefold() in wanted]
 
 
-def without_linear(table: Table, linear: Sequence[str], path: Path) -> Table:
-    """Return a table without its real columns; refuse those that it lacks."""
-    found = linear_among(table.columns, linear)
-    if len(found) != len(set(linear)):
+def without_columns(table: Table, beside: Sequence[str], path: Path) -> Table:
+    """Return a table without columns that are beside others; refuse those that it lacks."""
+    found = columns_among(table.columns, beside)
+    if len(found) != len(set(beside)):
         raise TableError(
             literal(f"{path}: the columns are {listing(table.columns)}")
-            + ", and {linear} names "
-            + literal(listing(linear))
+            + ", and {linear} and {period} name "
+            + literal(listing(beside))
             + "; give the names of the table"
         )
     for name in found:
@@ -285,11 +291,11 @@ def without_linear(table: Table, linear: Sequence[str], path: Path) -> Table:
     return table
 
 
-def _angles_alone(table: Table, tell: Sink, linear: Sequence[str] = ()) -> Table:
+def _angles_alone(table: Table, tell: Sink, beside: Sequence[str] = ()) -> Table:
     """Return a table without the columns that are no angles by their names."""
     named = table.header is not None or table.delimiter is None
     counts_first = sorted(table.columns, key=lambda name: not is_count_named(name))
-    real = linear_among(table.columns, linear)
+    real = columns_among(table.columns, beside)
     for name in (name for name in counts_first if named and name not in real):
         is_count = is_count_named(name)
         if (is_count or is_other_quantity(name)) and len(table.columns) > 1:
@@ -395,10 +401,9 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     The user is also told of a cell that was not given: data of another size would be folded into it.
     """
     space = where.space
-    if where.linear:
-        table = without_linear(table, where.linear, Path("the table"))
-        if not table.columns:
-            return where.unit or "radians"
+    table = without_columns(table, where.beside, Path("the table"))
+    if not table.columns:
+        return where.unit or "radians"
     if space not in SPACES and where.cell is None:
         tell(
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
@@ -58,7 +59,11 @@ class SpaceSettings(Settings, group="Density"):
     """The data are fractions of the cell's vectors, as in CIF, and not lengths along x, y and z."""
 
     linear: Annotated[tuple[str, ...], DefaultText("none")] = ()
-    """Columns of a torus that are real numbers rather than angles, such as length,temperature."""
+    """Columns that are real numbers, such as length,temperature: of a torus or beside another space."""
+
+    period: Annotated[tuple[str, ...], DefaultText("none")] = ()
+    """Columns with periods of their own, likewise, such as hour=24,day=365.25; of axes in degrees,
+    180."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
     """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
@@ -83,13 +88,24 @@ class SpaceSettings(Settings, group="Density"):
         """Check that there is such a space, and that only angles have a unit."""
         if self.cell is not None and self.space in SPACES:
             raise SettingError(f"{{cell}} applies to groups, not to the {self.space}")
-        if self.linear and self.space != "torus":
-            raise SettingError(
-                f"{{linear}} is for columns beside angles on a torus, not on the {self.space}"
+        if twice := {name for name in self.beside if self.beside.count(name) > 1}:
+            text = (
+                f"{literal(min(twice))} is named twice in {{linear}} and {{period}}: name it once"
             )
+            raise SettingError(text)
         self._check_rotations()
         _ = self.width  # which makes the group
         check_unit(self.space, self.unit)
+
+    @property
+    def periods(self) -> dict[str, float]:
+        """The periods of columns that have their own, by name."""
+        return dict(map(_period, self.period))
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """The columns that are real or have a period of their own."""
+        return (*self.linear, *self.periods)
 
     def _check_rotations(self) -> None:
         """Check that what is of rotations is asked of rotations, and that there are such symmetries."""
@@ -132,6 +148,20 @@ class SpaceSettings(Settings, group="Density"):
         if self.space in SPACES:
             return 2 if self.space == "klein-bottle" else None
         return group_of(self.space, self.cell).dim
+
+
+def _period(text: str) -> tuple[str, float]:
+    name, _, number = text.rpartition("=")
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not name.strip() or not 0 < value < math.inf:
+        raise SettingError(
+            f"{{period}} must hold columns with numbers above 0, such as hour=24, got "
+            f"{literal(repr(text))}"
+        )
+    return name.strip(), value
 
 
 def group_of(space: str, cell: tuple[float, ...] | None) -> CrystallographicGroup:

@@ -89,6 +89,11 @@ class Table:
         names = self.columns[:column] + self.columns[column + 1 :]
         return replace(self, values=np.delete(self.values, column, axis=1), columns=names)
 
+    def in_order(self, names: Sequence[str]) -> Table:
+        """Return the table with its columns in another order, by their names."""
+        order = [self.columns.index(name) for name in names]
+        return replace(self, values=self.values[:, order], columns=tuple(names))
+
 
 class TableError(SettingError, InputFileError):
     """A table that cannot be read as the settings say; the message names those in braces."""

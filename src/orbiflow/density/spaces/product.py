@@ -1,0 +1,214 @@
+"""Any space beside real and periodic columns: a direction and a depth, a place and a day."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Self, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.arguments import as_instance
+from orbiflow.arrays import Array
+from orbiflow.density.data import as_data
+from orbiflow.density.spaces.flat import Torus
+from orbiflow.density.spaces.mixed import Axis, MixedTorus
+from orbiflow.density.spaces.space import CHART, Space, by_sphere, checked_table, make_space
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup
+
+T = TypeVar("T", Tensor, Array)
+
+
+class ProductSpace(Space):
+    """A space beside other columns, each real or with a period of its own.
+
+    Data have the columns of `base` first; chart points are those of both, one after the other. The
+    natural measure is the product of both, such as steradian times kilometre. Densities are made of
+    kernels and mixtures, whose marginal and conditional densities have a closed form.
+
+    Args:
+        base: A space that is no torus (for which there is `MixedTorus`), or its settings and "name".
+        axes: The other columns, as in `MixedTorus`: periods, or centres and scales of real ones.
+
+    >>> from orbiflow.density.spaces import Sphere
+    >>> space = ProductSpace(Sphere(), [(10.0, 5.0), 24.0])
+    >>> space.from_chart(space.to_chart([[48.2, 16.4, 12.0, 30.0]])).round(6).tolist()
+    [[48.2, 16.4, 12.0, 6.0]]
+    """
+
+    name = "product"
+    has_chart = False
+
+    def __init__(self, base: Space | Mapping[str, Any], axes: Sequence[Axis]) -> None:
+        if isinstance(base, Mapping):
+            own = dict(base)
+            base = make_space(str(own.pop("name", None)), **own)
+        self.base = as_instance(base, Space, "base", "see `make_space`")
+        if isinstance(base, Torus | ProductSpace):
+            raise OrbiflowError(
+                f"the base of a product is no {base.name}: take a MixedTorus of all"
+            )
+        self.beside = MixedTorus(axes)
+        if self.beside.is_angle.any():
+            raise OrbiflowError(
+                "each column beside a space needs a period, or a centre and a scale"
+            )
+        self.parts = (self.base, self.beside)
+        count = self.beside.dim
+        self.columns = (*self.base.columns, *(f"beside{k}" for k in range(1, count + 1)))
+
+    @classmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        del data, unit, seed
+        raise OrbiflowError("name the columns beside the space: give {linear} or {period}")
+
+    @property
+    def data_name(self) -> str:
+        return self.base.data_name
+
+    @property
+    def dim(self) -> int:
+        return self.base.dim + self.beside.dim
+
+    @property
+    def chart_dim(self) -> int:
+        return self.base.chart_dim + self.beside.dim
+
+    @property
+    def group(self) -> CrystallographicGroup:  # pyright: ignore[reportIncompatibleVariableOverride]
+        raise OrbiflowError(
+            f"a {self.base.name} beside other columns has no crystallographic group: densities there "
+            "are made of kernels and mixtures"
+        )
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        return tuple(width + self.beside.dim for width in self.base.widths)
+
+    @property
+    def volume(self) -> float:
+        return self.base.volume * self.beside.volume
+
+    @property
+    def spheres(self) -> tuple[int, ...]:
+        return (*self.base.spheres, *self.beside.spheres)
+
+    @property
+    def moves(self) -> Array:
+        own, more = self.base.moves, self.beside.dim
+        found = np.zeros((len(own), len(self.spheres), len(self.spheres)))
+        found[:, :-more, :-more], found[:, -more:, -more:] = own, np.eye(more)
+        return found
+
+    def split(self, points: T) -> tuple[T, T]:
+        """Return the chart points (..., d) of the base and of the other columns."""
+        count = self.beside.dim
+        return points[..., :-count], points[..., -count:]
+
+    def _both(
+        self, ask: Callable[[Space, Tensor], Tensor], points: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        first, second = self.split(self._checked(points))
+        return ask(self.base, first), ask(self.beside, second)
+
+    def project(self, points: Tensor) -> Tensor:
+        return torch.cat(self._both(lambda own, x: own.project(x), points), dim=-1)
+
+    def retracted(self, points: Tensor) -> Tensor:
+        return torch.cat(self._both(lambda own, x: own.retracted(x), points), dim=-1)
+
+    def log_area(self, points: Tensor) -> Tensor:
+        first, second = self._both(lambda own, x: own.log_area(x), points)
+        return first + second
+
+    def log_density_factor(self, points: Tensor, measure: str) -> Tensor:
+        if measure == CHART:
+            return torch.zeros_like(points[..., 0])
+        both = self._both(lambda own, x: own.log_density_factor(x, measure), points)
+        return both[0] + both[1]
+
+    def log_kernel_factor(self, points: Tensor, measure: str) -> Tensor:
+        both = self._both(lambda own, x: own.log_kernel_factor(x, measure), points)
+        return both[0] + both[1]
+
+    def cover(self, data: ArrayLike) -> Tensor:
+        return self._of_data(data, lambda own, x: own.cover(x))
+
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        return self._of_data(data, lambda own, x: own.to_chart(x))
+
+    def _of_data(self, data: ArrayLike, ask: Callable[[Space, Array], Tensor]) -> Tensor:
+        names = as_data(data, "data").values
+        first, second = self.split(checked_table(names, self.widths, "data"))
+        return torch.cat([ask(self.base, first), ask(self.beside, second)], dim=-1)
+
+    def from_chart(self, points: Tensor) -> Array:
+        first, second = self.split(self._checked(points))
+        return np.concatenate(
+            [self.base.from_chart(first), self.beside.from_chart(second)], axis=-1
+        )
+
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
+        table = self.split(np.asarray(data, dtype=np.float64))
+        at, slopes = self.split(points), self.split(gradient)
+        found = [own.data_gradient(table[k], at[k], slopes[k]) for k, own in enumerate(self.parts)]
+        return np.concatenate(found, axis=-1)
+
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
+        first, second = self.split(self._checked(points))
+        images = self.base.features(first, which)
+        rest = self.beside.features(second).expand(len(images), -1, -1)
+        both = [
+            by_sphere(own, len(part.spheres))
+            for own, part in zip((images, rest), self.parts, strict=True)
+        ]
+        most = max(own.shape[-2] for own in both)
+        padded = [torch.nn.functional.pad(own, (0, 0, 0, most - own.shape[-2])) for own in both]
+        return torch.cat(padded, dim=-1).flatten(-2)
+
+    @property
+    def kernel_images(self) -> int:
+        return self.base.kernel_images
+
+    def from_features(self, features: Tensor) -> Tensor:
+        table = by_sphere(features, len(self.spheres))
+        first, second = self.split(table)
+        places = (
+            part.from_features(own[..., : 1 + part.spheres[0], :].flatten(-2))
+            for part, own in zip(self.parts, (first, second), strict=True)
+        )
+        return torch.cat(list(places), dim=-1)
+
+    def uniform(self, count: int, generator: torch.Generator) -> Tensor:
+        return torch.cat([own.uniform(count, generator) for own in self.parts], dim=-1)
+
+    def step_angle(self, step: float) -> float:
+        return min(own.step_angle(step) for own in self.parts)
+
+    @property
+    def together(self) -> int:
+        return self.base.chart_dim
+
+    def of_axes(self, axes: Sequence[int]) -> Space:
+        chart = self.base.chart_dim
+        own = [axis for axis in axes if axis < chart]
+        if own and list(axes[:chart]) != list(range(chart)):
+            raise OrbiflowError(
+                f"the columns of the {self.base.name} have a meaning together alone: name all, or none"
+            )
+        kept = [self.beside.axes[axis - chart] for axis in axes if axis >= chart]
+        if not own:
+            return MixedTorus(kept)
+        return ProductSpace(self.base, kept) if kept else self.base
+
+    def factors_of(self, axes: Sequence[int]) -> list[int]:
+        shift = len(self.base.spheres) - self.base.chart_dim
+        own = list(range(len(self.base.spheres))) if min(axes) < self.base.chart_dim else []
+        return [*own, *(axis + shift for axis in axes if axis >= self.base.chart_dim)]
+
+    def settings(self) -> dict[str, Any]:
+        base = {"name": self.base.name, **self.base.settings()}
+        return {"base": base, "axes": self.beside.settings()["axes"]}

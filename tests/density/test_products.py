@@ -1,0 +1,230 @@
+"""Spaces beside real and periodic columns: normalised, with closed marginals and conditionals."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    DensityEstimator,
+    MixedTorus,
+    Mixture,
+    ProductSpace,
+    Space,
+    UniformDensity,
+    density_to_bytes,
+    make_space,
+    read_density,
+)
+from orbiflow.errors import OrbiflowError, SettingError
+
+BASES: dict[str, Space] = {
+    "sphere": make_space("sphere", form="vector"),
+    "axes": make_space("projective-plane"),
+    "bottle": make_space("klein-bottle", unit="degrees"),
+    "rotations": make_space("rotation-space", form="quaternion", symmetry="222"),
+    "orbifold": make_space("p4"),
+    "hypersphere": make_space("hypersphere", dim=4),
+}
+AXES = [(3.0, 2.0), 24.0]
+names = st.sampled_from(sorted(BASES))
+seeds = st.integers(0, 2**31)
+
+
+def random_kernels(name: str, seed: int, count: int = 12) -> tuple[Mixture, torch.Tensor]:
+    """Kernels and a uniform part on a product, and some points of it."""
+    space = ProductSpace(BASES[name], AXES)
+    noise = torch.Generator().manual_seed(seed)
+    points = space.uniform(count + 8, noise)
+    kappa = 1 + 30 * torch.rand(count, len(space.spheres), dtype=torch.float64, generator=noise)
+    weights = torch.rand(count, dtype=torch.float64, generator=noise) + 0.1
+    kernels = AdaptiveKernels(space, points[:count], kappa, weights / weights.sum())
+    return Mixture([kernels, UniformDensity(space)], [0.8, 0.2]), points[count:]
+
+
+@given(names, seeds)
+def test_data_and_features_come_back(name: str, seed: int) -> None:
+    space = ProductSpace(BASES[name], AXES)
+    points = space.project(space.uniform(9, torch.Generator().manual_seed(seed)))
+    again = space.to_chart(space.from_chart(points))
+    np.testing.assert_allclose(space.from_chart(again), space.from_chart(points), atol=1e-7)
+    features = space.features(points)
+    assert features.shape[-1] % len(space.spheres) == 0
+    np.testing.assert_allclose(space.from_features(features[0]), points, atol=1e-7)
+
+
+@given(names, seeds)
+def test_a_kernel_is_the_product_of_those_of_the_parts(name: str, seed: int) -> None:
+    mixture, points = random_kernels(name, seed)
+    whole = mixture.components[0]
+    assert isinstance(whole, AdaptiveKernels)
+    space = whole.space
+    assert isinstance(space, ProductSpace)
+    chart, first = space.base.chart_dim, len(space.base.spheres)
+    tables: list[torch.Tensor] = []
+    for k, weight in enumerate(whole.weights):
+        one = torch.ones(1, dtype=torch.float64)
+        kappa, center = whole.concentrations[k : k + 1], whole.centers[k : k + 1]
+        base = AdaptiveKernels(space.base, center[:, :chart], kappa[:, :first], one)
+        rest = AdaptiveKernels(space.beside, center[:, chart:], kappa[:, first:], one)
+        logs = base.log_prob(points[:, :chart], measure="natural")
+        tables.append(logs + rest.log_prob(points[:, chart:], measure="natural") + weight.log())
+    expected = torch.stack(tables).logsumexp(dim=0)
+    np.testing.assert_allclose(whole.log_prob(points, measure="natural"), expected, atol=1e-9)
+
+
+@given(names, seeds)
+def test_a_conditional_is_the_ratio_of_joint_and_marginal(name: str, seed: int) -> None:
+    mixture, points = random_kernels(name, seed)
+    space, width = mixture.space, len(mixture.space.columns)
+    estimator = DensityEstimator.fitted(mixture)
+    rows = space.from_chart(points)
+    joint = estimator.score_samples(rows)
+    own = list(space.columns[: width - 2])
+    for kept, known in (([*own, "beside1"], ["beside2"]), (["beside2", "beside1"], own)):
+        where = [space.columns.index(one) for one in known]
+        alone = estimator.marginal(*known).score_samples(rows[:, where])
+        for row, expected in zip(rows, joint - alone, strict=True):
+            part = estimator.conditional(dict(zip(known, row[where], strict=True)))
+            at = [space.columns.index(one) for one in part.feature_names_in_]
+            assert sorted(part.feature_names_in_) == sorted(kept)
+            assert part.score_samples(row[None, at])[0] == pytest.approx(expected, abs=1e-7)
+
+
+def test_the_integral_over_directions_and_all_reals_is_one() -> None:
+    space = ProductSpace(make_space("sphere", form="vector"), [(3.0, 2.0)])
+    mixture, _ = random_kernels("sphere", 0)
+    density = DensityEstimator.fitted(mixture).marginal("x", "y", "z", "beside1")
+    assert isinstance(density.space_, ProductSpace)
+    assert density.space_.beside == space.beside
+    # Gauss's rule in the height and even longitudes, times Gauss's rule on ever longer pieces
+    height, weights = np.polynomial.legendre.leggauss(40)
+    around = 2 * np.pi * (np.arange(80) + 0.5) / 80
+    z, angle = (own.ravel() for own in np.meshgrid(height, around, indexing="ij"))
+    across = np.sqrt(1 - z**2)
+    vectors = np.column_stack([across * np.cos(angle), across * np.sin(angle), z])
+    areas = np.repeat(weights, 80) * 2 * np.pi / 80
+    nodes, sizes = np.polynomial.legendre.leggauss(8)
+    ends = np.concatenate([[0.0], 0.5 * 1.8 ** np.arange(22)])
+    mass = 0.0
+    for side in (1, -1):
+        for low, high in pairwise(ends):
+            for node, size in zip(nodes, sizes, strict=True):
+                at = 3 + side * ((low + high) / 2 + (high - low) / 2 * node)
+                rows = np.column_stack([vectors, np.full(len(vectors), at)])
+                inside = np.exp(density.score_samples(rows)) @ areas
+                mass += float(inside) * size * (high - low) / 2
+    assert mass == pytest.approx(1, abs=2e-6)
+
+
+@given(names, seeds)
+def test_samples_have_the_moments_of_the_density(name: str, seed: int) -> None:
+    mixture, _ = random_kernels(name, seed, 3)
+    drawn = DensityEstimator.fitted(mixture).sample(4000, random_state=0)
+    alone = DensityEstimator.fitted(mixture).marginal("beside2")
+    hours = np.linspace(0, 24, 1201)
+    mass = np.exp(alone.score_samples(hours[:, None]))
+    below = np.concatenate([[0.0], np.cumsum((mass[1:] + mass[:-1]) / 2) * (hours[1] - hours[0])])
+    assert below[-1] == pytest.approx(1, abs=1e-4)
+    share = np.interp(np.sort(drawn[:, -1]), hours, below)
+    assert np.abs(share - (np.arange(4000) + 0.5) / 4000).max() < 0.04
+
+
+@given(names, seeds)
+def test_gradients_are_those_of_differences(name: str, seed: int) -> None:
+    mixture, points = random_kernels(name, seed)
+    space = mixture.space
+    estimator, rows = DensityEstimator.fitted(mixture), space.from_chart(points[:3])
+    slopes = estimator.score_gradient(rows)
+    for column in (-1, -2):
+        move = np.zeros(rows.shape[1])
+        move[column] = 1e-5
+        rise = estimator.score_samples(rows + move) - estimator.score_samples(rows - move)
+        np.testing.assert_allclose(slopes[:, column], rise / 2e-5, rtol=1e-4, atol=1e-5)
+
+
+def test_a_file_gives_the_same_density_back(tmp_path: Path) -> None:
+    for name in BASES:
+        mixture, points = random_kernels(name, 5)
+        path = tmp_path / f"{name}.safetensors"
+        path.write_bytes(density_to_bytes(mixture))
+        again, _ = read_density(path)
+        assert again.space == mixture.space
+        assert torch.equal(again.log_prob(points), mixture.log_prob(points))
+
+
+def place_and_season(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Directions that go with the day, a depth that goes with the height; and their log density."""
+    rng = np.random.default_rng(seed)
+    day = rng.uniform(0, 365.0, count)
+    turn = 2 * np.pi * day / 365
+    mean = np.column_stack([np.cos(turn), np.sin(turn), np.full(count, 0.5)]) / np.sqrt(1.25)
+    kappa = 20.0
+    vectors = np.array([stats.vonmises_fisher(m, kappa).rvs(1, random_state=rng)[0] for m in mean])
+    depth = 10 + 4 * vectors[:, 2] + rng.normal(size=count)
+    logs = np.log(kappa / (4 * np.pi * np.sinh(kappa))) + kappa * (vectors * mean).sum(axis=1)
+    logs += stats.norm.logpdf(depth, 10 + 4 * vectors[:, 2]) - np.log(365)
+    return np.column_stack([vectors, depth, day]), logs
+
+
+def test_a_fit_is_near_the_truth() -> None:
+    rows, _ = place_and_season(1000, 0)
+    unseen, truth = place_and_season(1000, 1)
+    how: dict[str, Any] = {"linear": [3], "period": {4: 365.0}, "components": "kernels,mixture"}
+    fit = DensityEstimator("sphere", **how).fit(rows)
+    regret = float((truth - fit.score_samples(unseen)).mean())
+    assert 0 < regret < 0.25
+    # what leaves the day out cannot know where it is
+    apart = fit.marginal("x", "y", "z", "beside1").score_samples(unseen[:, :4]) - np.log(365)
+    assert float((truth - apart).mean()) > regret + 0.5
+
+
+def test_columns_beside_come_last_or_have_names() -> None:
+    rows, _ = place_and_season(60, 0)
+    frame = {name: rows[:, k] for k, name in enumerate(("x", "y", "z", "depth", "day"))}
+    order = ["day", "x", "y", "z", "depth"]
+    structured = np.rec.fromarrays([frame[name] for name in order], names=",".join(order))
+    how: dict[str, Any] = {"components": "mixture", "seed": 0}
+    fit = DensityEstimator("sphere", linear=["depth"], period={"day": 365}, **how).fit(structured)
+    assert list(fit.feature_names_in_) == ["x", "y", "z", "day", "depth"]
+    plain = fit.score_samples(rows[:, [0, 1, 2, 4, 3]])
+    np.testing.assert_allclose(fit.score_samples(structured), plain)
+    with pytest.raises(SettingError, match="must come last"):
+        DensityEstimator("sphere", linear=[0], **how).fit(rows)
+    with pytest.raises(SettingError, match="no column is left"):
+        DensityEstimator("sphere", linear=[0, 1], **how).fit(rows[:, :2])
+    with pytest.raises(OrbiflowError, match="meaning together alone"):
+        fit.marginal("x", "depth")
+    with pytest.raises(OrbiflowError, match="meaning together alone"):
+        fit.conditional(x=1.0)
+    with pytest.raises(OrbiflowError, match="a period must be above 0"):
+        ProductSpace(make_space("sphere"), [-1.0])
+    with pytest.raises(OrbiflowError, match="take a MixedTorus"):
+        ProductSpace(make_space("torus"), [24.0])
+    with pytest.raises(OrbiflowError, match="needs a period, or"):
+        ProductSpace(make_space("sphere"), [None])
+
+
+@given(st.floats(0.1, 1e4), seeds)
+def test_a_period_of_its_own_is_a_unit(period: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    space, radians = MixedTorus([period]), MixedTorus([None])
+    values = rng.uniform(-2 * period, 2 * period, (20, 1))
+    back = space.from_chart(space.to_chart(values))
+    assert ((back >= 0) & (back < period)).all()
+    turns = (back - values) / period
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    kernels = torch.tensor([[0.3]]), torch.tensor([[4.0]]), torch.ones(1)
+    one, other = (AdaptiveKernels(own, *kernels) for own in (space, radians))
+    points = space.to_chart(values)
+    ratio = one.log_prob(points, measure="natural") - other.log_prob(points, measure="natural")
+    np.testing.assert_allclose(ratio, np.log(2 * np.pi / period), atol=1e-9)
