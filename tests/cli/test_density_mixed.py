@@ -61,9 +61,78 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     found = json.loads(Path("cv/report.json").read_text())
     assert found["uniform"] < 0
     for words, message in (
-        (["--space", "sphere", "--linear", "length"], "beside angles on a torus"),
-        (["--space", "torus", "--unit", "degrees", "--linear", "speed"], "--linear names speed"),
+        (["--space", "sphere", "--linear", "length"], "takes a latitude and a longitude"),
+        (["--space", "torus", "--unit", "degrees", "--linear", "speed"], "--period name speed"),
+        (["--space", "torus", "--period", "phi"], "columns with numbers above 0"),
+        (["--space", "torus", "--linear", "length", "--period", "length=2"], "is named twice"),
     ):
         done = orbiflow("density", "fit", "rows.csv", *words, "-o", "no")
         assert done.status == 2
         assert message in done.err
+
+
+def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(0)
+    day = rng.uniform(0, 365, 150)
+    lat = 20 * np.sin(2 * np.pi * day / 365) + 5 * rng.normal(size=150)
+    rows = np.column_stack([day, rng.normal(10, 20, 150), lat, 3 + lat / 20 + rng.random(150)])
+    np.savetxt("rows.csv", rows, delimiter=",", header="day,lon,lat,depth", comments="")
+    how = ["--space", "sphere", "--linear", "depth", "--period", "day=365"]
+    how += ["--components", "mixture"]
+    done = orbiflow("density", "fit", "rows.csv", *how, "-o", "fit")
+    assert done.status == 0, done.err
+    report = json.loads(Path("fit/report.json").read_text())
+    assert report["columns"] == ["lat", "lon", "day", "depth"]
+    assert report["space"]["base"]["name"] == "sphere"
+    done = orbiflow("density", "score", "rows.csv", "-m", "fit", "--given", "day", "-o", "g.csv")
+    assert done.status == 0, done.err
+    done = orbiflow("density", "conditional", "-m", "fit", "--given", "day=91", "-o", "spring")
+    assert done.status == 0, done.err
+    assert "per steradian times unit" in done.out
+    done = orbiflow("density", "marginal", "-m", "spring", "--columns", "lat,lon", "-o", "place")
+    assert done.status == 0, done.err
+    assert Path("place/density.png").exists()
+    done = orbiflow("density", "marginal", "-m", "fit", "--columns", "lat", "-o", "half")
+    assert done.status != 0
+    assert "have a meaning together alone" in done.err
+    pictures = ["--data", "rows.csv", "--along", "depth", "--at", "3,4", "-o", "p"]
+    done = orbiflow("density", "plot", "-m", "fit", *pictures)
+    assert done.status == 0, done.err
+    assert {path.name for path in Path("p").iterdir()} >= {"series.png", "beside.png"}
+    done = orbiflow("density", "plot", "-m", "fit", "--along", "lat", "-o", "q")
+    assert done.status == 2
+    assert "--along must be a column beside the sphere: day, depth" in done.err
+    done = orbiflow("density", "plot", "-m", "place", "--along", "day", "-o", "q")
+    assert done.status == 2
+    trend = ["--of", "depth", "--along", "day", "-n", 5, "-o", "t.csv"]
+    done = orbiflow("density", "trend", "-m", "fit", *trend)
+    assert done.status == 0, done.err
+    table = np.loadtxt("t.csv", delimiter=",", skiprows=1)
+    assert table[[0, -1], 0].tolist() == [0, 365]
+    assert table[1, 1] > table[3, 1] + 0.5
+    done = orbiflow("density", "cv", "rows.csv", *how, "--folds", 3, "-o", "cv")
+    assert done.status == 0, done.err
+    done = orbiflow("density", "summary", "rows.csv", *how[:-2], "-o", "s.json")
+    assert done.status == 2
+
+
+def test_hours_on_a_torus(tmp_path: Path, orbiflow, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(0)
+    hour = rng.vonmises(3.0, 2.0, 80) * 12 / np.pi % 24
+    rows = np.column_stack([hour, np.degrees(rng.vonmises(0, 1, 80))])
+    np.savetxt("rows.csv", rows, delimiter=",", header="hour,heading", comments="")
+    how = ["--space", "torus", "--unit", "degrees", "--period", "hour=24"]
+    done = orbiflow("density", "fit", "rows.csv", *how, "--components", "mixture", "-o", "fit")
+    assert done.status == 0, done.err
+    assert orbiflow("density", "sample", "-m", "fit", "-n", 200, "-o", "s.csv").status == 0
+    drawn = np.loadtxt("s.csv", delimiter=",", skiprows=1)
+    assert ((drawn[:, 0] >= 0) & (drawn[:, 0] < 24)).all()
+    assert np.median(drawn[:, 0]) == pytest.approx(11.5, abs=1.5)
+    done = orbiflow("density", "conditional", "-m", "fit", "--given", "heading=0", "-o", "c")
+    assert done.status == 0, done.err
+    table = np.loadtxt("c/density.csv", delimiter=",", skiprows=1)
+    assert table[0, 0] == 0
+    assert table[:, 1].sum() * 24 / len(table) == pytest.approx(1, abs=1e-6)
+    assert orbiflow("density", "plot", "-m", "fit", "-o", "p").status == 0

@@ -168,7 +168,7 @@ def place_and_season(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     day = rng.uniform(0, 365.0, count)
     turn = 2 * np.pi * day / 365
     mean = np.column_stack([np.cos(turn), np.sin(turn), np.full(count, 0.5)]) / np.sqrt(1.25)
-    kappa = 20.0
+    kappa = 20
     vectors = np.array([stats.vonmises_fisher(m, kappa).rvs(1, random_state=rng)[0] for m in mean])
     depth = 10 + 4 * vectors[:, 2] + rng.normal(size=count)
     logs = np.log(kappa / (4 * np.pi * np.sinh(kappa))) + kappa * (vectors * mean).sum(axis=1)
@@ -192,7 +192,9 @@ def test_columns_beside_come_last_or_have_names() -> None:
     rows, _ = place_and_season(60, 0)
     frame = {name: rows[:, k] for k, name in enumerate(("x", "y", "z", "depth", "day"))}
     order = ["day", "x", "y", "z", "depth"]
-    structured = np.rec.fromarrays([frame[name] for name in order], names=",".join(order))
+    structured = np.zeros(len(rows), dtype=[(name, "f8") for name in order])
+    for name in order:
+        structured[name] = frame[name]
     how: dict[str, Any] = {"components": "mixture", "seed": 0}
     fit = DensityEstimator("sphere", linear=["depth"], period={"day": 365}, **how).fit(structured)
     assert list(fit.feature_names_in_) == ["x", "y", "z", "day", "depth"]

@@ -462,6 +462,10 @@ def trend(
         density, extra = model_at(model)
         names = names_of(density, extra)
         first, second = axes_of([of, along], names, on_event)
+        called = names[first], names[second]
+        if density.space.parts:  # both of them are beside its own columns
+            axes = inference.chosen_columns(density.space, [first, second], len(names)).axes
+            density, first, second = inference.marginal(density, axes), 0, 1
         at = _values(density, second, settings)
         progress = runtime.progress_events(on_event, cancel)
         found = inference.trend(
@@ -469,7 +473,6 @@ def trend(
             tick=lambda share: progress(0.9 * share, "finding conditional densities"),
         )  # fmt: skip
         space = inference.check_torus(density.space, "trends").of_axes([first, second])
-        called = names[first], names[second]
         picture = pictures.trend_picture(found, space, called, Sheet.screen())
     heads = [called[1], called[0]]
     for level in found.levels:

@@ -22,7 +22,7 @@ from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.regions import size_unit
 from orbiflow.density.run_folder import SAMPLES, write_files
-from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
+from orbiflow.density.spaces import RotationSpace, Space, Torus
 from orbiflow.density.tables import Table, TableError, TableSettings, column_names, listing, to_csv
 from orbiflow.errors import InputFileError, SettingError, literal
 from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
@@ -257,11 +257,8 @@ def _words(density: Density, names: list[str], out: Path) -> str:
             f"its logarithm right within {density.error:.1e} nats (root mean square) where it is "
             f"dense, and {density.largest_error:.1e} anywhere"
         )
-    per = f"per {str(density.space.unit).removesuffix('s')}"
-    power = "" if len(names) == 1 else f"^{len(names)}"
-    if not isinstance(density.space, Torus) or isinstance(density.space, MixedTorus):
-        per, power = f"per {size_unit(density.space).removesuffix('s')}", ""
-    return f"the density of {', '.join(names)}, {per}{power}, {exact}; written to {out}"
+    per = re.sub(r"\b(degree|turn|radian|steradian|unit)s\b", r"\1", size_unit(density.space))
+    return f"the density of {', '.join(names)}, per {per}, {exact}; written to {out}"
 
 
 def _table(density: Density, space: Torus) -> Array:

@@ -204,6 +204,10 @@ def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
     """Return the label of an axis of a torus or Klein bottle, and the places and texts of its ticks."""
     if span := real_spans(view.space).get(axis):
         return axis_label(view, axis), *_ticks(*span)
+    if axis in _own_axes(view.space):
+        period = cast(MixedTorus, view.space).period_of(axis)
+        if len(f"{period / 4:g}") > QUARTER_LETTERS:
+            return axis_label(view, axis), *_ticks(0.0, period)
     if view.space.is_torus:
         low = float(view.low[axis])
         quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
@@ -214,6 +218,10 @@ def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
         turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
         label = axis_label(view, 1 - axis)
     return label, places, [turn_text(view.space, axis, t) for t in turns]
+
+
+QUARTER_LETTERS = 3
+"""The most letters of a quarter of a period for ticks at each: hours have, and days of the year not."""
 
 
 def turn_text(space: Space, axis: int, turns: float) -> str:
@@ -386,7 +394,7 @@ def sentences(parts: Sequence[str]) -> str:
 
 def caption_lines(words: str, sheet: Sheet) -> list[str]:
     """Break a caption into lines as wide as a picture for a screen."""
-    return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER_EMS * sheet.small)))
+    return textwrap.wrap(words, int(0.93 * 72 * sheet.width / (0.93 * LETTER_EMS * sheet.small)))
 
 
 def write_caption(figure: Figure, words: str, sheet: Sheet) -> None:

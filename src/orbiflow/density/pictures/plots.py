@@ -18,6 +18,7 @@ from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
+from orbiflow.density.inference import marginal
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import figures
 from orbiflow.density.pictures.coastlines import coastlines_for, simplified
@@ -29,6 +30,7 @@ from orbiflow.density.pictures.grounds import region_lines
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import PlateCarree, chosen_map
 from orbiflow.density.pictures.roses import rose_picture
+from orbiflow.density.pictures.series import along_of, series_picture
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import density_page
 from orbiflow.density.pictures.textures import (
@@ -37,7 +39,7 @@ from orbiflow.density.pictures.textures import (
     poles_picture,
     sections_picture,
 )
-from orbiflow.density.spaces import RotationSpace, Space, check_measure
+from orbiflow.density.spaces import ProductSpace, RotationSpace, Space, check_measure
 from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
@@ -55,8 +57,9 @@ THUMBNAIL = "thumbnail.png"
 """The small picture beside the model of a fit in a batch."""
 
 PAGE = "surface.html"
-NAMES = ("density", "latlon", "square", "flow", "samples", "rose", "poles", "inverse", "sections")
-PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
+NAMES = ("density", "latlon", "square", "flow", "samples", "rose", "series", "beside")
+TEXTURE_NAMES = ("poles", "inverse", "sections")
+PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES + TEXTURE_NAMES), PAGE)
 """The files that a plot may write into a folder, and that go when another one is written there."""
 
 SAMPLES = 3000
@@ -107,7 +110,7 @@ def plot_density(
         settings = settings.replace(format="pdf")
     else:
         refuse_foreign_files(out)
-    shown = _Shown(density_of(density, "this DensityEstimator"), settings, data)
+    shown = _shown(density_of(density, "this DensityEstimator"), settings, data)
     if not single:
         make_folder(out)
     form, makers, pictures = settings.sheet.format, shown.makers(), dict[str, Picture]()
@@ -160,6 +163,56 @@ def is_one_file(out: Path) -> bool:
     return True
 
 
+class _ShownBeside:
+    """A density on a space beside other columns: what is drawn of both, and of one along the other."""
+
+    flows, coastlines = False, list[Array]()
+
+    def __init__(
+        self, density: Density, space: ProductSpace, settings: PlotSettings, data: ArrayLike | None
+    ) -> None:
+        self.density, self.space, self.settings = density, space, settings
+        names = settings.names or space.columns
+        self.first = len(names) - space.beside.dim
+        self.along = along_of(density, names, settings)
+        table = None if data is None else np.asarray(data, dtype=np.float64)
+        every = range(space.chart_dim)
+        base = marginal(density, every[: space.together])
+        own = settings.replace(names=names[: self.first], along=None, at=None)
+        self.base = _Shown(base, own, None if table is None else table[:, : self.first])
+        beside = marginal(density, every[space.together :])
+        other = PlotSettings(**{name: getattr(settings, name) for name in FOR_COLUMNS})
+        other = other.replace(names=names[self.first :])
+        self.beside = _Shown(beside, other, None if table is None else table[:, self.first :])
+        self.points = self.base.points
+
+    def makers(self) -> Mapping[str, Callable[[], Picture]]:
+        """Return functions that draw the figures, by the names of their files without the ending."""
+        found = dict(self.base.makers())
+        if self.space.base.dim == 2:
+            ground = self.base.grounds()["density"]
+            found["series"] = partial(
+                series_picture, self.density, self.along, self.settings, ground
+            )
+        one = self.beside.makers()
+        return {**found, "beside": one.get("samples") or one["density"]}
+
+
+FOR_COLUMNS = ("format", "width", "samples", "seed")
+"""Settings that hold for pictures of columns beside a space, too."""
+
+
+def _shown(
+    density: Density, settings: PlotSettings, data: ArrayLike | None
+) -> _Shown | _ShownBeside:
+    if isinstance(density.space, ProductSpace):
+        return _ShownBeside(density, density.space, settings, data)
+    for name in ("along", "at"):
+        if getattr(settings, name) is not None:
+            raise SettingError(f"{{{name}}} is of columns beside another space: leave it out")
+    return _Shown(density, settings, data)
+
+
 class _Shown:
     """A density and what is drawn with it; all that can be wrong is checked before the work."""
 
@@ -194,7 +247,7 @@ class _Shown:
                 what = "samples" if data is None else "data"
                 made["rose"] = partial(rose_picture, density, self.points, settings, what=what)
             return made
-        grounds = self._grounds()
+        grounds = self.grounds()
         dots = self.points if settings.dots else None
         draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
         makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
@@ -205,7 +258,7 @@ class _Shown:
             makers["samples"] = partial(draw, ground=grounds["density"])
         return makers
 
-    def _grounds(self) -> dict[str, figures.Ground]:
+    def grounds(self) -> dict[str, figures.Ground]:
         """Return what the density is drawn on, by the names of the figures."""
         space, square = self.space, figures.plane_ground(self.space, self.settings)
         if self.map is None:
@@ -261,6 +314,9 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     that the density was fitted to; rows that lack angles are left out.
     """
     space, table = density.space, np.asarray(data, dtype=np.float64)
+    if isinstance(space, ProductSpace):
+        base = marginal(density, range(space.together))
+        return density_thumbnail(base, table[:, : table.shape[1] - space.beside.dim])
     whole = table[~np.isnan(table).any(axis=1)]
     figure = SHEET.figure(SIZE[1] / 100)
     if space.has_chart and space.dim == 2:

@@ -103,6 +103,14 @@ class PlotSettings(Settings, group="Figures"):
     earth: Annotated[bool, Option("--earth", off="--no-coastlines"), MAPS] = True
     """Draw the Earth's coastlines where the data are lat,lon, unless there are others."""
 
+    along: Annotated[str | None, DefaultText("the first")] = None
+    """Of a space beside other columns, the one along which a series of pictures is drawn."""
+
+    at: Annotated[
+        tuple[float, ...] | None, DefaultText("six: even ones of a period, else by equal masses")
+    ] = None
+    """Values of that column."""
+
     pole: Annotated[tuple[str, ...] | None, TEXTURES, DefaultText("planes of low indices")] = None
     """Lattice planes of orientations, by Miller indices such as 001,1-11, whose pole figures are drawn;
     four indices, such as 10-10, are of hexagonal crystals."""

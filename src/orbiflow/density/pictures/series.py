@@ -1,0 +1,167 @@
+"""A series of pictures of a space of two dimensions: how its density changes along another column."""
+
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import torch
+
+from orbiflow.density.inference import chosen_columns, conditional, marginal
+from orbiflow.density.models import Density
+from orbiflow.density.pictures import frames
+from orbiflow.density.pictures.colours import bar_label, bar_ticks, density_over, is_sharp, shading
+from orbiflow.density.pictures.grounds import Colouring, Ground
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.spaces import ProductSpace
+from orbiflow.drawing import Picture, Sheet
+from orbiflow.errors import SettingError, literal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PANELS = 6
+"""Values that are drawn if none are asked for."""
+
+PIXELS = {True: 60_000, False: 160}
+"""Pixels of a map in all, or along the side of a square."""
+
+MOST_ACROSS, WIDE = 3, 1.5
+"""Panels side by side at most, and the width over the height of those of which two are."""
+
+DIGITS = 3
+"""Digits of a value above its panel."""
+
+
+class Along(NamedTuple):
+    """A column beside a space: its number among all columns, its name, and values of it."""
+
+    column: int
+    name: str
+    values: tuple[float, ...]
+
+
+def along_of(density: Density, names: tuple[str, ...], settings: PlotSettings) -> Along:
+    """Return the column along which a series goes, and its values.
+
+    These are even ones of a periodic column, and of a real one the middles of parts that have the same
+    mass.
+
+    Raises `SettingError` for another column.
+    """
+    space = density.space
+    assert isinstance(space, ProductSpace)
+    first = len(names) - space.beside.dim
+    called = [name.casefold() for name in names[first:]]
+    asked = (settings.along or names[first]).casefold()
+    if asked not in called:
+        listed = literal(", ".join(names[first:]))
+        raise SettingError(f"{{along}} must be a column beside the {space.base.name}: {listed}")
+    number = called.index(asked)
+    period = space.beside.period_of(number)
+    values = settings.at
+    if values is None and period:
+        values = tuple(period * (k + 0.5) / PANELS for k in range(PANELS))
+    elif values is None:
+        alone = marginal(density, chosen_columns(space, [first + number], len(names)).axes)
+        masses = (torch.arange(PANELS, dtype=torch.float64) + 0.5) / PANELS
+        values = tuple(alone.space.from_chart(alone.icdf(masses))[:, 0].tolist())
+    return Along(first + number, names[first + number], values)
+
+
+@torch.no_grad()
+def series_picture(
+    density: Density,
+    along: Along,
+    settings: PlotSettings,
+    ground: Ground,
+    *,
+    sheet: Sheet | None = None,
+) -> Picture:
+    """Draw the densities of a space where another column has some values, in the same colours.
+
+    Args:
+        density: A density on a `ProductSpace` whose base has two dimensions.
+        along: The column and its values.
+        settings: How it is drawn.
+        ground: What each is drawn on.
+        sheet: The sheet. Default: that of the settings.
+    """
+    space, sheet = density.space, sheet or settings.sheet
+    assert isinstance(space, ProductSpace)
+    axis = space.base.chart_dim + along.column - (len(space.columns) - space.beside.dim)
+    base = list(range(space.base.chart_dim))
+    pixels = ground.pixels(PIXELS[ground.outline is not None])
+    parts: list[Density] = []
+    for value in along.values:
+        turns = space.beside.turns(axis - len(base), torch.tensor(value, dtype=torch.float64))
+        parts.append(conditional(density, {axis: float(turns)}, base))
+    tables = [density_over(part, pixels.points, settings.measure, pixels.side) for part in parts]
+    areas = None if pixels.areas is None else pixels.areas[pixels.within]
+    every = np.concatenate([values[pixels.within] for values in tables])
+    log = None if settings.scale == "auto" else settings.scale == "log"
+    shade = shading(every, None if areas is None else np.tile(areas, len(tables)), log=log)
+    notes = ["Where the other column has the values above the panels"]
+    notes.append(f"Colours are {'logarithmic' if shade.log else 'linear'}, the same in all panels")
+    if any(is_sharp(part, pixels.side) for part in parts):
+        notes.append(f"peaks narrower than {pixels.size} are averaged over it")
+    caption = ground.caption(notes, None)
+    label = bar_label(shade, ground.space, settings.measure)
+    page = _Page(sheet, ground, len(tables), caption, label, [t.text for t in bar_ticks(shade)])
+    for k, (value, values) in enumerate(zip(along.values, tables, strict=True)):
+        axes = page.axes(k)
+        places = pixels.table(shade.places(values), 0.0)
+        colouring = Colouring(places, pixels.extent, shade, "", "", None, ground.outline)
+        image = colouring.draw(axes)
+        ground.draw_axes(axes, sheet, page.side, frames.Panel(False, k % page.columns == 0))
+        number = f"{value:.{DIGITS}g}".replace("-", "\N{MINUS SIGN}")
+        head = f"{frames.cut(frames.symbol(along.name), 24)} = {number}"
+        axes.set_title(head, fontsize=sheet.text, pad=ground.title_gap * sheet.text)
+        if k == 0:
+            frames.colour_bar(image, page.frame(axes), sheet, label, shade)
+    title = f"Density on the {frames.space_title(space.base)} along {frames.cut(along.name, 40)}"
+    if not sheet.printed:
+        frames.write_caption(page.figure, caption, sheet)
+    return Picture(page.figure, sheet, title, caption)
+
+
+class _Page:
+    """Equal panels in rows, `side` inches wide, beside one colour bar."""
+
+    def __init__(
+        self, sheet: Sheet, ground: Ground, count: int, caption: str, label: str, ticks: list[str]
+    ) -> None:
+        own, _ = ground.panels_room(sheet)
+        self.sheet, self.gap = sheet, own.gap * sheet.em
+        self.between = sheet.em * (own.above + own.below)
+        room = own._replace(above=own.above + 0.6, gap=1.6, bar=1.2)
+        room = frames.room_for_bar_beside(sheet, room, label, ticks)
+        room = room.with_words(caption, sheet)
+        self.room, self.beside = room._replace(right=room.right + own.right), own.right
+        inner = sheet.width - sheet.em * (self.room.left + self.room.right)
+        most = MOST_ACROSS if ground.aspect < WIDE else 2
+        self.columns = 1 if sheet.printed and sheet.width < frames.NARROW_INCHES else most
+        self.columns = min(self.columns, count)
+        self.side = (inner - (self.columns - 1) * self.gap) / self.columns
+        self.high, self.rows = self.side / ground.aspect, -(-count // self.columns)
+        tall = self.rows * self.high + (self.rows - 1) * self.between
+        self.figure = sheet.figure(tall + sheet.em * (self.room.above + self.room.below))
+
+    def axes(self, number: int) -> Axes:
+        """Return the axes of a panel, by its number from the top left."""
+        row, column = divmod(number, self.columns)
+        left = self.sheet.em * self.room.left + column * (self.side + self.gap)
+        below = self.sheet.em * self.room.below
+        below += (self.rows - 1 - row) * (self.high + self.between)
+        return frames.axes_at(self.figure, left, below, self.side, self.high)
+
+    def frame(self, axes: Axes) -> frames.Frame:
+        """Return the frame of one panel with the bar of all."""
+        em, wide = self.sheet.em, self.figure.get_size_inches()[0]
+        left = wide - em * (self.room.right - self.beside - self.room.gap)
+        tall = self.rows * self.high + (self.rows - 1) * self.between
+        bar = frames.axes_at(self.figure, left, em * self.room.below, em * self.room.bar, tall)
+        return frames.Frame(self.figure, axes, bar, tall)
