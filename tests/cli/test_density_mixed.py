@@ -34,8 +34,12 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     assert {path.name for path in Path("p").iterdir()} >= {"density.png"}
     assert not Path("p/surface.html").exists()
     done = orbiflow("density", "region", "-m", "part", "--mass", "0.5", "-o", "r.json")
-    assert done.status == 2
-    assert "of angles alone, not of real columns" in done.err
+    assert done.status == 0, done.err
+    (half,) = json.loads(Path("r.json").read_text())["regions"]
+    inside = table[:, 2] >= np.exp(half["log_prob"])
+    assert table[inside, 2].sum() * cell == pytest.approx(0.5, abs=0.03)
+    assert half["size"] == pytest.approx(inside.sum() * cell, rel=0.1)
+    assert half["fraction"] is None
     done = orbiflow("density", "score", "rows.csv", "-m", "fit", "--given", "phi", "-o", "g.csv")
     assert done.status == 0, done.err
     joint, given = (
@@ -61,7 +65,7 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     found = json.loads(Path("cv/report.json").read_text())
     assert found["uniform"] < 0
     for words, message in (
-        (["--space", "sphere", "--linear", "length"], "takes a latitude and a longitude"),
+        (["--space", "sphere", "--linear", "length"], "beyond 90 degrees"),
         (["--space", "torus", "--unit", "degrees", "--linear", "speed"], "--period name speed"),
         (["--space", "torus", "--period", "phi"], "columns with numbers above 0"),
         (["--space", "torus", "--linear", "length", "--period", "length=2"], "is named twice"),

@@ -25,6 +25,7 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
+from orbiflow.density.regions import DensityLevels
 from orbiflow.errors import OrbiflowError, SettingError
 
 BASES: dict[str, Space] = {
@@ -230,3 +231,18 @@ def test_a_period_of_its_own_is_a_unit(period: float, seed: int) -> None:
     points = space.to_chart(values)
     ratio = one.log_prob(points, measure="natural") - other.log_prob(points, measure="natural")
     np.testing.assert_allclose(ratio, np.log(2 * np.pi / period), atol=1e-9)
+
+
+@given(names, seeds)
+def test_regions_hold_their_mass_and_sizes_are_integrals(name: str, seed: int) -> None:
+    mixture, _ = random_kernels(name, seed, 3)
+    levels = DensityLevels(mixture, samples=4000)
+    found = levels.highest(0.6)
+    drawn = mixture.sample((4000,), torch.Generator().manual_seed(1))
+    logs = mixture.log_prob(drawn, measure="natural")
+    inside = logs >= found.log_prob
+    assert float(inside.double().mean()) == pytest.approx(0.6, abs=0.06)
+    # the mean of 1 / p over the density is the size
+    size = float((-logs[inside]).exp().sum()) / len(logs)
+    assert found.size == pytest.approx(size, rel=0.15)
+    assert found.fraction is None

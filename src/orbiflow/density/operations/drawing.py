@@ -123,7 +123,8 @@ def region(
 ) -> runtime.Outcome:
     """Find the smallest regions that hold a mass: threshold, size, and boundary as closed polygons.
 
-    On a torus of more or fewer than two angles there are threshold and size alone.
+    On a torus of more or fewer than two angles, and where columns are real, there are threshold and
+    size alone.
 
     Args:
         model: Folder that `fit` wrote.
@@ -137,7 +138,7 @@ def region(
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
-    if settings.min_mass is not None and not space.is_planar:
+    if settings.min_mass is not None and not space.is_surface:
         raise SettingError("{min_mass} is of islands, which are outlined in two dimensions alone")
     samples = regions.samples_for(settings.masses, settings.samples)
     progress = runtime.progress_events(on_event, cancel)
@@ -149,7 +150,7 @@ def region(
         found = [levels.highest(mass) for mass in settings.masses]
         found += [levels.above(level) for level in settings.level or ()]
         drawn: list[Outline] = []
-        if space.is_planar:
+        if space.is_surface:
             drawn = regions.outlines(
                 levels, found, budget=settings.budget, seed=settings.seed, min_mass=settings.min_mass,
                 told=lambda share, what: progress(0.1 + 0.9 * share, what),
@@ -168,12 +169,12 @@ def region(
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
     """Check that regions of a space can be written in a format."""
-    if kind == ".geojson" and not (space.is_round and space.is_planar):
+    if kind == ".geojson" and not (space.is_round and space.is_surface):
         raise OrbiflowError(
             f"{out}: GeoJSON is for places on a globe, not for points of the {space.name}: write .json"
-            + " or .csv" * space.is_planar
+            + " or .csv" * space.is_surface
         )
-    if kind == ".csv" and not space.is_planar:
+    if kind == ".csv" and not space.is_surface:
         raise OrbiflowError(
             f"{out}: a table holds outlines, which are drawn in two dimensions; this {space.name} has "
             f"{space.dimensions}: write .json, and use `orbiflow density score --region` for the rows "
@@ -200,12 +201,12 @@ def _described(found: DensityRegion, outline: Outline | None) -> str:
         count = len(outline.shape.geoms)
         polygons = f"; {_counted(count, 'polygon')}, which {'holds' if count == 1 else 'hold'} "
         polygons += _with_error(outline.mass, outline.error)
+    share = "" if drawn.fraction is None else f", {_percentage(drawn.fraction)} of the space"
     of = "log density" if found.smooth is None else "smoothed log density"
     return (
         f"mass {_with_error(found.held, found.error)}: {of} of at least "
         f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
-        f"{drawn.size:.6g} {regions.size_unit(found.density.space)}, "
-        f"{_percentage(drawn.fraction)} of the space{polygons}"
+        f"{drawn.size:.6g} {regions.size_unit(found.density.space)}{share}{polygons}"
     )
 
 

@@ -15,10 +15,10 @@ from orbiflow.arguments import as_number, as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of, scores_of
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import AdaptiveKernels, Density
+from orbiflow.density.models import AdaptiveKernels, Density, UniformDensity
 from orbiflow.density.regions.settings import MAX_SAMPLES, MIN_SAMPLES, SAMPLES, samples_for
-from orbiflow.density.spaces import whole_turn
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.density.spaces import MixedTorus, whole_turn
+from orbiflow.errors import SettingError
 from orbiflow.runtime import one_thread
 
 SAMPLES_PER_EVEN_POINT = 4
@@ -42,7 +42,7 @@ class DensityRegion:
     - `held`, `error`: The mass that the region holds, from samples, and its standard error. If a mass
       was asked for, the threshold is uncertain by so much.
     - `log_prob`: The threshold in nats. `log_prob_low`, `log_prob_high`: Its interval of 95 %.
-    - `size`, `size_error`: The size in natural measure (steradians, or the product of the angles'
+    - `size`, `size_error`: The size in natural measure (steradians, or the product of the columns'
       units), from samples, and its standard error.
     - `smooth`: The width of the smoothing. Then `density` and `log_prob` are of the smoothed density,
       and `held` is the mass of the density itself.
@@ -60,9 +60,10 @@ class DensityRegion:
     smooth: float | None = None
 
     @property
-    def fraction(self) -> float:
-        """The share of the space's natural measure."""
-        return self.size / self.density.space.volume
+    def fraction(self) -> float | None:
+        """The share of the space's natural measure, None where columns are real."""
+        volume = self.density.space.volume
+        return self.size / volume if math.isfinite(volume) else None
 
     def contains(self, data: ArrayLike) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Return whether data (N, k), in the space's own units, lie inside: (N,)."""
@@ -97,10 +98,6 @@ class DensityLevels:
         smooth: float | None = None,
     ) -> None:
         self.density, self.smooth = density_of(density), smooth
-        if not math.isfinite(self.density.space.volume):
-            raise OrbiflowError(
-                "regions of highest density are of angles alone, not of real columns"
-            )
         count = as_whole(samples, "samples", MIN_SAMPLES, MAX_SAMPLES)
         generator = torch.Generator().manual_seed(as_whole(seed, "seed", 0, 2**63 - 1))
         self.points: Tensor = self.density.sample((count,), generator).double()
@@ -110,9 +107,15 @@ class DensityLevels:
         if smooth is not None:
             self.surface = smoothed(self.density, smooth, generator)
         self.log_probs, self._even = (self._logs(points) for points in (self.points, even))
-        self._of_surface = self.log_probs
+        drawn, self._of_surface = self.points, self.log_probs
         if smooth is not None:
-            self._of_surface = self._logs(self.surface.sample((count,), generator).double())
+            drawn = self.surface.sample((count,), generator).double()
+            self._of_surface = self._logs(drawn)
+        spread = UniformDensity(self.density.space)  # that of the even points
+        self._floors = [
+            spread.log_prob(points, measure="natural").numpy() + math.log(evenly)
+            for points in (drawn, even)
+        ]
         self._sorted = np.sort(self.log_probs)
 
     def _logs(self, points: Tensor) -> Array:
@@ -161,15 +164,13 @@ class DensityLevels:
         Samples and even points are weighted by the mixture that they are drawn from (balance
         heuristic: Veach and Guibas, Optimally combining sampling techniques, 1995).
         """
-        volume, kinds = self.density.space.volume, (self._of_surface, self._even)
-        floor = math.log(len(self._even)) - math.log(volume)
         size, variance = 0.0, 0.0
-        for logs in kinds:
+        for logs, floor in zip((self._of_surface, self._even), self._floors, strict=True):
             weights = np.exp(-np.logaddexp(logs + math.log(len(self.log_probs)), floor))
             shares = np.where(logs >= level, weights, 0.0)
             size += float(shares.sum())
             variance += float(shares.var()) * len(shares)
-        return min(size, volume), math.sqrt(variance)
+        return min(size, self.density.space.volume), math.sqrt(variance)
 
 
 def smoothed(density: Density, width: float, generator: torch.Generator) -> AdaptiveKernels:
@@ -181,7 +182,7 @@ def smoothed(density: Density, width: float, generator: torch.Generator) -> Adap
         generator: Source of the samples.
     """
     space = density.space
-    if not space.is_round and space.unit in (None, "units"):
+    if not space.is_round and (space.unit in (None, "units") or isinstance(space, MixedTorus)):
         raise SettingError(f"{{smooth}} is for angles and directions, not for the {space.name}")
     turn = 360.0 if space.is_round else whole_turn(str(space.unit))
     least = turn / (2 * math.pi) * MAX_CONCENTRATION**-0.5

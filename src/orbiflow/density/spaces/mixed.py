@@ -135,6 +135,10 @@ class MixedTorus(Torus):
         return False
 
     @property
+    def dimensions(self) -> str:
+        return f"{self.dim}, and not of angles alone"
+
+    @property
     def data_name(self) -> str:
         return "torus"
 
