@@ -29,6 +29,7 @@ from orbiflow.density.fitting.families import (
     MixtureFamily,
     NetworkFamily,
     ParametricFamily,
+    ProductChainFamily,
 )
 from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.flow_trial import (
@@ -75,8 +76,8 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, PARAMETRIC, DensitySettings
-from orbiflow.density.models import MOST_DIM, Density, Mixture, flow_obstacle
-from orbiflow.density.spaces import Space, Torus
+from orbiflow.density.models import MOST_BESIDE, MOST_DIM, Density, Mixture, flow_obstacle
+from orbiflow.density.spaces import ProductSpace, Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.runtime import SideBySide
 
@@ -274,6 +275,8 @@ def _families(
     ]
     if space.is_torus and space.dim > 1:
         families.append(ChainFamily(space, settings.seed, starts))
+    if isinstance(space, ProductSpace) and space.beside.dim <= MOST_BESIDE:
+        families.append(ProductChainFamily(space, settings.seed, narrowest))
     if isinstance(space, Torus) and space.dim > MOST_DIM:
         families.append(NetworkFamily(space, settings.seed))
     named = [name for name in settings.allowed if name in PARAMETRIC]

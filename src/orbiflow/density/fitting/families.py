@@ -21,6 +21,7 @@ from orbiflow.density.fitting.chains import (
 from orbiflow.density.fitting.held_out import stacking_weights
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
 from orbiflow.density.fitting.parametric import fit_density_of
+from orbiflow.density.fitting.product_chains import fit_product_chains
 from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, UniformDensity, averaged_networks
@@ -215,6 +216,32 @@ class ChainFamily(SizedFamily):
             str(size): _mean([fit(size, turn) for turn in range(self.starts)])
             for size in self.sizes
         }
+
+
+@dataclass
+class ProductChainFamily(SizedFamily):
+    """Mixtures of chains on a product: other columns, then a point of its base."""
+
+    space: Space
+    seed: int
+    narrowest: float = NARROWEST
+    name = "chains"
+
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
+        train = train[:MOST_CHAINED]
+        generator = torch.Generator().manual_seed(self.seed + number)
+
+        def fit(size: int) -> Density:
+            say(f"chains of {size}")
+            start = fit_mixture(
+                self.space, train, size, narrowest=self.narrowest, generator=generator
+            )
+            return fit_product_chains(start, train, narrowest=self.narrowest)
+
+        if self.sizes is None:
+            sizes = [k for k in SIZES if k == 1 or CHAIN_ROWS * k <= len(train)]
+            return _grown(fit, sizes, held)
+        return {str(size): fit(size) for size in self.sizes}
 
 
 @dataclass

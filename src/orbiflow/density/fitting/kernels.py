@@ -229,7 +229,7 @@ def fit_mixture(
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
         resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (known + PRIOR_POINTS)
-        kappa = _concentrations(resultant, space.spheres).clamp(WIDEST / 100, narrowest)
+        kappa = concentrations_of(resultant, space.spheres).clamp(WIDEST / 100, narrowest)
         if score - last < MIN_GAIN_NATS * len(train):
             break
         last = score
@@ -280,7 +280,7 @@ def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
     return (parts / length.clamp_min(1e-300)[:, None]).flatten(1), length
 
 
-def _concentrations(resultant: Tensor, spheres: Sequence[int]) -> Tensor:
+def concentrations_of(resultant: Tensor, spheres: Sequence[int]) -> Tensor:
     """Return the concentrations (K, F) of mean cosines on spheres of these dimensions."""
     found = torch.empty_like(resultant)
     for dim in set(spheres):

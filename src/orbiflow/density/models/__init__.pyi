@@ -35,6 +35,8 @@ from .mixture import mixture_of as mixture_of
 from .network import VonMisesNetwork as VonMisesNetwork
 from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
+from .product_chains import MOST_BESIDE as MOST_BESIDE
+from .product_chains import ProductChains as ProductChains
 from .sine import VonMisesSine as VonMisesSine
 from .sine import log_sine as log_sine
 from .sums import FAINT_LOG as FAINT_LOG

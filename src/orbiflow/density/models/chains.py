@@ -272,8 +272,8 @@ def chained(order: Tensor) -> Tensor:
 
 
 def waves(angle: Tensor) -> Tensor:
-    """Return 1, sin and cos of angles (N, d) in radians: (N, 1 + 2 d)."""
-    return torch.cat([torch.ones_like(angle[:, :1]), angle.sin(), angle.cos()], dim=1)
+    """Return 1, sin and cos of angles (..., d) in radians: (..., 1 + 2 d)."""
+    return torch.cat([torch.ones_like(angle[..., :1]), angle.sin(), angle.cos()], dim=-1)
 
 
 BLOCK_ENTRIES = 2_000_000

@@ -395,6 +395,12 @@ class Split:
         return (*self.kept, *self.given)
 
 
+def in_order(points: Tensor, axes: Sequence[int]) -> tuple[Tensor, list[int]]:
+    """Return points (N, a) of some coordinates, and the numbers of these, in increasing order."""
+    order = sorted(range(len(axes)), key=axes.__getitem__)
+    return points[:, order], [axes[k] for k in order]
+
+
 Weighted = tuple[float, Density]
 """A density with the logarithm of its weight."""
 

@@ -77,7 +77,13 @@ def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
 
 
 def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
-    for module in ("mixture", "network", "fisher_bingham", "sine"):  # now all kinds are known
+    for module in (
+        "mixture",
+        "network",
+        "fisher_bingham",
+        "sine",
+        "product_chains",
+    ):  # now all kinds are known
         import_module(f"orbiflow.density.models.{module}")
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.density import Density, Restriction, Split, in_order
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
@@ -223,6 +223,7 @@ class UniformDensity(Density, kind="uniform"):
         del seed
         if not self.space.parts:
             return torch.zeros(len(points), dtype=torch.float64)
+        points, axes = in_order(points, axes)
         return UniformDensity(self.space.of_axes(axes)).log_chart(points.double())
 
     def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor:

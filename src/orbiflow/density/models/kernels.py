@@ -14,7 +14,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
-from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
+from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted, in_order
 from orbiflow.density.models.rotation_kernels import RotationKernels
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
 from orbiflow.density.spaces import CHART, RotationSpace, Space, by_sphere
@@ -116,7 +116,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         weights = self.weights.cpu().numpy()
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
         kappa = self.concentrations.cpu()[chosen]
-        return _drawn(self.space, self.centers.cpu()[chosen], kappa, rng)
+        return drawn_about(self.space, self.centers.cpu()[chosen], kappa, rng)
 
     @classmethod
     def joined(cls, components: Sequence[Any], weights: Tensor) -> Self:
@@ -134,10 +134,9 @@ class AdaptiveKernels(Density, kind="kernels"):
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         del seed
         if self.space.parts:
-            (_, own), *_ = self.restricted(
-                Split(self.space.chart_dim, tuple(axes)), self.space.of_axes(axes)
-            ).closed
-            return own.log_chart(points)
+            points, axes = in_order(points, axes)
+            split = Split(self.space.chart_dim, tuple(axes))
+            return self.restricted(split, self.space.of_axes(axes)).closed[0][1].log_chart(points)
         logs = self.weights.log()
         block = max(1, BLOCK_ENTRIES // len(self.weights))
         parts = [
@@ -213,27 +212,27 @@ def _terms(space: Space, features: Tensor, kappa: Tensor, weights: Tensor) -> Te
     """Return kernels about all E images (m, E * N) of their centers: then points need no images."""
     moves = torch.as_tensor(space.moves).to(kappa)
     every = torch.cat([move @ kappa.mT for move in moves], dim=1)
-    return Terms(features, every, (_peaks(space, kappa) + weights.log()).repeat(len(moves)))
+    return Terms(features, every, (kernel_peaks(space, kappa) + weights.log()).repeat(len(moves)))
 
 
-def _peaks(space: Space, kappa: Tensor) -> Tensor:
+def kernel_peaks(space: Space, kappa: Tensor) -> Tensor:
     """Return logarithms (N,) of the largest values of kernels of concentrations (N, F)."""
     if space.parts:
         widths = [len(part.spheres) for part in space.parts]
         own = zip(space.parts, torch.split(kappa, widths, dim=1), strict=True)
-        return torch.stack([_peaks(part, some) for part, some in own]).sum(dim=0)
+        return torch.stack([kernel_peaks(part, some) for part, some in own]).sum(dim=0)
     if space.is_round:
         return _round_peaks(kappa[:, 0], space.dim)
     return -(special.i0e(kappa) * space.sides.to(kappa)).log().sum(dim=1)
 
 
-def _drawn(space: Space, centers: Tensor, kappa: Tensor, rng: np.random.Generator) -> Tensor:
+def drawn_about(space: Space, centers: Tensor, kappa: Tensor, rng: np.random.Generator) -> Tensor:
     """Return a draw (N, d) of each of N kernels."""
     if space.parts:
         widths = [len(part.spheres) for part in space.parts]
         places = torch.split(centers, [part.chart_dim for part in space.parts], dim=1)
         every = zip(space.parts, places, torch.split(kappa, widths, dim=1), strict=True)
-        return torch.cat([_drawn(*one, rng) for one in every], dim=1)
+        return torch.cat([drawn_about(*one, rng) for one in every], dim=1)
     if space.is_round:
         vectors = _von_mises_fisher(space.features(centers)[0].numpy(), kappa[:, 0].numpy(), rng)
         return space.from_features(torch.tensor(vectors))
@@ -268,7 +267,7 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
     They are with respect to the chart's area on flat spaces and to the round area on round ones.
     """
     rows = kappa.repeat(1, centers.shape[1] // kappa.shape[1]) * centers
-    return rows, _peaks(space, kappa) - kappa.sum(dim=1)
+    return rows, kernel_peaks(space, kappa) - kappa.sum(dim=1)
 
 
 def _von_mises_fisher(centers: Array, kappa: Array, rng: np.random.Generator) -> Array:

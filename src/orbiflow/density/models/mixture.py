@@ -14,7 +14,7 @@ from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
 from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.spaces import MixedTorus, Space, Torus
+from orbiflow.density.spaces import MixedTorus, ProductSpace, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
 from orbiflow.typed_torch import listed
@@ -208,14 +208,14 @@ class PartialDensity(Density, kind="partial"):
     resampling: Rubin, 1987), of which `effective_share` says how many count.
 
     Args:
-        whole: A density on a torus.
-        split: Which of its angles are kept, given and hidden.
+        whole: A density on a torus, or on a product.
+        split: Which of its coordinates are kept, given and hidden.
     """
 
     article = "a part of another density"
 
     def __init__(self, whole: Density, split: Split) -> None:
-        super().__init__(as_instance(whole.space, Torus, "the whole's space").of_axes(split.kept))
+        super().__init__(whole.space.of_axes(split.kept))
         self.whole, self.split = whole, split
         self.log_given = 0.0
         if split.given:
@@ -294,7 +294,9 @@ class PartialDensity(Density, kind="partial"):
         kept, given = list(self.split.kept), list(self.split.given)
         whole = density_parts(self.whole, "whole")[0]
         axes = self.whole.space.settings().get("axes")
-        own = {} if axes is None else {"axes": axes}
+        own: dict[str, Any] = {} if axes is None else {"axes": axes}
+        if self.whole.space.parts:
+            own = {"space": self.whole.space.settings()}
         return {"dim": self.split.dim, "kept": kept, "given": given, "whole": whole, **own}
 
     def tensors(self) -> dict[str, Tensor]:
@@ -311,15 +313,20 @@ class PartialDensity(Density, kind="partial"):
         if not (
             type(dim) is int
             and all(type(axis) is int and 0 <= axis < dim for axis in axes)
-            and len(set(axes)) == len(axes) == space.dim + len(values)
+            and len(set(axes)) == len(axes) == space.chart_dim + len(values)
             and all(map(math.isfinite, values))
         ):
             raise OrbiflowError(f"parts {kept!r} and {given!r} of {dim!r} angles")
         unit, lines = str(space.settings().get("unit")), header.get("axes")
-        whole_space = Torus(dim, unit=unit) if lines is None else MixedTorus(lines, unit=unit)
-        if whole_space.dim != dim or whole_space.of_axes(axes[: space.dim]) != space:
+        whole_space: Space = (
+            Torus(dim, unit=unit) if lines is None else MixedTorus(lines, unit=unit)
+        )
+        if "space" in header:
+            whole_space = ProductSpace(**header["space"])
+        if whole_space.chart_dim != dim or whole_space.of_axes(axes[: space.chart_dim]) != space:
             raise OrbiflowError(f"columns {lines!r} of {dim!r}")
         whole = density_from(whole_space, header["whole"], within(tensors, "whole."))
         return cls(
-            whole, Split(dim, tuple(axes[: space.dim]), tuple(axes[space.dim :]), (*values,))
+            whole,
+            Split(dim, tuple(axes[: space.chart_dim]), tuple(axes[space.chart_dim :]), (*values,)),
         )
