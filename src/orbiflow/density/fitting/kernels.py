@@ -233,7 +233,7 @@ def fit_mixture(
         if score - last < MIN_GAIN_NATS * len(train):
             break
         last = score
-    return AdaptiveKernels(space, space.from_features(mean), kappa, weights)
+    return AdaptiveKernels(space, space.lifted(mean), kappa, weights)
 
 
 def _expectation(

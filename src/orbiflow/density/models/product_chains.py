@@ -153,7 +153,7 @@ class ProductChains(Density, kind="product-chains"):
             turns[:, axis] = value
         own = torch.einsum("nl,nlm->nm", waves(2 * math.pi * turns), self.slopes[chosen])
         middle = _directions(own, len(self.base.spheres))
-        places = self.base.from_features(middle.flatten(1))
+        places = self.base.lifted(middle.flatten(1))
         drawn = drawn_about(self.base, places, self.concentrations[chosen], rng)
         return torch.cat([drawn, self.beside.project(turns)], dim=1)
 
@@ -218,7 +218,7 @@ class ProductChains(Density, kind="product-chains"):
         kappa = self.concentrations[every]
         if not kept:
             middle = _directions(constant, len(self.base.spheres))[:, 0]
-            middles = self.base.from_features(middle.flatten(1))
+            middles = self.base.lifted(middle.flatten(1))
             return Restriction([(log, AdaptiveKernels(space, middles, kappa, weights))], [])
         rows = [*(1 + k for k in kept), *(1 + self.beside.dim + k for k in kept)]
         slopes = torch.cat([constant, self.slopes[every][:, rows]], dim=1)

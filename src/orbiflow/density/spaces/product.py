@@ -173,11 +173,11 @@ class ProductSpace(Space):
     def kernel_images(self) -> int:
         return self.base.kernel_images
 
-    def from_features(self, features: Tensor) -> Tensor:
+    def lifted(self, features: Tensor) -> Tensor:
         table = by_sphere(features, len(self.spheres))
         first, second = self.split(table)
         places = (
-            part.from_features(own[..., : 1 + part.spheres[0], :].flatten(-2))
+            part.lifted(own[..., : 1 + part.spheres[0], :].flatten(-2))
             for part, own in zip(self.parts, (first, second), strict=True)
         )
         return torch.cat(list(places), dim=-1)

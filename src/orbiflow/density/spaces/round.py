@@ -260,7 +260,7 @@ class RoundSpace(Space):
     def step_angle(self, step: float) -> float:
         return math.radians(step) if self.form == "latlon" else step
 
-    def from_features(self, features: Tensor) -> Tensor:
+    def lifted(self, features: Tensor) -> Tensor:
         return self.vectors_to_chart(features.numpy())
 
     @property

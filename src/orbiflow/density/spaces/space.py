@@ -325,9 +325,16 @@ class Space(ABC):
         return self.frame.own
 
     def from_features(self, features: Tensor) -> Tensor:
-        """Return the canonical points (N, d) that have these features (N, m)."""
+        """Return the canonical points (N, d) that have these features (N, m), or an image of them."""
+        return self.project(self.lifted(features))
+
+    def lifted(self, features: Tensor) -> Tensor:
+        """Return chart points (N, d) that have these features (N, m) themselves: no image is taken.
+
+        A kernel that is not the same along all axes must stay where it is.
+        """
         cos, sin = features.chunk(2, dim=-1)
-        return self.project(self.from_turns(torch.atan2(sin, cos) / (2 * math.pi)))
+        return self.from_turns(torch.atan2(sin, cos) / (2 * math.pi) % 1)
 
     def from_turns(self, turns: Tensor) -> Tensor:
         """Return chart vectors (..., d) of coordinates in the basis of the frame."""

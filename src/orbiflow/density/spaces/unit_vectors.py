@@ -84,8 +84,8 @@ class UnitVectorSpace(Space):
     def kernel_images(self) -> int:
         return len(self.elements)
 
-    def from_features(self, features: Tensor) -> Tensor:
-        return self.project(features)
+    def lifted(self, features: Tensor) -> Tensor:
+        return features
 
     def _unit(self, points: Tensor) -> Tensor:
         points = self._checked(points)
