@@ -140,7 +140,7 @@ class ProductChains(Density, kind="product-chains"):
         return logs + kernel_peaks(self.base, self.concentrations), 1 - off
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
-        return self._walk(count, {}, generator)
+        return self.to("cpu")._walk(count, {}, generator)
 
     def _walk(self, count: int, given: Mapping[int, float], generator: torch.Generator) -> Tensor:
         """Return draws (count, d), of which some other columns are given, by number among them."""
@@ -160,6 +160,8 @@ class ProductChains(Density, kind="product-chains"):
     def draw_given(
         self, count: int, given: Mapping[int, float], generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
+        if self.weights.device.type != "cpu":
+            return self.to("cpu").draw_given(count, given, generator)
         chart = self.base.chart_dim
         lines = {axis - chart: value for axis, value in given.items() if axis >= chart}
         points = self._walk(count, lines, generator)
