@@ -18,6 +18,7 @@ Log = Callable[[Data], Data]
 
 TORI = ("general", "glycine", "proline", "prepro")
 EARTH = ("quakes", "fire")
+MORE_EARTH = ("volerup", "flood")
 
 ROUNDED = 0.01
 """Radians, of the backbone angles."""
@@ -113,9 +114,9 @@ def backbone_chains() -> list[Data]:
 
 
 def earth(kind: str) -> Data:
-    """lat, lon (N, 2) in degrees of earthquakes or wildfires."""
-    name = {"quakes": "quakes_all", "fire": "fire"}[kind]
-    lines = _file(f"earth/{name}.csv", "the earthquakes and wildfires").read_text().splitlines()
+    """lat, lon (N, 2) in degrees of earthquakes, wildfires, volcanic eruptions or floods."""
+    name = {"quakes": "quakes_all"}.get(kind, kind)
+    lines = _file(f"earth/{name}.csv", "the tables of the earth").read_text().splitlines()
     return np.array(
         [[float(x) for x in line.split(",")] for line in lines if re.match(r"-?[\d.]+,", line)]
     )

@@ -11,6 +11,7 @@ are nats above uniform there, and how much de la Vallee Poussin's gains, with it
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,12 +22,28 @@ NEW_ROWS, WIDTHS = 1000, np.geomspace(30, 2000, 24)
 
 def drawn(components: int, count: int) -> np.ndarray:
     """Return unit quaternions (count, 4)."""
+    return mixture(components, count)[0]
+
+
+def mixture(components: int, count: int) -> tuple[np.ndarray, Callable[[np.ndarray], np.ndarray]]:
+    """Return unit quaternions (count, 4), and their log density in multiples of the uniform one."""
     rng = np.random.default_rng(components)
     means = Rotation.random(components, rng=rng)
     deviations = rng.gamma(100, 1, components) ** -0.5
     chosen = rng.integers(components, size=count)
     steps = rng.normal(size=(count, 3)) * deviations[chosen, None]
-    return (means[chosen] * Rotation.from_rotvec(steps)).as_quat()
+
+    def log_density(rows: np.ndarray) -> np.ndarray:
+        terms = []
+        for mean, deviation in zip(means, deviations, strict=True):
+            angle = (mean.inv() * Rotation.from_quat(rows)).magnitude()
+            # a step of a whole turn more is 60 deviations long
+            own = -((angle / deviation) ** 2) / 2 - 3 * np.log(deviation * np.sqrt(2 * np.pi))
+            # the volume of steps over that of rotations, 8 pi^2 in all
+            terms.append(own + np.log(8 * np.pi**2) - 2 * np.log(np.sinc(angle / 2 / np.pi)))
+        return logsumexp(terms, axis=0) - np.log(components)
+
+    return (means[chosen] * Rotation.from_rotvec(steps)).as_quat(), log_density
 
 
 def log_kernels(kind: str, kappa: float, cosines: np.ndarray) -> np.ndarray:

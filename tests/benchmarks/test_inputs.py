@@ -79,6 +79,6 @@ def test_what_is_missing_is_said_in_one_line(
 def test_the_page_names_every_benchmark() -> None:
     page = (ROOT / "docs" / "benchmarks.md").read_text()
     helpers = {"common", "density_data", "density_integral", "density_kde", "density_known"}
-    helpers |= {"density_limits", "memory"}
+    helpers |= {"density_limits", "memory", "rivals"}
     for path in BENCHMARKS.glob("*.py"):
         assert path.stem in helpers or f"benchmarks/{path.name}" in page
