@@ -15,8 +15,9 @@ rows, because it holds rows out by itself. Each fit has one thread, and flows of
 have the device.
 
 Integrals are means of p / q at draws of q: a tenth is uniform, the rest kernels about training rows, as
-wide as they are apart and of five widths. Their standard error is given. Those of the default are quadratures
-(density_integral.py) where that can be, because kernels about repeated rows are too narrow for draws.
+wide as they are apart and of five widths. Their standard error is given. Those of the default are
+quadratures (density_integral.py) where that can be, because kernels about repeated rows are too narrow
+for draws.
 
 The methods are the default, one kernel width and one mixture that are best on the held-out rows (both
 with a hundredth of the uniform density), and those of rivals.py.
@@ -67,7 +68,7 @@ OWN = ("orbiflow", "kernels", "mixture", "sklearn", "bvvmmm")
 METHODS = (*OWN, *FLOWS)
 
 ROTATION_ROWS, MIXTURE_SIZES = 10_000, (1, 2, 4, 8, 16, 32, 64, 128)
-DRAWS, CENTERS, DRAWN_KAPPAS = 40_000, 12_000, (3.0, 30.0, 1e3, 1e5, 1e7)
+DRAWS, CENTERS, DRAWN_KAPPAS = 40_000, 12_000, (0.7, 4.0, 30.0, 1e3, 1e7)
 
 Log = Callable[[Data], Data]
 
