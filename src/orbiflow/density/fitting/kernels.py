@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import torch
@@ -13,6 +14,7 @@ from torch import Tensor
 
 from orbiflow.density.fitting.chains import PRIOR_POINTS, PRIOR_RESULTANT, concentration, far_apart
 from orbiflow.density.fitting.likelihood import training
+from orbiflow.density.fitting.orbits import Orbits
 from orbiflow.density.fitting.repeats import places
 from orbiflow.density.fitting.rows import Rows, is_whole
 from orbiflow.density.models import (
@@ -22,7 +24,7 @@ from orbiflow.density.models import (
     AdaptiveKernels,
     kernel_rows,
 )
-from orbiflow.density.spaces import Space, by_sphere
+from orbiflow.density.spaces import Space, UnitVectorSpace, by_sphere
 from orbiflow.typed_torch import linalg, special
 
 NEIGHBOURS = (2, 4, 8, 16)
@@ -180,6 +182,14 @@ BLOCK, BLOCK_ENTRIES = 4_096, 2**18
 """The most points, and entries of images of points against components, worked on at a time: few enough
 for the cache."""
 
+MANY_IMAGES, FIRST_ROWS, LAST_ITERATIONS = 8, 2_000, 20
+"""Images of a point from which on components have images instead. Then EM first climbs on so many rows,
+and at most so many times more on all."""
+
+
+Step = Callable[[Tensor, Tensor, Tensor], tuple[Tensor, Tensor, Tensor, float]]
+"""A step of EM, as `_expectation` takes it, of components' means, concentrations and weights."""
+
 
 @training()
 @torch.no_grad()
@@ -203,6 +213,61 @@ def fit_mixture(
     angles (NaN) and count by their marginal likelihood (Ghahramani and Jordan, Supervised learning
     from incomplete data via an EM approach, 1994). Weights have the mean 1.
     """
+    many = isinstance(space, UnitVectorSpace) and len(space.elements) >= MANY_IMAGES
+    first = train[:FIRST_ROWS] if many and len(train) > 2 * FIRST_ROWS else train
+    seen, whole, away, step = _stage(space, first, components)
+    chosen = far_apart(away, len(seen), components, generator, whole.weights)
+    kappa = seen.new_full((components, len(space.spheres)), 10.0)
+    start = seen[chosen].clone(), kappa, seen.new_full((components,), 1 / components)
+    found = _climbed(space, step, start, iterations, MIN_GAIN_NATS * len(first), narrowest)
+    if first is not train:
+        *_, step = _stage(space, train, components)
+        most = min(iterations, LAST_ITERATIONS)
+        found = _climbed(space, step, found, most, MIN_GAIN_NATS * len(train), narrowest)
+    mean, kappa, weights = found
+    return AdaptiveKernels(space, space.lifted(mean), kappa, weights)
+
+
+def _stage(
+    space: Space, train: Rows, components: int
+) -> tuple[Tensor, Rows, Callable[[int], Tensor], Step]:
+    """Return features (N, m) of whole rows, these rows, and what fits components to all rows.
+
+    That is the squared distances (N,) from one of them, and a step of EM.
+    """
+    if isinstance(space, UnitVectorSpace) and len(space.elements) >= MANY_IMAGES:
+        orbits = Orbits(space, train.points, train.weights)
+        return orbits.points, train, orbits.away, orbits.expectation
+    return _by_images(space, train, components)
+
+
+def _climbed(
+    space: Space,
+    step: Step,
+    start: tuple[Tensor, Tensor, Tensor],
+    most: int,
+    least_gain: float,
+    narrowest: float,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return means, concentrations and weights after at most `most` steps that each gain enough."""
+    mean, kappa, weights = start
+    last = -math.inf
+    for _ in range(most):
+        count, known, total, score = step(mean, kappa, weights)
+        weights = (count + 0.01) / (count + 0.01).sum()
+        mean, length = _directions(space, total)
+        resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (known + PRIOR_POINTS)
+        kappa = concentrations_of(resultant, space.spheres).clamp(WIDEST / 100, narrowest)
+        if score - last < least_gain:
+            break
+        last = score
+    return mean, kappa, weights
+
+
+def _by_images(
+    space: Space, train: Rows, components: int
+) -> tuple[Tensor, Rows, Callable[[int], Tensor], Step]:
+    """Return what `_stage` does, by all images of all rows."""
     points, row_weights, whole = train.points, train.weights, is_whole(train)
     absent = points.isnan()
     images = space.features(points.nan_to_num(0.0))
@@ -219,21 +284,7 @@ def fit_mixture(
     def away(row: int) -> Tensor:
         return ((seen - seen[0, row]) ** 2).sum(dim=-1).amin(dim=0)
 
-    chosen = far_apart(away, seen.shape[1], components, generator, train[whole].weights)
-    mean = seen[0, chosen].clone()
-    kappa = mean.new_full((components, len(space.spheres)), 10.0)
-    weights = mean.new_full((components,), 1 / components)
-    last = -math.inf
-    for _ in range(iterations):
-        count, known, total, score = _expectation(space, every, mean, kappa, weights)
-        weights = (count + 0.01) / (count + 0.01).sum()
-        mean, length = _directions(space, total)
-        resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (known + PRIOR_POINTS)
-        kappa = concentrations_of(resultant, space.spheres).clamp(WIDEST / 100, narrowest)
-        if score - last < MIN_GAIN_NATS * len(train):
-            break
-        last = score
-    return AdaptiveKernels(space, space.lifted(mean), kappa, weights)
+    return seen[0], train[whole], away, partial(_expectation, space, every)
 
 
 def _expectation(
