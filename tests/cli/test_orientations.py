@@ -64,7 +64,14 @@ def test_points_without_an_orientation_are_doubted(tmp_path: Path, orbiflow: Any
     mixed = (tmp_path / "a.ctf").read_text().replace("\n1\t0", "\n2\t0", 5)
     (tmp_path / "b.ctf").write_text(mixed)
     done = orbiflow("density", "fit", tmp_path / "b.ctf", *how, "--unit", "degrees")
-    assert "WARNING: Phase has 1 (55 rows), 2 (5 rows): keep the rows of one phase" in done.out
+    told = "WARNING: Phase has 1 (55 rows), 2 (5 rows): keep the rows of one phase, such as --where"
+    assert f"{told} Phase=1" in done.out
+    one = orbiflow(
+        "density", "fit", tmp_path / "b.ctf", *how, "--unit", "degrees", "--where", "phase=1"
+    )
+    assert one.status == 0, one.err
+    assert "read 55 of 60 rows: those of phase=1" in one.out
+    assert "Phase has" not in one.out
     angles = np.radians(angles)
     angles[:7] = 12.56637
     (tmp_path / "a.ang").write_text(ang(angles))

@@ -193,9 +193,17 @@ def column_names(
 
 
 def read_labels(
-    path: str | Path, column: str, table: Table, *, has_header: bool | None = None
+    path: str | Path,
+    column: str,
+    table: Table,
+    *,
+    has_header: bool | None = None,
+    empty: bool = False,
 ) -> NDArray[np.str_]:
-    """Return the cells (N,) of a file's column, numbers or not, for the rows of its table."""
+    """Return the cells (N,) of a file's column, numbers or not, for the rows of its table.
+
+    Cells may be missing if `empty`: then they are empty.
+    """
     path = Path(path)
     kind = kind_of_file(path)
     found: dict[int, str] = {}
@@ -216,12 +224,12 @@ def read_labels(
             cells = [] if is_comment else split_line(path, number, line, layout.delimiter)
             found[number] = cells[index].strip() if index < len(cells) else ""
     missing = [line for line in table.lines.tolist() if not found.get(line)]
-    if missing:
+    if missing and not empty:
         raise InputFileError(
             f"{path}: {len(missing)} rows have no {column!r}, the first in line {missing[0]}; fill "
             "it in"
         )
-    return np.array([found[line] for line in table.lines.tolist()])
+    return np.array([found.get(line, "") for line in table.lines.tolist()])
 
 
 MAX_NPY_HEADER = 10_000

@@ -33,6 +33,7 @@ from orbiflow.density.data import (
     strike_note,
     unit_named,
 )
+from orbiflow.density.tables.conditions import conditions_of, rows_where
 from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.guesses import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
@@ -119,7 +120,7 @@ def read_rows(
     reader = _Reader(path, rows, tell, space, width, tuple(beside))
     weighing, counting = map(reader.column, (rows.weights, getattr(rows, "counts", None)))
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
-    for name in (group, given):
+    for name in (group, given, *conditions_of(rows.where)):
         if name is not None and rows.columns is None:
             others.append(_name(path, name, rows.header))
     try:
@@ -170,7 +171,14 @@ class _Reader:
     def read(self, columns: Sequence[str] | None, width: int | None, **missing: Any) -> Table:
         """Read columns of numbers."""
         how: dict[str, Any] = {"has_header": self.rows.header, "decimal": self.rows.decimal}
-        return read_table(self.path, columns=columns, width=width, **how, **missing)
+        if not self.rows.where:
+            return read_table(self.path, columns=columns, width=width, **how, **missing)
+        # other rows may lack what those asked for have
+        every = read_table(self.path, columns=columns, width=width, **how, keep_missing=True)
+        kept = rows_where(self.path, every, self.rows.where, has_header=self.rows.header)
+        words = f"read {kept.sum()} of {len(kept)} rows: those of {', '.join(self.rows.where)}"
+        chosen = replace(every.only(kept), notes=(*every.notes, words))
+        return chosen.complete(self.path, **missing)
 
     def column(self, name: str | None) -> Table | None:
         """Return a column of weights or counts, if one was named."""
@@ -327,8 +335,9 @@ def _tell_of_phases(path: Path, table: Table, header: bool | None, tell: Sink) -
     if len(phases) > 1:
         pairs = zip(phases.tolist(), counts.tolist(), strict=True)
         listed = ", ".join(f"{phase} ({count} rows)" for phase, count in pairs)
-        text = f"WARNING: {column} has {listed}: keep the rows of one phase, and of none that is 0"
-        tell(Note(text))
+        text = literal(f"WARNING: {column} has {listed}: keep the rows of one phase, such as ")
+        one = max(zip(counts.tolist(), phases.tolist(), strict=True))[1]
+        tell(Note(Advice(f"{text}{{where}} {literal(f'{column}={one}')}")))
 
 
 def _tell_of_weights(weighing: Table, tell: Sink) -> None:

@@ -185,6 +185,10 @@ class TableSettings(Settings, group="Reading the table"):
     header: Annotated[bool | None, DefaultText("found automatically")] = None
     """Whether the table's first line names the columns."""
 
+    where: Annotated[tuple[str, ...], DefaultText("all rows")] = ()
+    """Rows to read, by values of other columns, such as phase=1,site=north. Of values of one column, a
+    row must have one, of several columns one in each."""
+
     drop_missing: bool = False
     """Leave out rows that lack a value."""
 

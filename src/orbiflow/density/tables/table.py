@@ -199,7 +199,7 @@ def finished(path: Path, table: Table, reading: Reading) -> Table:
         if left:
             rows = f"{len(left)} row{'s' * (len(left) > 1)}"
             notes.append(f"left out {rows} with missing values, the first in {unit} {left[0]}")
-        values, lines, dropped = values[whole], lines[whole], frozenset(left)
+        values, lines, dropped = values[whole], lines[whole], dropped | frozenset(left)
     if not len(values):
         raise InputFileError(f"{path}: holds no rows of numbers; export it again")
     wrong = np.isinf(values) if reading.keep_missing else ~np.isfinite(values)

@@ -1,0 +1,101 @@
+"""Rows of a table are chosen by the values of other columns."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+TABLE = """site,angle,phase,count
+north,10,1,2
+north,20,1.0,2
+south,,2,3
+south,200,2,
+east,90,3,1
+"""
+
+
+@pytest.fixture(name="summary")
+def summary_fixture(tmp_path: Path, orbiflow: Any):
+    (tmp_path / "a.csv").write_text(TABLE)
+
+    def run(*options: str) -> tuple[Any, list[dict[str, Any]]]:
+        out = tmp_path / "out.json"
+        out.unlink(missing_ok=True)
+        how = ("--space", "torus", "--unit", "degrees", *options, "--out", out)
+        done = orbiflow("density", "summary", tmp_path / "a.csv", *how)
+        return done, json.loads(out.read_text())["columns"] if out.exists() else []
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("where", "rows", "mean"),
+    [
+        ("phase=1", 2, 15.0),
+        ("site=north", 2, 15.0),
+        ("site=north,site=east", 3, 39.0),
+        ("site = east", 1, 90.0),
+        ("phase=1,site=north", 2, 15.0),
+    ],
+)
+def test_rows_are_chosen_by_values(summary, where: str, rows: int, mean: float) -> None:
+    done, columns = summary("--columns", "angle", "--where", where)
+    assert done.status == 0, done.err
+    assert (columns[0]["rows"], columns[0]["mean"]) == (rows, pytest.approx(mean, abs=1))
+    assert f"read {rows} of 5 rows" in done.out
+
+
+def test_a_column_that_chooses_rows_is_no_data(summary) -> None:
+    done, columns = summary("--where", "phase=3")
+    assert done.status == 0, done.err
+    assert [own["name"] for own in columns] == ["angle"]
+
+
+def test_missing_values_of_rows_that_are_read_are_refused_and_of_others_not(summary) -> None:
+    done, _ = summary("--columns", "angle", "--where", "phase=2")
+    assert done.status != 0
+    assert "in line 4, column 'angle'" in done.err
+    done, columns = summary("--columns", "angle", "--where", "phase=2", "--drop-missing")
+    assert columns[0]["rows"] == 1
+    # counts are those of the rows that are read: one of the others has none
+    done, columns = summary("--columns", "angle", "--where", "phase=1", "--counts", "count")
+    assert columns[0]["rows"] == 4
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ("phase", "--where must hold columns with values, such as phase=1, got 'phase'"),
+        ("phase=", "such as phase=1"),
+        ("phase=7", "no row has phase 7; there are 1, 1.0, 2, 3: change --where"),
+        ("colour=red", "colour"),
+        ("site=north,phase=2", "no row has all of site=north, phase=2: change --where"),
+    ],
+)
+def test_what_chooses_no_row_is_refused(summary, where: str, words: str) -> None:
+    done, _ = summary("--columns", "angle", "--where", where)
+    assert done.status != 0
+    assert words in done.err
+    assert "Traceback" not in done.err
+
+
+def test_rows_that_are_not_read_have_no_score(tmp_path: Path, orbiflow: Any) -> None:
+    angles = np.random.default_rng(0).vonmises(0, 3, 60)
+    rows = "".join(f"{angle:.6f},{'ab'[k % 2]}\n" for k, angle in enumerate(angles))
+    (tmp_path / "a.csv").write_text("angle,kind\n" + rows)
+    how = ("--space", "torus", "--columns", "angle", "--components", "mixture")
+    done = orbiflow(
+        "density", "fit", tmp_path / "a.csv", *how, "--where", "kind=a", "-o", tmp_path / "m"
+    )
+    assert done.status == 0, done.err
+    assert "read 30 of 60 rows" in done.out
+    out = tmp_path / "scores.csv"
+    done = orbiflow(
+        *("density", "score", tmp_path / "a.csv", "--model", tmp_path / "m", "--where", "kind=b"),
+        *("--out", out),
+    )
+    assert done.status == 0, done.err
+    cells = [line.split(",") for line in out.read_text().splitlines()[1:]]
+    assert all((kind == "b") == bool(score) for _, kind, score, *_ in cells)
