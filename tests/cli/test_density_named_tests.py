@@ -53,6 +53,39 @@ def test_some_tests_of_two_tables_as_csv(orbiflow) -> None:
 
 
 @pytest.mark.usefixtures("folder")
+def test_rows_of_one_group_stay_together(orbiflow) -> None:
+    rng, lines = np.random.default_rng(1), ["kind,nest,phi"]
+    for nest in range(24):
+        # nests differ much, and the kinds of nests do not
+        angles = np.degrees(rng.vonmises(rng.vonmises(0, 2), 50, 12)).round(3)
+        lines += [f"{'ab'[nest % 2]},n{nest},{angle}" for angle in angles]
+    Path("nests.csv").write_text("\n".join(lines))
+    for kind in "ab":
+        own = [lines[0], *(line for line in lines if line.startswith(kind))]
+        Path(f"{kind}.csv").write_text("\n".join(own))
+    how = ("--space", "torus", "--unit", "degrees", "--tests", "all", "--columns", "phi")
+    found = {}
+    for name, options in {
+        "rows": ("-d", "nests.csv", "--by", "kind"),
+        "groups": ("-d", "nests.csv", "--by", "kind", "--group", "nest"),
+        "files": ("-d", "a.csv", "-d", "b.csv", "--group", "nest"),
+    }.items():
+        done = orbiflow("density", "compare", *options, *how, "--out", f"{name}.json")
+        assert done.status == 0, done.err
+        found[name] = json.loads(Path(f"{name}.json").read_text())["tests"]
+    assert min(one["p"] for one in found["rows"]) < 0.01
+    assert min(one["p"] for one in found["groups"]) > 0.05
+    assert all(one["by"] == "permutation" for one in found["groups"])
+    assert {one["name"]: one["statistic"] for one in found["groups"]} == pytest.approx(
+        {one["name"]: one["statistic"] for one in found["rows"]}
+    )
+    assert [one["p"] for one in found["files"]] == [one["p"] for one in found["groups"]]
+    assert "24 whole groups" in done.out
+    done = orbiflow("density", "compare", "-d", "a.csv", "-d", "nests.csv", "--group", "nest", *how)
+    assert "has rows in a and nests: tests by name are of samples without common groups" in done.err
+
+
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -64,7 +97,7 @@ def test_some_tests_of_two_tables_as_csv(orbiflow) -> None:
         ),
         (("-d", "all.csv", *HOW, "--by", "phi"), "--by must have 2 to 50 values"),
         (("-d", "all.csv", *HOW, "--by", "name"), "name"),
-        (("-d", "all.csv", *HOW, "--by", "kind", "--group", "kind"), "independent rows"),
+        (("-d", "all.csv", *HOW, "--by", "kind", "--group", "kind"), "has 1 group: each"),
         (("-d", "all.csv", "--by", "kind"), "need their --space"),
         (("-d", "a.csv", *HOW), "two --data"),
     ],

@@ -212,3 +212,13 @@ def test_doubts_and_refusals() -> None:
     with pytest.raises(OrbiflowError, match="no tests by name on the cubic-orientations"):
         named_tests({"a": turns, "b": turns}, "cubic-orientations")
     assert len(named_tests({"a": turns, "b": turns}, "rotation-space", QUICK).tests) == 2
+
+
+@pytest.mark.parametrize("statistic", ["energy", "watson_u2", "kuiper", "mardia_watson_wheeler"])
+def test_samples_of_a_permutation_may_have_other_sizes(statistic: str) -> None:
+    rng = np.random.default_rng(3)
+    vectors = vectors_of(rng.vonmises(0, 1, 30))
+    table = np.stack([np.arange(30) % 2, (np.arange(30) < 7).astype(int)], axis=1)
+    call = getattr(statistics, statistic)
+    alone = [float(call(vectors, table[:, [k]])[0]) for k in range(2)]
+    assert call(vectors, table) == pytest.approx(alone)

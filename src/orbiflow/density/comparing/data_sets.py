@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
 
@@ -150,7 +150,7 @@ def compare_samples(
     own, names, _, both = sample_points(samples, space, unit, seed)
     sizes, points = (len(both[0]), len(both[1])), torch.cat(both)
     first = np.arange(len(points)) < sizes[0]
-    members = Groups.of(_labels(groups, names, sizes), len(points))
+    members = Groups.of(None if groups is None else labels_of(groups, names, sizes), len(points))
     members.require()
     notes = members.notes()
     progress(0.0, "permuting")
@@ -228,15 +228,12 @@ def _named(name: str, call: Callable[[np.ndarray], T], table: np.ndarray) -> T:
         raise OrbiflowError(f"{name}: {error}") from error
 
 
-def _labels(
-    groups: Mapping[str, ArrayLike] | None, names: list[str], sizes: tuple[int, int]
-) -> np.ndarray | None:
-    if groups is None:
-        return None
+def labels_of(
+    groups: Mapping[str, ArrayLike], names: Sequence[str], sizes: Sequence[int]
+) -> NDArray[np.str_]:
+    """Return the labels (N,) of the rows of several data sets, one after the other."""
     if not is_a(groups, Mapping) or set(groups) != set(names):
-        raise OrbiflowError(
-            f"groups must have labels for {names[0]} and {names[1]}, by these names"
-        )
+        raise OrbiflowError(f"groups must have labels for {' and '.join(names)}, by these names")
     found: list[NDArray[np.str_]] = []
     for name, rows in zip(names, sizes, strict=True):
         labels = np.asarray(groups[name])

@@ -13,17 +13,20 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import statistics
-from orbiflow.density.comparing.data_sets import sample_points
+from orbiflow.density.comparing.data_sets import labels_of, sample_points
 from orbiflow.density.comparing.resampling import MAX_ROWS
 from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.comparing.statistics import Found, Labels
 from orbiflow.density.fitting import highest_log_likelihood
 from orbiflow.density.models import images_of
 from orbiflow.density.spaces import MixedTorus, Space, Torus
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import OrbiflowError, SettingError, literal
 
 MIN_SAMPLE = 5
 """Rows that each sample must have."""
+
+MOST_UNLIKE = 1.5
+"""Ratio of mean sizes of groups in two samples from which permutations of groups are in doubt."""
 
 MIN_LARGE, MIN_MEDIAN = 25, 10
 """Rows of each sample from which tests for large samples, and that of medians, are good."""
@@ -95,10 +98,6 @@ class SampleTests:
         return {"kind": "tests", **asdict(self)}
 
 
-Run = Callable[[Array, Labels, ComparisonSettings], Found]
-"""A test of unit vectors (N, p) in samples (N,)."""
-
-
 def _sure(_vectors: Array, _labels: Labels) -> str:
     return ""
 
@@ -107,44 +106,53 @@ def _sure(_vectors: Array, _labels: Labels) -> str:
 class _Kind:
     """A test: what it says is equal, what it assumes, its source, and where it can be made.
 
+    - `test`: Its statistic and p by a distribution, of unit vectors (N, p) in samples (N,).
+    - `statistic`: Its statistic alone, by a table (N, B) of samples, for p by permutations.
+    - `slow`: Whether it takes too long to be made for each permutation of groups.
     - `only`: Where it can be made: on "circles", "means" (circles and spheres), "axes", or anywhere.
     - `two`: Whether it is of two samples alone.
     - `doubt`: Says of unit vectors and samples why p may be wrong; empty if it should be right.
     """
 
-    run: Run
     hypothesis: str
     assumes: str
     reference: str
     only: str = ""
+    test: Callable[[Array, Labels], Found] | None = None
+    statistic: Callable[[Array, Labels], Array] | None = None
     two: bool = False
+    slow: bool = False
     doubt: Callable[[Array, Labels], str] = _sure
 
     def result(
-        self, name: str, column: str, vectors: Array, labels: Labels, settings: ComparisonSettings
+        self,
+        name: str,
+        column: str,
+        vectors: Array,
+        labels: Labels,
+        groups: Labels | None,
+        settings: ComparisonSettings,
     ) -> NamedTest:
-        """Make the test."""
-        found, doubt = self.run(vectors, labels, settings), self.doubt(vectors, labels)
-        words = (self.hypothesis, self.assumes, self.reference, doubt)
+        """Make the test; of rows in groups (N,) by permutations of these."""
+        doubt = self.doubt(vectors, labels) if groups is None else _unlike(labels, groups)
+        if groups is None and self.test is not None:
+            found = self.test(vectors, labels)
+        else:
+            kept = _some_of_each(labels, settings.seed)
+            found = statistics.permuted(
+                *(self._of_each, vectors[kept], labels[kept], settings.permutations, settings.seed),
+                None if groups is None else groups[kept],
+            )
+        assumes = self.assumes if groups is None else "assumes that groups are independent"
+        words = (self.hypothesis, assumes, self.reference, doubt)
         return NamedTest(name, column, found.statistic, found.degrees, found.p, found.by, *words)
 
-
-def _plain(test: Callable[[Array, Labels], Found]) -> Run:
-    def run(vectors: Array, labels: Labels, settings: ComparisonSettings) -> Found:
-        del settings
-        return test(vectors, labels)
-
-    return run
-
-
-def _by_permutation(statistic: Callable[[Array, Labels], Array]) -> Run:
-    def run(vectors: Array, labels: Labels, settings: ComparisonSettings) -> Found:
-        kept = _some_of_each(labels, settings.seed)
-        return statistics.permuted(
-            statistic, vectors[kept], labels[kept], settings.permutations, settings.seed
-        )
-
-    return run
+    def _of_each(self, vectors: Array, table: Labels) -> Array:
+        """Return the statistic (B,) of each column of a table (N, B) of samples."""
+        if self.statistic is not None:
+            return self.statistic(vectors, table)
+        assert self.test is not None
+        return np.array([self.test(vectors, labels).statistic for labels in table.T])
 
 
 def _some_of_each(labels: Labels, seed: int) -> Labels:
@@ -183,6 +191,18 @@ def _small(least: int) -> Callable[[Array, Labels], str]:
     return doubt
 
 
+def _unlike(labels: Labels, groups: Labels) -> str:
+    """Say if groups of some samples are larger: such must not change places (see `compare_samples`)."""
+    sizes = [
+        float(own.sum() / np.count_nonzero(own))
+        for own in (np.bincount(groups[labels == k]) for k in range(int(labels.max()) + 1))
+    ]
+    low, high = min(sizes), max(sizes)
+    if high < MOST_UNLIKE * low:
+        return ""
+    return f"as groups have {low:.3g} rows in one sample and {high:.3g} in another on average"
+
+
 def _scattered(vectors: Array, labels: Labels) -> str:
     width = vectors.shape[1]
     lengths = [
@@ -199,44 +219,44 @@ def _scattered(vectors: Array, labels: Labels) -> str:
 
 KINDS = {
     "watson-williams": _Kind(
-        _plain(statistics.watson_williams), "equal mean directions",
-        "assumes von Mises-Fisher samples of one concentration, above 1",
-        "Watson and Williams, 1956", "means", doubt=_scattered,
+        "equal mean directions", "assumes von Mises-Fisher samples of one concentration, above 1",
+        "Watson and Williams, 1956", "means", statistics.watson_williams, doubt=_scattered,
     ),
     "common-mean": _Kind(
-        _plain(statistics.common_mean), "equal mean directions",
+        "equal mean directions",
         "assumes 25 rows or more in each sample, no model and no common concentration",
-        "Watson, 1983; Fisher, 1993, chapter 5", "means", doubt=_small(MIN_LARGE),
+        "Watson, 1983; Fisher, 1993, chapter 5", "means", statistics.common_mean,
+        doubt=_small(MIN_LARGE),
     ),
     "common-median": _Kind(
-        _plain(statistics.common_median), "equal median directions",
-        "assumes 10 rows or more in each sample and no model", "Fisher, 1993, chapter 5",
-        "circles", doubt=_small(MIN_MEDIAN),
+        "equal median directions", "assumes 10 rows or more in each sample and no model",
+        "Fisher, 1993, chapter 5", "circles", statistics.common_median, doubt=_small(MIN_MEDIAN),
     ),
     "common-concentration": _Kind(
-        _plain(statistics.common_concentration), "equal concentrations about the samples' own means",
+        "equal concentrations about the samples' own means",
         "assumes one mode and a mean direction in each sample", "Fisher, 1993, chapter 5", "means",
+        statistics.common_concentration,
     ),
     "mardia-watson-wheeler": _Kind(
-        _by_permutation(statistics.mardia_watson_wheeler), "equal distributions",
-        "assumes nothing; sees other means or spreads", "Mardia, 1972; Wheeler and Watson, 1964",
-        "circles",
+        "equal distributions", "assumes nothing; sees other means or spreads",
+        "Mardia, 1972; Wheeler and Watson, 1964", "circles",
+        statistic=statistics.mardia_watson_wheeler,
     ),
     "watson-u2": _Kind(
-        _by_permutation(statistics.watson_u2), "equal distributions", "assumes nothing",
-        "Watson, 1962", "circles", two=True,
+        "equal distributions", "assumes nothing", "Watson, 1962", "circles",
+        statistic=statistics.watson_u2, two=True,
     ),
     "kuiper": _Kind(
-        _by_permutation(statistics.kuiper), "equal distributions", "assumes nothing", "Kuiper, 1960",
-        "circles", two=True,
+        "equal distributions", "assumes nothing", "Kuiper, 1960", "circles",
+        statistic=statistics.kuiper, two=True,
     ),
     "bingham": _Kind(
-        _plain(_ratio_of_likelihoods), "equal Bingham densities",
-        "assumes Bingham samples of 25 rows or more", "Wilks, 1938", "axes", doubt=_small(MIN_LARGE),
+        "equal Bingham densities", "assumes Bingham samples of 25 rows or more", "Wilks, 1938", "axes",
+        _ratio_of_likelihoods, slow=True, doubt=_small(MIN_LARGE),
     ),
     "energy": _Kind(
-        _by_permutation(statistics.energy), "equal distributions, of all columns together",
-        "assumes nothing", "Rizzo and Szekely, 2010",
+        "equal distributions, of all columns together", "assumes nothing",
+        "Rizzo and Szekely, 2010", statistic=statistics.energy,
     ),
 }  # fmt: skip
 """The tests by name, in the order in which they are shown."""
@@ -249,6 +269,7 @@ def named_tests(
     *,
     unit: str | None = None,
     columns: Sequence[str] | None = None,
+    groups: Mapping[str, ArrayLike] | None = None,
 ) -> SampleTests:
     """Test by name whether two or more samples have equal means, concentrations or distributions.
 
@@ -262,10 +283,12 @@ def named_tests(
         settings: The tests (default: all that there are on the space), permutations and seed.
         unit: Unit of angles, as `DensityEstimator` takes it.
         columns: Names of the columns of data sets that are arrays.
+        groups: A label for each row, by the same names. Rows of one group are not independent: every p
+            is then from permutations of whole groups, each of which must be in one sample alone.
 
     Raises:
         OrbiflowError: If there is one data set alone, data are not on the space, a sample has fewer
-            than five rows, or the space has no such tests.
+            than five rows or groups, a group is in two samples, or the space has no such tests.
 
     >>> rng = np.random.default_rng(0)
     >>> found = named_tests({k: rng.vonmises(k == "c", 3, (40, 1)) for k in "abc"})
@@ -281,14 +304,17 @@ def named_tests(
             f"{few} has {min(sizes)} rows: each sample must have {MIN_SAMPLE} or more"
         )
     labels = np.repeat(np.arange(len(sizes)), sizes)
+    members = None if groups is None else _members(groups, names, labels)
     sides, every, there = _vectors(own, torch.cat(points), tuple(columns or called))
-    asked = _asked(settings, there, own, len(sizes))
+    asked = _asked(settings, there, own, len(sizes), members is not None)
     found: list[NamedTest] = []
     for name in asked:
         kind = KINDS[name]
         for column, vectors in {"": every}.items() if name == "energy" else sides.items():
-            found.append(kind.result(name, column, vectors, labels, settings))
+            found.append(kind.result(name, column, vectors, labels, members, settings))
     notes = ["each p is that of one test alone: settle which one counts before you look"]
+    if members is not None:
+        notes.append(f"each p is from permutations of {int(members.max()) + 1} whole groups")
     if sum(sizes) > MAX_ROWS and any(one.by == "permutation" for one in found):
         notes.append(
             f"tests by permutations look at some {MAX_ROWS} of {sum(sizes)} rows, drawn at random"
@@ -296,6 +322,29 @@ def named_tests(
     return SampleTests(
         tuple(names), sizes, tuple(found), settings.permutations, settings.seed, tuple(notes)
     )
+
+
+def _members(groups: Mapping[str, ArrayLike], names: list[str], labels: Labels) -> Labels:
+    """Return the group (N,) of each row, from 0; refuse those in several samples, and few."""
+    own = labels_of(groups, names, tuple(np.bincount(labels).tolist()))
+    words, members = np.unique(own, return_inverse=True)
+    pairs: Labels = np.unique(np.stack([members.reshape(-1), labels], axis=1), axis=0)
+    count, each = np.bincount(pairs[:, 0]), np.bincount(pairs[:, 1])
+    if count.max() > 1:
+        twice = int(count.argmax())
+        both = [names[int(sample)] for sample in pairs[pairs[:, 0] == twice, 1]]
+        raise SettingError(
+            literal(f"the group {words[twice]} has rows in {' and '.join(both)}: ")
+            + "tests by name are of samples without common groups; compare two data sets without "
+            "{tests}"
+        )
+    few = int(each.min())
+    if few < MIN_SAMPLE:
+        raise OrbiflowError(
+            f"{names[int(each.argmin())]} has {few} group{'s' * (few > 1)}: each sample must have "
+            f"{MIN_SAMPLE} or more"
+        )
+    return members.reshape(-1)
 
 
 def _vectors(
@@ -323,7 +372,9 @@ def _vectors(
     return {"": vectors}, products, "axes"
 
 
-def _asked(settings: ComparisonSettings, there: str, space: Space, samples: int) -> list[str]:
+def _asked(
+    settings: ComparisonSettings, there: str, space: Space, samples: int, grouped: bool
+) -> list[str]:
     """Return the tests that can be made, of those asked for."""
     known = {
         name: kind
@@ -331,12 +382,15 @@ def _asked(settings: ComparisonSettings, there: str, space: Space, samples: int)
         if kind.only in ("", there) or (kind.only == "means" and there == "circles")
     }
     if settings.tests is None or "all" in settings.tests:
-        return [name for name, kind in known.items() if samples == 2 or not kind.two]
+        some = {name: kind for name, kind in known.items() if not (grouped and kind.slow)}
+        return [name for name, kind in some.items() if samples == 2 or not kind.two]
     for name in settings.tests:
         if name not in known:
             raise SettingError(
                 f"{{tests}}: there is no {name} on the {space.name}, but {', '.join(known)}"
             )
+        if known[name].slow and grouped:
+            raise SettingError(f"{{tests}}: {name} is of independent rows: leave {{group}} out")
         if known[name].two and samples > 2:
             raise SettingError(f"{{tests}}: {name} is of two samples, there are {samples}")
     return [name for name in known if name in settings.tests]

@@ -1,7 +1,8 @@
 """Statistics of tests of two or more samples of angles, directions or axes.
 
 All take unit vectors (N, p) of all samples together and the number (N,) of each row's sample. Those
-whose p is from permutations take a table (N, B) of such numbers, one column for each permutation.
+whose p is from permutations take a table (N, B) of such numbers, one column for each permutation, in
+which samples may have other sizes.
 
 Sources: Mardia and Jupp, Directional Statistics (2000), chapters 7 and 10; Fisher, Statistical
 Analysis of Circular Data (1993), chapter 5; Rizzo and Szekely, DISCO analysis (2010).
@@ -156,16 +157,15 @@ def median_direction(turns: Array) -> float:
     return float(x[best])
 
 
-def _steps(turns: Array, table: Labels) -> tuple[Array, float, float]:
-    """Return the difference (N, B) of two empirical distributions at each row, and both sizes."""
+def _steps(turns: Array, table: Labels) -> tuple[Array, Array, Array]:
+    """Return the difference (N, B) of two empirical distributions at each row, and both sizes (B,)."""
     order = np.argsort(turns, kind="stable")
     x, own = turns[order], table[order]
     last = np.searchsorted(x, x + TIED, side="right") - 1  # those that are equal step together
     first = own == 0
-    sizes = first[:, 0].sum(), (~first[:, 0]).sum()
-    each = first / sizes[0] - ~first / sizes[1]
-    steps: Array = np.cumsum(each, axis=0)[last]
-    return steps, float(sizes[0]), float(sizes[1])
+    one, other = first.sum(axis=0).astype(float), (~first).sum(axis=0).astype(float)
+    steps: Array = np.cumsum(first / one - ~first / other, axis=0)[last]
+    return steps, one, other
 
 
 def watson_u2(vectors: Array, table: Labels) -> Array:
@@ -179,7 +179,7 @@ def watson_u2(vectors: Array, table: Labels) -> Array:
 def kuiper(vectors: Array, table: Labels) -> Array:
     """Return Kuiper's statistic (B,) of two samples of angles, times sqrt(n m / (n + m))."""
     steps, one, other = _steps(_turns(vectors), table)
-    return math.sqrt(one * other / (one + other)) * (steps.max(axis=0) - steps.min(axis=0))
+    return np.sqrt(one * other / (one + other)) * (steps.max(axis=0) - steps.min(axis=0))
 
 
 def mardia_watson_wheeler(vectors: Array, table: Labels) -> Array:
@@ -193,7 +193,7 @@ def mardia_watson_wheeler(vectors: Array, table: Labels) -> Array:
     found = np.zeros(table.shape[1])
     for sample in range(int(table[:, 0].max()) + 1):
         own = (table == sample).astype(np.float64)
-        found += 2 * ((waves @ own) ** 2).sum(axis=0) / own[:, 0].sum()
+        found += 2 * ((waves @ own) ** 2).sum(axis=0) / own.sum(axis=0)
     return found
 
 
@@ -207,7 +207,7 @@ def energy(vectors: Array, table: Labels) -> Array:
     within = np.zeros(table.shape[1])
     for sample in range(samples):
         own = (table == sample).astype(np.float64)
-        within += ((distances @ own) * own).sum(axis=0) / (2 * own[:, 0].sum())
+        within += ((distances @ own) * own).sum(axis=0) / (2 * own.sum(axis=0))
     total = float(distances.sum()) / (2 * count)
     return (total - within) / (samples - 1) / np.maximum(within / (count - samples), 1e-300)
 
@@ -218,15 +218,23 @@ def permuted(
     labels: Labels,
     permutations: int,
     seed: int,
+    groups: Labels | None = None,
 ) -> Found:
-    """Return a statistic with its p among random permutations of the samples."""
+    """Return a statistic with its p among random permutations of the samples.
+
+    Rows of one of `groups` (N,), which all are of one sample, stay together.
+    """
     rng = np.random.default_rng(seed)
+    if groups is None:
+        groups = np.arange(len(labels))
+    _, first, member = np.unique(groups, return_index=True, return_inverse=True)
+    member, own = member.reshape(-1), labels[first]
     blocks = [statistic(vectors, labels[:, None])]
     size = max(1, BLOCK_ENTRIES // len(labels))
     for start in range(0, permutations, size):
         count = min(size, permutations - start)
-        table = np.stack([rng.permutation(labels) for _ in range(count)], axis=1)
-        blocks.append(statistic(vectors, table))
+        table = np.stack([rng.permutation(own) for _ in range(count)], axis=1)
+        blocks.append(statistic(vectors, table[member]))
     found = np.concatenate(blocks)
     p = float((found >= found[0] * (1 - 1e-12) - 1e-15).mean())
     return Found(float(found[0]), (), "permutation", p)

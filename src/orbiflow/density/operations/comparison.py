@@ -85,7 +85,7 @@ def compare(
     if models:
         _check_models(data, models, {**given, "by": by, "tests": settings.tests})
     else:
-        _check_data(data, given, by, group if named else None)
+        _check_data(data, given, by)
     if out is not None:
         runtime.check_output_file(out, *models, *data)
     read = _Reader(table, group, on_event, runtime.progress_events(on_event, cancel))
@@ -124,9 +124,7 @@ def _check_models(data: Sequence[Path], models: Sequence[Path], others: Mapping[
     _refuse(wrong)
 
 
-def _check_data(
-    data: Sequence[Path], where: Mapping[str, Any], by: str | None, tested_group: str | None
-) -> None:
+def _check_data(data: Sequence[Path], where: Mapping[str, Any], by: str | None) -> None:
     """Check that there are tables, or one with a column that divides it, and a space."""
     wrong = {
         "give two {models} or more and one {data} to compare models, or two {data} and their "
@@ -136,8 +134,6 @@ def _check_data(
         "two {data} need their {space}": "space" not in where,
         "{data} names one file twice: give two data sets": len({own.resolve() for own in data})
         < len(data),
-        "{tests} are of independent rows: leave {group} out, or compare two {data} without {tests}":
-        tested_group is not None,
     }  # fmt: skip
     _refuse(wrong)
 
@@ -149,12 +145,16 @@ def _refuse(wrong: Mapping[str, bool]) -> None:
 
 
 class _Reader(NamedTuple):
-    """How tables are read, the column of groups, who is told, and who hears of the progress."""
+    """How tables are read, the column of groups, who is told, and who hears of the progress.
+
+    - `beside`: Another column that is no data.
+    """
 
     settings: TableSettings
     group: str | None
     tell: runtime.Sink
     progress: Callable[[float, str], None]
+    beside: str | None = None
 
     def rows(
         self,
@@ -167,6 +167,7 @@ class _Reader(NamedTuple):
         """Return rows, without the column of groups if columns are not named."""
         settings = self.settings.replace(columns=columns)
         space: dict[str, Any] = {"group": self.group, "model_space": model_space}
+        space["given"] = self.beside
         if where is not None:
             space |= {"space": where.space, "width": where.width}
         return tables.read_rows(data, settings, tell, **space)
@@ -235,8 +236,15 @@ def _test_data(
 ) -> SampleTests:
     import numpy as np
 
-    found = _tables(data, where, read._replace(group=by))
+    found = _tables(data, where, read if by is None else read._replace(group=by, beside=read.group))
     values = {name: rows.table.values for name, rows in found.items()}
+    groups: dict[str, Any] | None = None
+    if read.group is not None:
+        header = read.settings.header
+        groups = {
+            name: tables.read_labels(rows.path, read.group, rows.table, has_header=header)
+            for name, rows in found.items()
+        }
     if by is not None:
         (rows,) = found.values()
         labels = np.asarray(rows.labels)
@@ -246,13 +254,20 @@ def _test_data(
                 f"{{by}} must have 2 to {MOST_SAMPLES} values, one for each data set; "
                 f"{literal(by)} has {len(names)}"
             )
+        own = None if groups is None else next(iter(groups.values()))
+        groups = None if own is None else {str(name): own[labels == name] for name in names}
         values = {str(name): rows.table.values[labels == name] for name in names}
     unit = _unit_of(found, where, read)
     columns = next(iter(found.values())).table.columns
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
         return comparing.named_tests(
-            values, space_of(where, columns, unit), settings, unit=unit, columns=columns
+            values,
+            space_of(where, columns, unit),
+            settings,
+            unit=unit,
+            columns=columns,
+            groups=groups,
         )
 
 
