@@ -35,6 +35,8 @@ DENSITY += [
     "categories",
     "comparing",
     "regions",
+    "weighed_rows",
+    "uniformity",
     "summaries",
     "orientations",
     "tables",

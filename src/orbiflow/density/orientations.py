@@ -14,10 +14,11 @@ from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data, as_numbers
+from orbiflow.density.data import as_data
 from orbiflow.density.inference import misorientations
 from orbiflow.density.spaces import ORIENTATIONS, RotationSpace, named_orientation, rotations_of
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
+from orbiflow.errors import SettingError
 
 STARTS, STEPS, MOST_LOOKED_AT = 16, 100, 2_000
 """Rows from which a mean is looked for, the most steps of each, and the most rows of a first look."""
@@ -88,16 +89,8 @@ def summarize_orientations(
     """
     as_instance(space, RotationSpace, "space")
     points = space.to_chart(as_data(data).values)
-    shares = np.ones(len(points)) if weights is None else as_numbers(weights, "weights")
-    if shares.shape != (len(points),) or not (np.isfinite(shares).all() and (shares >= 0).all()):
-        raise OrbiflowError(f"weights must be {len(points)} numbers, none below 0")
-    if not shares.any():
-        raise OrbiflowError("there is no row with a weight")
-    shares = shares / shares.sum()
-    labels = np.arange(len(points))
-    if groups is not None:
-        labels = np.unique(np.asarray(groups), return_inverse=True)[1].reshape(-1)
-    level = as_number(level, "level", 0.5, 0.999)
+    kept, rows = chosen_rows(points.numpy(), weights, groups, level)
+    points, shares = torch.tensor(kept), rows.weights
     mean, images = _mean(space, points, torch.tensor(shares))
     angles = np.degrees(misorientations(space, points, mean).numpy())
     order = np.argsort(angles)
@@ -106,11 +99,11 @@ def summarize_orientations(
     found = OrientationSummary(
         len(points),
         tuple(float(v) for v in written),
-        _cone(images, shares, labels, level),
+        _cone(images, rows),
         float(shares @ angles),
         half,
     )
-    return found, _near(space, points, shares, labels, level, near, within)
+    return found, _near(space, points, rows, near, within)
 
 
 def _mean(space: RotationSpace, points: Tensor, shares: Tensor) -> tuple[Tensor, Array]:
@@ -146,38 +139,28 @@ def _settled(
     return last, mean, near
 
 
-def _cone(images: Array, shares: Array, labels: Array, level: float) -> float | None:
+def _cone(images: Array, rows: WeighedRows) -> float | None:
     """Return the misorientation in degrees that holds the true mean, by the errors of an axis.
 
     The principal axis of quaternions is that of Fisher, Lewis and Embleton (1987), section 6.3.1, in
-    four dimensions; of groups the sums of their rows take the place of rows.
+    four dimensions.
     """
-    tensor = np.einsum("n,ni,nj->ij", shares, images, images)
+    tensor = np.einsum("n,ni,nj->ij", rows.weights, images, images)
     values, axes = np.linalg.eigh(tensor)
     along, gaps = images @ axes[:, ::-1], values[-1] - values[-2::-1]
-    units = int(labels.max()) + 1
-    if gaps.min() < 1e-12 or units < 5:
+    if gaps.min() < 1e-12 or rows.units < 5:
         return None
-    errors = shares[:, None] * along[:, :1] * along[:, 1:] / gaps
-    sums = np.zeros((units, 3))
-    np.add.at(sums, labels, errors)
-    variance = float((sums**2).sum()) / 3
-    if units == len(labels):
-        quantile = float(special.chdtri(3, 1 - level))
-    else:
-        variance *= units / (units - 1)
-        quantile = 3 * float(special.fdtri(3, units - 1, level))
-    sine = math.sqrt(quantile * variance)
+    errors = np.zeros_like(along)
+    errors[:, 1:] = along[:, :1] * along[:, 1:] / gaps
+    angle = half_angle(errors, rows)
     # the angle of a rotation is twice that of quaternions
-    return math.degrees(2 * math.asin(sine)) if sine < math.sin(math.pi / 4) else None
+    return math.degrees(2 * angle) if angle is not None and angle < math.pi / 4 else None
 
 
 def _near(
     space: RotationSpace,
     points: Tensor,
-    shares: Array,
-    labels: Array,
-    level: float,
+    rows: WeighedRows,
     near: Sequence[str] | None,
     within: float,
 ) -> list[NearSummary]:
@@ -185,17 +168,14 @@ def _near(
     reach = math.radians(as_number(within, "within", above=0, most=60))
     names = near_names(space, near)
     even = space.uniform(2**14 if names else 1, torch.Generator().manual_seed(0))
-    sums = np.zeros(int(labels.max()) + 1)
-    np.add.at(sums, labels, shares)
-    count = 1 / float((sums**2).sum())
-    z = math.sqrt(float(special.chdtri(1, 1 - level)))
+    count, square = rows.effective, tail(special.chdtri, 1, 1 - rows.level)
     found: list[NearSummary] = []
     for name in names:
         variants = ideal_variants(name)
-        share = float(shares @ (nearest(space, points, variants) <= reach))
-        middle = (share + z * z / (2 * count)) / (1 + z * z / count)
-        half = z / (1 + z * z / count)
-        half *= math.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+        share = float(rows.mean(nearest(space, points, variants) <= reach))
+        middle = (share + square / (2 * count)) / (1 + square / count)
+        half = math.sqrt(square) / (1 + square / count)
+        half *= math.sqrt(share * (1 - share) / count + square / (4 * count * count))
         by_chance = float((nearest(space, even, variants) <= reach).mean())
         low, high = max(0.0, middle - half), min(1.0, middle + half)
         found.append(NearSummary(name, share, low, high, by_chance))

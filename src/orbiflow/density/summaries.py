@@ -14,18 +14,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
-from orbiflow.arguments import as_array, as_number
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data, as_numbers, data_of, unit_of
+from orbiflow.density.data import as_data, data_of, unit_of
 from orbiflow.density.fitting import SAME, concentration
 from orbiflow.density.spaces import to_vectors, whole_turn
-from orbiflow.errors import OrbiflowError
+from orbiflow.density.uniformity import bingham_p, kuiper_p, rao_p, rayleigh_p, watson_p
+from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
 
 MIN_ROWS = 25
 """Rows or groups below which an interval is rough (Fisher, 1993, section 4.4.4)."""
@@ -45,8 +45,9 @@ class AngleSummary:
     - `resultant`: Mean resultant length, from 0 (no direction) to 1.
     - `concentration`: Likeliest concentration of a von Mises distribution, None if all rows are equal.
     - `deviation`: Circular standard deviation, sqrt(-2 log resultant), None without a resultant.
-    - `rayleigh_p`, `kuiper_p`, `watson_p`: Probabilities of such data if all angles are equally likely.
-      Rayleigh's test looks for one mode, the others for anything.
+    - `rayleigh_p`, `kuiper_p`, `watson_p`, `rao_p`: Probabilities of such data if all angles are
+      equally likely. Rayleigh's test looks for one mode, the others for anything, Rao's for uneven
+      gaps; it is None where many angles are equal.
     """
 
     name: str
@@ -59,6 +60,7 @@ class AngleSummary:
     rayleigh_p: float | None
     kuiper_p: float | None
     watson_p: float | None
+    rao_p: float | None = None
 
 
 @dataclass(frozen=True)
@@ -121,41 +123,6 @@ class AxisSummary:
     bingham_p: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Weights (n,) of sum 1, and the number of each row's group (n,), None if all are independent.
-
-    - `even`: Whether all rows count the same. `level`: The level of intervals.
-    """
-
-    weights: Array
-    groups: NDArray[np.int64] | None
-    even: bool
-    level: float
-
-    def mean(self, values: Array) -> Array:
-        return self.weights @ values
-
-    def sums(self, values: Array) -> Array:
-        """Return weighted sums (G, q) of values (n, q) over what is independent."""
-        weighted = self.weights[:, None] * values
-        if self.groups is None:
-            return weighted
-        found = np.zeros((int(self.groups.max()) + 1, values.shape[1]))
-        np.add.at(found, self.groups, weighted)
-        return found
-
-    @property
-    def units(self) -> int:
-        """The number of rows or groups."""
-        return len(self.weights) if self.groups is None else int(self.groups.max()) + 1
-
-    @property
-    def alike(self) -> bool:
-        """Whether rows are independent and count the same."""
-        return self.groups is None and self.even
-
-
 def summarize_angles(
     data: ArrayLike,
     names: tuple[str, ...] | None = None,
@@ -188,38 +155,16 @@ def summarize_angles(
     turn = whole_turn(unit_of("torus", values, names, unit))
     columns: list[AngleSummary] = []
     for name, column in zip(names, values.T, strict=True):
-        own, rows = _chosen(column[:, None], weights, groups, level)
+        own, rows = chosen_rows(column[:, None], weights, groups, level)
         columns.append(_angle_summary(name, own[:, 0] / turn, turn, rows))
     pairs: list[Correlation] = []
     for i, j in combinations(range(len(names)), 2):
-        own, rows = _chosen(values[:, [i, j]], weights, groups, level)
+        own, rows = chosen_rows(values[:, [i, j]], weights, groups, level)
         pairs.append(_correlation(names[i], names[j], own * (2 * np.pi / turn), rows))
     return columns, pairs
 
 
-def _chosen(
-    values: Array, weights: ArrayLike | None, groups: ArrayLike | None, level: float
-) -> tuple[Array, _Rows]:
-    """Return the rows that have all values and a weight."""
-    whole = np.isfinite(values).all(axis=1)
-    given = np.ones(len(values)) if weights is None else as_numbers(weights, "weights")
-    if given.shape != whole.shape or not (np.isfinite(given).all() and (given >= 0).all()):
-        raise OrbiflowError(f"weights must be {len(values)} numbers, none below 0")
-    whole &= given > 0
-    if not whole.any():
-        raise OrbiflowError("there is no row with a value and a weight")
-    own, numbers = given[whole], None
-    if groups is not None:
-        labels = np.asarray(groups)
-        if labels.shape != whole.shape:
-            raise OrbiflowError(f"groups must be {len(values)} labels, one for each row")
-        numbers = np.unique(labels[whole], return_inverse=True)[1].astype(np.int64)
-    even = bool((own == own[0]).all())
-    level = as_number(level, "level", 0.5, 0.999)
-    return values[whole], _Rows(own / own.sum(), numbers, even, level)
-
-
-def _angle_summary(name: str, turns: Array, turn: float, rows: _Rows) -> AngleSummary:
+def _angle_summary(name: str, turns: Array, turn: float, rows: WeighedRows) -> AngleSummary:
     angles = 2 * np.pi * turns
     vectors = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     mean, resultant, spread = _mean_direction(vectors, rows)
@@ -241,10 +186,11 @@ def _angle_summary(name: str, turns: Array, turn: float, rows: _Rows) -> AngleSu
         rayleigh_p=rayleigh_p(vectors, rows),
         kuiper_p=kuiper_p(turns) if rows.alike else None,
         watson_p=watson_p(turns) if rows.alike else None,
+        rao_p=rao_p(turns) if rows.alike else None,
     )
 
 
-def _mean_direction(vectors: Array, rows: _Rows) -> tuple[Array | None, float, float | None]:
+def _mean_direction(vectors: Array, rows: WeighedRows) -> tuple[Array | None, float, float | None]:
     """Return the mean direction (p,) of unit vectors (n, p), the resultant and the half angle."""
     total = rows.mean(vectors)
     resultant = min(1.0, float(np.linalg.norm(total)))
@@ -252,10 +198,10 @@ def _mean_direction(vectors: Array, rows: _Rows) -> tuple[Array | None, float, f
         return None, 0.0, None
     mean = total / resultant
     across = vectors - (vectors @ mean)[:, None] * mean
-    return mean, resultant, _half_angle(across / resultant, rows)
+    return mean, resultant, half_angle(across / resultant, rows)
 
 
-def _shortfall(vectors: Array, mean: Array | None, resultant: float, rows: _Rows) -> float:
+def _shortfall(vectors: Array, mean: Array | None, resultant: float, rows: WeighedRows) -> float:
     """Return 1 less the resultant of unit vectors (n, p), to all digits where they are close."""
     if mean is None:
         return 1.0
@@ -264,97 +210,7 @@ def _shortfall(vectors: Array, mean: Array | None, resultant: float, rows: _Rows
     return near if near < CLOSE else max(0.0, 1 - resultant)
 
 
-def _tail(of: Any, *arguments: float) -> float:
-    """Return a value of a distribution, from a function of SciPy's."""
-    return float(of(*arguments))
-
-
-def _half_angle(errors: Array, rows: _Rows) -> float | None:
-    """Return the half angle in radians of a cone that holds the true direction, None if none does.
-
-    `errors` (n, p) are each row's part in the error of the estimate, across it: their linearised sum
-    is the error. For independent rows these are Fisher (1993), equation 4.22, and Fisher, Lewis and
-    Embleton (1987), section 5.3.1; for groups the sums over a group take the place of rows.
-    """
-    free, units = errors.shape[1] - 1, rows.units
-    variance = float((rows.sums(errors) ** 2).sum()) / free
-    if units < 2:
-        return None
-    if rows.groups is None:
-        quantile = _tail(special.chdtri, free, 1 - rows.level)
-    else:
-        variance *= units / (units - 1)
-        quantile = free * _tail(special.fdtri, free, units - 1, rows.level)
-    sine = math.sqrt(quantile * variance)
-    return math.asin(sine) if sine < 1 else None
-
-
-def rayleigh_p(vectors: Array, rows: _Rows) -> float | None:
-    """Return Rayleigh's probability of unit vectors (n, p) if all directions are equally likely.
-
-    For angles, the approximation of Wilkie (1983); for directions, Jupp's correction of the score
-    (Mardia and Jupp, 2000, equation 10.4.6). With weights, n is their effective number (Kish).
-    """
-    width = vectors.shape[1]
-    if rows.groups is not None:
-        return _groups_p(vectors, rows)
-    count = 1 / float(rows.weights @ rows.weights)
-    square = float((rows.mean(vectors) ** 2).sum())
-    if width == 2:
-        root = math.sqrt(1 + 4 * count + 4 * count**2 * max(0.0, 1 - square))
-        return min(1.0, math.exp(root - 1 - 2 * count))
-    score = width * count * square
-    score = (1 - 1 / (2 * count)) * score + score**2 / (2 * count * (width + 2))
-    return _tail(special.chdtrc, width, score)
-
-
-def _groups_p(values: Array, rows: _Rows) -> float | None:
-    """Return Hotelling's probability that sums of values (n, q) over groups have mean 0."""
-    sums, width = rows.sums(values), values.shape[1]
-    free = len(sums) - width
-    if free < 1:
-        return None
-    mean = sums.mean(axis=0)
-    covariance: Array = np.cov(sums.T)
-    if np.linalg.matrix_rank(covariance) < width:
-        return None
-    inverse: Array = np.linalg.inv(covariance)
-    square = len(sums) / (len(sums) - 1) * float(mean @ inverse @ mean)
-    return _tail(special.fdtrc, width, free, square * free / width)
-
-
-def kuiper_p(turns: NDArray[np.float64]) -> float:
-    """Return Kuiper's probability of independent angles (n,), in turns, if all are equally likely.
-
-    Stephens' (1970) modification of the statistic (Mardia and Jupp, 2000, section 6.3.2).
-    """
-    x, count = np.sort(turns % 1.0), len(turns)
-    steps = np.arange(1, count + 1) / count
-    range_of = float((steps - x).max() + (x - steps + 1 / count).max())
-    value = range_of * (math.sqrt(count) + 0.155 + 0.24 / math.sqrt(count))
-    if value < 0.4:  # the series is slow, and its sum 1
-        return 1.0
-    squares = (np.arange(1, 30) * value) ** 2
-    return float(np.clip(2 * ((4 * squares - 1) * np.exp(-2 * squares)).sum(), 0.0, 1.0))
-
-
-def watson_p(turns: NDArray[np.float64]) -> float:
-    """Return Watson's probability (U^2) of independent angles (n,), in turns, if all are as likely.
-
-    Stephens' (1970) modification of the statistic (Mardia and Jupp, 2000, section 6.3.3).
-    """
-    x, count = np.sort(turns % 1.0), len(turns)
-    off = x - (np.arange(1, count + 1) - 0.5) / count
-    value = float(((off - off.mean()) ** 2).sum()) + 1 / (12 * count)
-    value = (value - 0.1 / count + 0.1 / count**2) * (1 + 0.8 / count)
-    if value < 0.005:
-        return 1.0
-    steps = np.arange(1, 60)
-    terms = (-1.0) ** (steps - 1) * np.exp(-2 * (np.pi * steps) ** 2 * value)
-    return float(np.clip(2 * terms.sum(), 0.0, 1.0))
-
-
-def _correlation(first: str, second: str, angles: Array, rows: _Rows) -> Correlation:
+def _correlation(first: str, second: str, angles: Array, rows: WeighedRows) -> Correlation:
     """Return the correlations of angles (n, 2) in radians."""
     p, q = np.sin(angles - np.angle(rows.mean(np.exp(1j * angles)))).T
     a, b = angles.T
@@ -364,7 +220,7 @@ def _correlation(first: str, second: str, angles: Array, rows: _Rows) -> Correla
     return Correlation(first, second, len(angles), sine, sine_p, _fisher_lee(a, b, rows))
 
 
-def _sine_p(products: Array, rows: _Rows) -> float | None:
+def _sine_p(products: Array, rows: WeighedRows) -> float | None:
     """Return how likely so large a mean of products (n,) is if the columns are independent.
 
     For independent rows it is Jammalamadaka and SenGupta (2001), equation 8.2.5.
@@ -376,10 +232,10 @@ def _sine_p(products: Array, rows: _Rows) -> float | None:
     score = abs(float(sums.sum())) / size
     if rows.groups is None:
         return math.erfc(score / math.sqrt(2))
-    return _tail(special.fdtrc, 1, len(sums) - 1, score**2)
+    return tail(special.fdtrc, 1, len(sums) - 1, score**2)
 
 
-def _fisher_lee(a: Array, b: Array, rows: _Rows) -> float | None:
+def _fisher_lee(a: Array, b: Array, rows: WeighedRows) -> float | None:
     """Return Fisher and Lee's correlation, by sums over rows (Fisher, 1993, equation 6.36)."""
     sums = [complex(rows.mean(np.exp(1j * x))) for x in (a - b, a + b, 2 * a, 2 * b)]
     minus, plus, one, two = (abs(s) ** 2 for s in sums)
@@ -402,7 +258,7 @@ def summarize_directions(
     """
     table, names = data_of("sphere", data)
     unit_of("sphere", table, names, unit)
-    vectors, rows = _chosen(to_vectors(table), weights, groups, level)
+    vectors, rows = chosen_rows(to_vectors(table), weights, groups, level)
     mean, resultant, cone = _mean_direction(vectors, rows)
     count, k, fisher_cone = len(vectors), None, None
     below = _shortfall(vectors, mean, resultant, rows)
@@ -427,7 +283,7 @@ def summarize_axes(
     """Summarise axes, either end of each as in `summarize_directions`."""
     table, names = data_of("projective-plane", data)
     unit_of("projective-plane", table, names, unit)
-    vectors, rows = _chosen(to_vectors(table), weights, groups, level)
+    vectors, rows = chosen_rows(to_vectors(table), weights, groups, level)
     products = vectors[:, :, None] * vectors[:, None, :]
     tensor = np.tensordot(rows.weights, products, axes=1)
     values, axes = np.linalg.eigh(tensor)
@@ -437,23 +293,12 @@ def summarize_axes(
     if gaps[0] > 1e-9:
         errors = np.zeros_like(vectors)
         errors[:, 1:] = along[:, :1] * along[:, 1:] / gaps
-        cone = _half_angle(errors, rows)
+        cone = half_angle(errors, rows)
     return AxisSummary(
         len(vectors), tuple(values.tolist()), _written(axes[0], table, end=True), _degrees(cone),
         _written(axes[2], table, end=True),
-        _bingham_p(vectors, rows),
+        bingham_p(vectors, rows),
     )  # fmt: skip
-
-
-def _bingham_p(vectors: Array, rows: _Rows) -> float | None:
-    """Return Bingham's probability of axes if all are equally likely (Mardia and Jupp, 10.7.3)."""
-    x, y, z = vectors.T
-    parts = [x * y * 2, x * z * 2, y * z * 2, x * x - y * y, (3 * z * z - 1) / math.sqrt(3)]
-    values = np.stack(parts, axis=1) / math.sqrt(2)  # coordinates of the traceless tensor
-    if rows.groups is not None:
-        return _groups_p(values, rows)
-    count = 1 / float(rows.weights @ rows.weights)
-    return _tail(special.chdtrc, 5, 7.5 * count * float((rows.mean(values) ** 2).sum()))
 
 
 def _written(vector: Array, table: Array, *, end: bool = False) -> tuple[float, ...]:

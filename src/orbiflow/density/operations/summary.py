@@ -150,7 +150,7 @@ def _summarised(
 
 TABLES = {
     "Angles": ("name", "rows", "mean", "half_width", "resultant", "concentration", "deviation"),
-    "Tests of uniformity": ("name", "rayleigh_p", "kuiper_p", "watson_p"),
+    "Tests of uniformity": ("name", "rayleigh_p", "kuiper_p", "watson_p", "rao_p"),
     "Circular correlations": ("first", "second", "sine", "sine_p", "pairs"),
 }
 """The figures in each table of angles."""
@@ -162,7 +162,8 @@ def _tables(found: dict[str, Any], level: float) -> list[runtime.Table]:
     words: dict[str, str] = {
         "half_width": f"± ({sure})", "deviation": "deviation", "pairs": "Fisher-Lee",
         "sine": "Jammalamadaka-SenGupta", "sine_p": "p", "rayleigh_p": "Rayleigh p",
-        "kuiper_p": "Kuiper p", "watson_p": "Watson p", "bingham_p": "Bingham p", "name": "column",
+        "kuiper_p": "Kuiper p", "watson_p": "Watson p", "rao_p": "Rao p",
+        "bingham_p": "Bingham p", "name": "column",
         "cone": f"cone ({sure}), degrees", "fisher_cone": f"Fisher's cone ({sure}), degrees",
         "k": "k = (n - 1)/(n - R)", "spread": "mean misorientation, degrees",
         "half": "half of the rows within, degrees",

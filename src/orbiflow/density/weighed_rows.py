@@ -1,0 +1,107 @@
+"""Rows with weights, of which some belong together, and how sure a direction estimated from them is.
+
+Errors count rows, or groups where there are any: rows of one group are not independent.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from orbiflow.arguments import as_number
+from orbiflow.arrays import Array
+from orbiflow.density.data import as_numbers
+from orbiflow.errors import OrbiflowError
+
+
+@dataclass(frozen=True, eq=False)
+class WeighedRows:
+    """Weights (n,) of sum 1, and the number of each row's group (n,), None if all are independent.
+
+    - `even`: Whether all rows count the same. `level`: The level of intervals.
+    """
+
+    weights: Array
+    groups: NDArray[np.int64] | None
+    even: bool
+    level: float
+
+    def mean(self, values: Array) -> Array:
+        return self.weights @ values
+
+    def sums(self, values: Array) -> Array:
+        """Return weighted sums (G, q) of values (n, q) over what is independent."""
+        weighted = self.weights[:, None] * values
+        if self.groups is None:
+            return weighted
+        found = np.zeros((int(self.groups.max()) + 1, values.shape[1]))
+        np.add.at(found, self.groups, weighted)
+        return found
+
+    @property
+    def units(self) -> int:
+        """The number of rows or groups."""
+        return len(self.weights) if self.groups is None else int(self.groups.max()) + 1
+
+    @property
+    def effective(self) -> float:
+        """The effective number of rows or groups (Kish), by the squares of their shares."""
+        shares = self.sums(np.ones((len(self.weights), 1)))[:, 0]
+        return 1 / float(shares @ shares)
+
+    @property
+    def alike(self) -> bool:
+        """Whether rows are independent and count the same."""
+        return self.groups is None and self.even
+
+
+def chosen_rows(
+    values: Array, weights: ArrayLike | None, groups: ArrayLike | None, level: float
+) -> tuple[Array, WeighedRows]:
+    """Return the rows that have all values and a weight."""
+    whole = np.isfinite(values).all(axis=1)
+    given = np.ones(len(values)) if weights is None else as_numbers(weights, "weights")
+    if given.shape != whole.shape or not (np.isfinite(given).all() and (given >= 0).all()):
+        raise OrbiflowError(f"weights must be {len(values)} numbers, none below 0")
+    whole &= given > 0
+    if not whole.any():
+        raise OrbiflowError("there is no row with a value and a weight")
+    own, numbers = given[whole], None
+    if groups is not None:
+        labels = np.asarray(groups)
+        if labels.shape != whole.shape:
+            raise OrbiflowError(f"groups must be {len(values)} labels, one for each row")
+        numbers = np.unique(labels[whole], return_inverse=True)[1].astype(np.int64)
+    even = bool((own == own[0]).all())
+    level = as_number(level, "level", 0.5, 0.999)
+    return values[whole], WeighedRows(own / own.sum(), numbers, even, level)
+
+
+def tail(of: Any, *arguments: float) -> float:
+    """Return a value of a distribution, from a function of SciPy's."""
+    return float(of(*arguments))
+
+
+def half_angle(errors: Array, rows: WeighedRows) -> float | None:
+    """Return the half angle in radians of a cone that holds the true direction, None if none does.
+
+    `errors` (n, p) are each row's part in the error of the estimate, across it: their linearised sum
+    is the error. For independent rows these are Fisher (1993), equation 4.22, and Fisher, Lewis and
+    Embleton (1987), section 5.3.1; for groups the sums over a group take the place of rows.
+    """
+    free, units = errors.shape[1] - 1, rows.units
+    variance = float((rows.sums(errors) ** 2).sum()) / free
+    if units < 2:
+        return None
+    if rows.groups is None:
+        quantile = tail(special.chdtri, free, 1 - rows.level)
+    else:
+        variance *= units / (units - 1)
+        quantile = free * tail(special.fdtri, free, units - 1, rows.level)
+    sine = math.sqrt(quantile * variance)
+    return math.asin(sine) if sine < 1 else None
