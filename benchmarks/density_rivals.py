@@ -329,54 +329,69 @@ def lines(path: Path) -> list[dict[str, Any]]:
     return list({identity(one): one for one in every}.values())
 
 
+TITLES = {
+    "quakes": "earthquakes", "fire": "wildfires", "volerup": "volcanic eruptions", "flood": "floods",
+    "general": "backbone, general", "prepro": "pre-proline", "rna": "RNA",
+    "side3": "backbone and first chi", **dict.fromkeys(SIDES[1:], "side chains"),
+    **{name: f"rotations, mixture of {name[4:]}" for name in ROTATIONS},
+}  # fmt: skip
+"""What sets are called in tables, where it is not their own name."""
+
+
 def show(found: list[dict[str, Any]]) -> None:
-    """Print a table of log densities, one of seconds, and one of integrals."""
+    """Print a table of log densities, and one of seconds and integrals over all sets."""
     good = [one for one in found if "error" not in one]
-    for title, cell in (
-        ("mean negative log density of test rows, nats", _nats),
-        ("seconds of a fit on one core; of flows, of both sizes", _seconds),
-        ("integrals, farthest from 1", _whole),
-    ):
-        print(f"\n{title}\n\n| set | rows | angles | truth | {' | '.join(METHODS)} |")
-        print("|---" * (4 + len(METHODS)) + "|")
-        for name in SETS:
-            own = [one for one in good if one["set"] == name]
-            if not own:
-                continue
-            truths = [one["truth"] for one in own if "truth" in one and one["method"] == "orbiflow"]
-            truth = f"{np.mean(truths):.3f}" if truths else ""
-            cells = [cell([one for one in own if one["method"] == method]) for method in METHODS]
-            head = f"{name} | {own[0]['rows']:,} | {own[0]['dim']} | {truth}"
-            print(f"| {head} | {' | '.join(cells)} |")
+    print("\nmean negative log density of test rows, nats\n")
+    print(f"| set | rows | angles | truth | {' | '.join(METHODS)} |")
+    print("|---" * (4 + len(METHODS)) + "|")
+    for name in SETS:
+        own = [one for one in good if one["set"] == name]
+        if own:
+            truths = [one["truth"] for one in own if one.get("truth") and one["split"] == 0]
+            truth = f"{truths[0]:.3f}" if truths else ""
+            cells = [_nats([one for one in own if one["method"] == method]) for method in METHODS]
+            title = TITLES.get(name.removesuffix("-apart"), name)
+            title += ", places apart" * (name in APART)
+            size = own[0]["dim"] if own[0]["set"] in (*TORI, *SIDES, "rna") else "sphere"
+            size = "SO(3)" if name in ROTATIONS else size
+            print(f"| {title} | {own[0]['rows']:,} | {size} | {truth} | {' | '.join(cells)} |")
+    print(f"\n| | {' | '.join(METHODS)} |")
+    print("|---" * (1 + len(METHODS)) + "|")
+    for title, cell in (("seconds, median of all sets", _seconds), ("integral", _whole)):
+        cells = [cell([one for one in good if one["method"] == method]) for method in METHODS]
+        print(f"| {title} | {' | '.join(cells)} |")
     for one in found:
         if "error" in one:
             print(f"failed: {' '.join(map(str, identity(one)))}: {one['error']}")
 
 
 def _chosen(fits: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Of each split the size that is better on the held-out rows."""
-    numbers = sorted({one["split"] for one in fits})
-    return [
-        min((one for one in fits if one["split"] == own), key=lambda one: one["held"])
-        for own in numbers
-    ]
+    """Of each set and split the size that is better on the held-out rows."""
+    parts: dict[tuple[str, int], dict[str, Any]] = {}
+    for one in sorted(fits, key=lambda one: -one["held"]):
+        parts[one["set"], one["split"]] = one
+    return list(parts.values())
 
 
 def _nats(fits: list[dict[str, Any]]) -> str:
     values = [one["test"] for one in _chosen(fits)]
-    return f"{np.mean(values):.3f} ± {np.std(values):.3f}" if values else ""
+    spread = f" ± {np.std(values):.3f}" if len(values) > 1 else ""
+    return f"{np.mean(values):.3f}{spread}" if values else ""
 
 
 def _seconds(fits: list[dict[str, Any]]) -> str:
-    count = len({one["split"] for one in fits})
-    return f"{sum(one['seconds'] for one in fits) / count:.0f}" if fits else ""
+    own: dict[tuple[str, int], float] = {}
+    for one in fits:  # of both sizes
+        part = one["set"], one["split"]
+        own[part] = own.get(part, 0.0) + one["seconds"]
+    return f"{np.median(list(own.values())):.0f}" if own else ""
 
 
 def _whole(fits: list[dict[str, Any]]) -> str:
     if not fits:
         return ""
     worst = max(_chosen(fits), key=lambda one: abs(one["mass"] - 1))
-    return f"{worst['mass']:.4f} ± {worst['mass_error']:.4f}"
+    return f"{worst['mass']:.4f} ± {worst['mass_error']:.4f} ({worst['set']})"
 
 
 def main() -> None:
