@@ -15,7 +15,8 @@ rows, because it holds rows out by itself. Each fit has one thread, and flows of
 have the device.
 
 Integrals are means of p / q at draws of q: a tenth is uniform, the rest kernels about training rows, as
-wide as they are apart and of five widths. Their standard error is given. Those of the default are
+wide as they are apart and of five widths, less what their linear relation to the parts of q, whose
+integrals are known, says of the draws. Their standard error is given. Those of the default are
 quadratures (density_integral.py) where that can be, because kernels about repeated rows are too narrow
 for draws.
 
@@ -212,25 +213,36 @@ def fit(job: Job, part: Part) -> tuple[Log, str, Mixture | None]:
 
 
 @cache
-def draws(name: str, split: int) -> tuple[Data, Data]:
-    """Points to integrate at, in the units of the space, and the log density that they are of."""
+def draws(name: str, split: int) -> tuple[Data, Data, Data]:
+    """Points to integrate at, in the units of the space, the log density q they are of, and its parts.
+
+    The parts (N, P) are relative to q, so that each has the mean 1.
+    """
     part = part_of(name, split)
     space = space_of(part)
     centers = space.to_chart(part.train[:CENTERS])
     even = torch.full((len(centers),), 1 / len(centers), dtype=torch.float64)
     (near,) = spreads(space, centers, [16])
-    local = AdaptiveKernels(space, centers, (0.5 / near).clamp(1, 1e7), even)
-    kernels = [even_kernels(space, centers, kappa, even) for kappa in DRAWN_KAPPAS]
-    proposal = Mixture([UniformDensity(space), local, *kernels], [0.1, 0.4, *[0.1] * len(kernels)])
+    parts = [
+        UniformDensity(space),
+        AdaptiveKernels(space, centers, (0.5 / near).clamp(1, 1e7), even),
+        *(even_kernels(space, centers, kappa, even) for kappa in DRAWN_KAPPAS),
+    ]
+    weights = np.array([0.1, 0.4, *[0.1] * len(DRAWN_KAPPAS)])
+    proposal = Mixture(parts, weights.tolist())
     points = space.from_chart(proposal.sample(DRAWS, torch.Generator().manual_seed(7)))
-    return points, of_library(part, proposal)(points)
+    logs = np.stack([of_library(part, own)(points) for own in parts], axis=1)
+    log = np.log(np.exp(logs - logs.max(axis=1, keepdims=True)) @ weights) + logs.max(axis=1)
+    return points, log, np.exp(logs - log[:, None])
 
 
 def mass(log_density: Log, job: Job) -> tuple[float, float]:
-    """The integral, and its standard error."""
-    points, log = draws(job.set, job.split)
+    """The integral, and its standard error: of what the parts of q, whose integrals are 1, leave."""
+    points, log, parts = draws(job.set, job.split)
     ratio = np.exp(log_density(points) - log)
-    return float(ratio.mean()), float(ratio.std() / len(ratio) ** 0.5)
+    slopes = np.linalg.lstsq(parts - parts.mean(axis=0), ratio - ratio.mean(), rcond=1e-10)[0]
+    rest = ratio - (parts - 1) @ slopes
+    return float(rest.mean()), float(rest.std() / len(rest) ** 0.5)
 
 
 def run(job: Job) -> dict[str, Any]:
