@@ -61,12 +61,12 @@ def test_fields_and_flows(name: str) -> None:
     field = FourierField(group, 2, divergence_free=True, dtype=torch.float64)
     with torch.no_grad():
         field.parameters_.normal_(0, 0.02, generator=torch.Generator().manual_seed(0))
-    flow = Flow([field], steps=8)
+    flow = Flow([field], steps=32)
     points = torch.rand(50, group.dim, dtype=torch.float64, generator=torch.Generator())
     expected = flow(points)
     found = flow.to("cuda")(points.cuda())
     torch.testing.assert_close(found.cpu(), expected, rtol=1e-10, atol=1e-10)
-    torch.testing.assert_close(flow.inverse(found), points.cuda(), rtol=1e-8, atol=1e-8)
+    torch.testing.assert_close(flow.inverse(found), points.cuda(), rtol=1e-6, atol=1e-6)
 
 
 @needs_cuda
@@ -74,7 +74,7 @@ def test_a_flow_is_trained() -> None:
     space = make_space("klein-bottle")
     flow = spline_flow(space, np.random.default_rng(0)).to("cuda")
     points = space.uniform(64, torch.Generator().manual_seed(0)).cuda()
-    moved, change = flow(points), []
+    moved, change = flow(points).detach(), list[float]()
     for _ in range(3):
         loss = (flow(points) - moved - 0.01).square().sum()
         change.append(float(loss.detach()))
