@@ -32,7 +32,8 @@ DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
     "data_space",
     "estimator",
-    "categories",
+    "covariates",
+    "conditional_estimator",
     "comparing",
     "regions",
     "weighed_rows",

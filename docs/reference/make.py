@@ -51,9 +51,9 @@ TOPICS = {
         "field_picture "
     ),
     "Densities": (
-        "DensityEstimator read_density density_to_bytes Density Mixture FlowDensity "
-        "AdaptiveKernels VonMisesChains VonMisesNetwork Space make_space QuotientSpace "
-        "RotationSpace UnitVectorSpace conditional marginal log_density_gradient "
+        "DensityEstimator ConditionalEstimator AngleRegressor read_density density_to_bytes "
+        "Density Mixture FlowDensity AdaptiveKernels VonMisesChains VonMisesNetwork Space make_space "
+        "QuotientSpace RotationSpace UnitVectorSpace conditional marginal log_density_gradient "
         "highest_density_region DensityLevels outlines to_klein "
     ),
     "Comparing densities, and data": (

@@ -7,6 +7,8 @@ from .density.comparing.paired import compare_models as compare_models
 from .density.comparing.paired import compare_scores as compare_scores
 from .density.comparing.resampling import cross_validation_folds as cross_validation_folds
 from .density.comparing.settings import ComparisonSettings as ComparisonSettings
+from .density.conditional_estimator import AngleRegressor as AngleRegressor
+from .density.conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .density.cross_validation.operations import cross_validate as cross_validate
 from .density.estimator import DensityEstimator as DensityEstimator
 from .density.inference.partial import conditional as conditional

@@ -17,7 +17,7 @@ OPERATIONS = {
     "density sample": "orbiflow.density.operations.queries:sample",
     "density marginal": "orbiflow.density.operations.queries:marginal",
     "density conditional": "orbiflow.density.operations.queries:conditional",
-    "density trend": "orbiflow.density.operations.queries:trend",
+    "density trend": "orbiflow.density.operations.trends:trend",
     "density plot": "orbiflow.density.operations.drawing:plot",
     "density compare": "orbiflow.density.operations.comparison:compare",
     "density region": "orbiflow.density.operations.drawing:region",

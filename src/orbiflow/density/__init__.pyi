@@ -1,5 +1,3 @@
-from .categories import CategoryDensity as CategoryDensity
-from .categories import fit_categories as fit_categories
 from .comparing.data_sets import DataComparison as DataComparison
 from .comparing.data_sets import Divergence as Divergence
 from .comparing.data_sets import compare_samples as compare_samples
@@ -13,6 +11,8 @@ from .comparing.paired import compare_models as compare_models
 from .comparing.paired import compare_scores as compare_scores
 from .comparing.resampling import cross_validation_folds as cross_validation_folds
 from .comparing.settings import ComparisonSettings as ComparisonSettings
+from .conditional_estimator import AngleRegressor as AngleRegressor
+from .conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density

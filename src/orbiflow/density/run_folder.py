@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,22 +12,8 @@ from orbiflow.runtime import Note, ResultFolder, Sink, Written, write_atomic
 SAMPLES = "samples.csv"
 """Samples beside the density that they are of."""
 
-CATEGORY_FILE = "category-{}.safetensors"
-"""The density where a word is known, beside that of all rows."""
-
-
-def category_files(folder: Path) -> dict[str, str]:
-    """Return the files of a folder's densities where a word is known, by the word, or {}."""
-    try:
-        document = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-        files = {word: own["file"] for word, own in document["categories"].items()}
-        safe = all(re.fullmatch(CATEGORY_NAME, name) for name in files.values())
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return {}
-    return files if safe and isinstance(document.get("given"), str) else {}
-
-
-CATEGORY_NAME = CATEGORY_FILE.replace(".", r"\.").format(r"[A-Za-z0-9_+-]{1,60}")
+CONDITIONAL = "conditional.safetensors"
+"""The density where covariates are known, beside that of all rows."""
 
 
 def written_files(folder: Path) -> set[str]:
@@ -45,7 +30,8 @@ def written_files(folder: Path) -> set[str]:
     from orbiflow.density.pictures import MODEL, PICTURES, REPORT, TABLE, THUMBNAIL
 
     samples = {SAMPLES} if "samples" in document else set[str]()
-    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES, *samples, *category_files(folder).values()}
+    given = {CONDITIONAL} if "covariates" in (document.get("given") or ()) else set[str]()
+    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES, *samples, *given}
 
 
 def write_files(folder: ResultFolder, files: Mapping[str, str | bytes], tell: Sink) -> None:

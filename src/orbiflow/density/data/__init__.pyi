@@ -2,6 +2,7 @@ from .column_names import LATITUDES as LATITUDES
 from .column_names import LONGITUDES as LONGITUDES
 from .column_names import UNITS as UNITS
 from .column_names import Pair as Pair
+from .column_names import cycle_named as cycle_named
 from .column_names import is_angle_named as is_angle_named
 from .column_names import is_count_named as is_count_named
 from .column_names import is_other_quantity as is_other_quantity
@@ -26,6 +27,7 @@ from .draws import runs_of_draws as runs_of_draws
 from .frames import OUTPUTS as OUTPUTS
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
+from .frames import columns_of as columns_of
 from .frames import frame_of as frame_of
 from .frames import require_table as require_table
 from .frames import require_values as require_values

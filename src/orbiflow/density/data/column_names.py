@@ -171,6 +171,33 @@ def is_angle_named(name: str) -> bool:
     return bool(words & known) or any(word.endswith(("angle", "winkel")) for word in words)
 
 
+CYCLES = {
+    "hour": (24.0, 0.0, 24.0), "hours": (24.0, 0.0, 24.0), "hr": (24.0, 0.0, 24.0),
+    "month": (12.0, 1.0, 12.0), "weekday": (7.0, 0.0, 7.0),
+    "doy": (365.25, 0.0, 366.0), "yday": (365.25, 0.0, 366.0), "dayofyear": (365.25, 0.0, 366.0),
+}  # fmt: skip
+"""Periods of columns by their names, and the least and the largest value that they then have."""
+
+
+def cycle_named(name: str, least: float, most: float, turn: float | None) -> float | None:
+    """Return the period that a column has by its name, with such values; None if it says none.
+
+    `turn` is that of angles, if there are any.
+
+    >>> cycle_named("hour", 0, 23, None), cycle_named("psi", -170, 175, 360.0)
+    (24.0, 360.0)
+    >>> cycle_named("hours", 0, 500, None), cycle_named("temperature", 0, 20, 360.0)
+    (None, None)
+    """
+    words = words_of(name)
+    if set(words) & ANGLES and turn is not None and max(abs(least), abs(most)) <= turn * 1.001:
+        return turn
+    found = CYCLES.get("".join(words)) or next(
+        (CYCLES[one] for one in words if one in CYCLES), None
+    )
+    return found[0] if found and found[1] <= least and most <= found[2] else None
+
+
 def is_other_quantity(name: str) -> bool:
     """Return whether a name says that a column holds no angles but another quantity.
 

@@ -41,7 +41,7 @@ def as_data(data: Any, what: str = "data") -> Data:
     >>> as_data(np.ma.masked_greater([[1.0, 999.0]], 900)).values.tolist()
     [[1.0, nan]]
     """
-    columns = _columns_of(data, what)
+    columns = columns_of(data, what)
     if columns is None:
         return Data(as_numbers(data, what), None)
     parts = [as_numbers(part, f"{what}: column {name!r}") for name, part in columns]
@@ -54,7 +54,7 @@ def as_data(data: Any, what: str = "data") -> Data:
     return Data(values, tuple(cast("list[str]", names)) if named else None)
 
 
-def _columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
+def columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
     """Return the names and columns of a frame, or None for what is not one."""
     if hasattr(data, "collect_schema") and hasattr(data, "collect"):
         raise OrbiflowError(f"{what}: a lazy frame holds no numbers yet; call its collect() first")

@@ -3,7 +3,10 @@ from .automatic import fit_chosen as fit_chosen
 from .flow import fit_density as fit_density
 from .flow import refuse_flow_settings as refuse_flow_settings
 from .held_out import LEAST_PLACES as LEAST_PLACES
+from .held_out import Folds as Folds
+from .held_out import folds_of as folds_of
 from .held_out import lightest_folds as lightest_folds
+from .held_out import sparse_weights as sparse_weights
 from .held_out import stacked as stacked
 from .held_out import stacking_weights as stacking_weights
 from .intervals import SAME as SAME
@@ -13,10 +16,14 @@ from .parameters import Parameter as Parameter
 from .parameters import ParametricFit as ParametricFit
 from .parametric import fit_parametric as fit_parametric
 from .repeats import places as places
+from .repeats import repeats_of as repeats_of
+from .repeats import spread_evenly as spread_evenly
 from .report import FitReport as FitReport
 from .report import Progress as Progress
 from .report import silent as silent
+from .rows import Rows as Rows
 from .rows import check_missing as check_missing
+from .rows import gain_of as gain_of
 from .rows import group_numbers as group_numbers
 from .rows import lone_groups_note as lone_groups_note
 from .rows import mean_of as mean_of

@@ -20,3 +20,4 @@ from .textures import rotations_only as rotations_only
 from .textures import texture_index as texture_index
 from .trends import Trend as Trend
 from .trends import trend as trend
+from .trends import trend_of as trend_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +38,7 @@ class Trend(NamedTuple):
     - `low`, `high`: The ends (n, L) of intervals of the masses `levels`. Of an angle they are
       counted from the direction opposite to the mean, and not beyond half a turn from it.
     - `log_density`: The log density (n,) of the values in natural measure: how many data speak there.
+      None of covariates, which have no density.
     """
 
     at: Array
@@ -45,7 +46,7 @@ class Trend(NamedTuple):
     low: Array
     high: Array
     levels: tuple[float, ...]
-    log_density: Array
+    log_density: Array | None
 
 
 @one_thread()
@@ -73,25 +74,65 @@ def trend(
     Raises `OrbiflowError` for other spaces, columns and values.
     """
     torus = check_torus(density.space, "trends")
-    values = as_array(at, "at", ("n",))
-    masses = tuple(as_number(level, "levels") for level in levels)
-    if not 0 < len(values) <= MOST_VALUES or not all(0 < mass < 1 for mass in masses):
-        raise OrbiflowError(f"a trend has 1 to {MOST_VALUES} values and masses between 0 and 1")
+    values, masses = _checked(at, levels)
     if of == along:
         raise OrbiflowError("a trend is of one column along another one")
     turns = torus.turns(along, torch.tensor(values))[:, None]
     own, alone = torus.of_axes([of]), turns.new_full((len(turns), torus.dim), torch.nan)
     alone[:, along] = turns[:, 0]
     logs = at_observed(density, alone, measure="natural")
-    cells = (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
+    cells = _cells()
     rows = list[tuple[float, Array]]()
     for part in torch.split(turns, TOGETHER):
         both = torch.cat([cells.repeat(len(part), 1), part.repeat_interleave(CELLS, 0)], dim=1)
         found = density.log_marginal(both, [of, along]).reshape(-1, CELLS)
         rows += [_about_mean(own, weights, masses) for weights in torch.softmax(found, dim=1)]
         tick(len(rows) / len(turns))
+    return _of_rows(values, rows, masses, logs.numpy())
+
+
+@one_thread()
+@torch.no_grad()
+def trend_of(
+    densities: Iterable[Density], of: int, at: ArrayLike, *, levels: Sequence[float] = LEVELS
+) -> Trend:
+    """Return the mean and intervals of a column in densities that are those at values (n,).
+
+    Arguments are those of `trend`; all densities are on one torus.
+    """
+    values, masses = _checked(at, levels)
+    rows = list[tuple[float, Array]]()
+    for density in densities:
+        torus = check_torus(density.space, "trends")
+        logs = (
+            density.log_prob(_cells()) if torus.dim == 1 else density.log_marginal(_cells(), [of])
+        )
+        rows.append(_about_mean(torus.of_axes([of]), torch.softmax(logs, dim=0), masses))
+    return _of_rows(values, rows, masses, None)
+
+
+def _checked(at: ArrayLike, levels: Sequence[float]) -> tuple[Array, tuple[float, ...]]:
+    """Return values (n,) and masses, which are looked at."""
+    values = as_array(at, "at", ("n",))
+    masses = tuple(as_number(level, "levels") for level in levels)
+    if not 0 < len(values) <= MOST_VALUES or not all(0 < mass < 1 for mass in masses):
+        raise OrbiflowError(f"a trend has 1 to {MOST_VALUES} values and masses between 0 and 1")
+    return values, masses
+
+
+def _cells() -> Tensor:
+    """Return the middles (CELLS, 1) of even cells of a circle, in turns."""
+    return (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
+
+
+def _of_rows(
+    values: Array,
+    rows: Sequence[tuple[float, Array]],
+    masses: tuple[float, ...],
+    logs: Array | None,
+) -> Trend:
     mean, ends = np.array([row[0] for row in rows]), np.stack([row[1] for row in rows])
-    return Trend(values, mean, ends[:, 0], ends[:, 1], masses, logs.numpy())
+    return Trend(values, mean, ends[:, 0], ends[:, 1], masses, logs)
 
 
 def _about_mean(space: Torus, weights: Tensor, masses: Sequence[float]) -> tuple[float, Array]:
@@ -99,7 +140,7 @@ def _about_mean(space: Torus, weights: Tensor, masses: Sequence[float]) -> tuple
 
     `weights` (CELLS,) are masses of even cells of its circle.
     """
-    turns = (torch.arange(CELLS, dtype=torch.float64) + 0.5) / CELLS
+    turns = _cells()[:, 0]
     tails = np.array([[(1 - m) / 2 for m in masses], [(1 + m) / 2 for m in masses]])
     period = space.period_of(0)
     if not period:

@@ -15,8 +15,14 @@ from .evaluation import kl_by_quadrature as kl_by_quadrature
 from .evaluation import log_density_gradient as log_density_gradient
 from .evaluation import midpoints as midpoints
 from .figures import Estimate as Estimate
+from .files import density_from as density_from
+from .files import density_parts as density_parts
 from .files import density_to_bytes as density_to_bytes
+from .files import known_kinds as known_kinds
 from .files import read_density as read_density
+from .files import space_from as space_from
+from .files import space_header as space_header
+from .files import within as within
 from .fisher_bingham import AngularCentralGaussian as AngularCentralGaussian
 from .fisher_bingham import FisherBingham as FisherBingham
 from .fisher_bingham import images_of as images_of

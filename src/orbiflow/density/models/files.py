@@ -29,19 +29,13 @@ def density_to_bytes(density: Density, **extra: Any) -> bytes:
     values for the reader, for JSON.
     """
     header, tensors = density_parts(as_instance(density, Density, "density"), "density")
-    space = _checked_space(density.space)
-    document = {
-        "format": FORMAT,
-        "space": {"name": space.name, **space.settings()},
-        "group": group_header(space.group) if space.has_chart else None,
-        "density": header,
-        "extra": extra,
-    }
+    space = space_header(density.space)
+    document = {"format": FORMAT, **space, "density": header, "extra": extra}
     return tensor_bytes(document, tensors, "a density")
 
 
-def _checked_space(space: Space) -> Space:
-    """Return the space if its name and settings make it again."""
+def space_header(space: Space) -> dict[str, Any]:
+    """Return what `space_from` makes a space of again, for JSON; refuse other spaces."""
     try:
         again = make_space(space.name, **space.settings())
     except OrbiflowError:
@@ -56,6 +50,18 @@ def _checked_space(space: Space) -> Space:
             f"the space is a {type(space).__name__}, which `make_space` does not make again: give the "
             'class a name of its own, `name = "..."`, and settings that are its options'
         )
+    return {
+        "space": {"name": space.name, **space.settings()},
+        "group": group_header(space.group) if space.has_chart else None,
+    }
+
+
+def space_from(header: Mapping[str, Any]) -> Space:
+    """Make the space of `space_header` again."""
+    options = dict(header["space"])
+    space = make_space(str(options.pop("name")), **options)
+    if space.has_chart and not is_of_group(header["group"], space.group):
+        raise OrbiflowError(f"its group is not {space.group!r}, which its space has here")
     return space
 
 
@@ -69,27 +75,19 @@ def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
         if header["format"] != FORMAT:
             raise ValueError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # what is made in it could never be differentiated
-            return _restored(header, tensors), header["extra"]
+            known_kinds()
+            space = space_from(header)
+            return density_from(space, header["density"], tensors), header["extra"]
     except (OrbiflowError, ValueError, KeyError, TypeError, RecursionError, RuntimeError) as error:
         raise InputFileError(
             f"{path}: not a density saved by orbiflow, or damaged ({error})"
         ) from error
 
 
-def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
-    for module in (
-        "mixture",
-        "network",
-        "fisher_bingham",
-        "sine",
-        "product_chains",
-    ):  # now all kinds are known
+def known_kinds() -> None:
+    """Import the modules of all kinds of densities that files may hold."""
+    for module in ("mixture", "network", "fisher_bingham", "sine", "product_chains"):
         import_module(f"orbiflow.density.models.{module}")
-    options = dict(header["space"])
-    space = make_space(str(options.pop("name")), **options)
-    if space.has_chart and not is_of_group(header["group"], space.group):
-        raise OrbiflowError(f"its group is not {space.group!r}, which its space has here")
-    return density_from(space, header["density"], tensors)
 
 
 def density_parts(

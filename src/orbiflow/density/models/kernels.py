@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from scipy.special import ive
 from torch import Tensor
+from torch.autograd import Function
 
 from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
@@ -19,7 +20,7 @@ from orbiflow.density.models.rotation_kernels import RotationKernels
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
 from orbiflow.density.spaces import CHART, RotationSpace, Space, by_sphere
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import fft, special
+from orbiflow.typed_torch import applied, fft, special
 
 MOST_KERNELS = 1_000_000
 """The most kernels that a file may hold."""
@@ -253,12 +254,28 @@ def _log_ive(order: float, kappa: Tensor) -> Tensor:
     first = (1 - 4 * order**2) / (8 * kappa)  # DLMF 10.40.1
     large = torch.log1p(first * (1 + (9 - 4 * order**2) / (16 * kappa)))
     large -= (2 * math.pi * kappa).log() / 2
-    small = (
-        as_tensor(ive(order, kappa.clamp_max(ASYMPTOTIC_CONCENTRATION).cpu().numpy()), "ive")
-        .to(kappa)
-        .log()
-    )
+    small = applied(_LogIve, order, kappa.clamp_max(ASYMPTOTIC_CONCENTRATION))
     return torch.where(kappa < ASYMPTOTIC_CONCENTRATION, small, large)
+
+
+class _LogIve(Function):
+    """SciPy's log I(kappa) - kappa of some order, with its derivative."""
+
+    @staticmethod
+    def forward(ctx: Any, order: float, kappa: Tensor) -> Tensor:
+        ctx.order = order
+        ctx.save_for_backward(kappa)
+        return _ive(order, kappa).log()
+
+    @staticmethod
+    def backward(ctx: Any, *grads: Tensor) -> tuple[None, Tensor]:
+        (kappa,) = ctx.saved_tensors
+        ratio = _ive(ctx.order + 1, kappa) / _ive(ctx.order, kappa)
+        return None, grads[0] * (ratio + ctx.order / kappa - 1)  # DLMF 10.29.2
+
+
+def _ive(order: float, kappa: Tensor) -> Tensor:
+    return torch.as_tensor(ive(order, kappa.detach().double().cpu().numpy())).to(kappa)
 
 
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:

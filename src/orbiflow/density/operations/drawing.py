@@ -42,6 +42,7 @@ def plot(
     model: Model,
     out: Annotated[Path, Option("-o")] = Path("plots"),
     data: Path | None = None,
+    given: Annotated[tuple[str, ...], DefaultText("none")] = (),
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
@@ -55,12 +56,19 @@ def plot(
         model: Folder that `fit` wrote.
         out: Folder for the pictures, made if need be; or a .pdf, which gets a page for each figure.
         data: Table to draw beside samples in samples.png, and as the dots of --dots.
+        given: The covariates of the fit, such as temperature=295,residue=GLY: the density where they
+            are.
     """
     if data is None and table.fields_given:
         name = min(table.fields_given)
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
-    from orbiflow.density.operations.saved import check_fits, model_at, names_of, with_columns_of
+    from orbiflow.density.operations.saved import (
+        check_fits,
+        density_given,
+        names_of,
+        with_columns_of,
+    )
 
     single = pictures.is_one_file(out)
     if single and settings.format not in (None, "pdf"):
@@ -68,7 +76,7 @@ def plot(
     # pictures may stand beside their model
     check = runtime.check_output_file if single else runtime.check_outside_runs
     check(out, model, data, settings.coastlines)
-    density, extra = model_at(model)
+    density, extra = density_given(model, given, on_event)
     space = density.space
     if settings.names is None:
         settings = settings.replace(names=tuple(names_of(density, extra)))

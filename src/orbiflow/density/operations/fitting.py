@@ -14,7 +14,7 @@ from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
 from orbiflow.density.data import is_angular
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
-from orbiflow.density.operations import categories
+from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning
@@ -45,7 +45,7 @@ def fit(
     settings: DensitySettings = DensitySettings(),
     reading: CountedRowSettings = CountedRowSettings(),
     *,
-    given: Annotated[str | None, DefaultText("none")] = None,
+    given: Annotated[tuple[str, ...], DefaultText("none")] = (),
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
     picture: Annotated[bool, Hidden()] = False,
     on_event: runtime.Sink = runtime.ignore,
@@ -57,13 +57,18 @@ def fit(
 
     Args:
         data: CSV, TSV, NPY or Parquet.
-        given: Column of words, such as residue: a density where each is known, too.
+        given: Covariates, such as temperature,hour,residue: the density where they are known, too.
+            Numbers, cyclic ones by their names or as hour:24, and words; level:word takes numbers for
+            words.
         out: Folder for the results, made if need be.
         picture: Also draw a small picture, thumbnail.png.
     """
     begin = time.perf_counter()
     _check(where, settings, reading)
     with runtime.one_thread():
+        known = covariates.given_columns(
+            given, tables.column_names(data, has_header=reading.header)
+        )
         rows = tables.read_rows(
             data,
             reading,
@@ -72,25 +77,27 @@ def fit(
             width=where.width,
             group=reading.group,
             beside=where.beside,
-            given=given,
+            given=[own.name for own in known],
         )
+        cells = covariates.read_given(rows, known, reading, turn_of(where, rows))
+        rows = cells.rows
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
         estimator = fit_rows(rows, where, settings, reading, on_event, cancel)
         asked = {**settings.values(), **reading.values()}
         document = _document(estimator, rows, asked, settings.seed)
-        words: dict[str, bytes] = {}
-        if given is not None:
-            words, said = categories.fit_words(estimator, rows, given, on_event, cancel)
+        others: dict[str, bytes] = {}
+        if given:
+            others, said = covariates.fit_given(estimator, cells, on_event, cancel)
             document |= said
         document["seconds"] = time.perf_counter() - begin
-        known = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()
+        sketch = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()
         model = models.density_to_bytes(
-            estimator.density_, columns=list(rows.table.columns), fitted_rows=known
+            estimator.density_, columns=list(rows.table.columns), fitted_rows=sketch
         )
         report = json.dumps(document, allow_nan=False, indent=1)
-        files = {pictures.MODEL: model, pictures.REPORT: report, **words}
+        files = {pictures.MODEL: model, pictures.REPORT: report, **others}
         if picture:
             files[pictures.THUMBNAIL] = pictures.density_thumbnail(estimator.density_, values)
     write_files(folder, files, on_event)
@@ -121,6 +128,13 @@ def parameter_table(found: ParametricFit) -> runtime.Table:
             for one in found.parameters
         ),
     )
+
+
+def turn_of(where: SpaceSettings, rows: TableRows) -> float | None:
+    """Return a whole turn in the unit of the angles of a torus, None of other data."""
+    if where.space != "torus":
+        return None
+    return spaces.whole_turn(tables.angle_unit(where, rows.table, runtime.ignore))
 
 
 def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> str | Space:

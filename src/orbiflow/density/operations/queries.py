@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow import runtime
 from orbiflow.density import comparing, fitting, models, regions, spaces, tables
-from orbiflow.density.operations.categories import score_words, word_column
+from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import Advice, literal
@@ -35,7 +34,7 @@ class ScoreSettings(Settings, group="Scores"):
 
     given: Annotated[tuple[str, ...], DefaultText("none")] = ()
     """Columns that are known: the log density of the others where these are, p(others | given). Or the
-    column of words that was given to the fit."""
+    covariates that were given to the fit."""
 
     region: bool = False
     """Add a column hdr: the mass of the smallest region of highest density that holds the row."""
@@ -86,15 +85,19 @@ def score(
         density, extra = model_at(model)
         spaces.check_measure(settings.measure, density.space)
         read = with_columns_of(reading, data, extra, on_event)
-        column = word_column(model, settings.given)
-        space = density.space.name
-        rows = tables.read_rows(data, read, on_event, model_space=space, given=column)
+        where_known = covariates.conditional_in(model) if settings.given else None
+        asked = where_known and covariates.columns_asked(where_known[0], settings.given)
+        space, others = density.space.name, [own.name for own in asked or ()]
+        rows = tables.read_rows(data, read, on_event, model_space=space, given=others)
+        cells = covariates.read_given(rows, asked or (), reading, None)
+        rows = cells.rows
         check_fits(data, rows.table, density, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)
         names = [*rows.table.columns]
-        if column is not None:
-            score_some = partial(_log_densities, settings=settings, progress=progress)
-            logs = score_words(model, rows, column, score_some, may_lack)
+        if where_known and asked:
+            logs = covariates.score_given(
+                where_known[0], cells, settings.measure, on_event, progress
+            )
             columns, over, notes = {"log_prob_given": logs}, f"{rows.whole.sum()} rows", []
             mean = mean_of_whole(logs, rows.weights, rows.whole)
         else:
@@ -241,6 +244,9 @@ def _missing_note(known: Tensor, name: str) -> str:
 class SampleSettings(Settings, group="Samples"):
     """How samples are drawn."""
 
+    given: Annotated[tuple[str, ...], DefaultText("none")] = ()
+    """The covariates of the fit, such as temperature=295,residue=GLY: samples where they are."""
+
     count: Annotated[int, Range(1, 100_000_000), Option("-n")] = 1000
     """Number of samples."""
 
@@ -267,11 +273,11 @@ def sample(
 
     import torch
 
-    from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density.operations.saved import density_given, names_of
 
     runtime.check_output_file(out, model)
     with runtime.one_thread():
-        density, extra = model_at(model)
+        density, extra = density_given(model, settings.given, on_event)
         generator = torch.Generator().manual_seed(settings.seed)
         data = density.space.from_chart(density.sample((settings.count,), generator))
     names = names_of(density, extra)
@@ -355,30 +361,43 @@ def conditional(
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
-    """Find the density of a torus' other angles where some are known.
+    """Find the density where covariates of the fit, or some of a torus' angles, are known.
 
     Writes a model that score, sample and plot read; of one or two angles density.csv and density.png,
     too.
 
     Args:
         model: Folder that `orbiflow density fit` wrote.
-        given: What is known, in the model's unit, such as psi=-45 or psi=-45,chi1=60.
+        given: What is known: covariates, such as temperature=295,residue=GLY, and angles in the
+            model's unit, such as psi=-45,chi1=60.
         columns: Of the other angles, those to keep.
         out: Folder of the new model, made if need be.
     """
     if not given:
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
-    pairs = [_angle(text) for text in given]
+    for text in given:
+        covariates.pair_of(text)
 
     from orbiflow.density import inference
     from orbiflow.density.operations import saved
 
     runtime.check_output_folder(out, model, what="model")
     with runtime.one_thread():
-        density, extra = saved.model_at(model)
+        density, extra, left, x = saved.split_given(model, given, on_event)
+        pairs = [_angle(text) for text in left]
         names = saved.names_of(density, extra)
-        known, given_at, left = saved.condition_of(density.space, names, pairs, columns, on_event)
-        kept, axes = inference.chosen_columns(density.space, left, len(names))
+        if not pairs:
+            folder = runtime.ResultFolder(out, written_files)
+            progress = runtime.progress_events(on_event, cancel)
+            kept = saved.axes_of(columns, names, on_event) if columns is not None else None
+            found = saved.some_columns(density, kept, len(names))
+            kept_names = [names[k] for k in kept or range(len(names))]
+            origin = {"given": x, "model": str(model)}
+            return saved.write_derived(
+                found, kept_names, origin, folder, settings, progress, on_event
+            )
+        known, given_at, others = saved.condition_of(density.space, names, pairs, columns, on_event)
+        kept, axes = inference.chosen_columns(density.space, others, len(names))
         folder = runtime.ResultFolder(out, written_files)
         progress = runtime.progress_events(on_event, cancel)
         progress(0.0, "integrating")
@@ -392,7 +411,7 @@ def conditional(
         ratio = f"{math.exp(evidence):.3g} times that of the uniform density{rare}"
         on_event(runtime.Note(f"the density at {words} is {ratio}"))
         over_uniform = {"log_density_of_given_over_uniform": evidence}
-        origin = {"given": known, **over_uniform, "model": str(model)}
+        origin = {"given": {**x, **known}, **over_uniform, "model": str(model)}
         kept_names = [names[k] for k in kept]
         return saved.write_derived(found, kept_names, origin, folder, settings, progress, on_event)
 
@@ -408,101 +427,3 @@ def _angle(text: str) -> tuple[str, float]:
         raise SettingError(
             f"{{given}} must be angles such as psi=-45, got {literal(repr(text))}"
         ) from None
-
-
-class TrendSettings(Settings, group="Trend"):
-    """At which values a trend is found, and what its intervals hold."""
-
-    start: Annotated[float | None, DefaultText("where 2 % of the density lie below")] = None
-    """The first value."""
-
-    end: Annotated[float | None, DefaultText("where 2 % lie above; of an angle a whole turn")] = (
-        None
-    )
-    """The last value."""
-
-    count: Annotated[int, Range(2, 1000), Option("-n")] = 41
-    """Number of values."""
-
-    levels: tuple[float, ...] = (0.5, 0.9)
-    """What the intervals hold."""
-
-
-@runtime.operation("density trend")
-def trend(
-    settings: TrendSettings = TrendSettings(),
-    *,
-    model: Model,
-    of: str,
-    along: str,
-    out: Out = Path("trend.csv"),
-    on_event: runtime.Sink = runtime.ignore,
-    cancel: runtime.Cancel = runtime.Cancel(),
-) -> runtime.Outcome:
-    """Find how one column goes with another: its mean and intervals at each of many values.
-
-    Writes a table and, beside it, a picture of the same name.
-
-    Args:
-        model: Folder that `orbiflow density fit` wrote, of angles or of angles beside real columns.
-        of: The column whose mean is found.
-        along: The column that is known.
-        out: The table.
-    """
-    check_table_name(out)
-
-    import numpy as np
-
-    from orbiflow.density import inference, pictures
-    from orbiflow.density.operations.saved import axes_of, model_at, names_of
-    from orbiflow.drawing import Sheet
-
-    runtime.check_output_file(out, model)
-    with runtime.one_thread():
-        density, extra = model_at(model)
-        names = names_of(density, extra)
-        first, second = axes_of([of, along], names, on_event)
-        called = names[first], names[second]
-        if density.space.parts:  # both of them are beside its own columns
-            axes = inference.chosen_columns(density.space, [first, second], len(names)).axes
-            density, first, second = inference.marginal(density, axes), 0, 1
-        at = _values(density, second, settings)
-        progress = runtime.progress_events(on_event, cancel)
-        found = inference.trend(
-            density, first, second, at, levels=settings.levels,
-            tick=lambda share: progress(0.9 * share, "finding conditional densities"),
-        )  # fmt: skip
-        space = inference.check_torus(density.space, "trends").of_axes([first, second])
-        picture = pictures.trend_picture(found, space, called, Sheet.screen())
-    heads = [called[1], called[0]]
-    for level in found.levels:
-        heads += [f"{called[0]}_low_{100 * level:g}", f"{called[0]}_high_{100 * level:g}"]
-    bands = np.stack([found.low, found.high], axis=2).reshape(len(at), -1)
-    rows = np.column_stack([found.at, found.mean, bands, found.log_density])
-    drawn = out.with_suffix(".png")
-    write_file(out, tables.to_csv([*heads, "log_density"], rows), on_event)
-    words = f"the mean of {called[0]} at {len(at)} values of {called[1]}; written to {out}"
-    write_file(drawn, picture.file(), on_event, words)
-    return runtime.Outcome({"file": str(out), "picture": str(drawn), "rows": len(at)})
-
-
-def _values(density: models.Density, axis: int, settings: TrendSettings) -> Array:
-    """Return the values (n,) of a column at which a trend is found."""
-    import numpy as np
-    import torch
-
-    from orbiflow.density import inference
-
-    space = inference.check_torus(density.space, "trends")
-    period = space.period_of(axis)
-    low = space.first_turn(axis) * period
-    high = low + period
-    if not period:
-        alone = inference.marginal(density, [axis])
-        masses = torch.tensor([0.02, 0.98], dtype=torch.float64)
-        low, high = alone.space.from_chart(alone.icdf(masses))[:, 0].tolist()
-    low = low if settings.start is None else settings.start
-    high = high if settings.end is None else settings.end
-    if not low < high:
-        raise SettingError(f"{{end}} must be above {{start}}, got {low:g} to {high:g}")
-    return np.linspace(low, high, settings.count)

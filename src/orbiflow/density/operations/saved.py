@@ -20,6 +20,7 @@ from orbiflow.density import inference, pictures, tables
 from orbiflow.density.data import check_form, doubts_of_other_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
+from orbiflow.density.operations import covariates
 from orbiflow.density.regions import size_unit
 from orbiflow.density.run_folder import SAMPLES, write_files
 from orbiflow.density.spaces import RotationSpace, Space, Torus
@@ -40,6 +41,46 @@ def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
             f"cannot read {path}: there is no {what}; give the folder that `orbiflow density fit` wrote"
         )
     return read_density(file)
+
+
+def split_given(
+    path: Path, given: Sequence[str], tell: Sink
+) -> tuple[Density, dict[str, Any], list[str], dict[str, Any]]:
+    """Return a model where covariates are known, what was saved, what else is given, and covariates.
+
+    `given` are texts such as temperature=295: those of covariates choose the density, all others are
+    left.
+    """
+    found = covariates.conditional_in(path)
+    own = {} if found is None else {one.casefold(): one for one in found[0].covariates.names}
+    pairs = [(text.rpartition("=")[0].strip().casefold(), text) for text in given]
+    left = [text for name, text in pairs if name not in own]
+    known = [covariates.pair_of(text) for name, text in pairs if name in own]
+    if found is None or not known:
+        return *model_at(path), left, {}
+    density = covariates.density_at(found[0], known, tell)
+    values = covariates.values_of(found[0], known)
+    return density, found[1], left, {name: cell[0].item() for name, cell in values.items()}
+
+
+def density_given(path: Path, given: Sequence[str], tell: Sink) -> tuple[Density, dict[str, Any]]:
+    """Return a model where covariates are as texts such as temperature=295 say, and what was saved."""
+    density, extra, left, _ = split_given(path, given, tell)
+    if left:
+        raise SettingError(
+            "{given}: "
+            + literal(f"{path} has no covariate {left[0].rpartition('=')[0]!r}")
+            + "; `density conditional` fixes columns of the data"
+        )
+    return density, extra
+
+
+def some_columns(density: Density, kept: Sequence[int] | None, count: int) -> Mixture:
+    """Return a density of all its `count` columns, or of some of them, as a mixture."""
+    if kept is not None:
+        axes = inference.chosen_columns(density.space, kept, count).axes
+        return inference.marginal(density, axes)
+    return density if isinstance(density, Mixture) else Mixture([density], [1.0])
 
 
 def names_of(density: Density, extra: dict[str, Any]) -> list[str]:

@@ -10,6 +10,7 @@ from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
 from .frame import Frame as Frame
+from .mixed import Line as Line
 from .mixed import MixedTorus as MixedTorus
 from .patches import to_klein as to_klein
 from .point_groups import international_name as international_name

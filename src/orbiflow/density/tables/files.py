@@ -208,8 +208,8 @@ def read_labels(
     kind = kind_of_file(path)
     found: dict[int, str] = {}
     if kind == "npy":
-        numbers = read_table(path, columns=[column], width=1, drop_missing=True)
-        cells = numbers.values[:, 0].astype(str).tolist()
+        numbers = read_table(path, columns=[column], width=1, keep_missing=True)
+        cells = ["" if cell != cell else str(cell) for cell in numbers.values[:, 0].tolist()]
         found = dict(zip(numbers.lines.tolist(), cells, strict=True))
     elif kind == "parquet":
         names = _parquet_names(path)

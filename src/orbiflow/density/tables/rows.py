@@ -105,7 +105,7 @@ def read_rows(
     group: str | None = None,
     model_space: str | None = None,
     beside: Sequence[str] = (),
-    given: str | None = None,
+    given: Sequence[str] = (),
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
@@ -120,7 +120,7 @@ def read_rows(
     reader = _Reader(path, rows, tell, space, width, tuple(beside))
     weighing, counting = map(reader.column, (rows.weights, getattr(rows, "counts", None)))
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
-    for name in (group, given, *conditions_of(rows.where)):
+    for name in (group, *given, *conditions_of(rows.where)):
         if name is not None and rows.columns is None:
             others.append(_name(path, name, rows.header))
     try:

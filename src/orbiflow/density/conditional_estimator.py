@@ -1,0 +1,327 @@
+"""Densities where covariates are known, and the regression of angles, as scikit-learn has them."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+
+from orbiflow.arguments import described, is_a
+from orbiflow.arrays import Array
+from orbiflow.density.covariates import (
+    ConditionalDensity,
+    ConditionalReport,
+    Covariates,
+    Values,
+    fit_conditional,
+)
+from orbiflow.density.data import columns_of
+from orbiflow.density.estimator import DensityEstimator, RandomState
+from orbiflow.density.fitting import Progress, mean_of, weighed
+from orbiflow.density.inference import Trend, axes_named, trend_of
+from orbiflow.density.spaces import MixedTorus, Space, Torus, check_measure
+from orbiflow.errors import DataWarning, OrbiflowError
+
+
+def _signature() -> inspect.Signature:
+    """The parameters of `DensityEstimator`, and the cycles of covariates."""
+    (space, *others) = inspect.signature(DensityEstimator).parameters.values()
+    cycles = inspect.Parameter("cycles", inspect.Parameter.KEYWORD_ONLY, default=None)
+    return inspect.Signature([space, cycles, *others])
+
+
+class ConditionalEstimator(DensityEstimator):
+    """Exact, normalised density of the data where covariates are known: p(data | x).
+
+    Covariates are real numbers, cyclic ones such as hours of the day, and words, alone and together.
+    Rows held out choose among conditional kernels, a neural mixture, the conditional of a joint density
+    and the density of all rows, which is what is left where covariates say nothing. That density is
+    there as well: what is asked without `given` is asked of it.
+
+    Args:
+        space: As for `DensityEstimator`, like all others.
+        cycles: After what cyclic covariates begin again, by their names, such as {"hour": 24}.
+
+    After `fit`: what a `DensityEstimator` has, `conditional_density_` and `conditional_report_`, which
+    says what the covariates gain and what is chosen.
+
+    >>> rng = np.random.default_rng(0)
+    >>> length = rng.uniform(0, 2, 200)
+    >>> angles = rng.vonmises(length, 8.0)[:, None]
+    >>> fit = ConditionalEstimator(unit="radians", components="kernels").fit(angles, {"length": length})
+    >>> bool(abs(fit.at(length=1.5).mean()[0] - 1.5) < 0.2)
+    True
+    """
+
+    conditional_density_: ConditionalDensity
+    conditional_report_: ConditionalReport
+    __signature__ = _signature()
+
+    def __init__(
+        self,
+        space: str | Space = "torus",
+        *,
+        cycles: Mapping[str, float] | None = None,
+        **settings: Any,
+    ) -> None:
+        super().__init__(space, **settings)
+        self.cycles = cycles
+
+    def fit(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self,
+        X: ArrayLike,
+        given: Any,
+        sample_weight: ArrayLike | None = None,
+        *,
+        groups: ArrayLike | None = None,
+        columns: Sequence[str] | None = None,
+        progress: Progress | None = None,
+    ) -> Self:
+        """Fit to data (N, k) and what is known of each row.
+
+        Args:
+            X: The data, as for `DensityEstimator.fit`.
+            given: Columns: a data frame, a mapping {"name": values}, or an array (N, c), whose columns
+                are called x1, x2 and so on. Text is words, all else numbers.
+            sample_weight: How much each row counts (N,).
+            groups: A label (N,) a row: rows of one are held out together.
+            columns: Names of an array's columns, as for `DensityEstimator.fit`.
+            progress: Hears the share of the work done.
+
+        Raises:
+            OrbiflowError: For data as `DensityEstimator.fit`; for missing values among the covariates,
+                one that has one value alone, another number of rows, and fewer than 30 rows.
+        """
+        cells = columns_given(given)
+        covariates = Covariates.of(cells, self.cycles or {})
+        super().fit(X, None, sample_weight, groups=groups, columns=columns, progress=progress)
+        return self.fit_given(X, cells, covariates, sample_weight, groups, progress)
+
+    def fit_given(
+        self,
+        X: ArrayLike,
+        cells: Mapping[str, Values],
+        covariates: Covariates,
+        weights: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> Self:
+        """Fit what depends on covariates beside a density of all rows that is fitted already."""
+        points = self.points_of(X)
+        if self.missing != "refuse":
+            raise OrbiflowError(
+                'rows that lack angles have no density at covariates: missing="refuse"'
+            )
+        self.conditional_density_, self.conditional_report_ = fit_conditional(
+            self._fitted(),
+            points,
+            _features(covariates, cells, len(points)),
+            covariates,
+            self.settings(),
+            weights=weights,
+            groups=groups,
+            progress=progress,
+        )
+        return self
+
+    def score_samples(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, X: ArrayLike, given: Any = None, *, measure: str = "natural"
+    ) -> Array:
+        """Log densities (N,) in nats at data (N, k), each where its covariates are as `given`.
+
+        Without `given`, of the density of all rows.
+
+        Raises:
+            OrbiflowError: As `DensityEstimator.score_samples`, and for covariates that lack a column or
+                a value, or have a word that the fit has not seen.
+        """
+        if given is None:
+            return super().score_samples(X, measure=measure)
+        own = self._conditional()
+        check_measure(measure, own.space)
+        points = self.points_of(X)
+        return own.log_prob(points, self._x(given, len(points)), measure=measure).numpy()
+
+    def score(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, X: ArrayLike, given: Any = None, sample_weight: ArrayLike | None = None
+    ) -> float:
+        """Mean log density of data (N, k), weighted, in natural measure; as `score_samples`."""
+        scores = torch.as_tensor(self.score_samples(X, given))
+        rows = weighed(scores[:, None], sample_weight)
+        return mean_of(rows.points[:, 0], rows.weights)
+
+    def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, n_samples: int = 1, given: Any = None, random_state: RandomState = None
+    ) -> Any:
+        """New data (n_samples, k), where the covariates are as `given`: one value for each name."""
+        if given is None:
+            return super().sample(n_samples, random_state)
+        return self.at(given).sample(n_samples, random_state)
+
+    def at(self, given: Mapping[str, Any] | None = None, /, **values: Any) -> DensityEstimator:
+        """The density where covariates have some values: a `DensityEstimator` that is fitted.
+
+        All covariates are named: `at(temperature=295, residue="GLY")`.
+        """
+        own = self._conditional()
+        cells = {name: np.array([value]) for name, value in ({**(given or {}), **values}).items()}
+        if unknown := [name for name in cells if name not in own.covariates.names]:
+            known = ", ".join(own.covariates.names)
+            raise OrbiflowError(f"no covariate {unknown[0]!r}; there are {known}")
+        density = own.at(self._x(cells, 1)[0])
+        return DensityEstimator.fitted(density, columns=self._column_names())
+
+    def trend_along(
+        self,
+        along: str,
+        at: ArrayLike,
+        of: str | int = 0,
+        *,
+        given: Mapping[str, Any] | None = None,
+        levels: Sequence[float] = (0.5, 0.9),
+    ) -> Trend:
+        """How a column goes with a covariate: its mean and intervals at values (n,) of `along`.
+
+        The other covariates are as `given`. The intervals hold the shares `levels` of new data.
+        """
+        (axis,) = axes_named([of], self._column_names())
+        values = np.asarray(at)
+        densities = (self.at({**(given or {}), along: one}).density_ for one in values)
+        return trend_of(densities, axis, values, levels=levels)
+
+    def _x(self, given: Any, rows: int) -> torch.Tensor:
+        covariates = self._conditional().covariates
+        cells = columns_given(given, covariates.names)
+        x = _features(covariates, cells, rows)
+        for doubt in covariates.doubts(cells):
+            warnings.warn(doubt, DataWarning, stacklevel=3)
+        return x
+
+    def _conditional(self) -> ConditionalDensity:
+        if not hasattr(self, "conditional_density_"):
+            raise OrbiflowError("this estimator is not fitted yet: call fit first")
+        return self.conditional_density_
+
+
+class AngleRegressor(ConditionalEstimator):
+    """Regression of angles on covariates, in scikit-learn's order: `fit(X, y)`, `predict(X)`.
+
+    A `ConditionalEstimator` whose `X` are covariates and whose `y` are angles; `at`, `sample` and
+    `trend_along` are those of the density. Parameters are the same.
+
+    >>> rng = np.random.default_rng(0)
+    >>> x = rng.uniform(-1, 1, (200, 1))
+    >>> angles = rng.vonmises(2 * x[:, 0], 20.0)
+    >>> fit = AngleRegressor(unit="radians", components="kernels").fit(x, angles)
+    >>> bool(abs(fit.predict([[0.5]])[0] - 1.0) < 0.1)
+    True
+    """
+
+    def fit(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self,
+        X: Any,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        *,
+        groups: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> Self:
+        """Fit to covariates (N, c) and angles (N,) or (N, d) on a torus."""
+        angles = np.asarray(y, dtype=np.float64)
+        self.is_flat_ = angles.ndim == 1
+        super().fit(_table(angles), X, sample_weight, groups=groups, progress=progress)
+        self._period()
+        self.n_features_in_ = len(self.conditional_density_.covariates.columns)
+        return self
+
+    def predict(self, X: Any) -> Array:
+        """The mean directions (N,) or (N, d) where the covariates are X (N, c), within half a turn."""
+        own = self._conditional()
+        rows = len(next(iter(columns_given(X, own.covariates.names).values())))
+        turns = own.mean_directions(self._x(X, rows)).numpy()
+        angles = turns * self._period()
+        return angles[:, 0] if self.is_flat_ else angles
+
+    def score(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, X: Any, y: ArrayLike, sample_weight: ArrayLike | None = None
+    ) -> float:
+        """1 less the mean of 1 - cos(angle - prediction), in that about the angles' mean direction.
+
+        As the R^2 of a regression of numbers: 1 is perfect, 0 no better than the mean direction.
+        """
+        angles = _table(np.asarray(y, dtype=np.float64))
+        weights = np.ones(len(angles)) if sample_weight is None else np.asarray(sample_weight)
+        radians = 2 * np.pi / self._period()
+        own, found = angles * radians, _table(self.predict(X)) * radians
+        mean = np.angle((weights[:, None] * np.exp(1j * own)).sum(axis=0))
+        left, all_of_it = (
+            float((weights[:, None] * (1 - np.cos(own - at))).sum()) for at in (found, mean)
+        )
+        return 1 - left / all_of_it if all_of_it else 0.0
+
+    def _period(self) -> float:
+        if not isinstance(self.space_, Torus) or isinstance(self.space_, MixedTorus):
+            raise OrbiflowError("a regression of angles is for a torus without real columns")
+        return self.space_.period
+
+    def __sklearn_tags__(self) -> Any:
+        # asked for by scikit-learn alone, which is therefore there
+        from sklearn.utils import RegressorTags, Tags, TargetTags  # pyright: ignore[reportMissingImports, reportMissingTypeStubs]
+
+        return Tags(
+            estimator_type="regressor",
+            target_tags=TargetTags(required=True, multi_output=True),
+            transformer_tags=None,
+            regressor_tags=RegressorTags(),
+            classifier_tags=None,
+        )
+
+
+def columns_given(given: Any, names: Sequence[str] | None = None) -> dict[str, Values]:
+    """Return covariates as columns of cells (N,) by name.
+
+    Args:
+        given: A data frame, a mapping, or an array (N, c).
+        names: Those that are wanted; an array's columns are in this order. Default: all there are.
+
+    Raises `OrbiflowError` for a column that is not there and for columns of several lengths.
+    """
+    pairs = list(given.items()) if is_a(given, Mapping) else columns_of(given, "given")
+    if pairs is None:
+        table = np.asarray(given)
+        if table.ndim != 2:
+            raise OrbiflowError(
+                f"given: expected columns or an array (N, c), got {described(given)}"
+            )
+        called = names or [f"x{k}" for k in range(1, table.shape[1] + 1)]
+        if len(called) != table.shape[1]:
+            raise OrbiflowError(
+                f"given: expected {', '.join(called)}, got {table.shape[1]} columns"
+            )
+        pairs = list(zip(called, table.T, strict=True))
+    found = {str(name): np.asarray(cells) for name, cells in pairs}
+    if names is not None:
+        if lacking := [name for name in names if name not in found]:
+            raise OrbiflowError(f"given: there is no {', '.join(lacking)} among {', '.join(found)}")
+        found = {name: found[name] for name in names}
+    shapes = {cells.shape for cells in found.values()}
+    if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
+        raise OrbiflowError(f"given: the columns must be of one length, got {sorted(shapes)}")
+    return found
+
+
+def _features(covariates: Covariates, cells: Mapping[str, Values], rows: int) -> torch.Tensor:
+    x = covariates.features(cells)
+    if len(x) != rows:
+        raise OrbiflowError(f"given: expected {rows} rows, as the data have, got {len(x)}")
+    return x
+
+
+def _table(angles: Array) -> Array:
+    """Return angles (N,) or (N, d) as a table."""
+    return angles[:, None] if angles.ndim == 1 else angles

@@ -1,0 +1,5 @@
+"""Densities where covariates are known: p(data | x)."""
+
+from orbiflow.extras import door
+
+__getattr__, __dir__, __all__ = door(__name__, __file__)

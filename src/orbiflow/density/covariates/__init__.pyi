@@ -1,0 +1,10 @@
+from .columns import Covariate as Covariate
+from .columns import Covariates as Covariates
+from .columns import Values as Values
+from .columns import is_text as is_text
+from .density import ConditionalDensity as ConditionalDensity
+from .files import conditional_to_bytes as conditional_to_bytes
+from .files import read_conditional as read_conditional
+from .fit import ConditionalReport as ConditionalReport
+from .fit import PartEvidence as PartEvidence
+from .fit import fit_conditional as fit_conditional

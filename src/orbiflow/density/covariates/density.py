@@ -1,0 +1,135 @@
+"""p(data | covariates) as a mixture of parts, exactly normalised wherever the covariates are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.covariates.columns import Covariates
+from orbiflow.density.covariates.joint import JointDensity
+from orbiflow.density.covariates.kernels import ConditionalKernels
+from orbiflow.density.covariates.network import NeuralMixture
+from orbiflow.density.covariates.parts import Part
+from orbiflow.density.covariates.regression import CircularRegression
+from orbiflow.density.fitting import stacked
+from orbiflow.density.models import Density, density_from, density_parts, mixture_of, within
+from orbiflow.density.spaces import Space
+from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import listed
+
+
+class Unconditional(Part):
+    """The density of all rows, whatever the covariates are.
+
+    Args:
+        density: That density.
+    """
+
+    kind = "all"
+
+    def __init__(self, density: Density) -> None:
+        self.space, self.density = density.space, density
+
+    @torch.no_grad()
+    def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
+        del x
+        return self.density.log_prob(points)
+
+    def at(self, x: Tensor) -> Density:
+        del x
+        return self.density
+
+    def mean_features(self, x: Tensor) -> Tensor:
+        return super().mean_features(x[:1]).expand(len(x), -1)
+
+    def header(self) -> dict[str, Any]:
+        return {"density": density_parts(self.density, "density")[0]}
+
+    def tensors(self) -> dict[str, Tensor]:
+        return density_parts(self.density, "density")[1]
+
+    @classmethod
+    def from_header(
+        cls, space: Space, number: Tensor, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        del number
+        return cls(density_from(space, header["density"], tensors))
+
+
+PARTS: dict[str, type[Part]] = {
+    own.kind: own
+    for own in (Unconditional, ConditionalKernels, NeuralMixture, CircularRegression, JointDensity)
+}
+"""What a conditional density may be made of, by kind."""
+
+
+class ConditionalDensity:
+    """A mixture of conditional densities, exactly normalised wherever the covariates are.
+
+    Args:
+        covariates: The columns that are known.
+        parts: Its parts, on one space.
+        weights: Their weights (P,), above 0 and of sum 1.
+    """
+
+    def __init__(
+        self, covariates: Covariates, parts: Sequence[Part], weights: Sequence[float]
+    ) -> None:
+        self.covariates, self.parts, self.space = covariates, tuple(parts), parts[0].space
+        self.weights = torch.tensor(weights, dtype=torch.float64)
+
+    @torch.no_grad()
+    def log_prob(self, points: Tensor, x: Tensor, *, measure: str = "square") -> Tensor:
+        """Return log densities (N,) at points (N, d) of the chart and features (N, m)."""
+        logs = torch.stack([part.log_prob(points, x) for part in self.parts])
+        return stacked(logs, self.weights) + self.space.log_density_factor(points, measure)
+
+    def at(self, x: Tensor) -> Density:
+        """Return the density where the features are x (m,), a mixture that can be saved."""
+        found: list[tuple[float, Density]] = []
+        for weight, part in zip(listed(self.weights), self.parts, strict=True):
+            found += [(weight * share, own) for share, own in part.at(x).parts()]
+        return mixture_of(found)
+
+    def mean_directions(self, x: Tensor) -> Tensor:
+        """Return the mean directions (N, d) of a torus' angles in turns, by features (N, m)."""
+        means = torch.stack([part.mean_features(x) for part in self.parts])
+        cos, sin = torch.einsum("p,pnk->nk", self.weights, means).chunk(2, dim=1)
+        return torch.atan2(sin, cos) / (2 * math.pi)
+
+    def header(self) -> dict[str, Any]:
+        """Return what makes the density again, together with `tensors`; ready for JSON."""
+        parts = [{"kind": own.kind, **own.header()} for own in self.parts]
+        return {"covariates": self.covariates.to_json(), "parts": parts}
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Return all tensors by name."""
+        found = {"weights": self.weights}
+        for number, part in enumerate(self.parts):
+            own = part.tensors().items()
+            found |= {f"{number}.{name}": tensor for name, tensor in own}
+        return found
+
+    @classmethod
+    def from_header(
+        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        """Make the density again; raise `OrbiflowError` for what cannot be."""
+        covariates = Covariates.from_json(header["covariates"])
+        parts = [
+            PARTS[own["kind"]].from_header(space, covariates.number, own, within(tensors, f"{k}."))
+            for k, own in enumerate(header["parts"])
+        ]
+        weights = tensors["weights"]
+        if (
+            not parts
+            or tuple(weights.shape) != (len(parts),)
+            or not bool((weights > 0).all())
+            or abs(float(weights.sum()) - 1) > 1e-6
+        ):
+            raise OrbiflowError("weights that are none")
+        return cls(covariates, parts, listed(weights))

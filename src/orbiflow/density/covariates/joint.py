@@ -1,0 +1,120 @@
+"""Conditional densities of a joint density, on a torus, of the data and the covariates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Self
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.covariates.columns import SPREAD
+from orbiflow.density.covariates.parts import Part
+from orbiflow.density.inference import at_observed
+from orbiflow.density.models import (
+    Density,
+    PartialDensity,
+    Split,
+    density_from,
+    density_parts,
+    mixture_of,
+)
+from orbiflow.density.spaces import MixedTorus, Space, Torus
+from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import listed
+
+MOST_DIM = 6
+"""The most angles and covariates together."""
+
+BLOCK_ROWS = 2**12
+"""Rows worked on at a time."""
+
+
+class JointDensity(Part):
+    """p(y, x) / p(x) of a density of data on a torus and of covariates, each of them a circle, too.
+
+    A real covariate is a circle that closes at infinity, as in `MixedTorus`.
+
+    Args:
+        space: The torus of the data.
+        density: A density on `joint_torus` of it.
+        number: The number (m,) of the covariate of each feature.
+    """
+
+    kind = "joint"
+    space: Torus
+
+    def __init__(self, space: Torus, density: Density, number: Tensor) -> None:
+        self.space, self.density, self.number = space, density, number
+
+    @torch.no_grad()
+    def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
+        known = covariate_turns(x, self.number)
+        none = points.new_full(points.shape, math.nan)
+        found = [
+            at_observed(self.density, torch.cat([own, at], dim=1))
+            - at_observed(self.density, torch.cat([lack, at], dim=1))
+            for own, lack, at in zip(
+                *(part.split(BLOCK_ROWS) for part in (points, none, known)), strict=True
+            )
+        ]
+        return torch.cat(found)
+
+    @torch.no_grad()
+    def at(self, x: Tensor) -> Density:
+        values: list[float] = listed(covariate_turns(x[None], self.number)[0])
+        d = self.space.dim
+        split = Split(
+            d + len(values), tuple(range(d)), tuple(range(d, d + len(values))), (*values,)
+        )
+        closed, left = self.density.restricted(split, self.space)
+        others = [(log, PartialDensity(own, how)) for log, own, how in left]
+        parts = [*closed, *((log + own.log_given, own) for log, own in others)]
+        top = max(log for log, _ in parts)
+        weighted = [(math.exp(log - top), own) for log, own in parts]
+        return mixture_of([(weight, own) for weight, own in weighted if weight > 0])
+
+    def header(self) -> dict[str, Any]:
+        return {"density": density_parts(self.density, "joint density")[0]}
+
+    def tensors(self) -> dict[str, Tensor]:
+        return density_parts(self.density, "joint density")[1]
+
+    @classmethod
+    def from_header(
+        cls, space: Space, number: Tensor, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        if not isinstance(space, Torus) or not is_joint_possible(space, number):
+            raise OrbiflowError("a joint density that cannot be")
+        joint = joint_torus(space, int(number.max()) + 1)
+        return cls(space, density_from(joint, header["density"], tensors), number)
+
+
+def is_joint_possible(space: Space, number: Tensor) -> bool:
+    """Return whether there are so few columns on a torus; `number` is that of `JointDensity`.
+
+    Words, which have more features, are taken for none.
+    """
+    few = isinstance(space, Torus) and space.dim + int(number.max()) + 1 <= MOST_DIM
+    return few and int(number.bincount().max()) <= 2
+
+
+def joint_torus(space: Torus, covariates: int) -> Torus:
+    """Return the torus of a torus' columns and as many circles more."""
+    if isinstance(space, MixedTorus):
+        return MixedTorus([*space.axes, *[None] * covariates], unit=str(space.unit))
+    return Torus(space.dim + covariates, unit=str(space.unit))
+
+
+def covariate_turns(x: Tensor, number: Tensor) -> Tensor:
+    """Return where real and cyclic covariates are on circles, in turns (N, c), by features (N, m)."""
+    found: list[Tensor] = []
+    for own in range(int(number.max()) + 1):
+        some = x[:, number == own]
+        if some.shape[1] == 2:
+            found.append(torch.atan2(some[:, 1], some[:, 0]) / (2 * math.pi) % 1)
+        else:
+            share = some[:, 0] / SPREAD
+            found.append(0.5 + (3 * share - share**3) / 4)
+    return torch.stack(found, dim=1)

@@ -1,0 +1,86 @@
+"""What a part of a conditional density can do."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.models import Density
+from orbiflow.density.spaces import CHART, Space
+from orbiflow.typed_torch import special
+
+
+class Part(ABC):
+    """A density of points of a space where features of covariates are known.
+
+    - `kind`: Its name in files and reports.
+    """
+
+    kind: ClassVar[str]
+    space: Space
+
+    @abstractmethod
+    def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
+        """Return log densities (N,) per area of the chart at points (N, d) and features (N, m)."""
+
+    @abstractmethod
+    def at(self, x: Tensor) -> Density:
+        """Return the density where the features are x (m,)."""
+
+    @torch.no_grad()
+    def mean_features(self, x: Tensor) -> Tensor:
+        """Return the means (N, 2 d) of the features of a torus' points where features are x (N, m)."""
+        return torch.stack([_mean_features(self.at(own)) for own in x])
+
+    @abstractmethod
+    def header(self) -> dict[str, Any]:
+        """Return what makes it again, together with `tensors`; ready for JSON."""
+
+    @abstractmethod
+    def tensors(self) -> dict[str, Tensor]:
+        """Return its tensors by name."""
+
+    @classmethod
+    @abstractmethod
+    def from_header(
+        cls, space: Space, number: Tensor, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Part:
+        """Make it again; `number` (m,) says of which covariate each feature is.
+
+        Raises `OrbiflowError` for what cannot be.
+        """
+
+
+LEAST_LOG_KAPPA, MOST_LOG_KAPPA = math.log(0.02), math.log(1e6)
+"""Logarithms of the least and largest concentration of kernels that are fitted."""
+
+
+def on_chart(space: Space, points: Tensor, logs: Tensor) -> Tensor:
+    """Return log densities per area of the chart, of those that kernels have (N,) at points (N, d)."""
+    return logs + space.log_kernel_factor(points, CHART)
+
+
+CELLS = 720
+"""Even cells of a circle of which means are taken."""
+
+
+def _mean_features(density: Density) -> Tensor:
+    """Return the means (2 d,) of cosines and of sines of a torus' angles."""
+    cells = (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
+    angle, found = 2 * math.pi * cells[:, 0], list[Tensor]()
+    for axis in range(density.space.dim):
+        whole = density.space.dim == 1
+        logs = density.log_prob(cells) if whole else density.log_marginal(cells, [axis])
+        weights = torch.softmax(logs, dim=0)
+        found.append(torch.stack([weights @ angle.cos(), weights @ angle.sin()]))
+    return torch.stack(found, dim=1).flatten()
+
+
+def mean_cosines(kappa: Tensor) -> Tensor:
+    """Return the mean cosines of von Mises densities of concentrations (...)."""
+    return special.i1e(kappa) / special.i0e(kappa)

@@ -1,0 +1,126 @@
+"""The commands of densities where covariates are known: fit, score, sample, conditional and trend."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.runtime import Note, find
+
+MEANS = {"GLY": 0.0, "PRO": 90.0}
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a table, and the fit of its angles to all other columns."""
+    folder = tmp_path_factory.mktemp("given")
+    rng = np.random.default_rng(0)
+    words, warm = rng.choice(list(MEANS), 240), rng.normal(20, 5, 240)
+    hours = rng.uniform(0, 24, 240)
+    mean = np.radians([MEANS[word] for word in words]) + (warm - 20) / 10
+    angles = np.degrees(rng.vonmises(mean, 20.0))
+    rows = zip(angles, warm, hours, words, strict=True)
+    text = "phi,warm,hour,residue\n" + "\n".join(",".join(map(str, row)) for row in rows)
+    (folder / "rows.csv").write_text(text)
+    how = {"space": "torus", "unit": "degrees", "components": ["mixture"], "columns": ["phi"]}
+    given = {
+        "data": folder / "rows.csv",
+        "given": ["residue", "warm", "hour"],
+        "out": folder / "fit",
+    }
+    told: list[object] = []
+    find("density fit").call({**how, **given}).run(told.append)
+    notes = {one.text for one in told if isinstance(one, Note)}
+    assert {
+        "took warm as real numbers",
+        "took hour as cyclic, of period 24",
+        "took residue as 2 words",
+    } <= notes
+    return folder
+
+
+def test_the_report_says_what_is_gained(model: Path) -> None:
+    said = json.loads((model / "fit" / "report.json").read_text())["given"]
+    assert said["gain"] > 4 * said["error"]
+    assert set(said["words"]["residue"]) == set(MEANS)
+    assert [one["name"] for one in said["covariates"]] == ["residue", "warm", "hour"]
+
+
+def test_rows_are_scored_where_all_is_known(model: Path, orbiflow, tmp_path: Path) -> None:
+    ask = ("density", "score", model / "rows.csv", "-m", model / "fit", "-o", tmp_path / "s.csv")
+    assert orbiflow(*ask, "--given", "warm,hour,residue").status == 0
+    known = [
+        float(row["log_prob_given"])
+        for row in csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
+    ]
+    assert orbiflow(*ask).status == 0
+    alone = [
+        float(row["log_prob"])
+        for row in csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
+    ]
+    assert np.mean(known) > np.mean(alone) + 0.7
+    done = orbiflow(*ask, "--given", "warm")
+    assert done.status == 2
+    assert "--given must name all covariates of the fit, residue, warm, hour" in done.err
+    other = tmp_path / "other.csv"
+    other.write_text("phi,warm,hour,residue\n1,20,3,TRP\n2,,4,GLY\n")
+    ask = ("density", "score", other, "-m", model / "fit", "-o", tmp_path / "t.csv")
+    ask = (*ask, "--given", "warm,hour,residue")
+    assert "rows have no 'warm', the first in line 3" in orbiflow(*ask).err
+    assert (
+        "'residue' has TRP, and the fit has seen GLY, PRO" in orbiflow(*ask, "--drop-missing").err
+    )
+
+
+def test_samples_and_models_are_where_covariates_are(model: Path, orbiflow, tmp_path: Path) -> None:
+    at = ("--given", "warm=25,hour=6,residue=PRO")
+    done = orbiflow("density", "sample", "-m", model / "fit", *at, "-o", tmp_path / "s.csv")
+    assert done.status == 0, done.err
+    drawn = np.radians(np.loadtxt(tmp_path / "s.csv", skiprows=1))
+    truth = 90 + np.degrees(0.5)
+    assert np.degrees(np.angle(np.exp(1j * drawn).mean())) == pytest.approx(truth, abs=10)
+    done = orbiflow("density", "conditional", "-m", model / "fit", *at, "-o", tmp_path / "part")
+    assert done.status == 0, done.err
+    table = np.loadtxt(tmp_path / "part" / "density.csv", delimiter=",", skiprows=1)
+    assert table[table[:, 1].argmax(), 0] == pytest.approx(truth, abs=12)
+    given = json.loads((tmp_path / "part" / "report.json").read_text())["given"]
+    assert given == {"residue": "PRO", "warm": 25.0, "hour": 6.0}
+    for wrong, words in (
+        ("warm=25,hour=6", "residue is missing"),
+        ("warm=hot,hour=6,residue=PRO", "warm must be a number, got 'hot'"),
+        ("warm=25,hour=6,residue=PRO,speed=3", "has no covariate 'speed'"),
+    ):
+        done = orbiflow("density", "sample", "-m", model / "fit", "--given", wrong)
+        assert done.status == 2
+        assert words in done.err
+    far = orbiflow(
+        "density", "sample", "-m", model / "fit", "--given", "warm=900,hour=6,residue=PRO"
+    )
+    assert "'warm' has 900, far beyond the fit's" in far.out
+
+
+def test_trends_are_along_covariates(model: Path, orbiflow, tmp_path: Path) -> None:
+    ask = ("density", "trend", "-m", model / "fit", "--of", "phi", "--given", "hour=6")
+    done = orbiflow(*ask, "--along", "warm", "-n", 5, "-o", tmp_path / "t.csv")
+    assert done.status == 0, done.err
+    rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
+    assert [row["residue"] for row in rows] == ["GLY"] * 5 + ["PRO"] * 5
+    assert float(rows[7]["phi_low_50"]) < float(rows[7]["phi"]) < float(rows[7]["phi_high_50"])
+    done = orbiflow(*ask, "--along", "residue", "-o", tmp_path / "w.csv")
+    assert "warm is held at its median" in done.out
+    rows = list(csv.DictReader((tmp_path / "w.csv").read_text().splitlines()))
+    assert [float(row["phi"]) for row in rows] == pytest.approx([0, 90], abs=12)
+    for name in "tw":
+        assert (tmp_path / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_numbers_with_a_slip_are_no_words(orbiflow, tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_text("phi,warm\n" + "1,2\n" * 20 + "2,3O\n")
+    how = ["--space", "torus", "--unit", "degrees", "--columns", "phi", "--given", "warm"]
+    done = orbiflow("density", "fit", tmp_path / "rows.csv", *how, "-o", tmp_path / "fit")
+    assert done.status == 2
+    assert "column 'warm' has '3O' in line 22, and numbers otherwise" in done.err

@@ -1,0 +1,261 @@
+"""Densities where covariates are known: mass, truth, useless covariates, files, scikit-learn."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from orbiflow.density import AngleRegressor, ConditionalEstimator, UniformDensity, make_space
+from orbiflow.density.covariates import (
+    ConditionalDensity,
+    Covariates,
+    conditional_to_bytes,
+    read_conditional,
+)
+from orbiflow.density.covariates.density import Unconditional
+from orbiflow.density.covariates.joint import JointDensity, joint_torus
+from orbiflow.density.covariates.kernels import ConditionalKernels
+from orbiflow.density.covariates.network import NeuralMixture
+from orbiflow.density.covariates.regression import CircularRegression
+from orbiflow.density.fitting import Rows
+from orbiflow.density.models import AdaptiveKernels
+from orbiflow.density.spaces import ProductSpace, Torus
+from orbiflow.errors import DataWarning, InputFileError, OrbiflowError
+
+WORDS = {"GLY": 0.0, "PRO": 2.0}
+QUICK: dict[str, Any] = {"unit": "radians", "components": "kernels"}
+
+
+def drawn(count: int, seed: int = 0) -> tuple[Any, dict[str, Any], Any]:
+    """Angles (N, 1), what is known of them, and their true log densities."""
+    rng = np.random.default_rng(seed)
+    cells = {
+        "temperature": rng.standard_t(4, count),
+        "hour": rng.uniform(0, 24, count),
+        "residue": rng.choice(list(WORDS), count),
+    }
+    mean = 0.8 * np.tanh(cells["temperature"]) + 0.6 * np.sin(2 * np.pi * cells["hour"] / 24)
+    mean += np.array([WORDS[word] for word in cells["residue"]])
+    angles = rng.vonmises(mean, 10.0)
+    return angles[:, None], cells, stats.vonmises.logpdf(angles, 10.0, loc=mean)
+
+
+@pytest.fixture(scope="module")
+def fit() -> ConditionalEstimator:
+    angles, cells, _ = drawn(500)
+    return ConditionalEstimator(**QUICK, cycles={"hour": 24}).fit(angles, cells)
+
+
+def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
+    """A mixture of all parts with random parameters, where a number, a cycle and a word are known."""
+    rng = np.random.default_rng(seed)
+    cells = {
+        "x": rng.normal(size=40) * 10.0 ** rng.integers(-3, 4),
+        "hour": rng.uniform(0, 24, 40),
+        "kind": rng.choice(["a", "b", "c"], 40),
+    }
+    cells["kind"][:3] = ["a", "b", "c"]
+    if isinstance(space, Torus):
+        del cells["kind"]  # there is a joint density, which takes none
+    covariates = Covariates.of(cells, {"hour": 24})
+    x = covariates.features(cells)
+    points = space.to_chart(rng.uniform(-1, 1, (40, dims)))
+    wide = torch.tensor(rng.uniform(0.05, 3, len(covariates.columns)))
+    width = len(space.spheres)
+    kappa = torch.tensor(rng.uniform(0.5, 30, width))
+    kernels = ConditionalKernels(
+        space, Rows(points), x, covariates.number, wide, kappa, torch.tensor(rng.dirichlet([1] * 3))
+    )
+    hidden, out = 8, 3 * (space.features(points).shape[-1] + width + 1)
+    shapes = [
+        (x.shape[1], hidden),
+        (1, hidden),
+        (hidden, hidden),
+        (1, hidden),
+        (hidden, out),
+        (1, out),
+    ]
+    layers = [torch.tensor(rng.normal(size=(2, *shape))) / shape[0] ** 0.5 for shape in shapes]
+    networks = NeuralMixture(space, layers)
+    parts: list[Any] = [Unconditional(UniformDensity(space)), kernels, networks]
+    if isinstance(space, Torus):
+        shape = (dims, x.shape[1])
+        slopes, spreads = (
+            torch.tensor(rng.normal(size=(a, b))) for a, b in (shape, (dims, 1 + shape[1]))
+        )
+        means = torch.tensor(rng.uniform(-4, 4, dims))
+        parts.append(CircularRegression(space, means, slopes, spreads / 2))
+        joint = joint_torus(space, 2)
+        centers = torch.tensor(rng.uniform(size=(20, dims + 2)))
+        sharp = torch.tensor(rng.uniform(0.5, 20, (20, dims + 2)))
+        density = AdaptiveKernels(joint, centers, sharp, torch.full((20,), 0.05))
+        parts.append(JointDensity(space, density, covariates.number))
+    weights = rng.dirichlet([2.0] * len(parts)).tolist()
+    return ConditionalDensity(covariates, parts, weights)
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.integers(0, 10**6), st.floats(-1e3, 1e3), st.floats(-50, 50))
+def test_each_density_is_normalised_and_what_it_is_at_its_covariates(
+    seed: int, value: float, hour: float
+) -> None:
+    for space, dims in ((make_space("torus", dim=1), 1), (make_space("klein-bottle"), 2)):
+        density = random_density(seed, space, dims)
+        cells = {"x": np.array([value]), "hour": np.array([hour]), "kind": np.array(["b"])}
+        cells = {name: cells[name] for name in density.covariates.names}
+        x = density.covariates.features(cells)
+        points = space.midpoints(512 if dims == 1 else 96)
+        logs = density.log_prob(points, x.expand(len(points), -1))
+        assert float(logs.exp().mean()) == pytest.approx(1, abs=2e-3)
+        assert torch.allclose(density.at(x[0]).log_prob(points), logs, atol=1e-6)
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_rows_on_a_sphere_and_beside_a_number_have_densities_too(beside: bool) -> None:
+    space = make_space("sphere")
+    space = ProductSpace(space, [(0.0, 1.0)]) if beside else space
+    density = random_density(1, space, space.chart_dim)
+    cells = {"x": np.array([0.0]), "hour": np.array([3.0]), "kind": np.array(["c"])}
+    x = density.covariates.features(cells)
+    count = 40 if beside else 128
+    line = (torch.arange(count, dtype=torch.float64) + 0.5) / count
+    points = torch.cartesian_prod(*[line] * space.chart_dim)
+    logs = density.log_prob(points, x.expand(len(points), -1))
+    assert float(logs.exp().mean()) == pytest.approx(1, abs=5e-3)
+    assert torch.allclose(density.at(x[0]).log_prob(points), logs, atol=1e-6)
+
+
+def test_truth_is_found_with_numbers_cycles_and_words_together(fit: ConditionalEstimator) -> None:
+    angles, cells, truth = drawn(1500, seed=1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)
+        regret = float((truth - fit.score_samples(angles, cells)).mean())
+    assert 0 < regret < 0.2
+    assert fit.score(angles) < truth.mean() - 0.8  # without covariates
+    report = fit.conditional_report_
+    assert report.gain > 5 * report.error > 0
+    shares = {one.kind: one.share for one in report.parts}
+    assert sum(shares.values()) == pytest.approx(1)
+    assert shares["all"] < 0.1
+
+
+def test_samples_are_of_the_density_at_the_covariates(fit: ConditionalEstimator) -> None:
+    known = {"temperature": 0.5, "hour": 6.0, "residue": "PRO"}
+    samples = fit.sample(4000, known, random_state=0)
+    at = fit.at(known)
+    assert stats.kstest(at.cdf(samples), "uniform").pvalue > 1e-3
+    assert at.mean()[0] == pytest.approx(2 + 0.8 * np.tanh(0.5) + 0.6, abs=0.2)
+    whole = fit.score_samples(samples[:5], {name: [v] * 5 for name, v in known.items()})
+    assert np.allclose(at.score_samples(samples[:5]), whole, atol=1e-6)
+
+
+def test_a_useless_covariate_leaves_the_density_of_all_rows() -> None:
+    rng = np.random.default_rng(0)
+    angles, new = rng.vonmises(0, 2, (300, 1)), rng.vonmises(0, 2, (500, 1))
+    how = {**QUICK, "components": "mixture"}
+    fit = ConditionalEstimator(**how).fit(angles, {"noise": rng.normal(size=300)})
+    assert [(one.kind, one.share) for one in fit.conditional_report_.parts if one.share] == [
+        ("all", 1.0)
+    ]
+    assert np.allclose(
+        fit.score_samples(new, {"noise": rng.normal(size=500)}), fit.score_samples(new)
+    )
+
+
+def test_intervals_hold_the_shares_that_they_say() -> None:
+    rng = np.random.default_rng(4)
+    x, new = rng.uniform(-1, 1, 800), rng.uniform(-0.9, 0.9, 2000)
+    fit = ConditionalEstimator(**QUICK).fit(rng.vonmises(2 * x, 8.0)[:, None], {"x": x})
+    angles = rng.vonmises(2 * new, 8.0)
+    grid = np.linspace(-0.9, 0.9, 31)
+    trend = fit.trend_along("x", grid, levels=(0.5, 0.9))
+    assert np.abs(trend.mean - 2 * grid).max() < 0.2
+    for level, mass in enumerate(trend.levels):
+        low, high = (np.interp(new, grid, end[:, level]) for end in (trend.low, trend.high))
+        assert ((low < angles) & (angles < high)).mean() == pytest.approx(mass, abs=0.05)
+
+
+def test_a_file_makes_the_same_density_again(fit: ConditionalEstimator, tmp_path: Path) -> None:
+    for number, density in enumerate((
+        fit.conditional_density_, random_density(5, make_space("torus", dim=1), 1)
+    )):  # fmt: skip
+        path = tmp_path / f"{number}.safetensors"
+        path.write_bytes(conditional_to_bytes(density, columns=["phi"]))
+        again, extra = read_conditional(path)
+        assert extra == {"columns": ["phi"]}
+        points = density.space.midpoints(50)
+        x = torch.randn(50, density.covariates.width, dtype=torch.float64).clamp(-1, 1)
+        assert torch.equal(again.log_prob(points, x), density.log_prob(points, x))
+        data = path.read_bytes()
+        path.write_bytes(data[:-9] + bytes([data[-9] ^ 1]) + data[-8:])
+        with pytest.raises(InputFileError):
+            read_conditional(path)
+
+
+def test_what_is_given_must_be_known(fit: ConditionalEstimator) -> None:
+    angles, cells, _ = drawn(40)
+    lacking = {**cells, "temperature": np.append(cells["temperature"][:-1], np.nan)}
+    other = {**cells, "residue": np.array(["TRP"] * 40)}
+    wrong: list[tuple[Any, str]] = [
+        (lacking, "row 40 has no value of 'temperature'"),
+        (other, "'residue' has TRP, and the fit has seen GLY, PRO"),
+        ({"hour": cells["hour"]}, "there is no temperature, residue among hour"),
+        (
+            {name: own[:5] for name, own in cells.items()},
+            "expected 40 rows, as the data have, got 5",
+        ),
+    ]
+    for given_cells, message in wrong:
+        with pytest.raises(OrbiflowError, match=message):
+            fit.score_samples(angles, given_cells)
+    with pytest.raises(OrbiflowError, match="no covariate 'speed'; there are temperature"):
+        fit.at(speed=3)
+    with pytest.raises(OrbiflowError, match="no hour, residue"):
+        fit.at(temperature=3)
+    with pytest.raises(OrbiflowError, match="'x' has one value alone"):
+        ConditionalEstimator(**QUICK).fit(angles, {"x": np.ones(40)})
+    with pytest.raises(OrbiflowError, match="needs 30 rows or more, got 20"):
+        ConditionalEstimator(**QUICK).fit(angles[:20], {"x": np.arange(20.0)})
+    with pytest.raises(OrbiflowError, match="cycles: no column 'day'"):
+        ConditionalEstimator(**QUICK, cycles={"day": 365}).fit(angles, cells)
+    with pytest.warns(DataWarning, match="'temperature' has 1000, far beyond the fit's"):
+        fit.at(temperature=1000, hour=3, residue="GLY")
+
+
+def test_weights_and_groups_count() -> None:
+    rng = np.random.default_rng(6)
+    x = rng.uniform(-1, 1, 240)
+    angles = np.where(np.arange(240) % 2, rng.vonmises(2 * x, 9.0), rng.vonmises(3, 9.0, 240))
+    weights = np.where(np.arange(240) % 2, 1.0, 1e-3)
+    how = {"sample_weight": weights, "groups": np.arange(240) // 4}
+    fit = ConditionalEstimator(**QUICK).fit(angles[:, None], {"x": x}, **how)
+    assert fit.at(x=0.5).mean()[0] == pytest.approx(1.0, abs=0.25)
+
+
+def test_the_regressor_is_scikit_learns() -> None:
+    rng = np.random.default_rng(7)
+    x = rng.normal(size=(240, 2))
+    angles = rng.vonmises(3 * np.tanh(x[:, 0]), 12.0)
+    own = AngleRegressor(**QUICK).fit(x[:180], angles[:180])
+    assert own.n_features_in_ == 2
+    assert own.predict(x[180:]).shape == (60,)
+    assert own.score(x[180:], angles[180:]) > 0.7
+    assert own.score(x[:60], own.predict(x[:60]) + np.pi) < 0
+    at = own.at(x1=0.3, x2=0.1)
+    assert own.predict([[0.3, 0.1]])[0] == pytest.approx(at.mean()[0], abs=1e-4)
+    scaled = make_pipeline(StandardScaler(), clone(own)).fit(x[:180], angles[:180])
+    assert scaled.score(x[180:], angles[180:]) > 0.7
+    search = GridSearchCV(AngleRegressor(unit="radians"), {"components": ["kernels"]}, cv=2)
+    assert search.fit(x[:120], angles[:120]).best_score_ > 0.5
