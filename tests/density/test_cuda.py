@@ -55,7 +55,7 @@ def test_densities_that_are_moved_nowhere() -> None:
 
 
 @needs_cuda
-@pytest.mark.parametrize("name", ["p4", "P 21 21 21"])
+@pytest.mark.parametrize("name", ["p4", "hantzsche-wendt"])
 def test_fields_and_flows(name: str) -> None:
     group = group_by_name(name)
     field = FourierField(group, 2, divergence_free=True, dtype=torch.float64)

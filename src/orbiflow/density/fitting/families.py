@@ -28,7 +28,10 @@ from orbiflow.density.models import MOST_DIM, Density, UniformDensity, averaged_
 from orbiflow.density.spaces import Space, Torus
 
 SIZES = (1, 2, 4, 8, 16, 32, 64)
-"""Components of the mixtures and chains tried."""
+"""Components of the chains tried, which are more flexible than those of mixtures."""
+
+MIXTURE_SIZES = (*SIZES, 128)
+"""Components of the mixtures tried: EM finds 64 bumps by more than 64 components."""
 
 MIXTURE_ROWS, CHAIN_ROWS = 8, 20
 """Rows that each component must have on average."""
@@ -180,7 +183,9 @@ class MixtureFamily(SizedFamily):
             )
 
         if self.sizes is None:
-            return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= whole], held)
+            return _grown(
+                fit, [k for k in MIXTURE_SIZES if k == 1 or MIXTURE_ROWS * k <= whole], held
+            )
         return {str(size): fit(size) for size in self.sizes}
 
 
