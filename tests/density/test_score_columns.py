@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,7 +24,8 @@ ANGLES = pd.DataFrame({"phi": RNG.normal(-60, 9, 60), "psi": RNG.normal(-45, 9, 
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder, how = tmp_path_factory.mktemp("models"), {"components": "mixture"}
+    folder = tmp_path_factory.mktemp("models")
+    how: dict[str, Any] = {"components": "mixture"}
     places = pd.DataFrame(PLACES, columns=["lat", "lon"])
     made = {
         "places": DensityEstimator("sphere", **how).fit(places),

@@ -26,6 +26,7 @@ def test_a_length_follows_its_angle(fit: DensityEstimator) -> None:
     assert np.abs(found.high - found.mean[:, None] - half).max() < 0.006
     assert np.abs(found.mean[:, None] - found.low - half).max() < 0.006
     alone = fit.marginal(0).score_samples(at[:, None])
+    assert found.log_density is not None
     assert np.allclose(found.log_density, alone, atol=0.02)
 
 

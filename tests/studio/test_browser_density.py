@@ -109,7 +109,7 @@ def test_regions_and_conditionals_are_those_of_the_density(
     )
     levels = DensityLevels(density, samples=20_000)
     exact = [levels.highest(share).fraction for share in (0.3, 0.6, 0.9)]
-    np.testing.assert_allclose(areas, exact, rtol=0.05)
+    np.testing.assert_allclose(areas, np.array(exact, dtype=np.float64), rtol=0.05)
     turns = (np.arange(90)[:, None] + 0.5) / 90 - 0.5
     for axis, found in enumerate(slices):
         own = conditional(density, {axis: 0.3 - 0.5})
