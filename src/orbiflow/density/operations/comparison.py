@@ -167,7 +167,7 @@ class _Reader(NamedTuple):
         """Return rows, without the column of groups if columns are not named."""
         settings = self.settings.replace(columns=columns)
         space: dict[str, Any] = {"group": self.group, "model_space": model_space}
-        space["given"] = self.beside
+        space["given"] = () if self.beside is None else (self.beside,)
         if where is not None:
             space |= {"space": where.space, "width": where.width}
         return tables.read_rows(data, settings, tell, **space)
