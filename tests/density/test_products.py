@@ -209,6 +209,9 @@ def test_columns_beside_come_last_or_have_names() -> None:
         fit.marginal("x", "depth")
     with pytest.raises(OrbiflowError, match="meaning together alone"):
         fit.conditional(x=1.0)
+    with pytest.raises(OrbiflowError, match="ask marginal densities"):
+        fit.mean()
+    assert fit.marginal("depth").mean().shape == (1,)
     with pytest.raises(OrbiflowError, match="a period must be above 0"):
         ProductSpace(make_space("sphere"), [-1.0])
     with pytest.raises(OrbiflowError, match="take a MixedTorus"):

@@ -63,6 +63,11 @@ class WithFigures(Distribution):
         space = self.space
         if space.is_torus:
             return torch.stack([self._mean_of(axis) for axis in range(space.dim)])
+        if space.parts:
+            raise OrbiflowError(
+                f"columns beside the {space.parts[0].name} have means of their own: ask marginal "
+                "densities for them"
+            )
         if space.name not in ("sphere", "hypersphere"):
             raise OrbiflowError(
                 f"points of the {space.name} have no mean, as several images of a point are the same: "
