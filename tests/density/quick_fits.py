@@ -14,6 +14,7 @@ def quick_fits(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{FITTING}.kernels.LADDER_RUNGS", 9)
     patch.setattr(f"{FITTING}.kernels.SCALES", (0.4, 1.6))
     patch.setattr(f"{FITTING}.families.SIZES", (1, 4, 16))
+    patch.setattr(f"{FITTING}.families.MIXTURE_SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.held_out.USED", ())
 
 
