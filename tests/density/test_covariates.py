@@ -17,7 +17,13 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from orbiflow.density import AngleRegressor, ConditionalEstimator, UniformDensity, make_space
+from orbiflow.density import (
+    AngleRegressor,
+    ConditionalEstimator,
+    DensityEstimator,
+    UniformDensity,
+    make_space,
+)
 from orbiflow.density.covariates import (
     ConditionalDensity,
     Covariates,
@@ -33,6 +39,7 @@ from orbiflow.density.fitting import Rows
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import ProductSpace, Torus
 from orbiflow.errors import DataWarning, InputFileError, OrbiflowError
+from orbiflow.loading import load, save
 
 WORDS = {"GLY": 0.0, "PRO": 2.0}
 QUICK: dict[str, Any] = {"unit": "radians", "components": "kernels"}
@@ -259,3 +266,22 @@ def test_the_regressor_is_scikit_learns() -> None:
     assert scaled.score(x[180:], angles[180:]) > 0.7
     search = GridSearchCV(AngleRegressor(unit="radians"), {"components": ["kernels"]}, cv=2)
     assert search.fit(x[:120], angles[:120]).best_score_ > 0.5
+
+
+def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    length = rng.uniform(0, 2, 80)
+    angles = rng.vonmises(length, 8.0)[:, None]
+    fit = ConditionalEstimator(unit="radians", components="mixture").fit(angles, {"length": length})
+    folder = save(fit, tmp_path / "fit")
+    again = load(folder)
+    assert isinstance(again, ConditionalEstimator)
+    known = {"length": length[:9]}
+    np.testing.assert_allclose(
+        again.score_samples(angles[:9], known), fit.score_samples(angles[:9], known)
+    )
+    assert save(again, folder) == folder
+    plain = DensityEstimator("torus", unit="radians", components="mixture").fit(angles)
+    assert type(load(save(plain, folder))) is DensityEstimator
+    with pytest.raises(OrbiflowError, match="saved in a folder"):
+        save(fit, tmp_path / "fit.safetensors")

@@ -13,6 +13,8 @@ from .comparing.resampling import cross_validation_folds as cross_validation_fol
 from .comparing.settings import ComparisonSettings as ComparisonSettings
 from .conditional_estimator import AngleRegressor as AngleRegressor
 from .conditional_estimator import ConditionalEstimator as ConditionalEstimator
+from .covariates.files import conditional_to_bytes as conditional_to_bytes
+from .covariates.files import read_conditional as read_conditional
 from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
@@ -73,6 +75,7 @@ from .regions.levels import DensityRegion as DensityRegion
 from .regions.levels import highest_density_region as highest_density_region
 from .regions.settings import RegionSettings as RegionSettings
 from .regions.settings import resolvable_masses as resolvable_masses
+from .run_folder import CONDITIONAL as CONDITIONAL
 from .run_folder import written_files as written_files
 from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
