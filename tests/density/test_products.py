@@ -25,6 +25,8 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
+from orbiflow.density.fitting import Rows
+from orbiflow.density.fitting.tuned_widths import tuned_concentrations
 from orbiflow.density.regions import DensityLevels
 from orbiflow.errors import OrbiflowError, SettingError
 
@@ -249,3 +251,19 @@ def test_regions_hold_their_mass_and_sizes_are_integrals(name: str, seed: int) -
     size = float((-logs[inside]).exp().sum()) / len(logs)
     assert found.size == pytest.approx(size, rel=0.15)
     assert found.fraction is None
+
+
+def test_widths_are_tuned_where_columns_have_nothing_in_common() -> None:
+    rng = np.random.default_rng(0)
+    rows, _ = place_and_season(300, 0)
+    rows[:, 3] = rng.integers(0, 5, 300) + 0.01 * rng.normal(size=300)  # five narrow layers
+    fit = DensityEstimator("sphere", linear=[3], period={4: 365.0}, components="kernels").fit(rows)
+    points = fit.space_.to_chart(rows)
+    found = tuned_concentrations(fit.space_, Rows(points), 1e7)
+    assert found is not None
+    assert found.shape == (3,)
+    assert float(found[1]) > 50 * float(found[0])
+    assert tuned_concentrations(make_space("sphere"), Rows(points[:, :2]), 1e7) is None
+    few = tuned_concentrations(fit.space_, Rows(points[:5]), 1e7)
+    assert few is not None
+    assert bool(few.isfinite().all())

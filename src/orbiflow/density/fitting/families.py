@@ -23,6 +23,7 @@ from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_esti
 from orbiflow.density.fitting.parametric import fit_density_of
 from orbiflow.density.fitting.product_chains import fit_product_chains
 from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
+from orbiflow.density.fitting.tuned_widths import tuned_concentrations
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, UniformDensity, averaged_networks
 from orbiflow.density.spaces import Space, Torus
@@ -99,6 +100,7 @@ class KernelFamily(Family):
     # other rows may prefer what has next to no weight, or its neighbours
     kept, negligible = None, 1e-8
     _names: list[str] | None = None
+    _tuned: tuple[Tensor | None] | None = None
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         say("kernels")
@@ -133,9 +135,12 @@ class KernelFamily(Family):
     def _estimates(self, rows: Rows, only: Collection[str] | None) -> dict[str, Density]:
         known = is_whole(rows)
         whole = rows[known]
+        if self._tuned is None:  # once: the first rows of all folds are much the same
+            self._tuned = (tuned_concentrations(self.space, whole, self.narrowest),)
         found = kernel_estimates(
-            self.space, whole, narrowest=self.narrowest, repeats=self.repeats, only=only
-        )
+            self.space, whole, narrowest=self.narrowest, repeats=self.repeats, only=only,
+            tuned=self._tuned[0],
+        )  # fmt: skip
         if len(whole) == len(rows):
             return dict(found)
         total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())

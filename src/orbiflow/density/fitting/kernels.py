@@ -126,6 +126,10 @@ def ladder(narrowest: float) -> list[float]:
     return rungs
 
 
+TUNED_SCALES = (0.3, 1.0, 3.0)
+"""Multiples of tuned concentrations that are tried."""
+
+
 def kernel_estimates(
     space: Space,
     rows: Rows,
@@ -133,6 +137,7 @@ def kernel_estimates(
     narrowest: float = NARROWEST,
     repeats: bool = True,
     only: Collection[str] | None = None,
+    tuned: Tensor | None = None,
 ) -> dict[str, AdaptiveKernels]:
     """Return estimates about training rows in random order, by their names; all, or `only` some.
 
@@ -150,6 +155,11 @@ def kernel_estimates(
         name = f"width {kappa**-0.5:.2g}"
         if only is None or name in only:
             found[name] = start.with_concentrations(torch.full_like(start.concentrations, kappa))
+    for scale in TUNED_SCALES if tuned is not None else ():
+        name = f"tuned, {scale:g}"
+        if tuned is not None and (only is None or name in only):
+            kappa = (scale * tuned).clamp(WIDEST / 100, narrowest)
+            found[name] = start.with_concentrations(kappa.expand_as(start.concentrations))
     counts, place = places(train)
     first = torch.full((len(counts),), len(train)).scatter_reduce(
         0, place, torch.arange(len(train)), "amin"

@@ -33,6 +33,7 @@ from .flow import UniformDensity as UniformDensity
 from .flow import flow_obstacle as flow_obstacle
 from .kernels import MAX_CONCENTRATION as MAX_CONCENTRATION
 from .kernels import AdaptiveKernels as AdaptiveKernels
+from .kernels import kernel_peaks as kernel_peaks
 from .kernels import kernel_rows as kernel_rows
 from .kernels import kernels_for as kernels_for
 from .mixture import Mixture as Mixture
