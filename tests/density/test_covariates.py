@@ -285,3 +285,11 @@ def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:
     assert type(load(save(plain, folder))) is DensityEstimator
     with pytest.raises(OrbiflowError, match="saved in a folder"):
         save(fit, tmp_path / "fit.safetensors")
+
+
+def test_rows_that_lack_angles_are_refused_before_the_fit() -> None:
+    angles = np.full((40, 2), np.nan)
+    fit = ConditionalEstimator(unit="radians", missing="marginalise")
+    with pytest.raises(OrbiflowError, match="missing marginalise has no densities where"):
+        fit.fit(angles, {"length": np.arange(40.0)})
+    assert not hasattr(fit, "density_")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 import torch
@@ -9,6 +11,7 @@ import torch
 from density.test_moving import SPACES, blend, near, others, spline_flow
 from density.test_product_chains import random_chains
 from density.test_products import BASES, random_kernels
+from elsewhere import a_device
 from orbiflow.density import Density, make_space
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
@@ -17,41 +20,55 @@ from orbiflow.symmetry import group_by_name
 needs_cuda = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
 
 
-def check_moved(density: Density, points: torch.Tensor, device: str) -> None:
-    """The density has the same values, gradients and samples on a device."""
-    at = points.detach().requires_grad_()
-    values = density.log_prob(at)
-    (slopes,) = torch.autograd.grad(values.sum(), at)
-    moved = density.to(device)
-    there = points.detach().to(device).requires_grad_()
-    found = moved.log_prob(there)
-    (others,) = torch.autograd.grad(found.sum(), there)
-    assert found.device.type == others.device.type == device
-    torch.testing.assert_close(found.cpu(), values, rtol=1e-8, atol=1e-8)
-    torch.testing.assert_close(others.cpu(), slopes, rtol=1e-5, atol=1e-5)
-    one, two = (torch.Generator().manual_seed(0) for _ in range(2))
-    torch.testing.assert_close(moved.sample(9, one).cpu(), density.sample(9, two))
+class Checked(NamedTuple):
+    """A density, points, and what it says there and draws on the CPU."""
 
+    density: Density
+    points: torch.Tensor
+    values: torch.Tensor
+    slopes: torch.Tensor
+    drawn: torch.Tensor
 
-def check_kinds(device: str) -> None:
-    for name in SPACES:
-        density = blend(name, 1, sharp=1e3)
-        check_moved(density, near(density, 1), device)
-    for density in others(2):
-        check_moved(density, near(density, 2), device)
-    for name in BASES:
-        mixture, points = random_kernels(name, 3)
-        check_moved(mixture, points, device)
-        check_moved(random_chains(name, 3), points, device)
+    @classmethod
+    def of(cls, density: Density, points: torch.Tensor) -> Checked:
+        at = points.detach().requires_grad_()
+        values = density.log_prob(at)
+        (slopes,) = torch.autograd.grad(values.sum(), at)
+        drawn = density.sample(9, torch.Generator().manual_seed(0))
+        return cls(density, points.detach(), values.detach(), slopes, drawn)
+
+    def is_same_on(self, device: str | torch.device) -> None:
+        moved = self.density.to(device)
+        there = self.points.to(device).requires_grad_()
+        found = moved.log_prob(there)
+        (slopes,) = torch.autograd.grad(found.sum(), there)
+        assert found.device.type == slopes.device.type == torch.device(device).type
+        torch.testing.assert_close(found.detach().cpu(), self.values, rtol=1e-8, atol=1e-8)
+        torch.testing.assert_close(slopes.cpu(), self.slopes, rtol=1e-5, atol=1e-5)
+        drawn = moved.sample(9, torch.Generator().manual_seed(0))
+        torch.testing.assert_close(drawn.cpu(), self.drawn)
 
 
 @needs_cuda
 def test_densities() -> None:
-    check_kinds("cuda")
+    for name in SPACES:
+        density = blend(name, 1, sharp=1e3)
+        Checked.of(density, near(density, 1)).is_same_on("cuda")
+    for density in others(2):
+        Checked.of(density, near(density, 2)).is_same_on("cuda")
+    for name in BASES:
+        mixture, points = random_kernels(name, 3)
+        Checked.of(mixture, points).is_same_on("cuda")
+        Checked.of(random_chains(name, 3), points).is_same_on("cuda")
 
 
-def test_densities_that_are_moved_nowhere() -> None:
-    check_kinds("cpu")
+@pytest.mark.parametrize("name", sorted(BASES))
+def test_products_on_a_device_that_tests_make_up(name: str) -> None:
+    mixture, points = random_kernels(name, 3)
+    known = [Checked.of(own, points) for own in (mixture, random_chains(name, 3))]
+    with a_device() as device:
+        for own in known:
+            own.is_same_on(device)
 
 
 @needs_cuda

@@ -18,6 +18,7 @@ from orbiflow.density.covariates import (
     ConditionalReport,
     Covariates,
     Values,
+    check_complete,
     fit_conditional,
 )
 from orbiflow.density.data import columns_of
@@ -99,31 +100,16 @@ class ConditionalEstimator(DensityEstimator):
         """
         cells = columns_given(given)
         covariates = Covariates.of(cells, self.cycles or {})
+        check_complete(self.missing)
         super().fit(X, None, sample_weight, groups=groups, columns=columns, progress=progress)
-        return self.fit_given(X, cells, covariates, sample_weight, groups, progress)
-
-    def fit_given(
-        self,
-        X: ArrayLike,
-        cells: Mapping[str, Values],
-        covariates: Covariates,
-        weights: ArrayLike | None = None,
-        groups: ArrayLike | None = None,
-        progress: Progress | None = None,
-    ) -> Self:
-        """Fit what depends on covariates beside a density of all rows that is fitted already."""
         points = self.points_of(X)
-        if self.missing != "refuse":
-            raise OrbiflowError(
-                'rows that lack angles have no density at covariates: missing="refuse"'
-            )
         self.conditional_density_, self.conditional_report_ = fit_conditional(
             self._fitted(),
             points,
             _features(covariates, cells, len(points)),
             covariates,
             self.settings(),
-            weights=weights,
+            weights=sample_weight,
             groups=groups,
             progress=progress,
         )

@@ -31,8 +31,6 @@ from orbiflow.density.spaces import (
 )
 from orbiflow.errors import SettingError, literal
 
-NONE_GIVEN: Mapping[str | int, float] = {}
-
 
 class DataInSpace(NamedTuple):
     """A space, data (N, k) in the order of its columns, and the names of these, if they have names."""
@@ -55,7 +53,7 @@ class DataColumns:
     space: str | Space
     unit: str | None = None
     linear: Sequence[str | int] = ()
-    period: Mapping[str | int, float] = field(default_factory=lambda: NONE_GIVEN)
+    period: Mapping[str | int, float] = field(default_factory=dict[str | int, float])
     seed: int = 0
 
     @property

@@ -7,4 +7,5 @@ from .files import conditional_to_bytes as conditional_to_bytes
 from .files import read_conditional as read_conditional
 from .fit import ConditionalReport as ConditionalReport
 from .fit import PartEvidence as PartEvidence
+from .fit import check_complete as check_complete
 from .fit import fit_conditional as fit_conditional

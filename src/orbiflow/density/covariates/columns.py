@@ -41,7 +41,7 @@ class Covariate:
     """
 
     name: str
-    line: tuple[float, float] | None = None
+    line: Line | None = None
     range: tuple[float, float] = (-math.inf, math.inf)
     period: float | None = None
     words: tuple[str, ...] = ()
@@ -67,9 +67,7 @@ class Covariate:
             return cls(name, words=words)
         numbers = _numbers(name, cells)
         line = Line.of(numbers, repr(name))
-        return cls(
-            name, line=(line.centre, line.scale), range=(float(numbers.min()), float(numbers.max()))
-        )
+        return cls(name, line=line, range=(float(numbers.min()), float(numbers.max())))
 
     @property
     def kind(self) -> str:
@@ -92,8 +90,7 @@ class Covariate:
             angle = 2 * math.pi * numbers / self.period
             return torch.stack([angle.cos(), angle.sin()], dim=1)
         assert self.line is not None
-        away = (numbers - self.line[0]) / self.line[1]
-        return (SPREAD * away / (4 + away**2).sqrt())[:, None]
+        return SPREAD * self.line.share(numbers)[:, None]
 
     def _known(self, words: NDArray[np.str_]) -> NDArray[np.intp]:
         """Return the numbers (N,) of words; refuse those that the fit has not seen."""
@@ -191,8 +188,7 @@ class Covariates:
                 raise OrbiflowError("a period that is none")
             if line is not None:
                 low, high = (as_number(end, "range") for end in one["range"])
-                own = Line.checked(line)
-                found.append(Covariate(one["name"], (own.centre, own.scale), (low, high)))
+                found.append(Covariate(one["name"], Line.checked(line), (low, high)))
             else:
                 found.append(Covariate(one["name"], period=period, words=words))
         if not found or len({own.name for own in found}) < len(found):

@@ -41,7 +41,7 @@ from orbiflow.density.fitting import (
 )
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space, Torus
-from orbiflow.errors import DataWarning, OrbiflowError
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed
 
@@ -165,6 +165,14 @@ class _Task:
             warnings.simplefilter("ignore", DataWarning)  # the fit to all rows has said them
             how: dict[str, Any] = {"weights": counts, "groups": labels}
             return fit_chosen(space, points[chosen], settings or self.settings, **how)[0]
+
+
+def check_complete(missing: str) -> None:
+    """Refuse to fit rows that lack angles, of which no density is known where covariates are."""
+    if missing != "refuse":
+        raise SettingError(
+            f"{{missing}} {missing} has no densities where covariates are known: leave out such rows"
+        )
 
 
 @one_thread()

@@ -20,7 +20,7 @@ from orbiflow.density.models import (
     density_parts,
     mixture_of,
 )
-from orbiflow.density.spaces import MixedTorus, Space, Torus
+from orbiflow.density.spaces import MixedTorus, Space, Torus, turns_at
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
 
@@ -115,6 +115,5 @@ def covariate_turns(x: Tensor, number: Tensor) -> Tensor:
         if some.shape[1] == 2:
             found.append(torch.atan2(some[:, 1], some[:, 0]) / (2 * math.pi) % 1)
         else:
-            share = some[:, 0] / SPREAD
-            found.append(0.5 + (3 * share - share**3) / 4)
+            found.append(turns_at(some[:, 0] / SPREAD))
     return torch.stack(found, dim=1)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
+from orbiflow.density.inference import cell_masses, cells
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import CHART, Space
 from orbiflow.typed_torch import special
@@ -65,18 +66,11 @@ def on_chart(space: Space, points: Tensor, logs: Tensor) -> Tensor:
     return logs + space.log_kernel_factor(points, CHART)
 
 
-CELLS = 720
-"""Even cells of a circle of which means are taken."""
-
-
 def _mean_features(density: Density) -> Tensor:
     """Return the means (2 d,) of cosines and of sines of a torus' angles."""
-    cells = (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
-    angle, found = 2 * math.pi * cells[:, 0], list[Tensor]()
+    angle, found = 2 * math.pi * cells()[:, 0], list[Tensor]()
     for axis in range(density.space.dim):
-        whole = density.space.dim == 1
-        logs = density.log_prob(cells) if whole else density.log_marginal(cells, [axis])
-        weights = torch.softmax(logs, dim=0)
+        weights = cell_masses(density, axis)
         found.append(torch.stack([weights @ angle.cos(), weights @ angle.sin()]))
     return torch.stack(found, dim=1).flatten()
 

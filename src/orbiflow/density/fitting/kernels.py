@@ -141,7 +141,8 @@ def kernel_estimates(
 ) -> dict[str, AdaptiveKernels]:
     """Return estimates about training rows in random order, by their names; all, or `only` some.
 
-    "width ..." have one concentration, in a ladder; "near ..." a share of the mean square distance to
+    "width ..." have one concentration, in a ladder; "tuned ..." multiples of concentrations (F,) that
+    were `tuned`; "near ..." a share of the mean square distance to
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
     narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
@@ -155,11 +156,12 @@ def kernel_estimates(
         name = f"width {kappa**-0.5:.2g}"
         if only is None or name in only:
             found[name] = start.with_concentrations(torch.full_like(start.concentrations, kappa))
-    for scale in TUNED_SCALES if tuned is not None else ():
-        name = f"tuned, {scale:g}"
-        if tuned is not None and (only is None or name in only):
-            kappa = (scale * tuned).clamp(WIDEST / 100, narrowest)
-            found[name] = start.with_concentrations(kappa.expand_as(start.concentrations))
+    if tuned is not None:
+        for scale in TUNED_SCALES:
+            name = f"tuned, {scale:g}"
+            if only is None or name in only:
+                kappa = (scale * tuned).clamp(WIDEST / 100, narrowest)
+                found[name] = start.with_concentrations(kappa.expand_as(start.concentrations))
     counts, place = places(train)
     first = torch.full((len(counts),), len(train)).scatter_reduce(
         0, place, torch.arange(len(train)), "amin"

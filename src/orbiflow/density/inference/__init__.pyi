@@ -19,5 +19,8 @@ from .textures import pole_density as pole_density
 from .textures import rotations_only as rotations_only
 from .textures import texture_index as texture_index
 from .trends import Trend as Trend
+from .trends import cell_masses as cell_masses
+from .trends import cells as cells
+from .trends import pair_alone as pair_alone
 from .trends import trend as trend
 from .trends import trend_of as trend_of

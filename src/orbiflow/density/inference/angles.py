@@ -119,14 +119,14 @@ def given_named(
         known[column] = as_number(value, repr(names[column]))
     columns, axes = chosen_columns(space, list(known), len(names))
     values = [known[column] for column in columns]
+    alone = [axis for axis in axes if axis >= space.together]
+    whole = values[: len(values) - len(alone)]
     found: dict[int, float] = {}
-    if axes[0] < space.together:
-        whole = values[: len(values) - len(axes) + space.together]
+    if whole:
         found |= enumerate(listed(space.parts[0].cover([whole])[0]))
-    for axis, value in zip(axes[::-1], values[::-1], strict=False):
-        if axis >= space.together:
-            number = torch.tensor(value, dtype=torch.float64)
-            found[axis] = float(lines_of(space).turns(axis - space.together, number))
+    for axis, value in zip(alone, values[len(whole) :], strict=True):
+        number = torch.tensor(value, dtype=torch.float64)
+        found[axis] = float(lines_of(space).turns(axis - space.together, number))
     return found
 
 

@@ -9,9 +9,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.arrays import Array
-from orbiflow.density.inference.angles import axes_named, chosen_columns
-from orbiflow.density.inference.partial import marginal
-from orbiflow.density.inference.trends import Trend, trend
+from orbiflow.density.inference.angles import axes_named
+from orbiflow.density.inference.trends import Trend, pair_alone, trend
 from orbiflow.density.models import Density, Estimate
 from orbiflow.density.spaces import Space
 
@@ -71,7 +70,4 @@ class FittedFigures:
         """
         density, names = self._fitted(), self._column_names()
         first, second = axes_named([of, along], names)
-        if density.space.parts:  # both are beside its own columns
-            axes = chosen_columns(density.space, [first, second], len(names)).axes
-            density, first, second = marginal(density, axes), 0, 1
-        return trend(density, first, second, at, levels=levels)
+        return trend(*pair_alone(density, first, second, len(names)), at, levels=levels)

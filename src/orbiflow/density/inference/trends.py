@@ -12,7 +12,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.inference.angles import at_observed, check_torus
+from orbiflow.density.inference.angles import at_observed, check_torus, chosen_columns
+from orbiflow.density.inference.partial import marginal
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Torus
 from orbiflow.errors import OrbiflowError
@@ -81,14 +82,24 @@ def trend(
     own, alone = torus.of_axes([of]), turns.new_full((len(turns), torus.dim), torch.nan)
     alone[:, along] = turns[:, 0]
     logs = at_observed(density, alone, measure="natural")
-    cells = _cells()
+    middles = cells()
     rows = list[tuple[float, Array]]()
     for part in torch.split(turns, TOGETHER):
-        both = torch.cat([cells.repeat(len(part), 1), part.repeat_interleave(CELLS, 0)], dim=1)
+        both = torch.cat([middles.repeat(len(part), 1), part.repeat_interleave(CELLS, 0)], dim=1)
         found = density.log_marginal(both, [of, along]).reshape(-1, CELLS)
         rows += [_about_mean(own, weights, masses) for weights in torch.softmax(found, dim=1)]
         tick(len(rows) / len(turns))
     return _of_rows(values, rows, masses, logs.numpy())
+
+
+def pair_alone(density: Density, of: int, along: int, width: int) -> tuple[Density, int, int]:
+    """Return a density on a torus that has two of so many columns, and their numbers there.
+
+    Of a product both are beside its own columns, and have a marginal density.
+    """
+    if not density.space.parts:
+        return density, of, along
+    return marginal(density, chosen_columns(density.space, [of, along], width).axes), 0, 1
 
 
 @one_thread()
@@ -104,10 +115,7 @@ def trend_of(
     rows = list[tuple[float, Array]]()
     for density in densities:
         torus = check_torus(density.space, "trends")
-        logs = (
-            density.log_prob(_cells()) if torus.dim == 1 else density.log_marginal(_cells(), [of])
-        )
-        rows.append(_about_mean(torus.of_axes([of]), torch.softmax(logs, dim=0), masses))
+        rows.append(_about_mean(torus.of_axes([of]), cell_masses(density, of), masses))
     return _of_rows(values, rows, masses, None)
 
 
@@ -120,7 +128,14 @@ def _checked(at: ArrayLike, levels: Sequence[float]) -> tuple[Array, tuple[float
     return values, masses
 
 
-def _cells() -> Tensor:
+def cell_masses(density: Density, axis: int) -> Tensor:
+    """Return the masses (CELLS,) of even cells of one column of a density on a torus."""
+    whole = density.space.dim == 1
+    logs = density.log_prob(cells()) if whole else density.log_marginal(cells(), [axis])
+    return torch.softmax(logs, dim=0)
+
+
+def cells() -> Tensor:
     """Return the middles (CELLS, 1) of even cells of a circle, in turns."""
     return (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
 
@@ -140,7 +155,7 @@ def _about_mean(space: Torus, weights: Tensor, masses: Sequence[float]) -> tuple
 
     `weights` (CELLS,) are masses of even cells of its circle.
     """
-    turns = _cells()[:, 0]
+    turns = cells()[:, 0]
     tails = np.array([[(1 - m) / 2 for m in masses], [(1 + m) / 2 for m in masses]])
     period = space.period_of(0)
     if not period:

@@ -107,8 +107,9 @@ class ProductChains(Density, kind="product-chains"):
 
     def _log_beside(self, turns: Tensor, axes: Sequence[int] | None = None) -> Tensor:
         """Return log densities (N, K) of some of the other columns at turns (N, len(axes))."""
-        chosen = list(range(self.beside.dim)) if axes is None else list(axes)
-        center, kappa = self.centers[:, chosen], self.sharpness[:, chosen]
+        center, kappa = self.centers, self.sharpness
+        if axes is not None:
+            center, kappa = center[:, list(axes)], kappa[:, list(axes)]
         sine = (math.pi * (turns[:, None] - center)).sin()
         return -(2 * kappa * sine**2).sum(dim=-1) - special.i0e(kappa).log().sum(dim=-1)
 

@@ -59,6 +59,14 @@ def given_columns(wanted: Sequence[str], names: Sequence[str] | None) -> list[Gi
     return found
 
 
+def asked_columns(given: Sequence[str], data: Path, reading: RowSettings) -> list[Given]:
+    """Return the columns of a table that are given to a fit, which must be one of whole rows."""
+    if not given:
+        return []
+    covariates.check_complete(reading.kept_missing)
+    return given_columns(given, tables.column_names(data, has_header=reading.header))
+
+
 class GivenCells(NamedTuple):
     """The rows of a table, the cells (N,) of its columns that are given, and cyclic ones' periods."""
 
@@ -156,10 +164,6 @@ def fit_given(
     known = covariates.Covariates.of(given.cells, given.periods)
     for own in known.columns:
         tell(runtime.Note(f"took {own.name} as {own.kind}"))
-    if estimator.missing != "refuse":
-        raise SettingError(
-            "{missing} marginalise has no densities where {given} is known: drop rows"
-        )
     density, report = covariates.fit_conditional(
         estimator.density_,
         estimator.points_of(rows.table.values),

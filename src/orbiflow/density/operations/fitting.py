@@ -66,9 +66,7 @@ def fit(
     begin = time.perf_counter()
     _check(where, settings, reading)
     with runtime.one_thread():
-        known = covariates.given_columns(
-            given, tables.column_names(data, has_header=reading.header)
-        )
+        known = covariates.asked_columns(given, data, reading)
         rows = tables.read_rows(
             data,
             reading,
@@ -79,7 +77,8 @@ def fit(
             beside=where.beside,
             given=[own.name for own in known],
         )
-        cells = covariates.read_given(rows, known, reading, turn_of(where, rows))
+        turn = turn_of(where, rows) if known else None
+        cells = covariates.read_given(rows, known, reading, turn)
         rows = cells.rows
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)

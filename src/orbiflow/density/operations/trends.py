@@ -159,9 +159,7 @@ def _along_column(
     names = names_of(density, extra)
     first, second = axes_of([of, along], names, tell)
     called = names[first], names[second]
-    if density.space.parts:  # both of them are beside its own columns
-        axes = inference.chosen_columns(density.space, [first, second], len(names)).axes
-        density, first, second = inference.marginal(density, axes), 0, 1
+    density, first, second = inference.pair_alone(density, first, second, len(names))
     at = _values(density, second, settings)
     found = inference.trend(
         density, first, second, at, levels=settings.levels,
@@ -230,8 +228,8 @@ def _others(
         if own.name == along or own.name.casefold() in said:
             continue
         if own.line is not None:
-            pairs.append((own.name, f"{own.line[0]:.6g}"))
-            tell(runtime.Note(f"{own.name} is held at its median, {own.line[0]:.6g}"))
+            pairs.append((own.name, f"{own.line.centre:.6g}"))
+            tell(runtime.Note(f"{own.name} is held at its median, {own.line.centre:.6g}"))
         elif own.words and not beside and len(own.words) <= MOST_PANELS:
             beside, panels = own.name, own.words
             apart.append(own.name)

@@ -12,6 +12,7 @@ from .flat import whole_turn as whole_turn
 from .frame import Frame as Frame
 from .mixed import Line as Line
 from .mixed import MixedTorus as MixedTorus
+from .mixed import turns_at as turns_at
 from .patches import to_klein as to_klein
 from .point_groups import international_name as international_name
 from .point_groups import rotation_group_name as rotation_group_name

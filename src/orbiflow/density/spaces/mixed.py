@@ -41,6 +41,11 @@ class Line(NamedTuple):
             raise OrbiflowError(f"a real column needs a centre and a scale above 0, got {values}")
         return cls(*values)
 
+    def share(self, values: Tensor) -> Tensor:
+        """Return v = z / sqrt(4 + z^2) of values in any shape, from -1 to 1, with z in scales."""
+        away = (values - self.centre) / self.scale
+        return away / (4 + away**2).sqrt()
+
     @classmethod
     def of(cls, values: Array, name: str) -> Line:
         """Return the line that suits a column (N,) of data, by its quantiles."""
@@ -50,6 +55,11 @@ class Line(NamedTuple):
         if not spread > 1e-12 * abs(float(middle)):
             raise OrbiflowError(f"{name} has one value alone: leave it out")
         return cls(float(middle), SCALES * spread)
+
+
+def turns_at(share: Tensor) -> Tensor:
+    """Return the turns of shares v of `Line.share`: Student's distribution function."""
+    return 0.5 + (3 * share - share**3) / 4
 
 
 Axis = Sequence[float] | float | None
@@ -171,9 +181,7 @@ class MixedTorus(Torus):
         line = self.lines[axis]
         if line is None:
             return values / self.period_of(axis)
-        away = (values - line.centre) / line.scale
-        share = away / (4 + away**2).sqrt()
-        return 0.5 + (3 * share - share**3) / 4
+        return turns_at(line.share(values))
 
     def from_chart(self, points: Tensor) -> Array:
         """Return angles in [-1/2, 1/2) turns, and other columns in their own units: (N, dim).

@@ -12,7 +12,6 @@ from torch import Tensor
 
 from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data
 from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.mixed import Axis, MixedTorus
 from orbiflow.density.spaces.space import CHART, Space, by_sphere, checked_table, make_space
@@ -141,8 +140,7 @@ class ProductSpace(Space):
         return self._of_data(data, lambda own, x: own.to_chart(x))
 
     def _of_data(self, data: ArrayLike, ask: Callable[[Space, Array], Tensor]) -> Tensor:
-        names = as_data(data, "data").values
-        first, second = self.split(checked_table(names, self.widths, "data"))
+        first, second = self.split(checked_table(data, self.widths, "data"))
         return torch.cat([ask(self.base, first), ask(self.beside, second)], dim=-1)
 
     def from_chart(self, points: Tensor) -> Array:
