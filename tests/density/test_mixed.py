@@ -211,3 +211,13 @@ def test_radians_in_the_place_of_degrees_are_doubted() -> None:
     rows[:, 0] = np.radians(rows[:, 0])
     with pytest.warns(UserWarning, match="seem to be radians"):
         fit.score_samples(rows)
+
+
+@pytest.mark.parametrize("how", [{}, {"linear": (1,)}], ids=["angles", "mixed"])
+def test_warnings_are_where_the_data_are_given(how: dict[str, Any]) -> None:
+    rng = np.random.default_rng(0)
+    data = np.column_stack([rng.uniform(-3, 3, 60), rng.normal(size=60)])[:, : 1 + len(how)]
+    estimator = DensityEstimator("torus", unit="degrees", components="mixture", **how)
+    with pytest.warns(UserWarning, match="within 2 pi") as found:
+        estimator.fit(data)
+    assert {Path(one.filename).name for one in found} == {Path(__file__).name}

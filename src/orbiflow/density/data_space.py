@@ -61,15 +61,13 @@ class DataColumns:
         """The name of the space whose rules the data obey."""
         return self.space.data_name if isinstance(self.space, Space) else str(self.space)
 
-    def of(
-        self, values: Array, names: tuple[str, ...] | None, *, stacklevel: int = 3
-    ) -> DataInSpace:
+    def of(self, values: Array, names: tuple[str, ...] | None) -> DataInSpace:
         """Return the space of data (N, k), once they are known to be of it.
 
         Columns beside a space that is no torus come last.
 
         Warns:
-            DataWarning: Of what is doubtful, at so many calls from here.
+            DataWarning: Of what is doubtful, at the caller's caller, who gave the data.
 
         Raises:
             OrbiflowError: For data that are not of the space, columns in another order, and others.
@@ -82,7 +80,7 @@ class DataColumns:
         if isinstance(own, MixedTorus | ProductSpace):
             return DataInSpace(self._given(own, values, names, bool(periods)), values, names)
         if not periods:
-            found = self._plain(values, names, stacklevel + 1)
+            found = self._plain(values, names)
             return DataInSpace(found, values, names)
         if own == "torus":
             return DataInSpace(self._mixed(values, names, called, periods), values, names)
@@ -100,7 +98,7 @@ class DataColumns:
         count = len(order) - len(periods)
         if not count:
             raise SettingError(literal(f"no column is left for the {self.name}"))
-        base = self._plain(values[:, :count], names and names[:count], stacklevel + 1)
+        base = self._plain(values[:, :count], names and names[:count])
         sides = {k: periods[column] for k, column in enumerate(order[count:])}
         labels = [called[k] for k in order[count:]]
         beside = MixedTorus.for_columns(values[:, count:], sides, labels)
@@ -138,7 +136,7 @@ class DataColumns:
         if not kept:
             return unit or "radians"
         beside = tuple(names[k] for k in kept) if names else None
-        return unit_of("torus", values[:, kept], beside, unit, stacklevel=7)
+        return unit_of("torus", values[:, kept], beside, unit, stacklevel=6)
 
     def _mixed(
         self,
@@ -151,7 +149,7 @@ class DataColumns:
         unit = self._angle_unit(values, names, angles, self.unit)
         return MixedTorus.for_columns(values, periods, called, unit=unit)
 
-    def _plain(self, values: Array, names: tuple[str, ...] | None, stacklevel: int) -> Space:
+    def _plain(self, values: Array, names: tuple[str, ...] | None) -> Space:
         """Return the space of data without others beside them."""
         own = self.space if isinstance(self.space, Space) else None
         name, unit, form = self.name, self.unit, None
@@ -164,9 +162,9 @@ class DataColumns:
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):
                 raise SettingError(f"{{unit}} {self.unit} is not the space's, {unit}: leave it out")
-        found = unit_of(name, values, names, unit, form=form, stacklevel=stacklevel + 1)
+        found = unit_of(name, values, names, unit, form=form, stacklevel=5)
         if isinstance(own, QuotientSpace):
-            own.warn_of_fractions(values, stacklevel=stacklevel + 1)
+            own.warn_of_fractions(values, stacklevel=5)
         if own is not None:
             return own
         return space_for(cast(str, self.space), values, unit=found, seed=self.seed, form=form)

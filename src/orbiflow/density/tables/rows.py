@@ -188,7 +188,7 @@ class _Reader:
         """Return the columns that were asked for, or those that the space takes beside `others`."""
         names, columns = self.names(), self.rows.columns
         if columns is None and self.space is not None:
-            more = columns_among(names, self.beside)
+            more = _beside(names, self.beside, self.path) if names else []
             left = [name for name in names if name not in others and name not in more]
             columns = self._by_name(self.space, left)
             columns = columns and (*columns, *more)
@@ -284,16 +284,22 @@ def columns_among(names: Sequence[str], asked: Sequence[str]) -> list[str]:
     return [name for name in names if name.casefold() in wanted]
 
 
-def without_columns(table: Table, beside: Sequence[str], path: Path) -> Table:
-    """Return a table without columns that are beside others; refuse those that it lacks."""
-    found = columns_among(table.columns, beside)
-    if len(found) != len(set(beside)):
+def _beside(names: Sequence[str], asked: Sequence[str], path: Path) -> list[str]:
+    """Return the columns that are asked for beside others; refuse those that a table lacks."""
+    found = columns_among(names, asked)
+    if len(found) != len(set(asked)):
         raise TableError(
-            literal(f"{path}: the columns are {listing(table.columns)}")
+            literal(f"{path}: the columns are {listing(names)}")
             + ", and {linear} and {period} name "
-            + literal(listing(beside))
+            + literal(listing(asked))
             + "; give the names of the table"
         )
+    return found
+
+
+def without_columns(table: Table, beside: Sequence[str], path: Path) -> Table:
+    """Return a table without columns that are beside others; refuse those that it lacks."""
+    found = _beside(table.columns, beside, path)
     for name in found:
         table = table.without(table.columns.index(name))
     return table
