@@ -137,7 +137,7 @@ class _Page:
         own, _ = ground.panels_room(sheet)
         self.sheet, self.gap = sheet, own.gap * sheet.em
         self.between = sheet.em * (own.above + own.below)
-        room = own._replace(above=own.above + 0.6, gap=1.6, bar=1.2)
+        room = own._replace(left=own.left + 0.8, above=own.above + 0.6, gap=1.6, bar=1.2)
         room = frames.room_for_bar_beside(sheet, room, label, ticks)
         room = room.with_words(caption, sheet)
         self.room, self.beside = room._replace(right=room.right + own.right), own.right
