@@ -90,7 +90,7 @@ def png_that_says(width: int, height: int) -> bytes:
         (("--tile-size", "9px", "--area", "9000x9000px"), "the most is 20000: choose larger tiles"),
         (("--palette", "neon"), "unknown palette 'neon'; there are delft"),
         (("--outline", "thick"), "--outline ... 'thick' is not a length"),
-        (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, which reaches from"),
+        (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, whose nearest point is"),
         (("--eye", "here"), "--eye ... 'here' is not x,y or x,y,radius"),
         (("--eye", "nan,1"), "--eye ... must be a finite number, got nan"),
         (("--eye", "210,190,-3"), "--eye ... radius ... got 210,190,-3"),

@@ -73,7 +73,7 @@ def test_each_connected_part_is_one() -> None:
 @pytest.mark.parametrize(
     ("spots", "message"),
     [
-        ([(0, 0)], r"the pin at 0,0 lies outside the silhouette, which spans x from 114 to 781"),
+        ([(0, 0)], r"the pin at 0,0 lies outside the silhouette, .* spans x from 114 to 781"),
         ([(300, 650, 20)], "lies outside the silhouette"),
         ([(300, 300, 0)], "the radius of a pin must be above 0, got 0"),
         ([(300, 300, -5)], "the radius of a pin must be above 0, got -5"),

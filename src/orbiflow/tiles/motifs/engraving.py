@@ -13,7 +13,6 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import (
     arc_lengths,
     best_similarity,
@@ -24,6 +23,7 @@ from orbiflow.tiles.geometry import (
 from orbiflow.tiles.motifs.raster import Grid
 from orbiflow.tiles.motifs.settings import Strokes
 from orbiflow.tiles.page import INK, Curve, Part, Style
+from orbiflow.tiles.silhouette import outside
 from orbiflow.tiles.tile import EscherTile
 
 GRID_DENSITY = 420.0  # cells of the raster along the square root of the area
@@ -127,11 +127,7 @@ def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     x, y = given[:2]
     outline = shapely.Polygon(tile.silhouette_outline)
     if not outline.contains(shapely.Point(x, y)):
-        left, top, right, bottom = outline.bounds
-        raise OrbiflowError(
-            f"the eye at {x:g},{y:g} lies outside the silhouette, which reaches from "
-            f"{left:.4g},{top:.4g} to {right:.4g},{bottom:.4g}"
-        )
+        raise outside("the eye", x, y, outline)
     polygon = shapely.Polygon(tile.tile.polygon)
     size = float(np.sqrt(polygon.area))
     here = np.array([x, y])

@@ -13,6 +13,7 @@ from .outlines import DISC_OVERREACH as DISC_OVERREACH
 from .outlines import Samples as Samples
 from .outlines import important_vertices as important_vertices
 from .outlines import opened as opened
+from .outlines import outside as outside
 from .outlines import sampled as sampled
 from .outlines import with_corners as with_corners
 from .pins import Pins as Pins

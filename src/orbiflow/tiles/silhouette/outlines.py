@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+import shapely.ops
 from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
@@ -119,6 +120,17 @@ def percent(share: float) -> str:
     if 0 < share < 0.001:
         return "under 0.1%"
     return "over 99.9%" if 0.999 < share < 1 else f"{share:.1%}"
+
+
+def outside(what: str, x: float, y: float, silhouette: Polygon) -> OrbiflowError:
+    """Return the error that says that `what`, such as a pin, lies outside a silhouette."""
+    near = shapely.ops.nearest_points(silhouette, shapely.Point(x, y))[0]
+    left, top, right, bottom = silhouette.bounds
+    return OrbiflowError(
+        f"{what} at {x:g},{y:g} lies outside the silhouette, whose nearest point is "
+        f"{near.x:.4g},{near.y:.4g}; its box spans x from {left:.4g} to {right:.4g} and y from "
+        f"{top:.4g} to {bottom:.4g}"
+    )
 
 
 def filled(polygon: Polygon) -> Polygon:

@@ -19,7 +19,7 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import resampled
 from orbiflow.tiles.silhouette.emphasis import Emphasis
-from orbiflow.tiles.silhouette.outlines import percent
+from orbiflow.tiles.silhouette.outlines import outside, percent
 from orbiflow.tiles.silhouette.target import Target
 
 DEFAULT_RADIUS = 0.08  # default radius of a spot, in longer sides of the silhouette's bounding box
@@ -198,9 +198,5 @@ def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
     elif region.contains(centre):
         radius = max(radius, REACH_PAST_OUTLINE * centre.distance(region.exterior))
     if centre.distance(region) > radius:
-        (xmin, ymin), (xmax, ymax) = target.outline.min(axis=0), target.outline.max(axis=0)
-        raise OrbiflowError(
-            f"the pin at {x:g},{y:g} lies outside the silhouette, which spans x from {xmin:g} to "
-            f"{xmax:g} and y from {ymin:g} to {ymax:g}"
-        )
+        raise outside("the pin", x, y, region)
     return x, y, radius

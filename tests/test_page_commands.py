@@ -1,0 +1,186 @@
+"""Every command of `orbiflow` that a page prints in a block of its own runs there, in the page's order.
+
+Searches and fits try little, and tables have few rows: what they find is tested where they are made.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zlib
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from filelock import FileLock
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from cli.conftest import call_main
+from density.quick_fits import quick_fits, quick_pictures
+from orbiflow.solids import Mesh
+from orbiflow.solids import search as solid_search
+from orbiflow.tiles import LikenessSearch
+from orbiflow.tiles.search.pair_search import PairSearch
+from shell_lines import ROOT, Line
+from small_pairs import FEW as FEW_PAIRS
+from small_pairs import small_pairs
+from small_searches import FEW, small_searches
+from solids.known_bodies import creature
+from solids.small_fills import small_fills
+from test_shell_lines import LINES
+
+COMMANDS = [line for line in LINES if line.whole and line.words[0] == "orbiflow"]
+PAGES = sorted({line.page for line in COMMANDS})
+
+BEFORE = {"docs/density-pictures.md": ("density fit quakes.csv --space sphere --out quakes",)}
+"""What a reader of a page has done before."""
+
+NOT_HERE = {
+    "studio": "a server without an end: tests/studio starts it",
+    "--scheduler": "needs a cluster: tests/batch has one",
+    "--pairs": "tests/batch has the smallest folder of pairs",
+    "MODEL": "stands for any model",
+    "map.ctf": "tests/cli/test_orientations.py has a file of that kind",
+    "texture": "the model of map.ctf",
+    "examples/silhouettes/nagata/spider_120.dat": "finds no pair where so little is tried",
+}
+
+FINDS = (
+    "escherize examples/silhouettes/turtle.png --out out/turtle",
+    "escherize examples/silhouettes/barbet.svg --out out/barbet",
+    "escherize examples/silhouettes/squirrel.dat --classes IH4 --out out/squirrel",
+    "escherize docs/gallery/silhouettes/seal.svg --classes IH5 --out out/seal",
+    "escherize docs/gallery/silhouettes/seal.svg docs/gallery/silhouettes/shark.svg --out out/pair",
+    "fill examples/meshes/koala.obj --out out/koala",
+)
+"""What pages begin with; it is done once for all of them."""
+
+COLUMNS = {
+    "his": "phi,psi,chi1,chi2,protein", "his-fitted": "phi,psi,protein", "trp": "phi,psi,protein",
+    "his-held": "phi,psi,protein", "turned": "lat,lon,polarity", "a": "angle", "b": "angle",
+    "angles": "phi,psi", "model": "phi,psi", "bonds": "phi,length,temperature",
+    "weather": "wind_dir,hour,temperature,pressure,airport,day", "motifs": "x,y",
+    "waters": "x,y,z", "turns": "x,y,z,w", "fires": "latitude,longitude", "cells": "lat,lon,cell",
+    "quakes": "lat,lon", "quakes-fitted": "lat,lon", "quakes-held": "lat,lon", "ring": "lat,lon",
+    "rolled": "phi1,Phi,phi2", "directions": "lat,lon", "poles": "lat,lon",
+}  # fmt: skip
+OF_A_PAGE = {
+    ("docs/conditionals.md", "new"): COLUMNS["weather"],
+    ("docs/densities.md", "new"): "lat,lon,phi,length,temperature",
+    ("docs/densities.md", "places"): "day,lon,lat,depth",
+    ("docs/quotients.md", "places"): "x,y,z",
+    ("docs/summaries.md", "poles"): "plat,plon",
+}
+COAST = {"type": "LineString", "coordinates": [[0, 0], [20, 30], [60, 40]]}
+LENGTHS = {"length", "temperature", "pressure", "depth", "x", "y", "z"}
+
+
+def column(name: str, count: int, random: np.random.Generator) -> list[object]:
+    """Some values that a column of this name may have."""
+    if name in ("protein", "cell", "airport", "polarity"):
+        words = {"polarity": "NR", "airport": ["JFK", "EWR"]}.get(name, "ABCDEFGHIJKL")
+        return [words[k % len(words)] for k in range(count)]
+    if name in ("hour", "day"):
+        return [float(k % 24) + 0.5 for k in range(count)]
+    if name in LENGTHS:
+        return (random.normal(size=count) + 5).round(3).tolist()
+    if "lat" in name:
+        return np.degrees(np.arcsin(random.uniform(-0.9, 0.9, count))).round(3).tolist()
+    return random.normal(1, 0.5, count).round(3).tolist()
+
+
+def write_table(path: Path, columns: str) -> None:
+    random = np.random.default_rng(zlib.crc32(path.stem.encode()))
+    names = columns.split(",")
+    rows = zip(*(column(name, 60, random) for name in names), strict=True)
+    if columns == "x,y,z,w":
+        rows = Rotation.random(60, rng=random).as_quat()
+    path.write_text("\n".join([columns, *(",".join(map(str, row)) for row in rows)]) + "\n")
+
+
+def write_obj(path: Path, mesh: Mesh) -> None:
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in mesh.points]
+    path.write_text("\n".join([*lines, *(f"f {a} {b} {c}" for a, b, c in mesh.faces + 1)]))
+
+
+@pytest.fixture(scope="module", name="_little")
+def little_fixture() -> Iterator[pytest.MonkeyPatch]:
+    """Searches at any effort, fits and pictures try little."""
+    with ExitStack() as stack:
+        for make in (small_searches, small_pairs, small_fills):
+            stack.enter_context(make())
+        patch = stack.enter_context(pytest.MonkeyPatch.context())
+        patch.setitem(LikenessSearch.efforts, "normal", FEW)  # pyright: ignore[reportArgumentType]
+        patch.setitem(solid_search.EFFORTS, "normal", solid_search.EFFORTS["fast"])
+        patch.setitem(PairSearch.efforts, "normal", FEW_PAIRS)  # pyright: ignore[reportArgumentType]
+        quick_fits(patch)
+        quick_pictures(patch)
+        yield patch
+
+
+@pytest.fixture(scope="module", name="workshop")
+def workshop_fixture(tmp_path_factory: pytest.TempPathFactory, _little: object) -> Path:
+    """A folder as readers have it who did what pages begin with; made once a run, never changed."""
+    folder = tmp_path_factory.getbasetemp().parent / "workshop"
+    with FileLock(f"{folder}.lock"), pytest.MonkeyPatch.context() as patch:
+        if not folder.exists():
+            new = folder.with_name("workshop-new")
+            (new / "out").mkdir(parents=True)
+            patch.chdir(new)
+            bring_files(new)
+            for words in FINDS:
+                done = call_main(lambda: ("", ""), *words.split())
+                assert done.status == 0, words
+            new.rename(folder)
+    return folder
+
+
+def bring_files(folder: Path) -> None:
+    """Bring the files that pages read: the repository's own, and small ones as readers may have."""
+    (folder / "docs").symlink_to(ROOT / "docs")
+    shutil.copytree(ROOT / "examples", folder / "examples")
+    write_obj(folder / "examples" / "meshes" / "koala.obj", creature())
+    for table in (folder / "examples" / "density").glob("*.csv"):
+        table.write_text("".join(table.read_text().splitlines(keepends=True)[:300]))
+    for name in ("animals", "angles"):
+        (folder / name).mkdir()
+    for animal in ("turtle.png", "barbet.svg"):
+        shutil.copy(ROOT / "examples" / "silhouettes" / animal, folder / "animals")
+    for name in "ab":
+        write_table(folder / "angles" / f"{name}.csv", "phi,psi")
+    Image.new("RGB", (192, 192), "olive").save(folder / "turtle-painted.png")
+    Image.new("RGB", (802, 672), "olive").save(folder / "dolphin.png")
+    shutil.copy(ROOT / "examples/silhouettes/turtle.png", folder)
+    shutil.copy(ROOT / "examples/artwork/barbet.svg", folder / "bird.svg")
+    (folder / "coast.geojson").write_text(json.dumps(COAST))
+    np.save(folder / "patches.npy", np.random.default_rng(0).normal(size=(60, 9)))
+    for name, columns in COLUMNS.items():
+        write_table(folder / f"{name}.csv", columns)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page(
+    page: str,
+    workshop: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    desk = shutil.copytree(workshop, tmp_path / "desk", symlinks=True)
+    monkeypatch.chdir(desk)
+    for (of, name), columns in OF_A_PAGE.items():
+        if of == page:
+            write_table(desk / f"{name}.csv", columns)
+    refused = []
+    before = [Line(page, f"orbiflow {words}", whole=True) for words in BEFORE.get(page, ())]
+    for line in [*before, *(line for line in COMMANDS if line.page == page)]:
+        words = line.words[1:]
+        if " ".join(words) in FINDS or (NOT_HERE.keys() & {*words} and "rolled" not in words):
+            continue
+        done = call_main(capsys.readouterr, *words)
+        if done.status:
+            refused.append(f"{line.text}\n{done.err or done.out}")
+    assert not refused, "\n".join(refused)
