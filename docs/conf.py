@@ -38,9 +38,11 @@ suppress_warnings = ["myst.xref_missing", "myst.header"]
 
 
 def plain_prose(
-    _app: Any, _what: str, _name: str, _obj: Any, _options: Any, lines: list[str]
+    _app: Any, what: str, _name: str, obj: Any, _options: Any, lines: list[str]
 ) -> None:
     """Docstrings are prose with code between backticks: |G| and 2 * 3 are not markup in it."""
+    if what == "data" and type(obj).__module__ == "builtins":  # a table has dict's own docstring
+        lines.clear()
     blocks = re.split(r"(\n\s*\n)", "\n".join(lines))
     for k, block in enumerate(blocks):
         if block.lstrip().startswith(">>>"):
