@@ -16,7 +16,7 @@ from orbiflow.density import (
     fit_automatic,
     make_space,
 )
-from orbiflow.density.fitting import group_numbers
+from orbiflow.density.data import group_numbers
 from orbiflow.density.fitting.held_out import (
     FOLDS,
     TOLERANCE_NATS,

@@ -15,6 +15,7 @@ from scipy import special
 from torch import Tensor
 
 from orbiflow.arrays import Array
+from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting.forms import FORMS, Cloud
 from orbiflow.density.fitting.goodness import DRAWS, smooth_test
 from orbiflow.density.fitting.intervals import (
@@ -34,7 +35,6 @@ from orbiflow.density.fitting.report import FitReport, mean_nll, own_points
 from orbiflow.density.fitting.rows import (
     Rows,
     effective_rows,
-    group_numbers,
     lone_groups_note,
     weighed,
     weights_note,
@@ -143,6 +143,7 @@ def fit_parametric(
     >>> [one.name for one in report.parametric.parameters]
     ['mean_lat', 'mean_lon', 'concentration']
     """
+    points, weights, groups = alongside(points=points, weights=weights, groups=groups)
     own = own_points(space, points)
     labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
     rows = weighed(own, weights, labels)
