@@ -39,7 +39,6 @@ from .frames import require_values as require_values
 from .row_labels import alongside as alongside
 from .row_labels import cells_of as cells_of
 from .row_labels import group_numbers as group_numbers
-from .row_labels import is_category as is_category
 from .row_labels import missing_among as missing_among
 from .strikes import DIP_DIRECTION as DIP_DIRECTION
 from .strikes import data_of as data_of

@@ -86,8 +86,9 @@ def group_numbers(labels: Any, rows: int, what: str = "groups") -> NDArray[np.in
             f"{what}: {len(at)} row{'s' * (len(at) > 1)} without a label, the first is row "
             f"{at[0] + 1}; fill them in, or leave such rows out"
         )
-    if array.dtype.kind == "O":
-        array = array.astype(str)
+    if array.dtype.kind == "O":  # numbers are in their order, whoever holds them
+        numeric = all(isinstance(label, numbers.Real) for label in array)
+        array = array.astype(np.float64 if numeric else str)
     return np.unique(array, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
 

@@ -41,7 +41,7 @@ from orbiflow.density.fitting.rows import (
 )
 from orbiflow.density.models import AdaptiveKernels, Density, images_of
 from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.typed_torch import linalg
 
 MOST_WIDTH = 16
@@ -204,6 +204,10 @@ def _factors(
 ) -> list[tuple[str, Tensor, tuple[Writing, ...]]]:
     """Return the unit vectors (N, p) of each factor of the space, and how directions are written."""
     names = tuple(columns or space.columns)
+    if len(names) != len(space.columns):
+        raise SettingError(
+            f"{{columns}} must name the {len(space.columns)} columns of the space, got {len(names)} names"
+        )
     if not isinstance(space, Torus):
         periods = tuple(360.0 if column == "lon" else 0.0 for column in space.columns)
         if isinstance(space, RotationSpace) and space.form not in (
@@ -212,10 +216,9 @@ def _factors(
             "matrix",
         ):
             periods = (space.period,) * 3
-        written = names if len(names) == len(space.columns) else space.columns
         unit = _unit_of(space)
         limits = tuple(_largest(column, unit) for column in space.columns)
-        writing = Writing(partial(_written, space), written, periods, limits, unit)
+        writing = Writing(partial(_written, space), names, periods, limits, unit)
         return [("", space.features(points)[0], (writing,))]
     found: list[tuple[str, Tensor, tuple[Writing, ...]]] = []
     for axis, column in enumerate(names):

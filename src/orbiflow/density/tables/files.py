@@ -337,16 +337,19 @@ def holds_words(path: str | Path, column: str) -> bool:
         return False
     with _parquet(path) as file:
         schema = file.schema_arrow
-        kind = schema.types[find(path, schema.names, column)]
-        types = importlib.import_module("pyarrow").types
+        number = find(path, schema.names, column)
+        types, kind = importlib.import_module("pyarrow").types, schema.types[number]
         if types.is_temporal(kind):
             raise InputFileError(
                 f"{path}: column {quote(column)} holds times ({kind}); save numbers, such as hours "
                 "since a first moment"
             )
-        return not any(
-            test(kind) for test in (types.is_integer, types.is_floating, types.is_decimal)
-        )
+        if not any(test(kind) for test in (types.is_integer, types.is_floating, types.is_decimal)):
+            return True
+        # Parquet has categories of words alone, pandas notes others
+        noted = (schema.pandas_metadata or {}).get("columns", [])
+        own = [one for one in noted if one["field_name"] == schema.names[number]]
+        return any(one["pandas_type"] == "categorical" for one in own)
 
 
 def _damaged(path: Path, exc: Exception) -> InputFileError:
