@@ -18,7 +18,7 @@ TABLE = pandas.DataFrame(
     {
         "phi": np.degrees(RNG.vonmises(0, 2, ROWS)),
         "hour": RNG.uniform(0, 24, ROWS),
-        "elevation": RNG.normal(400, 90, ROWS).round(1),
+        "elevation": RNG.uniform(0, 900, ROWS).round(1),
         "level": pandas.Categorical(RNG.integers(1, 4, ROWS)),
     }
 )
@@ -75,7 +75,7 @@ def test_codes_are_refused_in_all_columns(fit: Any, role: tuple[str, str]) -> No
     assert "--missing-codes" in error
     said = fit(wrong, *ask, "--missing-codes", "-9999", "--drop-missing")
     assert rows_of(said) == ROWS - 1
-    wrong.loc[3, "elevation"] = 999.9  # as far from the others as an elevation may be
+    wrong.loc[3, "elevation"] = 999.9  # no farther from the others than an elevation may be
     assert rows_of(fit(wrong, *ask)) == ROWS
 
 
@@ -84,4 +84,4 @@ def test_two_values_are_doubted(orbiflow: Any, tmp_path: Path) -> None:
     table.to_csv(tmp_path / "table.csv", index=False)
     words = ("density", "fit", tmp_path / "table.csv", "--space", "torus", "--unit", "degrees")
     how = ("--columns", "phi,rain", "--linear", "rain", "--components", "mixture")
-    assert "'rain' has two values alone" in orbiflow(*words, *how, "-o", tmp_path / "two").err
+    assert "'rain' has two values alone" in orbiflow(*words, *how, "-o", tmp_path / "two").out

@@ -44,7 +44,7 @@ def fit(given: Any, **settings: Any) -> ConditionalEstimator:
 
 
 def kinds(given: Any, **settings: Any) -> list[str]:
-    """What makes one doubt what covariates are, of a fit that ends once they are known, because no row counts."""
+    """What makes one doubt covariates, of a fit that ends with them, because no row counts."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:

@@ -85,6 +85,17 @@ def test_a_pressure_may_be_999_9(role: str) -> None:
 
 
 @pytest.mark.parametrize("role", ["covariate", "column"])
+def test_codes_below_all_others(role: str) -> None:
+    """However far positive numbers reach."""
+    rain = RNG.lognormal(2, 2, 200)
+    rain[[5, 9]] = -99.9
+    with pytest.raises(SettingError, match="in 2 rows"):
+        read(rain, role)
+    with pytest.raises(OrbiflowError, match="weights"):
+        read(np.where(rain < 0, 1.0, rain), role)
+
+
+@pytest.mark.parametrize("role", ["covariate", "column"])
 def test_other_numbers_far_from_all_are_doubted(role: str) -> None:
     with (
         pytest.warns(DataWarning, match="'x' is 0 in 2 rows"),

@@ -67,9 +67,10 @@ def codes_among(column: Array, turn: float | None) -> list[float]:
     """Return values of a column (N,) that seem to stand for missing ones.
 
     Of real numbers, whose `turn` is None, they are numbers such as 999 or -9999 that are farther from
-    all others than these spread. Of angles they are such numbers far from all others or again and again
-    where others hardly repeat, a few numbers beyond a turn that come again and again where other values
-    keep within a turn, or 360 where others keep within half a turn either way, as DSSP writes it.
+    all others than these spread, or alone below 0. Of angles they are such numbers far from all others
+    or again and again where others hardly repeat, a few numbers beyond a turn that come again and again
+    where other values keep within a turn, or 360 where others keep within half a turn either way, as
+    DSSP writes it.
 
     >>> codes_among(np.array([10.0, 350.0, 20.0, 999.0, 990.0]), 360.0)
     [990.0, 999.0]
@@ -118,7 +119,8 @@ def _codes_apart(distinct: Array, counts: NDArray[np.int64]) -> list[float]:
     wide = np.where(sure, LEAST_APART, LEAST_APART_ALONE) * (most - least)
     if len(inner) < FEW_VALUES:  # which may be all that there are
         wide = LEAST_APART_ALONE * max(most - least, -least, most)
-    return distinct[named & (apart > wide)].tolist()
+    is_alone_below = sure & (distinct < 0) & (least >= 0)  # however far the others reach
+    return distinct[named & (is_alone_below | (apart > wide))].tolist()
 
 
 def refuse_codes(space: str, values: Array, names: Sequence[str], unit: str, cure: str) -> None:

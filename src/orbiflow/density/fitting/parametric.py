@@ -206,7 +206,7 @@ def _factors(
     names = tuple(columns or space.columns)
     if len(names) != len(space.columns):
         raise SettingError(
-            f"{{columns}} must name the {len(space.columns)} columns of the space, got {len(names)} names"
+            f"{{columns}} must name the {len(space.columns)} columns of the space, got {len(names)}"
         )
     if not isinstance(space, Torus):
         periods = tuple(360.0 if column == "lon" else 0.0 for column in space.columns)
