@@ -6,11 +6,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_instance
-from orbiflow.density.data import as_numbers
+from orbiflow.arguments import as_choice, as_instance, is_tensor
+from orbiflow.density.data import as_numbers, cells_of
 from orbiflow.density.inference import check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import Space, row_count
@@ -98,7 +99,12 @@ def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) ->
 
 def weights_of(weights: Any, rows: int) -> Tensor:
     """Return the weights of so many rows, as they were given."""
-    own = torch.tensor(as_numbers(weights, "weights"))
+    given = cells_of(weights)
+    if is_tensor(given):
+        given = given.double()
+    elif np.asarray(given).dtype.kind == "b":  # which rows count
+        given = np.asarray(given, dtype=np.float64)
+    own = torch.tensor(as_numbers(given, "weights"))
     if own.shape != (rows,):
         raise OrbiflowError(
             f"expected a weight for each of {rows} rows, got an array {tuple(own.shape)}"

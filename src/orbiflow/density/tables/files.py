@@ -347,9 +347,9 @@ def holds_words(path: str | Path, column: str) -> bool:
         if not any(test(kind) for test in (types.is_integer, types.is_floating, types.is_decimal)):
             return True
         # Parquet has categories of words alone, pandas notes others
-        noted = (schema.pandas_metadata or {}).get("columns", [])
-        own = [one for one in noted if one["field_name"] == schema.names[number]]
-        return any(one["pandas_type"] == "categorical" for one in own)
+        noted: Any = schema.pandas_metadata or {"columns": []}
+        own = {one["field_name"]: one["pandas_type"] for one in noted["columns"]}
+        return own.get(schema.names[number]) == "categorical"
 
 
 def _damaged(path: Path, exc: Exception) -> InputFileError:
