@@ -189,7 +189,7 @@ def test_the_score_is_the_weighted_mean() -> None:
         (np.where(np.arange(60) == 5, np.nan, 1.0), "row 6 has nan"),
         (np.full(60, np.inf), "row 1 has inf"),
         (np.zeros(60), "all weights are 0"),
-        (["much"] * 60, "real numbers"),
+        (["much"] * 60, "weights: expected numbers"),
     ],
 )
 def test_weights_that_are_none_are_refused(weights: object, message: str) -> None:

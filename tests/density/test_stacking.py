@@ -16,7 +16,7 @@ from orbiflow.density import (
     fit_automatic,
     make_space,
 )
-from orbiflow.density.fitting import group_numbers
+from orbiflow.density.data import group_numbers
 from orbiflow.density.fitting.held_out import (
     FOLDS,
     TOLERANCE_NATS,
@@ -235,7 +235,7 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
         ([0] * 40, "0 different rows are left"),
         ([0] * 37 + [1, 2, 3], "3 different rows are left"),
         ([0] * 20, "a label for each of 40 rows"),
-        ([None] * 40, "0 different rows are left"),
+        ([None] * 40, "40 rows without a label"),
     ],
 )
 def test_groups_that_cannot_be_held_out(labels: list[object], said: str) -> None:

@@ -199,7 +199,7 @@ def test_what_cannot_be_told() -> None:
     [
         ({"weights": [1, -1]}, "weights must be 2 numbers, none below 0"),
         ({"weights": [0, 0]}, "no row with a value and a weight"),
-        ({"groups": ["a"]}, "groups must be 2 labels"),
+        ({"groups": ["a"]}, "groups: .* each of 2 rows"),
         ({"level": 2}, "level"),
         ({"unit": "hours"}, "unit"),
     ],

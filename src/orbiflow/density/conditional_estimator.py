@@ -21,7 +21,7 @@ from orbiflow.density.covariates import (
     check_complete,
     fit_conditional,
 )
-from orbiflow.density.data import columns_of
+from orbiflow.density.data import alongside, as_data, as_numbers, cells_of, columns_of
 from orbiflow.density.estimator import DensityEstimator, RandomState
 from orbiflow.density.fitting import Progress, mean_of, weighed
 from orbiflow.density.inference import Trend, axes_named, trend_of
@@ -46,7 +46,9 @@ class ConditionalEstimator(DensityEstimator):
 
     Args:
         space: As for `DensityEstimator`, like all others.
-        cycles: After what cyclic covariates begin again, by their names, such as {"hour": 24}.
+        cycles: After what cyclic covariates begin again, by their names, such as {"hour": 24}, and None
+            of plain numbers. Others are cyclic, with a `DataWarning`, if their values suit and they are
+            called hour, month, weekday, doy or, beside angles, after an angle.
 
     After `fit`: what a `DensityEstimator` has, `conditional_density_` and `conditional_report_`, which
     says what the covariates gain and what is chosen.
@@ -67,7 +69,7 @@ class ConditionalEstimator(DensityEstimator):
         self,
         space: str | Space = "torus",
         *,
-        cycles: Mapping[str, float] | None = None,
+        cycles: Mapping[str, float | None] | None = None,
         **settings: Any,
     ) -> None:
         super().__init__(space, **settings)
@@ -98,11 +100,15 @@ class ConditionalEstimator(DensityEstimator):
             OrbiflowError: For data as `DensityEstimator.fit`; for missing values among the covariates,
                 one that has one value alone, another number of rows, and fewer than 30 rows.
         """
+        _, given, sample_weight, groups = alongside(
+            X=X, given=given, sample_weight=sample_weight, groups=groups
+        )
         cells = columns_given(given)
-        covariates = Covariates.of(cells, self.cycles or {})
         check_complete(self.missing)
-        super().fit(X, None, sample_weight, groups=groups, columns=columns, progress=progress)
-        points = self.points_of(X)
+        read = self._read(X, columns)
+        covariates = self._covariates(cells)
+        self._fit(read, sample_weight, groups, progress)
+        points = self._chart(read.values)
         self.conditional_density_, self.conditional_report_ = fit_conditional(
             self._fitted(),
             points,
@@ -128,6 +134,7 @@ class ConditionalEstimator(DensityEstimator):
         """
         if given is None:
             return super().score_samples(X, measure=measure)
+        _, given = alongside(X=X, given=given)
         own = self._conditional()
         check_measure(measure, own.space)
         points = self.points_of(X)
@@ -137,6 +144,7 @@ class ConditionalEstimator(DensityEstimator):
         self, X: ArrayLike, given: Any = None, sample_weight: ArrayLike | None = None
     ) -> float:
         """Mean log density of data (N, k), weighted, in natural measure; as `score_samples`."""
+        _, given, sample_weight = alongside(X=X, given=given, sample_weight=sample_weight)
         scores = torch.as_tensor(self.score_samples(X, given))
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
@@ -180,6 +188,22 @@ class ConditionalEstimator(DensityEstimator):
         densities = (self.at({**(given or {}), along: one}).density_ for one in values)
         return trend_of(densities, axis, values, levels=levels)
 
+    def _covariates(self, cells: Mapping[str, Values]) -> Covariates:
+        """Return what covariates of a fit are; warn of what is doubtful."""
+        turn = self.space_.period if isinstance(self.space_, Torus) else None
+        found = Covariates.of(cells, cycles := self.cycles or {}, turn)
+        for own in found.columns:
+            if own.period is not None and own.name not in cycles:
+                text = (
+                    f"{own.name!r} was taken for cyclic, of period {own.period:g}, by its name: "
+                    f"cycles={{{own.name!r}: {own.period:g}}} says so, and None there that it is a "
+                    "plain number"
+                )
+                warnings.warn(text, DataWarning, stacklevel=3)
+        for doubt in found.fit_doubts(cells):
+            warnings.warn(doubt, DataWarning, stacklevel=3)
+        return found
+
     def _x(self, given: Any, rows: int) -> torch.Tensor:
         covariates = self._conditional().covariates
         cells = columns_given(given, covariates.names)
@@ -218,9 +242,12 @@ class AngleRegressor(ConditionalEstimator):
         progress: Progress | None = None,
     ) -> Self:
         """Fit to covariates (N, c) and angles (N,) or (N, d) on a torus."""
-        angles = np.asarray(y, dtype=np.float64)
-        self.is_flat_ = angles.ndim == 1
-        super().fit(_table(angles), X, sample_weight, groups=groups, progress=progress)
+        _, y, sample_weight, groups = alongside(
+            X=X, y=y, sample_weight=sample_weight, groups=groups
+        )
+        angles = as_data(y, "y")
+        self.is_flat_ = np.ndim(y) == 1
+        super().fit(_table(angles.values), X, sample_weight, groups=groups, progress=progress)
         self._period()
         self.n_features_in_ = len(self.conditional_density_.covariates.columns)
         return self
@@ -240,8 +267,11 @@ class AngleRegressor(ConditionalEstimator):
 
         As the R^2 of a regression of numbers: 1 is perfect, 0 no better than the mean direction.
         """
-        angles = _table(np.asarray(y, dtype=np.float64))
-        weights = np.ones(len(angles)) if sample_weight is None else np.asarray(sample_weight)
+        _, y, sample_weight = alongside(X=X, y=y, sample_weight=sample_weight)
+        angles = _table(as_data(y, "y").values)
+        weights = (
+            np.ones(len(angles)) if sample_weight is None else as_numbers(sample_weight, "weights")
+        )
         radians = 2 * np.pi / self._period()
         own, found = angles * radians, _table(self.predict(X)) * radians
         mean = np.angle((weights[:, None] * np.exp(1j * own)).sum(axis=0))
@@ -277,7 +307,9 @@ def columns_given(given: Any, names: Sequence[str] | None = None) -> dict[str, V
 
     Raises `OrbiflowError` for a column that is not there and for columns of several lengths.
     """
-    pairs = list(given.items()) if is_a(given, Mapping) else columns_of(given, "given")
+    (given,) = alongside(given=given)
+    is_mapping = is_a(given, Mapping) and not hasattr(given, "dims")
+    pairs = list(given.items()) if is_mapping else columns_of(given, "given")
     if pairs is None:
         table = np.asarray(given)
         if table.ndim != 2:
@@ -290,7 +322,7 @@ def columns_given(given: Any, names: Sequence[str] | None = None) -> dict[str, V
                 f"given: expected {', '.join(called)}, got {table.shape[1]} columns"
             )
         pairs = list(zip(called, table.T, strict=True))
-    found = {str(name): np.asarray(cells) for name, cells in pairs}
+    found = {str(name): np.asarray(cells_of(cells)) for name, cells in pairs}
     if names is not None:
         if lacking := [name for name in names if name not in found]:
             raise OrbiflowError(f"given: there is no {', '.join(lacking)} among {', '.join(found)}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, cast
 
@@ -11,15 +12,20 @@ import numpy as np
 from orbiflow.arguments import as_number, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
+    NAN_CURE,
     ROTATIONS,
+    Data,
+    check_columns,
     check_form,
+    doubts_of_line,
     is_angular,
+    refuse_codes_of,
     require_table,
     require_values,
     rotation_form,
     unit_of,
 )
-from orbiflow.density.inference import axes_named
+from orbiflow.density.inference import axes_named, refuse_codes_beside
 from orbiflow.density.spaces import (
     MixedTorus,
     ProductSpace,
@@ -29,7 +35,7 @@ from orbiflow.density.spaces import (
     Torus,
     space_for,
 )
-from orbiflow.errors import SettingError, literal
+from orbiflow.errors import DataWarning, SettingError, literal
 
 
 class DataInSpace(NamedTuple):
@@ -61,6 +67,13 @@ class DataColumns:
         """The name of the space whose rules the data obey."""
         return self.space.data_name if isinstance(self.space, Space) else str(self.space)
 
+    def beside(self, data: Data) -> Collection[str | int]:
+        """Return the columns beside those of the space, by names or numbers from 0."""
+        if isinstance(self.space, ProductSpace):
+            width = data.values.shape[-1]
+            return range(width - self.space.beside.dim, width)
+        return (*self.linear, *self.period)
+
     def of(self, values: Array, names: tuple[str, ...] | None) -> DataInSpace:
         """Return the space of data (N, k), once they are known to be of it.
 
@@ -76,6 +89,12 @@ class DataColumns:
         require_values(values, names)
         called = names or tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
         periods = self._periods(called)
+        sides = sorted(periods)
+        own_names = [called[k] for k in sides]
+        refuse_codes_of(values[:, sides], own_names, [periods[k] for k in sides], NAN_CURE)
+        for k in (k for k in sides if periods[k] is None):
+            for doubt in doubts_of_line(called[k], values[:, k]):
+                warnings.warn(doubt.text, DataWarning, stacklevel=4)
         own = self.space
         if isinstance(own, MixedTorus | ProductSpace):
             return DataInSpace(self._given(own, values, names, bool(periods)), values, names)
@@ -125,6 +144,10 @@ class DataColumns:
         if more or values.shape[1] not in own.widths:
             widths = " or ".join(map(str, own.widths))
             raise SettingError(f"the space says which of {widths} columns are real: give no others")
+        called = names or own.columns
+        if isinstance(own, ProductSpace) and names:
+            check_columns(own.data_name, names[: len(names) - own.beside.dim])
+        refuse_codes_beside(own, values, called, NAN_CURE)
         if isinstance(own, MixedTorus):
             self._angle_unit(values, names, own.is_angle, str(own.unit))
         return own
@@ -136,7 +159,7 @@ class DataColumns:
         if not kept:
             return unit or "radians"
         beside = tuple(names[k] for k in kept) if names else None
-        return unit_of("torus", values[:, kept], beside, unit, stacklevel=6)
+        return unit_of("torus", values[:, kept], beside, unit, stacklevel=7)
 
     def _mixed(
         self,
@@ -162,9 +185,9 @@ class DataColumns:
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):
                 raise SettingError(f"{{unit}} {self.unit} is not the space's, {unit}: leave it out")
-        found = unit_of(name, values, names, unit, form=form, stacklevel=5)
+        found = unit_of(name, values, names, unit, form=form, stacklevel=6)
         if isinstance(own, QuotientSpace):
-            own.warn_of_fractions(values, stacklevel=5)
+            own.warn_of_fractions(values, stacklevel=6)
         if own is not None:
             return own
         return space_for(cast(str, self.space), values, unit=found, seed=self.seed, form=form)

@@ -18,9 +18,12 @@ from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
     OUTPUTS,
-    check_columns,
+    Data,
+    alongside,
     data_of,
     frame_of,
+    in_space_order,
+    named_by,
     require_table,
     runs_of_draws,
 )
@@ -69,6 +72,14 @@ def seed_of(random_state: RandomState) -> int:
         return int(random_state) % 2**63
     wanted = "None, an integer, or a NumPy RandomState or Generator"
     raise refusal("random_state", wanted, random_state)
+
+
+def _refuse_targets(y: object) -> None:
+    """Refuse what is not used: a density has no targets."""
+    if y is not None:
+        raise refusal(
+            "y", "None", y, "weights are given as sample_weight, covariates to another class"
+        )
 
 
 def _signature() -> inspect.Signature:
@@ -150,8 +161,8 @@ class DensityEstimator(FittedFigures):
         groups: ArrayLike | None = None,
         columns: Sequence[str] | None = None,
         progress: Progress | None = None,
-    ) -> DensityEstimator:
-        """Fit to data (N, k) in the space's own units; `y` is ignored.
+    ) -> Self:
+        """Fit to data (N, k) in the space's own units; there is no `y` but None.
 
         Data are an array or a data frame (pandas, polars, pyarrow, xarray) with as many columns as the
         space takes, or draws of a sampler (ArviZ's InferenceData, an xarray.Dataset along chain and
@@ -164,38 +175,52 @@ class DensityEstimator(FittedFigures):
             groups: a label (N,) a row: rows of one are held out together where parts are chosen, for
                 densities of new groups (proteins, stations, fires). Default: none, of draws in chains
                 the tenths of each chain, because neighbouring draws are alike.
-            columns: names of an array's columns, for those of a parametric family's parameters.
+            columns: names of an array's columns; those of a frame have names.
 
         Raises:
             OrbiflowError: for data that are not of the space, in another order than its columns, or of
                 an unknown unit; too few points, weights that are none, a setting out of range, or one
                 that has no meaning on a torus of so many angles.
         """
-        del y
-        settings = self.settings()
-        columns_of_space = self._columns()
-        read = data_of(columns_of_space.name, X)
-        self.space_, data, names = columns_of_space.of(*read)
-        points = self._chart(data)
+        _refuse_targets(y)
+        _, sample_weight, groups = alongside(X=X, sample_weight=sample_weight, groups=groups)
+        read = self._read(X, columns)
+        if groups is None and not self.settings().flow_alone:
+            groups = runs_of_draws(X)
+        return self._fit(read, sample_weight, groups, progress)
+
+    def _read(self, X: ArrayLike, columns: Sequence[str] | None) -> Data:
+        """Return the data of a fit and the names of their columns; set their space."""
+        known = self._columns()
+        found = data_of(known.name, X, in_order=False, stacklevel=5)
+        found = in_space_order(known.name, found, known.beside(found), stacklevel=4)
+        self.space_, values, names = known.of(*named_by(found, columns))
+        return Data(values, names)
+
+    def _fit(
+        self,
+        read: Data,
+        sample_weight: ArrayLike | None,
+        groups: ArrayLike | None,
+        progress: Progress | None,
+    ) -> Self:
+        """Fit to data that were read."""
+        settings, points = self.settings(), self._chart(read.values)
         if flow_obstacle(self.space_):
             refuse_flow_settings(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
-        if groups is None and not settings.flow_alone:
-            groups = runs_of_draws(X)
         how: dict[str, Any] = {"weights": sample_weight, "groups": groups, "progress": progress}
-        how |= {"missing": self.missing, "columns": names or columns}
+        how |= {"missing": self.missing, "columns": read.names}
         found = fit_chosen(self.space_, points, settings, **how)
-        self._keep(found, data.shape[1], names)
+        self._keep(found, read)
         return self
 
-    def _keep(
-        self, found: tuple[Density, FitReport], width: int, names: tuple[str, ...] | None
-    ) -> None:
-        """Set what there is after a fit to columns of these names."""
+    def _keep(self, found: tuple[Density, FitReport], read: Data) -> None:
+        """Set what there is after a fit to data."""
         self.density_, self.report_ = found
-        self.n_features_in_ = int(width)
-        if names is not None:
-            self.feature_names_in_ = np.array(names, dtype=object)
+        self.n_features_in_ = read.values.shape[1]
+        if read.names is not None:
+            self.feature_names_in_ = np.array(read.names, dtype=object)
         elif hasattr(self, "feature_names_in_"):
             del self.feature_names_in_  # of an earlier fit
 
@@ -317,8 +342,9 @@ class DensityEstimator(FittedFigures):
     def score(
         self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None
     ) -> float:
-        """Mean log density of data (N, k), weighted, in natural measure."""
-        del y
+        """Mean log density of data (N, k), weighted, in natural measure; there is no `y` but None."""
+        _refuse_targets(y)
+        _, sample_weight = alongside(X=X, sample_weight=sample_weight)
         points = self._chart(self._checked(X))
         scores = at_observed(self.density_, points, measure="natural")
         rows = weighed(scores[:, None], sample_weight)
@@ -409,8 +435,8 @@ class DensityEstimator(FittedFigures):
         if names is None or list(names) == fitted:
             return data
         if all(re.fullmatch(r"(column|angle)\d+", name) for name in fitted):  # they have no names
-            check_columns(self.space_.data_name, names)
-            return data
+            found, known = Data(data, names), DataColumns(self.space_)
+            return in_space_order(known.name, found, known.beside(found), stacklevel=5).values
         if sorted(names) != sorted(fitted) or len(set(fitted)) < len(fitted):
             # a frame may have other cases, as tables may
             cases = [name.casefold() for name in names]

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data
+from orbiflow.density.data import alongside, as_data
 from orbiflow.density.inference import misorientations
 from orbiflow.density.spaces import ORIENTATIONS, RotationSpace, named_orientation, rotations_of
 from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
@@ -88,6 +88,7 @@ def summarize_orientations(
     ('cube', 0.75)
     """
     as_instance(space, RotationSpace, "space")
+    data, weights, groups = alongside(data=data, weights=weights, groups=groups)
     points = space.to_chart(as_data(data).values)
     kept, rows = chosen_rows(points.numpy(), weights, groups, level)
     points, shares = torch.tensor(kept), rows.weights

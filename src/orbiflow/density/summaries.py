@@ -21,7 +21,7 @@ from scipy import special
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data, data_of, unit_of
+from orbiflow.density.data import alongside, as_data, data_of, unit_of
 from orbiflow.density.fitting import SAME, concentration
 from orbiflow.density.spaces import to_vectors, whole_turn
 from orbiflow.density.uniformity import bingham_p, kuiper_p, rao_p, rayleigh_p, watson_p
@@ -146,6 +146,7 @@ def summarize_angles(
     >>> round(one[0].mean), round(one[0].resultant, 3)  # Mardia and Jupp, example 1.1
     (51, 0.711)
     """
+    data, weights, groups = alongside(data=data, weights=weights, groups=groups)
     found = as_data(data)
     values = as_array(found.values, "data", (...,), finite=False)
     values = as_array(
@@ -256,6 +257,7 @@ def summarize_directions(
     `unit` is "degrees" for those that could be taken for radians, which are refused otherwise.
     `weights`, `groups` and `level` are those of `summarize_angles`.
     """
+    data, weights, groups = alongside(data=data, weights=weights, groups=groups)
     table, names = data_of("sphere", data)
     unit_of("sphere", table, names, unit)
     vectors, rows = chosen_rows(to_vectors(table), weights, groups, level)
@@ -281,6 +283,7 @@ def summarize_axes(
     level: float = 0.95,
 ) -> AxisSummary:
     """Summarise axes, either end of each as in `summarize_directions`."""
+    data, weights, groups = alongside(data=data, weights=weights, groups=groups)
     table, names = data_of("projective-plane", data)
     unit_of("projective-plane", table, names, unit)
     vectors, rows = chosen_rows(to_vectors(table), weights, groups, level)

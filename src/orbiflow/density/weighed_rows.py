@@ -15,7 +15,7 @@ from scipy import special
 
 from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_numbers
+from orbiflow.density.data import as_numbers, group_numbers
 from orbiflow.errors import OrbiflowError
 
 
@@ -73,10 +73,7 @@ def chosen_rows(
         raise OrbiflowError("there is no row with a value and a weight")
     own, numbers = given[whole], None
     if groups is not None:
-        labels = np.asarray(groups)
-        if labels.shape != whole.shape:
-            raise OrbiflowError(f"groups must be {len(values)} labels, one for each row")
-        numbers = np.unique(labels[whole], return_inverse=True)[1].astype(np.int64)
+        numbers = group_numbers(group_numbers(groups, len(values))[whole], len(own))
     even = bool((own == own[0]).all())
     level = as_number(level, "level", 0.5, 0.999)
     return values[whole], WeighedRows(own / own.sum(), numbers, even, level)

@@ -18,7 +18,7 @@ from orbiflow.arguments import as_array, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
-from orbiflow.density.data import data_of, unit_of
+from orbiflow.density.data import alongside, cells_of, data_of, group_numbers, unit_of
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import DataWarning, OrbiflowError
@@ -150,7 +150,7 @@ def compare_samples(
     own, names, _, both = sample_points(samples, space, unit, seed)
     sizes, points = (len(both[0]), len(both[1])), torch.cat(both)
     first = np.arange(len(points)) < sizes[0]
-    members = Groups.of(None if groups is None else labels_of(groups, names, sizes), len(points))
+    members = Groups.of(None if groups is None else labels_of(groups, samples, sizes), len(points))
     members.require()
     notes = members.notes()
     progress(0.0, "permuting")
@@ -229,20 +229,17 @@ def _named(name: str, call: Callable[[np.ndarray], T], table: np.ndarray) -> T:
 
 
 def labels_of(
-    groups: Mapping[str, ArrayLike], names: Sequence[str], sizes: Sequence[int]
+    groups: Mapping[str, ArrayLike], samples: Mapping[str, ArrayLike], sizes: Sequence[int]
 ) -> NDArray[np.str_]:
     """Return the labels (N,) of the rows of several data sets, one after the other."""
-    if not is_a(groups, Mapping) or set(groups) != set(names):
-        raise OrbiflowError(f"groups must have labels for {' and '.join(names)}, by these names")
+    if not is_a(groups, Mapping) or set(groups) != set(samples):
+        raise OrbiflowError(f"groups must have labels for {' and '.join(samples)}, by these names")
     found: list[NDArray[np.str_]] = []
-    for name, rows in zip(names, sizes, strict=True):
-        labels = np.asarray(groups[name])
-        if labels.shape != (rows,):
-            raise OrbiflowError(
-                f"groups of {name}: expected a label for each of {rows} rows, got shape "
-                f"{labels.shape}"
-            )
-        found.append(labels.astype(str))
+    for (name, sample), rows in zip(samples.items(), sizes, strict=True):
+        _, labels = alongside(**{name: sample, "groups": groups[name]})
+        own = np.asarray(cells_of(labels))
+        group_numbers(own, rows, f"groups of {name}")  # which checks them
+        found.append(own.astype(str))
     return np.concatenate(found)
 
 

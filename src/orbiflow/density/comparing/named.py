@@ -304,7 +304,7 @@ def named_tests(
             f"{few} has {min(sizes)} rows: each sample must have {MIN_SAMPLE} or more"
         )
     labels = np.repeat(np.arange(len(sizes)), sizes)
-    members = None if groups is None else _members(groups, names, labels)
+    members = None if groups is None else _members(groups, samples, labels)
     sides, every, there = _vectors(own, torch.cat(points), tuple(columns or called))
     asked = _asked(settings, there, own, len(sizes), members is not None)
     found: list[NamedTest] = []
@@ -324,9 +324,12 @@ def named_tests(
     )
 
 
-def _members(groups: Mapping[str, ArrayLike], names: list[str], labels: Labels) -> Labels:
+def _members(
+    groups: Mapping[str, ArrayLike], samples: Mapping[str, ArrayLike], labels: Labels
+) -> Labels:
     """Return the group (N,) of each row, from 0; refuse those in several samples, and few."""
-    own = labels_of(groups, names, tuple(np.bincount(labels).tolist()))
+    names = list(samples)
+    own = labels_of(groups, samples, tuple(np.bincount(labels).tolist()))
     words, members = np.unique(own, return_inverse=True)
     pairs: Labels = np.unique(np.stack([members.reshape(-1), labels], axis=1), axis=0)
     count, each = np.bincount(pairs[:, 0]), np.bincount(pairs[:, 1])

@@ -15,6 +15,7 @@ from orbiflow.arguments import as_array, as_instance, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
+from orbiflow.density.data import alongside
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
@@ -141,6 +142,7 @@ def compare_scores(
     ('a', True)
     """
     settings = settings or ComparisonSettings()
+    scores, groups, weights = alongside(scores=scores, groups=groups, weights=weights)
     table = _table(scores)
     members = Groups.of(groups, len(table))
     members.require()
@@ -268,6 +270,7 @@ def compare_models(
         raise OrbiflowError("give two models or more, by their names")
     densities = {name: density_of(model, name) for name, model in models.items()}
     require_one_space({name: density.space for name, density in densities.items()})
+    data, groups = alongside(data=data, groups=groups)
     scores = {name: scores_of(density, data) for name, density in densities.items()}
     return compare_scores(scores, settings, groups=groups)
 

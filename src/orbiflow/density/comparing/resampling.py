@@ -12,7 +12,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
-from orbiflow.density.fitting import group_numbers, lightest_folds, lone_groups_note
+from orbiflow.density.data import group_numbers
+from orbiflow.density.fitting import lightest_folds, lone_groups_note
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread

@@ -14,6 +14,13 @@ from torch import Tensor
 
 from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
+from orbiflow.density.data import (
+    as_numbers,
+    cycle_named,
+    doubts_of_number,
+    missing_among,
+    refuse_codes_of,
+)
 from orbiflow.density.spaces import Line
 from orbiflow.errors import OrbiflowError
 
@@ -22,6 +29,9 @@ Values = NDArray[Any]
 
 MOST_WORDS = 1_000
 """The most words of a column."""
+
+CURE = "leave such rows out"
+"""What to do with codes for missing values."""
 
 SPREAD = 5.0
 """The feature of a real number is about its distance from the middle in deviations, this at most."""
@@ -55,7 +65,6 @@ class Covariate:
         if period is not None:
             if not as_number(period, f"the period of {name!r}") > 0:
                 raise OrbiflowError(f"the period of {name!r} must be above 0, got {period}")
-            _numbers(name, cells)
             return cls(name, period=float(period))
         if is_text(cells):
             words = tuple(np.unique(_text(name, cells)).tolist())
@@ -102,6 +111,14 @@ class Covariate:
             )
         return at
 
+    def refuse_codes(self, cells: Values, cure: str, *, is_new: bool) -> None:
+        """Refuse numbers that seem to stand for missing ones, also beside the fit's if they are new."""
+        if not self.words:
+            numbers = _numbers(self.name, cells)
+            if is_new and self.line is not None:
+                numbers = np.append(numbers, np.linspace(*self.range, 9))
+            refuse_codes_of(numbers[:, None], [self.name], [self.period], cure)
+
     def doubt(self, cells: Values) -> str | None:
         """Return what makes one doubt of cells: that the fit has seen nothing like them."""
         if self.line is None:
@@ -126,13 +143,32 @@ class Covariates:
     columns: tuple[Covariate, ...] = field(default_factory=tuple[Covariate, ...])
 
     @classmethod
-    def of(cls, cells: Mapping[str, Values], periods: Mapping[str, float]) -> Covariates:
-        """Return what suits columns of cells; `periods` are those of cyclic ones."""
+    def of(
+        cls,
+        cells: Mapping[str, Values],
+        periods: Mapping[str, float | None],
+        turn: float | None = None,
+        cure: str = CURE,
+    ) -> Covariates:
+        """Return what suits columns of cells.
+
+        Args:
+            cells: The columns.
+            periods: Those of cyclic ones, and None of others. What is not named is cyclic if its name
+                says so and its values suit, such as hours of the day.
+            turn: That of the data, if they are angles.
+            cure: What to do with codes for missing values.
+        """
         if not cells:
             raise OrbiflowError("given holds no column: name one or more that are known")
         if unknown := [name for name in periods if name not in cells]:
             raise OrbiflowError(f"cycles: no column {unknown[0]!r}; there are {', '.join(cells)}")
-        return cls(tuple(Covariate.of(name, own, periods.get(name)) for name, own in cells.items()))
+        found: list[Covariate] = []
+        for name, own in cells.items():
+            period = periods[name] if name in periods else _period_named(name, own, turn)
+            found.append(Covariate.of(name, own, period))
+            found[-1].refuse_codes(own, cure, is_new=False)
+        return cls(tuple(found))
 
     @property
     def names(self) -> list[str]:
@@ -158,8 +194,20 @@ class Covariates:
         """Return what models see of cells, in float64: (N, width)."""
         return torch.cat([own.features(cells[own.name]) for own in self.columns], dim=1)
 
-    def doubts(self, cells: Mapping[str, Values]) -> list[str]:
-        """Return what makes one doubt of cells."""
+    def fit_doubts(self, cells: Mapping[str, Values]) -> list[str]:
+        """Return what makes one doubt the cells of a fit."""
+        lines = [own.name for own in self.columns if own.line is not None]
+        return [
+            d.text for name in lines for d in doubts_of_number(name, _numbers(name, cells[name]))
+        ]
+
+    def doubts(self, cells: Mapping[str, Values], cure: str = CURE) -> list[str]:
+        """Return what makes one doubt of cells that the fit has not seen.
+
+        Raises `SettingError` for codes for missing values; `cure` says what to do with them.
+        """
+        for own in self.columns:
+            own.refuse_codes(cells[own.name], cure, is_new=True)
         return [doubt for own in self.columns if (doubt := own.doubt(cells[own.name]))]
 
     def to_json(self) -> list[dict[str, Any]]:
@@ -208,18 +256,20 @@ def is_text(cells: Values) -> bool:
 
 
 def _text(name: str, cells: Values) -> NDArray[np.str_]:
-    if cells.dtype.kind == "O":
-        _refuse_missing(name, np.array([cell is None or cell != cell for cell in cells]))
-    words = cells.astype(str)
-    _refuse_missing(name, np.char.strip(words) == "")
-    return words
+    _refuse_missing(name, missing_among(cells))
+    return cells.astype(str)
+
+
+def _period_named(name: str, cells: Values, turn: float | None) -> float | None:
+    """Return the period of a column of numbers that its name says, if its values suit."""
+    if is_text(cells):
+        return None
+    numbers = _numbers(name, cells)
+    return cycle_named(name, float(numbers.min()), float(numbers.max()), turn)
 
 
 def _numbers(name: str, cells: Values) -> Array:
-    try:
-        numbers = cells.astype(np.float64)
-    except (TypeError, ValueError):
-        raise OrbiflowError(f"{name!r} must be numbers, got words") from None
+    numbers = as_numbers(cells, repr(name))
     _refuse_missing(name, ~np.isfinite(numbers))
     return numbers
 

@@ -23,6 +23,7 @@ from orbiflow.density.covariates.kernels import ConditionalKernels, fit_kernels
 from orbiflow.density.covariates.network import NeuralMixture, fit_networks
 from orbiflow.density.covariates.parts import Part
 from orbiflow.density.covariates.regression import CircularRegression, fit_regression
+from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting import (
     DensitySettings,
     Folds,
@@ -31,7 +32,6 @@ from orbiflow.density.fitting import (
     fit_chosen,
     folds_of,
     gain_of,
-    group_numbers,
     repeats_of,
     silent,
     sparse_weights,
@@ -271,6 +271,7 @@ def _task(
     if found.taken_for(settings.repeats) == "rounding" and found.can_be_undone:
         noise = torch.Generator().manual_seed(settings.seed)
         points = spread_evenly(space, points, found, noise)
+    weights, groups = alongside(weights=weights, groups=groups)
     labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(points)))
     place = torch.arange(len(points), dtype=torch.float64)[:, None]
     rows = weighed(torch.cat([points, x, place], dim=1), weights, labels)

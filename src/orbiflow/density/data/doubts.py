@@ -49,20 +49,40 @@ MOST_CODES = 3
 """More different values beyond a turn are no codes, unless they are among `CODES`."""
 
 
-def codes_among(column: Array, turn: float) -> list[float]:
+FILLS = np.array([1e20, 1e30, 1e35, 1e36, 9.96921e36, 3.402823e38, 1.797693e308])
+"""Numbers, or their opposites, with which libraries fill gaps: those of netCDF and the largest ones."""
+
+FILL_TOLERANCE = 1e-5
+"""Share by which a printed fill value may differ."""
+
+LEAST_APART, LEAST_APART_ALONE = 1.0, 10.0
+"""Distance of a code from all real numbers of a column, in their range; the latter of a short one that
+is there once, which may be the farthest of many."""
+
+SURE_CODE = 999.0
+"""Codes below may be the farthest of many whole numbers by accident."""
+
+
+def codes_among(column: Array, turn: float | None) -> list[float]:
     """Return values of a column (N,) that seem to stand for missing ones.
 
-    They are numbers such as 999 or -99 far from all others or again and again where others hardly
-    repeat, a few numbers beyond a turn that come again and again where other values keep within a turn,
-    or 360 where others keep within half a turn either way, as DSSP writes it.
+    Of real numbers, whose `turn` is None, they are numbers such as 999 or -9999 that are farther from
+    all others than these spread, or alone below 0. Of angles they are such numbers far from all others
+    or again and again where others hardly repeat, a few numbers beyond a turn that come again and again
+    where other values keep within a turn, or 360 where others keep within half a turn either way, as
+    DSSP writes it.
 
     >>> codes_among(np.array([10.0, 350.0, 20.0, 999.0, 990.0]), 360.0)
     [990.0, 999.0]
     >>> codes_among(np.array([350.0, 1025.0, 700.0, 990.5]), 360.0)
     []
+    >>> codes_among(np.array([994.2, 999.9, 1013.5, -9999.0]), None)
+    [-9999.0]
     """
     distinct, counts = np.unique(column[np.isfinite(column)], return_counts=True)
     sizes = np.abs(distinct)
+    if turn is None:
+        return _codes_apart(distinct, counts)
     named = np.isin(sizes, list(CODES)) | (sizes > MAX_ANGLE) | (distinct == -1)
     rest, often = distinct[~named], counts[~named] > 1
     beyond = np.abs(rest) > turn * (1 + TURN_TOLERANCE)
@@ -82,24 +102,55 @@ def codes_among(column: Array, turn: float) -> list[float]:
     return sorted(found)
 
 
+def _codes_apart(distinct: Array, counts: NDArray[np.int64]) -> list[float]:
+    """Return the codes among different real numbers (M,), in order, that stand apart from all others.
+
+    These have their counts (M,).
+    """
+    fills = np.isclose(np.abs(distinct)[:, None], FILLS, rtol=FILL_TOLERANCE, atol=0).any(axis=1)
+    named = np.isin(np.abs(distinct), list(CODES)) | fills
+    # those between others are data, such as a pressure of 999.9
+    inner = np.flatnonzero(~named)
+    if len(inner) < 2:
+        return []
+    least, most = float(distinct[inner[0]]), float(distinct[inner[-1]])
+    apart = np.maximum(least - distinct, distinct - most)
+    sure = (counts > 1) | (np.abs(distinct) >= SURE_CODE)
+    wide = np.where(sure, LEAST_APART, LEAST_APART_ALONE) * (most - least)
+    if len(inner) < FEW_VALUES:  # which may be all that there are
+        wide = LEAST_APART_ALONE * max(most - least, -least, most)
+    is_alone_below = sure & (distinct < 0) & (least >= 0)  # however far the others reach
+    return distinct[named & (is_alone_below | (apart > wide))].tolist()
+
+
 def refuse_codes(space: str, values: Array, names: Sequence[str], unit: str, cure: str) -> None:
-    """Refuse angles or places (N, k), some of which seem to stand for missing values.
+    """Refuse data (N, k) of a space of which some seem to stand for missing values.
 
     `cure` says what to do.
     """
     width = values.shape[1]
-    if not is_angular(space, width) and not (space in DIRECTIONS and width == 2):
+    if space not in DIRECTIONS or width != 2:
+        turn = TURNS[unit] if is_angular(space, width) else None
+        refuse_codes_of(values, names, [turn] * width, cure)
         return
-    for name, column, most in zip(names, values.T, (90.0, *[360.0] * width), strict=False):
-        if is_angular(space, width):
-            codes = codes_among(column, TURNS[unit])
-        else:
-            known = column[np.isfinite(column) & (np.abs(column) > most * (1 + TURN_TOLERANCE))]
-            codes = np.unique(known).tolist()
-            if not all(abs(v) in CODES or abs(v) > MAX_ANGLE for v in codes):
-                continue
-        if codes:
-            raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)
+    for name, column, most in zip(names, values.T, (90.0, 360.0), strict=True):
+        known = column[np.isfinite(column) & (np.abs(column) > most * (1 + TURN_TOLERANCE))]
+        codes = np.unique(known).tolist()
+        if all(abs(v) in CODES or abs(v) > MAX_ANGLE for v in codes):
+            _refuse(codes, column, name, cure)
+
+
+def refuse_codes_of(
+    values: Array, names: Sequence[str], turns: Sequence[float | None], cure: str
+) -> None:
+    """Refuse columns (N, k), of turns or else real numbers, as `refuse_codes` does."""
+    for name, column, turn in zip(names, values.T, turns, strict=True):
+        _refuse(codes_among(column, turn), column, name, cure)
+
+
+def _refuse(codes: Sequence[float], column: Array, name: str, cure: str) -> None:
+    if codes:
+        raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)
 
 
 def _is_beyond_halves(rest: Array, turn: float) -> bool:
@@ -196,6 +247,35 @@ def doubts_of_angle(name: str, column: Array, turn: float) -> list[Doubt]:
         )
         doubts.append(Doubt(text, False))
     return doubts
+
+
+def doubts_of_number(name: str, column: Array) -> list[Doubt]:
+    """Return doubts about a column (N,) of real numbers, of which some may stand for missing ones."""
+    distinct, counts = np.unique(column[np.isfinite(column)], return_counts=True)
+    found: list[Doubt] = []
+    for end in (0, -1):
+        rest = np.delete(distinct, end)
+        if len(rest) < FEW_VALUES or counts[end] < 2:
+            continue
+        if float(np.abs(rest - distinct[end]).min()) > LEAST_APART * float(np.ptp(rest)):
+            text = (
+                f"{name!r} is {distinct[end]:g} in {counts[end]} rows, far from all other values: if "
+                "that stands for a missing value, leave these rows out"
+            )
+            found.append(Doubt(text, True))
+    return found
+
+
+def doubts_of_line(name: str, column: Array) -> list[Doubt]:
+    """Return doubts about a column (N,) of real numbers that is to have a density."""
+    distinct = np.unique(column[np.isfinite(column)])
+    if len(distinct) != 2:
+        return doubts_of_number(name, column)
+    text = (
+        f"{name!r} has two values alone, {distinct[0]:g} and {distinct[1]:g}, as a word such as yes or "
+        "no has: a density of real numbers says little of it; make it a covariate, or leave it out"
+    )
+    return [Doubt(text, True)]
 
 
 def doubts_of_torus(name: str, column: Array, turn: float) -> list[Doubt]:

@@ -6,6 +6,7 @@ import importlib
 import math
 import numbers
 from collections.abc import Mapping, Sequence
+from datetime import date, time, timedelta
 from decimal import Decimal
 from typing import Any, NamedTuple, cast
 
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 from orbiflow.arguments import described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.data.draws import columns_of_draws, has_draws, posterior_of
-from orbiflow.errors import OrbiflowError
+from orbiflow.density.data.row_labels import cells_of, is_missing
+from orbiflow.errors import OrbiflowError, SettingError, literal
 
 
 class Data(NamedTuple):
@@ -54,6 +56,27 @@ def as_data(data: Any, what: str = "data") -> Data:
     return Data(values, tuple(cast("list[str]", names)) if named else None)
 
 
+def named_by(data: Data, columns: Sequence[str] | None) -> Data:
+    """Return data whose columns have the names of a call, if it gives some to an array.
+
+    Raises:
+        SettingError: For names of a frame's columns, which have their own, and too many or few.
+    """
+    if columns is None:
+        return data
+    width = data.values.shape[-1] if data.values.ndim == 2 else 0
+    if data.names is not None:
+        raise SettingError(
+            literal(f"the data have the columns {', '.join(data.names)}: choose among them in ")
+            + "the data frame, and leave {columns} out, which names those of an array"
+        )
+    if isinstance(columns, str) or len(columns) != width:
+        raise SettingError(
+            f"{{columns}} must name the {width} columns of the data, got {columns!r}"
+        )
+    return Data(data.values, tuple(map(str, columns)))
+
+
 def columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
     """Return the names and columns of a frame, or None for what is not one."""
     if hasattr(data, "collect_schema") and hasattr(data, "collect"):
@@ -69,28 +92,25 @@ def columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
             )
         return [(name, data[name].values) for name in data.data_vars]
     if hasattr(data, "column_names"):  # pyarrow
-        return [(n, _plain(data.column(k))) for k, n in enumerate(data.column_names)]
+        return [(n, cells_of(data.column(k))) for k, n in enumerate(data.column_names)]
     if is_a(data, np.ndarray) and data.dtype.names:
         return [(name, data[name]) for name in data.dtype.names]
     frame: Any = data
+    if hasattr(data, "dtype") and not is_tensor(data) and is_a(name := _name_of(data), str):
+        return [(name, cells_of(data))]
     names = getattr(frame, "columns", None)
     if names is None or callable(names):
         return None
     if hasattr(frame, "iloc"):  # pandas
-        return [(n, _plain(frame.iloc[:, k])) for k, n in enumerate(names)]
+        return [(n, cells_of(frame.iloc[:, k])) for k, n in enumerate(names)]
     if hasattr(frame, "get_columns"):  # polars
-        return [(n, _plain(c)) for n, c in zip(names, frame.get_columns(), strict=True)]
+        return [(n, cells_of(c)) for n, c in zip(names, frame.get_columns(), strict=True)]
     return list(zip(names, np.asarray(frame).T, strict=True))
 
 
-def _plain(column: Any) -> Any:
-    """Return a frame's column as an array, of objects where its kind has a mark for missing values."""
-    if hasattr(column, "to_pylist"):  # pyarrow
-        return np.array([*column.to_pylist(), None], dtype=object)[:-1]
-    kind = str(column.dtype)
-    if kind.startswith(("float", "int", "uint")) and "[" not in kind:
-        return column.to_numpy()
-    return np.fromiter(column, dtype=object, count=len(column))
+def _name_of(column: Any) -> str | None:
+    """Return the name of a column (N,) of pandas, polars or xarray, None if it has none."""
+    return (getattr(column, "name", None) or None) if len(column.shape) == 1 else None
 
 
 def as_numbers(data: Any, what: str) -> Array:
@@ -99,6 +119,7 @@ def as_numbers(data: Any, what: str) -> Array:
     >>> as_numbers([[1, None]], "angles").tolist()
     [[1.0, nan]]
     """
+    data = cells_of(data)
     if is_tensor(data):
         data = data.detach().cpu()
         data = (data.double() if data.is_floating_point() else data).numpy()
@@ -119,11 +140,15 @@ def as_numbers(data: Any, what: str) -> Array:
     if array.dtype.kind == "O":
         array = _of_objects(array, what)
     elif array.dtype.kind not in "fiu":
-        raise OrbiflowError(f"{what}: expected numbers, got {_kind(array)}")
+        cure = DATES_CURE * (array.dtype.kind in "mM")
+        raise OrbiflowError(f"{what}: expected numbers, got {_kind(array)}{cure}")
     values = array.astype(np.float64)
     if mask is not None:
         values[mask] = np.nan
     return values
+
+
+DATES_CURE = "; give numbers, such as hours since a first moment, or hours of the day"
 
 
 def _kind(array: NDArray[Any]) -> str:
@@ -138,11 +163,12 @@ def _of_objects(array: NDArray[Any], what: str) -> Array:
     for k, item in enumerate(array.reshape(-1)):
         if isinstance(item, float | int | Decimal | numbers.Real) and not is_a(item, bool):
             flat[k] = float(item)
-        elif item is None or type(item).__name__ in ("NAType", "NaTType", "MaskedConstant"):
+        elif is_missing(item):
             flat[k] = math.nan
         else:
             row = np.unravel_index(k, array.shape)[0] + 1 if array.ndim else 1
             cure = "; numpy.angle gives the angles of complex numbers" * is_a(item, complex)
+            cure += DATES_CURE * is_a(item, date | time | timedelta)
             raise OrbiflowError(
                 f"{what}: expected numbers, got {described(item)} in row {row}{cure}"
             )

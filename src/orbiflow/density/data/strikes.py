@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.density.data.column_names import words_of
-from orbiflow.density.data.columns import DIRECTIONS
+from orbiflow.density.data.columns import DIRECTIONS, arrangements
 from orbiflow.density.data.frames import Data, as_data
 from orbiflow.errors import DataWarning
 
@@ -73,17 +73,47 @@ def data_of(
 ) -> Data:
     """Return the data of a space and the names of their columns, strikes as directions of dip.
 
-    A strike before its dip stays as it is, to be refused, where columns must be `in_order`.
+    Columns are put `in_order` as `in_space_order` does.
 
     Warns:
-        DataWarning: Of strikes, at so many calls from here.
+        DataWarning: Of strikes and another order, at so many calls from here.
     """
     found = as_data(data, what)
     strike = strike_beside_dip(found.names or ()) if space in DIRECTIONS else None
-    if strike is None or found.names is None or (in_order and strike == 0):
-        return found
-    warnings.warn(strike_note(found.names[strike]), DataWarning, stacklevel=stacklevel)
-    values = found.values.copy()
-    values[:, strike] = dip_directions(values[:, strike])
-    names = (*found.names[:strike], DIP_DIRECTION, *found.names[strike + 1 :])
-    return Data(values, names)
+    if strike is not None and found.names is not None:
+        warnings.warn(strike_note(found.names[strike]), DataWarning, stacklevel=stacklevel)
+        values = found.values.copy()
+        values[:, strike] = dip_directions(values[:, strike])
+        names = (*found.names[:strike], DIP_DIRECTION, *found.names[strike + 1 :])
+        found = Data(values, names)
+    return in_space_order(space, found, stacklevel=stacklevel + 1) if in_order else found
+
+
+def in_space_order(
+    space: str, data: Data, beside: Collection[str | int] = (), *, stacklevel: int = 3
+) -> Data:
+    """Return a frame's data with the columns in a space's order, if names say which they are.
+
+    Columns `beside` those of the space, by names or numbers from 0, stay in their places.
+
+    Warns:
+        DataWarning: Of another order than the frame's, at so many calls from here.
+    """
+    if data.names is None:
+        return data
+    others = {one.casefold() if isinstance(one, str) else one for one in beside}
+    own = [k for k, name in enumerate(data.names) if not {k, name.casefold()} & others]
+    ways = [
+        one
+        for one in arrangements(space, [data.names[k] for k in own])
+        if len(one.columns) == len(own)
+    ]
+    order = list(range(len(data.names)))
+    for place, k in zip(own, ways[0].columns if ways else range(len(own)), strict=True):
+        order[place] = own[k]
+    if order == sorted(order):
+        return data
+    names = tuple(data.names[k] for k in order)
+    text = f"took {', '.join(names)} as {ways[0].words}: results have this order, too"
+    warnings.warn(text, DataWarning, stacklevel=stacklevel)
+    return Data(data.values[:, order], names)

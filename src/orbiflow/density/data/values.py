@@ -126,8 +126,8 @@ def check_values(
     if is_angular(space, values.shape[1], form):
         own, more = _angles(space, values, called, unit, cure)
         return own, doubts + more
+    refuse_codes(space, values, called, "degrees", cure)
     if space in DIRECTIONS and values.shape[1] == 2:
-        refuse_codes(space, values, called, "degrees", cure)
         doubts += place_doubts(space, values, called, unit)
     return "radians", doubts
 

@@ -24,7 +24,6 @@ from .report import silent as silent
 from .rows import Rows as Rows
 from .rows import check_missing as check_missing
 from .rows import gain_of as gain_of
-from .rows import group_numbers as group_numbers
 from .rows import lone_groups_note as lone_groups_note
 from .rows import mean_of as mean_of
 from .rows import weighed as weighed

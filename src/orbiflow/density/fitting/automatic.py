@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
+from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting.evidence import (
     Candidates,
     Course,
@@ -65,7 +66,6 @@ from orbiflow.density.fitting.rows import (
     Rows,
     check_missing,
     effective_rows,
-    group_numbers,
     is_whole,
     lone_groups_note,
     mean_of,
@@ -194,7 +194,7 @@ def fit_automatic(
     parts = (*tried.evidence, *(replace(one, share=one.share * rest) for one in others))
     report = _report(density, folds, candidates, weights, tried, parts, found)
     for note in (*found.warnings(settings.repeats), *limited):
-        warnings.warn(note, DataWarning, stacklevel=5)
+        warnings.warn(note, DataWarning, stacklevel=6)
     after = (
         *weights_note(folds.rows),
         *lone_groups_note(folds.rows.groups),
@@ -243,6 +243,7 @@ def _rows(
     missing: str,
 ) -> tuple[Rows, DensitySettings, list[str]]:
     """Rows that say anything, the parts that can be fitted to them, and what to say of it."""
+    points, weights, groups = alongside(points=points, weights=weights, groups=groups)
     if missing == "refuse":
         own = own_points(space, points)
         labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))

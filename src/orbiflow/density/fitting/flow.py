@@ -13,6 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
+from orbiflow.density.data import alongside
 from orbiflow.density.fitting.likelihood import (
     Budget,
     HopelessAt,
@@ -190,6 +191,7 @@ def fit_density(
         raise OrbiflowError(f'{obstacle}: fit other components, such as "{others}"')
     say = progress or silent
     generator = torch.Generator().manual_seed(settings.seed)
+    points, weights = alongside(points=points, weights=weights)
     rows = weighed(own_points(space, points), weights)
     order, out, duplicates = sides(rows.points, settings.validation, generator)
     train, validation = (rows[order[side]] for side in (~out, out))

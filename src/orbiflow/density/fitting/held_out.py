@@ -10,8 +10,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from orbiflow.density.data import group_numbers
 from orbiflow.density.fitting.repeats import places
-from orbiflow.density.fitting.rows import Rows, gain_of, group_numbers, mean_of
+from orbiflow.density.fitting.rows import Rows, gain_of, mean_of
 from orbiflow.errors import OrbiflowError
 
 FOLDS = 10

@@ -15,6 +15,7 @@ from scipy import special
 from torch import Tensor
 
 from orbiflow.arrays import Array
+from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting.forms import FORMS, Cloud
 from orbiflow.density.fitting.goodness import DRAWS, smooth_test
 from orbiflow.density.fitting.intervals import (
@@ -34,14 +35,13 @@ from orbiflow.density.fitting.report import FitReport, mean_nll, own_points
 from orbiflow.density.fitting.rows import (
     Rows,
     effective_rows,
-    group_numbers,
     lone_groups_note,
     weighed,
     weights_note,
 )
 from orbiflow.density.models import AdaptiveKernels, Density, images_of
 from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.typed_torch import linalg
 
 MOST_WIDTH = 16
@@ -143,6 +143,7 @@ def fit_parametric(
     >>> [one.name for one in report.parametric.parameters]
     ['mean_lat', 'mean_lon', 'concentration']
     """
+    points, weights, groups = alongside(points=points, weights=weights, groups=groups)
     own = own_points(space, points)
     labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
     rows = weighed(own, weights, labels)
@@ -203,6 +204,10 @@ def _factors(
 ) -> list[tuple[str, Tensor, tuple[Writing, ...]]]:
     """Return the unit vectors (N, p) of each factor of the space, and how directions are written."""
     names = tuple(columns or space.columns)
+    if len(names) != len(space.columns):
+        raise SettingError(
+            f"{{columns}} must name the {len(space.columns)} columns of the space, got {len(names)}"
+        )
     if not isinstance(space, Torus):
         periods = tuple(360.0 if column == "lon" else 0.0 for column in space.columns)
         if isinstance(space, RotationSpace) and space.form not in (
@@ -211,10 +216,9 @@ def _factors(
             "matrix",
         ):
             periods = (space.period,) * 3
-        written = names if len(names) == len(space.columns) else space.columns
         unit = _unit_of(space)
         limits = tuple(_largest(column, unit) for column in space.columns)
-        writing = Writing(partial(_written, space), written, periods, limits, unit)
+        writing = Writing(partial(_written, space), names, periods, limits, unit)
         return [("", space.features(points)[0], (writing,))]
     found: list[tuple[str, Tensor, tuple[Writing, ...]]] = []
     for axis, column in enumerate(names):

@@ -23,6 +23,7 @@ from orbiflow.density.fitting.rounding import (
     spread_of,
     step_of,
 )
+from orbiflow.density.inference import chart_of_rows
 from orbiflow.density.spaces import Space, Torus, whole_turn
 from orbiflow.errors import Advice, literal
 
@@ -237,7 +238,7 @@ def spread_evenly(
     data += noise.numpy()
     if space.is_round:
         data[:, 0] = data[:, 0].clip(-90, 90)
-    return space.to_chart(data)
+    return chart_of_rows(space, data, may_lack=isinstance(space, Torus))
 
 
 def _coordinates(space: Space, points: Tensor) -> Array | None:

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_instance, as_tensor, described
+from orbiflow.arguments import as_choice, as_instance, is_tensor
+from orbiflow.density.data import as_numbers, cells_of
 from orbiflow.density.inference import check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import Space, row_count
@@ -99,28 +99,17 @@ def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) ->
 
 def weights_of(weights: Any, rows: int) -> Tensor:
     """Return the weights of so many rows, as they were given."""
-    own = as_tensor(weights, "weights").detach().double().clone()
+    given = cells_of(weights)
+    if is_tensor(given):
+        given = given.double()
+    elif np.asarray(given).dtype.kind == "b":  # which rows count
+        given = np.asarray(given, dtype=np.float64)
+    own = torch.tensor(as_numbers(given, "weights"))
     if own.shape != (rows,):
         raise OrbiflowError(
             f"expected a weight for each of {rows} rows, got an array {tuple(own.shape)}"
         )
     return own
-
-
-def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
-    """Return the group (N,) of each row as a whole number from 0, from labels of any kind.
-
-    >>> group_numbers(["a", "b", "a"], 3).tolist()
-    [0, 1, 0]
-    """
-    array = np.asarray(labels)
-    if array.shape != (rows,):
-        raise OrbiflowError(
-            f"groups: expected a label for each of {rows} rows, got {described(labels)}"
-        )
-    if array.dtype.kind == "O":
-        array = array.astype(str)
-    return np.unique(array, return_inverse=True)[1].astype(np.int64)
 
 
 def lone_groups_note(groups: Tensor | None) -> list[str]:

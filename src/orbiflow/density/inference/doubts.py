@@ -16,6 +16,7 @@ from orbiflow.density.data import (
     is_angular,
     place_doubts,
     refuse_codes,
+    refuse_codes_of,
     seeming_unit,
 )
 from orbiflow.density.inference.angles import at_observed
@@ -49,10 +50,13 @@ def data_doubts(
     if isinstance(space, MixedTorus) and width == space.dim:
         return _mixed_doubts(density, space, values, called, cure)
     if isinstance(space, ProductSpace):
+        refuse_codes_beside(space, values, called, cure)
         is_place = space.base.name in DIRECTIONS and width - space.beside.dim == 2
         return _places(space.base, values[:, :2], called[:2], cure) if is_place else []
     unit = data_unit(space, width)
     if unit is None or not values.size:
+        if values.ndim == 2:
+            refuse_codes(space.name, values, called, "", cure)
         return []
     # a few angles in radians that go on turning may be among the codes
     read_as = unit if len(values) >= FEW_ROWS else "degrees"
@@ -74,6 +78,24 @@ def data_doubts(
     return [_beyond(called[int(most.argmax())], float(most.max()), unit, other)]
 
 
+def refuse_codes_beside(
+    space: MixedTorus | ProductSpace, values: Array, names: Sequence[str], cure: str
+) -> None:
+    """Refuse data (N, k), whose last columns may be no angles, with codes for missing values there.
+
+    Real numbers are those of the rows and some about the middle of the space's line.
+    """
+    beside = space if isinstance(space, MixedTorus) else space.beside
+    first = values.shape[1] - beside.dim
+    for axis in np.flatnonzero(~beside.is_angle).tolist():
+        line, column = beside.lines[axis], first + axis
+        own = values[:, [column]]
+        if line is not None:
+            known = line.centre + 2 * line.scale * np.linspace(-1, 1, 9)
+            own = np.append(own, known[:, None], axis=0)
+        refuse_codes_of(own, names[column : column + 1], [beside.period_of(axis) or None], cure)
+
+
 def _places(base: Space, values: Array, names: Sequence[str], cure: str) -> list[str]:
     """Return doubts about latitudes and longitudes (N, 2) beside other columns."""
     refuse_codes(base.name, values, names, "degrees", cure)
@@ -84,6 +106,7 @@ def _mixed_doubts(
     density: Density, space: MixedTorus, values: Array, names: Sequence[str], cure: str
 ) -> list[str]:
     """Return doubts about the angles among columns of which some are real."""
+    refuse_codes_beside(space, values, names, cure)
     angles: list[int] = np.flatnonzero(space.is_angle).tolist()
     own, unit = values[:, angles], str(space.unit)
     called = [names[k] for k in angles]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from orbiflow import runtime
 from orbiflow.density import covariates, inference, tables
-from orbiflow.density.data import cycle_named
 from orbiflow.density.run_folder import CONDITIONAL
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 
@@ -72,21 +71,19 @@ class GivenCells(NamedTuple):
 
     rows: TableRows
     cells: dict[str, Values]
-    periods: dict[str, float]
+    periods: dict[str, float | None]
 
 
-def read_given(
-    rows: TableRows, given: Sequence[Given], reading: RowSettings, turn: float | None
-) -> GivenCells:
+def read_given(rows: TableRows, given: Sequence[Given], reading: RowSettings) -> GivenCells:
     """Return what is given of the rows of a table: numbers, or words where a cell is no number.
 
-    Rows that lack a value are left out if missing ones are. `turn` is that of the data's angles.
+    Rows that lack a value are left out if missing ones are.
     """
     import numpy as np
 
     dropped = reading.drop_missing or reading.missing == "drop"
     cells: dict[str, Values] = {}
-    periods: dict[str, float] = {}
+    periods: dict[str, float | None] = {}
     for name, kind in given:
         if name.casefold() in {own.casefold() for own in [*rows.table.columns, *cells]}:
             raise SettingError(
@@ -95,8 +92,8 @@ def read_given(
                 "{given}; leave one out"
             )
         cells[name] = _cells(rows, name, kind, reading, dropped=dropped)
-        if (period := _period(name, kind, cells[name], turn)) is not None:
-            periods[name] = period
+        if kind is not None:
+            periods[name] = None if kind in ("word", "real") else float(kind)
     if dropped and cells:
         kept = np.logical_and.reduce([~_is_missing(own) for own in cells.values()])
         rows = rows.only(kept)
@@ -112,7 +109,7 @@ def _cells(
 
     words = tables.read_labels(rows.path, name, rows.table, has_header=rows.header, empty=dropped)
     missing = np.array([word.casefold() in MISSING for word in words])
-    if kind == "word":
+    if kind == "word" or (kind is None and tables.holds_words(rows.path, name)):
         return words
     numbers = np.full(len(words), np.nan)
     is_number = missing.copy()
@@ -145,25 +142,23 @@ def _is_missing(cells: Values) -> NDArray[Any]:
     return np.array([word.casefold() in MISSING for word in cells])
 
 
-def _period(name: str, kind: str | None, cells: Values, turn: float | None) -> float | None:
-    """Return the period of a column, which its kind or its name says; None of other ones."""
-    import numpy as np
-
-    if kind is not None:
-        return None if kind in ("word", "real") else float(kind)
-    if cells.dtype.kind != "f":
-        return None
-    return cycle_named(name, float(np.nanmin(cells)), float(np.nanmax(cells)), turn)
-
-
 def fit_given(
-    estimator: DensityEstimator, given: GivenCells, tell: runtime.Sink, cancel: runtime.Cancel
+    estimator: DensityEstimator,
+    given: GivenCells,
+    turn: float | None,
+    tell: runtime.Sink,
+    cancel: runtime.Cancel,
 ) -> tuple[dict[str, bytes], dict[str, Any]]:
-    """Return the file of the density where covariates are known, and what the report says of it."""
+    """Return the file of the density where covariates are known, and what the report says of it.
+
+    `turn` is that of the data's angles.
+    """
     rows = given.rows
-    known = covariates.Covariates.of(given.cells, given.periods)
+    known = covariates.Covariates.of(given.cells, given.periods, turn, tables.CURE)
     for own in known.columns:
         tell(runtime.Note(f"took {own.name} as {own.kind}"))
+    for doubt in known.fit_doubts(given.cells):
+        tell(runtime.Note(f"WARNING: {doubt}"))
     density, report = covariates.fit_conditional(
         estimator.density_,
         estimator.points_of(rows.table.values),
@@ -287,7 +282,7 @@ def score_given(
     except OrbiflowError as error:
         text = f"{given.rows.path}: {error}; leave such rows out, or score without what is given"
         raise InputFileError(text) from error
-    for doubt in known.doubts(given.cells):
+    for doubt in known.doubts(given.cells, tables.CURE):
         tell(runtime.Note(f"WARNING: {doubt}"))
     points = inference.chart_of_rows(density.space, given.rows.table.values, may_lack=False)
     found: list[Array] = []

@@ -78,7 +78,7 @@ def fit(
             given=[own.name for own in known],
         )
         turn = turn_of(where, rows) if known else None
-        cells = covariates.read_given(rows, known, reading, turn)
+        cells = covariates.read_given(rows, known, reading)
         rows = cells.rows
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
@@ -88,7 +88,7 @@ def fit(
         document = _document(estimator, rows, asked, settings.seed)
         others: dict[str, bytes] = {}
         if given:
-            others, said = covariates.fit_given(estimator, cells, on_event, cancel)
+            others, said = covariates.fit_given(estimator, cells, turn, on_event, cancel)
             document |= said
         document["seconds"] = time.perf_counter() - begin
         sketch = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()

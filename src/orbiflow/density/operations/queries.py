@@ -89,7 +89,7 @@ def score(
         asked = where_known and covariates.columns_asked(where_known[0], settings.given)
         space, others = density.space.name, [own.name for own in asked or ()]
         rows = tables.read_rows(data, read, on_event, model_space=space, given=others)
-        cells = covariates.read_given(rows, asked or (), reading, None)
+        cells = covariates.read_given(rows, asked or (), reading)
         rows = cells.rows
         check_fits(data, rows.table, density, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)

@@ -27,6 +27,10 @@ MIDDLE = 0.6827
 """The share of normal data that lie within one deviation of the middle."""
 
 
+LARGE = 1e9
+"""Numbers from here on may differ by less than is seen beside them."""
+
+
 class Line(NamedTuple):
     """A real column: the value at the middle of its circle, and that which is a quarter beyond."""
 
@@ -53,7 +57,12 @@ class Line(NamedTuple):
         low, middle, high = np.quantile(known, [(1 - MIDDLE) / 2, 0.5, (1 + MIDDLE) / 2])
         spread = float(high - low) / 2 or float(known.std())
         if not spread > 1e-12 * abs(float(middle)):
-            raise OrbiflowError(f"{name} has one value alone: leave it out")
+            if abs(middle) < LARGE:
+                raise OrbiflowError(f"{name} has one value alone: leave it out")
+            raise OrbiflowError(
+                f"the differences of {name} are lost beside its size, {middle:.3g}: subtract its least "
+                "value first, or leave it out if it has one value alone"
+            )
         return cls(float(middle), SCALES * spread)
 
 

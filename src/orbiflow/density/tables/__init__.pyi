@@ -1,6 +1,7 @@
 from .cells import with_minus as with_minus
 from .files import append_columns as append_columns
 from .files import column_names as column_names
+from .files import holds_words as holds_words
 from .files import read_labels as read_labels
 from .files import read_table as read_table
 from .files import renamed_columns as renamed_columns

@@ -328,5 +328,29 @@ def read_parquet(path: Path, reading: Reading) -> Table:
     return finished(path, Table(values, names, lines, tuple(notes)), reading)
 
 
+def holds_words(path: str | Path, column: str) -> bool:
+    """Return whether a column of a file is words by its type, whatever is in its cells.
+
+    Raises `InputFileError` for times.
+    """
+    if kind_of_file(path := Path(path)) != "parquet":
+        return False
+    with _parquet(path) as file:
+        schema = file.schema_arrow
+        number = find(path, schema.names, column)
+        types, kind = importlib.import_module("pyarrow").types, schema.types[number]
+        if types.is_temporal(kind):
+            raise InputFileError(
+                f"{path}: column {quote(column)} holds times ({kind}); save numbers, such as hours "
+                "since a first moment"
+            )
+        if not any(test(kind) for test in (types.is_integer, types.is_floating, types.is_decimal)):
+            return True
+        # Parquet has categories of words alone, pandas notes others
+        noted: Any = schema.pandas_metadata or {"columns": []}
+        own = {one["field_name"]: one["pandas_type"] for one in noted["columns"]}
+        return own.get(schema.names[number]) == "categorical"
+
+
 def _damaged(path: Path, exc: Exception) -> InputFileError:
     return InputFileError(f"{path}: damaged or of an unknown kind ({quote(str(exc))}); save again")

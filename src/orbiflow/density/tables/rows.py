@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,11 +23,13 @@ from orbiflow.density.data import (
     chosen_arrangement,
     dip_direction_among,
     dip_directions,
+    doubts_of_line,
     fraction_doubts,
     is_angle_named,
     is_count_named,
     is_identifier,
     is_other_quantity,
+    refuse_codes_of,
     seeming_unit,
     strike_beside_dip,
     strike_note,
@@ -416,22 +418,34 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     The user is also told of a cell that was not given: data of another size would be folded into it.
     """
     space = where.space
+    doubts: list[Doubt] = []
+    for name, turn in [*((name, None) for name in where.linear), *where.periods.items()]:
+        for own in columns_among(table.columns, [name]):
+            column = table.values[:, table.columns.index(own)]
+            refuse_codes_of(column[:, None], [own], [turn], CURE)
+            doubts += doubts_of_line(own, column) if turn is None else []
     table = without_columns(table, where.beside, Path("the table"))
     if not table.columns:
+        _tell_doubts(doubts, tell)
         return where.unit or "radians"
     if space not in SPACES and where.cell is None:
         tell(
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
         )
     asked, form = _asked_unit(where, table), where.rotation_form(table.columns)
-    unit, doubts = check_values(space, table.values, table.columns, asked, CURE, form)
+    unit, more = check_values(space, table.values, table.columns, asked, CURE, form)
+    doubts += more
     doubts += _doubts_of_units(table)
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
+    _tell_doubts(doubts, tell)
+    return unit
+
+
+def _tell_doubts(doubts: Iterable[Doubt], tell: Sink) -> None:
     for doubt in doubts:
         words = literal(doubt.text).replace("(fractional)", "({fractional})")
         tell(Note(Advice(f"WARNING: {words}" if doubt.is_serious else words)))
-    return unit
 
 
 def _doubts_of_units(table: Table) -> list[Doubt]:

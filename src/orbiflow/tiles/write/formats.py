@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from orbiflow.arguments import as_choice
 from orbiflow.settings import OneOf
@@ -34,9 +34,19 @@ LINES_ALONE = frozenset({"dxf", "json"})
 """The formats that hold no pictures of pixels."""
 
 
-def write_scene(scene: Scene, format: str, **detail: Any) -> str | bytes:
-    """Return the content of a scene's file; `detail` is what the format's writer takes."""
+def write_scene(
+    scene: Scene, format: str, *, tolerance: float = TOLERANCE, dpi: float = 300.0
+) -> str | bytes:
+    """Return the content of a scene's file.
+
+    Args:
+        scene: The scene.
+        format: The name of a format.
+        tolerance: The distance in mm of polylines from curves, in formats of lines.
+        dpi: Pixels an inch, in formats of pixels.
+    """
     module, name = WRITERS[as_choice(format, tuple(WRITERS), "the format")].split(":")
     writer = getattr(import_module(module), name)
+    detail = {"tolerance": tolerance, "dpi": dpi}
     known = writer.__kwdefaults__ or {}
     return writer(scene, **{key: value for key, value in detail.items() if key in known})

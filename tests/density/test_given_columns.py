@@ -1,0 +1,224 @@
+"""What covariates and columns are by their types and names: categories, cycles, dates, words."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orbiflow.density import (
+    AngleRegressor,
+    ConditionalEstimator,
+    DensityEstimator,
+    fit_parametric,
+    make_space,
+)
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError
+
+pandas = pytest.importorskip("pandas")
+polars = pytest.importorskip("polars")
+arrow = pytest.importorskip("pyarrow")
+RNG = np.random.default_rng(0)
+ROWS = 60
+ANGLES = np.degrees(RNG.vonmises(0, 2, (ROWS, 1)))
+PAIRS = np.degrees(RNG.vonmises(0, 2, (ROWS, 2)))
+KIND: Any = {"unit": "degrees", "components": "mixture"}
+LEVELS = RNG.integers(1, 4, ROWS)
+WORDS = LEVELS.astype(str)
+
+CATEGORIES: dict[str, Any] = {
+    "Categorical": pandas.Categorical(LEVELS),
+    "Series": pandas.Series(LEVELS, dtype="category"),
+    "CategoricalIndex": pandas.CategoricalIndex(LEVELS),
+    "polars": polars.Series(WORDS).cast(polars.Categorical),
+    "enum": polars.Series(WORDS, dtype=polars.Enum(["1", "2", "3"])),
+    "dictionary": arrow.array(LEVELS).dictionary_encode(),
+    "words": WORDS,
+}
+
+
+def fit(given: Any, **settings: Any) -> ConditionalEstimator:
+    return ConditionalEstimator(**KIND, **settings).fit(ANGLES, given)
+
+
+def kinds(given: Any, **settings: Any) -> list[str]:
+    """What makes one doubt covariates, of a fit that ends with them, because no row counts."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            ConditionalEstimator(**KIND, **settings).fit(ANGLES, given, np.zeros(ROWS))
+        except OrbiflowError as error:
+            if "weights are 0" not in str(error):
+                raise
+    return [str(one.message) for one in caught if one.category is DataWarning]
+
+
+@pytest.fixture(scope="module", name="by_word")
+def by_word_fixture() -> ConditionalEstimator:
+    return fit({"level": WORDS})
+
+
+@pytest.mark.parametrize("kind", CATEGORIES)
+def test_categories_are_words(kind: str, by_word: ConditionalEstimator) -> None:
+    given = {"level": CATEGORIES[kind]}
+    right = by_word.score_samples(ANGLES, {"level": WORDS})
+    assert np.array_equal(by_word.score_samples(ANGLES, given), right)
+    with pytest.raises(OrbiflowError, match=r"'level' has 7"):
+        by_word.at(level=7)
+
+
+def test_fits_to_categories_know_no_others() -> None:
+    tables = (
+        pandas.DataFrame({"level": CATEGORIES["Categorical"]}),
+        arrow.table({"level": CATEGORIES["dictionary"]}),
+    )
+    for table in tables:
+        model = fit(table)
+        with pytest.raises(OrbiflowError, match="'level' has 7"):
+            model.score_samples(ANGLES[:1], {"level": [7]})
+    gap = pandas.Categorical([None, *LEVELS[1:]])
+    with pytest.raises(OrbiflowError, match="row 1 has no value of 'level'"):
+        fit({"level": gap})
+    with pytest.raises(OrbiflowError, match="expected numbers"):
+        DensityEstimator(**KIND).fit(pandas.DataFrame({"phi": CATEGORIES["Series"]}))
+
+
+@pytest.mark.parametrize("gap", [pandas.NA, None, np.nan, " "])
+def test_gaps_among_words(gap: Any) -> None:
+    words = WORDS.astype(object)
+    words[3] = gap
+    for given in (words, pandas.Series(words), pandas.Series(words, dtype="string")):
+        with pytest.raises(OrbiflowError, match="row 4 has no value of 'level'"):
+            fit({"level": given})
+
+
+HOURS = RNG.uniform(0, 24, ROWS)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "is_cyclic"),
+    [
+        ("hour", HOURS, True),
+        ("hr", HOURS, True),
+        ("hour", HOURS * 20, False),
+        ("month", RNG.integers(1, 13, ROWS), True),
+        ("weekday", RNG.integers(0, 7, ROWS), True),
+        ("doy", RNG.integers(1, 366, ROWS), True),
+        ("heading", RNG.uniform(0, 360, ROWS), True),
+        ("warm", HOURS, False),
+    ],
+)
+def test_names_say_cycles(name: str, values: np.ndarray, is_cyclic: bool) -> None:
+    said = [text for text in kinds({name: values}) if "cyclic" in text]
+    assert len(said) == is_cyclic
+    assert all(f"'{name}'" in text for text in said)
+    assert kinds({name: values}, cycles={name: 400}) == []
+    assert kinds({name: values}, cycles={name: None}) == []
+
+
+def test_both_ends_of_a_day_are_one() -> None:
+    with pytest.warns(DataWarning, match="24"):
+        model = fit({"hour": HOURS})
+    same = fit({"hour": HOURS}, cycles={"hour": 24})
+    plain = fit({"hour": HOURS}, cycles={"hour": None})
+    scores = [own.score_samples(ANGLES, {"hour": HOURS}) for own in (model, same, plain)]
+    assert np.array_equal(scores[0], scores[1])
+    assert model.at(hour=0).score(ANGLES) == pytest.approx(model.at(hour=24).score(ANGLES))
+    assert [own.period for own in plain.conditional_density_.covariates.columns] == [None]
+
+
+def test_dates_are_no_numbers() -> None:
+    dates = pandas.date_range("2026-01-01", periods=ROWS, freq="h")
+    for given in (
+        {"time": dates},
+        {"time": dates.to_numpy()},
+        pandas.DataFrame({"time": dates.tz_localize("UTC")}),
+        polars.DataFrame({"time": dates.to_numpy()}),
+        arrow.table({"time": arrow.array(dates.to_numpy())}),
+        {"time": dates - dates[0]},
+    ):
+        with pytest.raises(OrbiflowError, match=r"'time'.* (hours|durations)"):
+            kinds(given)
+    with pytest.raises(OrbiflowError, match=r"'phi'.* hours"):
+        DensityEstimator(**KIND).fit(pandas.DataFrame({"phi": dates}))
+
+
+@pytest.mark.parametrize("spread", [1, 1_000])
+def test_large_whole_numbers_lose_their_differences(spread: int) -> None:
+    numbers = 2**62 + spread * np.arange(ROWS)
+    with pytest.raises(OrbiflowError, match=r"'key'.*subtract"):
+        kinds({"key": numbers})
+    assert kinds({"key": numbers - 2**62}) == []
+    with pytest.raises(OrbiflowError, match="'key' has one value alone"):
+        kinds({"key": np.full(ROWS, 7)})
+
+
+def test_a_series_is_a_column() -> None:
+    phi, warm = pandas.Series(ANGLES[:, 0], name="phi"), pandas.Series(HOURS, name="warm")
+    model = DensityEstimator(**KIND).fit(phi)
+    assert list(model.feature_names_in_) == ["phi"]
+    right = DensityEstimator(**KIND).fit(ANGLES).score_samples(ANGLES)
+    for column in (phi, polars.Series("phi", phi.to_numpy()), ANGLES):
+        assert np.array_equal(model.score_samples(column), right)
+    with pytest.raises(OrbiflowError, match="phi"):
+        model.score_samples(warm)
+    assert kinds(warm) == kinds({"warm": HOURS})
+    with pytest.raises(OrbiflowError, match="shape"):
+        DensityEstimator(**KIND).fit(phi.rename(None))
+
+
+def test_two_values_are_doubted_where_a_density_is_asked_for() -> None:
+    table = pandas.DataFrame({"phi": ANGLES[:, 0], "rain": LEVELS > 1}).astype(float)
+    with pytest.warns(DataWarning, match="'rain' has two values alone"):
+        DensityEstimator(**KIND, linear=["rain"]).fit(table)
+    assert kinds({"rain": table["rain"]}) == []
+
+
+def test_whole_hours_with_gaps() -> None:
+    hours = RNG.integers(0, 24, 240).astype(float)
+    table = pandas.DataFrame({"phi": np.degrees(RNG.vonmises(hours / 4, 5)), "hour": hours})
+    table.loc[[2, 5], "hour"] = np.nan
+    table.loc[7, "phi"] = np.nan
+    with pytest.warns(DataWarning, match="hour are rounded to 1|rounded to 1"):
+        model = DensityEstimator(**KIND, period={"hour": 24}, missing="marginalise").fit(table)
+    assert np.isfinite(model.score_samples(table)).all()
+    assert float(model.marginal("hour").score(table[["hour"]].dropna())) == pytest.approx(
+        -np.log(24), abs=0.2
+    )
+
+
+def test_arguments_are_used_or_refused() -> None:
+    frame = pandas.DataFrame(PAIRS, columns=["phi", "psi"])
+    model = DensityEstimator(**KIND)
+    with pytest.raises(SettingError, match="columns"):
+        model.fit(frame, columns=["phi"])
+    for wrong in (["phi"], ["phi", "psi", "chi"], "ab"):
+        with pytest.raises(SettingError, match="columns"):
+            model.fit(PAIRS, columns=wrong)
+    assert list(model.fit(PAIRS, columns=["phi", "psi"]).feature_names_in_) == ["phi", "psi"]
+    assert model.conditional(psi=10).feature_names_in_.tolist() == ["phi"]
+    with pytest.raises(SettingError, match="columns"):
+        ConditionalEstimator(**KIND).fit(frame, HOURS[:, None], columns=["phi"])
+    for call in (model.fit, model.score):
+        with pytest.raises(SettingError, match="y must be None"):
+            call(PAIRS, np.ones(ROWS))
+    torus = make_space("torus", dim=2, unit="degrees")
+    with pytest.raises(SettingError, match="columns"):
+        fit_parametric(torus, torus.to_chart(PAIRS), "von-mises", columns=["phi"])
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        DensityEstimator,
+        ConditionalEstimator,
+        AngleRegressor,
+        lambda **wrong: DensityEstimator().set_params(**wrong),
+        lambda **wrong: make_space("torus", **wrong),
+    ],
+)
+def test_unknown_names_are_refused(call: Any) -> None:
+    with pytest.raises((OrbiflowError, TypeError), match="colour"):
+        call(colour=3)
