@@ -49,7 +49,7 @@ def shape_tile(kind: IsohedralClass) -> EscherTile:
     for height in BENDS:
         bent = space.tile(space.start + height * step, same_area=False)
         outline = shapely.Polygon(bent.polygon)
-        # vertices that slide along a mirror pass each other: what touches itself by rounding is no start
+        # vertices that slide along a mirror may pass each other: rounding must not decide
         if outline.is_valid and shapely.minimum_clearance(outline) >= CLEARANCE * SIZE:
             found = EscherTile(bent, name=kind.name)
             if found.certificate.valid:
