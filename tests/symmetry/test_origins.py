@@ -12,7 +12,6 @@ import pytest
 from orbiflow.density import QuotientSpace
 from orbiflow.errors import GroupError, InputFileError
 from orbiflow.symmetry import Isometry, group_by_name, group_from_cif, is_group_name, space_group
-
 from orbiflow.symmetry.group_symbols import has_two_origins, settings_named, settings_numbered
 
 # number: short symbol, and where origin 2 lies from origin 1, in the conventional cell
