@@ -49,7 +49,7 @@ def worst(function: VectorField, group: CrystallographicGroup, kind: Kind) -> fl
 def check(number: int, max_frequency: int) -> tuple[str, bool]:
     """A line of the table, and whether all is well."""
     start = time.process_time()
-    group = space_group(number)
+    group = space_group(number, origin=1)
     known = gemmi.find_spacegroup_by_number(number)
     assert known is not None
     listed = known.operations()

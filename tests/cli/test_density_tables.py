@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -431,3 +432,15 @@ def test_columns_beside_those_whose_cells_have_a_unit(
     done, _ = summary("phi,psi\n" + rows, "--space", "torus")
     assert "psi: no unit in the cells, read as degrees as the others are" in done.out
     assert ("WARNING" in done.out) == is_serious
+
+
+def test_a_space_group_is_asked_for_its_origin(tmp_path: Path, orbiflow: Any) -> None:
+    np.savetxt(tmp_path / "a.csv", RNG.random((40, 3)), delimiter=",", header="x,y,z", comments="")
+    asked = fit(orbiflow, tmp_path / "a.csv", tmp_path / "m", "--space", "85")
+    assert asked.status != 0
+    words = re.findall("'(85:.)'", asked.err)
+    assert len(words) == 2
+    for word in words:
+        done = fit(orbiflow, tmp_path / "a.csv", tmp_path / word[-1], "--space", word)
+        assert done.status == 0, done.err
+        assert f"P 4/n{word[2:]}" in done.out + done.err

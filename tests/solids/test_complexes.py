@@ -94,7 +94,7 @@ def test_discs_on_a_cube_are_one_connected_part_with_a_connected_rest():
     assert sum(discs) == 56
 
 
-@given(st.sampled_from(["P 1 m 1", "P n m a", "P 4/m m m", "F d -3 m"]))
+@given(st.sampled_from(["P 1 m 1", "P n m a", "P 4/m m m", "F d -3 m:1"]))
 @settings(max_examples=4)
 def test_groups_with_mirrors_are_refused(name):
     with pytest.raises(GroupError, match="has mirrors"):

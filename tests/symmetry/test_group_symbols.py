@@ -150,7 +150,7 @@ KNOWN = {
     "P21/m21/n21/b": "P m n b",
     "C 2/m 2/c 2_1/e": "C m c a",
     "P_2/m_2/m_2/m": "P m m m",
-    r"$F\,4_1/d\,\bar{3}\,2/m$": "F d -3 m:1",
+    r"$F\,4_1/d\,\bar{3}\,2/m$:2": "F d -3 m:2",
     "F 41/d -3 2/m :2": "F d -3 m:2",
     "R -3 2/c:R": "R -3 c:R",
 }
@@ -272,7 +272,7 @@ def test_plane_groups_are_read_with_blanks_or_refused(name: str) -> None:
     ("name", "meant"),
     [
         ("227:2", "F d -3 m:2"),
-        ("227", "F d -3 m:1"),
+        ("227:1", "F d -3 m:1"),
         ("62:cab", "P b n m"),
         ("14:b1", "P 1 21/c 1"),
         ("166:R", "R -3 m:R"),
@@ -282,7 +282,7 @@ def test_plane_groups_are_read_with_blanks_or_refused(name: str) -> None:
         ("I41/amdZ", "I 41/a m d:2"),
         ("P4/nmmS", "P 4/n m m:1"),
         ("Pbar1", "P -1"),
-        ("Fdbar3m", "F d -3 m:1"),
+        ("Fdbar3m:1", "F d -3 m:1"),
         ("Pm3barm", "P m -3 m"),
         ("F 4d 2 3 -1d", "F d -3 m:1"),
         ("P 2c -2ac", "P c a 21"),

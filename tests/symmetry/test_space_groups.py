@@ -74,7 +74,7 @@ def test_the_primitive_cells_are_the_textbooks():
 
 @pytest.mark.parametrize(
     ("name", "same"),
-    [(19, "P 21 21 21"), ("19", "P212121"), (14, "P 21/c"), (148, "R -3:H"), (227, "Fd-3m:1")],
+    [(19, "P 21 21 21"), ("19", "P212121"), (14, "P 21/c"), (148, "R -3:H"), ("227:2", "Fd-3m:2")],
 )
 def test_numbers_and_short_symbols(name, same):
     assert space_group(name) == space_group(same)

@@ -53,9 +53,8 @@ def whole(name: str):
     sides = (
         (1.0, 1.0, 2.0) if name[2] in "346" or name[2:4] in ("-3", "-4", "-6") else (1.0, 1.2, 2.0)
     )
-    return space_group(
-        name.capitalize(), (*sides, 90, 90, 120 if name[2:4].strip("- ")[0] in "36" else 90)
-    )
+    cell = (*sides, 90, 90, 120 if name[2:4].strip("- ")[0] in "36" else 90)
+    return space_group(name.capitalize(), cell, origin=1)
 
 
 def wild(points):
@@ -108,7 +107,9 @@ def test_point_groups_are_space_groups_without_translations(name):
     torch.testing.assert_close(field(points), mean, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize(("name", "along"), [("P 4 m m", "z"), ("P 4/n b m", "xy"), ("P 2 3", "")])
+@pytest.mark.parametrize(
+    ("name", "along"), [("P 4 m m", "z"), ("P 4/n b m:1", "xy"), ("P 2 3", "")]
+)
 def test_divergences_and_files(tmp_path, name, along):
     group = space_group(name)
     field = symmetrize(torch.nn.Tanh(), group, along=along)
@@ -123,7 +124,7 @@ def test_divergences_and_files(tmp_path, name, along):
 
 
 def test_a_group_about_another_point_or_with_slanted_vectors():
-    moved = space_group("P 4/n b m").conjugate(np.eye(3), [0.2, 0.1, 0.3])
+    moved = space_group("P 4/n b m:1").conjugate(np.eye(3), [0.2, 0.1, 0.3])
     assert lattice_along(moved, "xy").shape == (3, 2)
     centred = space_group("C 2 2 2", (1, 1.2, 0.3))
     assert np.abs(lattice_along(centred, "xy")[2]).max() == 0.0
@@ -132,7 +133,7 @@ def test_a_group_about_another_point_or_with_slanted_vectors():
 
 @pytest.mark.parametrize(
     ("name", "along"),
-    [("P 41", "xy"), ("P c", "xy"), ("P 2 3", "xy"), ("P 2 3", "z"), ("P n n n", "")],
+    [("P 41", "xy"), ("P c", "xy"), ("P 2 3", "xy"), ("P 2 3", "z"), ("P n n n:1", "")],
 )
 def test_groups_that_screw_glide_or_turn_across_are_refused(name, along):
     with pytest.raises(GroupError, match=f"not periodic along '{along}' alone"):

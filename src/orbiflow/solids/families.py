@@ -51,7 +51,8 @@ class GroupFamily:
             GroupError: For an unknown name, and for groups with reflections: a mirror would cut each
                 solid flat.
         """
-        group = space_group(name)
+        # solids are found anywhere in the cell: another origin only moves all of them together
+        group = space_group(name, origin=1)
         for element in group.cosets:
             if np.isclose(np.trace(element.linear), 1) and np.linalg.det(element.linear) < 0:
                 _refuse_mirrors(group, name)

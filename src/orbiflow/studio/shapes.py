@@ -27,7 +27,8 @@ from orbiflow.tiles import (
 SIZE = 100.0  # square root of a shape's area, in the units of its project
 POINTS = 72  # about how many points an outline has
 WAVE = 0.62  # length of the waves by which it is bent, in its size
-BENDS = (0.11, 0.08, 0.055, 0.03, 0.015)  # their heights, the largest that leaves a tile
+BENDS = (0.11, 0.08, 0.055, 0.03, 0.015)  # their heights, the largest that leaves a clear tile
+CLEARANCE = 0.01  # how far a vertex can move, in the size, before its outline may meet itself
 
 
 def shape_tile(kind: IsohedralClass) -> EscherTile:
@@ -47,7 +48,9 @@ def shape_tile(kind: IsohedralClass) -> EscherTile:
     step = np.linalg.lstsq(space.matrix, waves.ravel(), rcond=None)[0]
     for height in BENDS:
         bent = space.tile(space.start + height * step, same_area=False)
-        if shapely.Polygon(bent.polygon).is_valid:
+        outline = shapely.Polygon(bent.polygon)
+        # vertices that slide along a mirror may pass each other: rounding must not decide
+        if outline.is_valid and shapely.minimum_clearance(outline) >= CLEARANCE * SIZE:
             found = EscherTile(bent, name=kind.name)
             if found.certificate.valid:
                 return found

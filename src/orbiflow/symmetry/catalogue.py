@@ -30,7 +30,8 @@ class WallpaperGroup(NamedTuple):
     """A row of the table: lattice system, order of the point group, generators.
 
     A generator ((a, b, c, d), (u, v)) is x' = a x + b y + u, y' = c x + d y + v in fractional
-    coordinates. cm and cmm are given on their primitive (rhombic) cell.
+    coordinates. cm and cmm are given on their primitive (rhombic) cell, whose vectors are
+    (a + b) / 2 and (a - b) / 2.
     """
 
     system: str
@@ -51,11 +52,11 @@ WALLPAPER_GROUPS: dict[str, WallpaperGroup] = {
     "p2": WallpaperGroup("oblique", 2, (_TURN2,)),
     "pm": WallpaperGroup("rectangular", 2, (_MIRROR,)),
     "pg": WallpaperGroup("rectangular", 2, (((-1, 0, 0, 1), (0.0, 0.5)),)),
-    "cm": WallpaperGroup("rhombic", 2, (_SWAP,)),
+    "cm": WallpaperGroup("rhombic", 2, (_ANTISWAP,)),
     "pmm": WallpaperGroup("rectangular", 4, (_TURN2, _MIRROR)),
     "pmg": WallpaperGroup("rectangular", 4, (_TURN2, ((-1, 0, 0, 1), (0.5, 0.0)))),
     "pgg": WallpaperGroup("rectangular", 4, (_TURN2, ((-1, 0, 0, 1), (0.5, 0.5)))),
-    "cmm": WallpaperGroup("rhombic", 4, (_TURN2, _SWAP)),
+    "cmm": WallpaperGroup("rhombic", 4, (_TURN2, _ANTISWAP)),
     "p4": WallpaperGroup("square", 4, (_TURN4,)),
     "p4m": WallpaperGroup("square", 8, (_TURN4, _MIRROR)),
     "p4g": WallpaperGroup("square", 8, (_TURN4, ((-1, 0, 0, 1), (0.5, 0.5)))),
@@ -75,32 +76,33 @@ _OTHER_SYMBOLS = {
     **{"p4mm": "p4m", "p4gm": "p4g", "p6mm": "p6m"},
 }
 
-_TURNED = {"p11m": "pm", "p11g": "pg", "p2gm": "pmg"}
+_TURNED = {"p11m": "pm", "p11g": "pg", "c11m": "cm", "p2gm": "pmg"}
 """Symbols in the setting with exchanged axes."""
 
 
-def short_symbol(name: str) -> str:
-    """Return the short symbol of a wallpaper group, and any other name as it is."""
+def _plane_symbol(name: str) -> str:
+    """Return the short symbol of a wallpaper group, a key of `_TURNED`, or another name as it is."""
     plain = str(name).replace("×", "x").replace(" ", "").strip("$")
-    return plain if plain in WALLPAPER_GROUPS else _OTHER_SYMBOLS.get(plain, name)
+    is_known = plain in WALLPAPER_GROUPS or plain in _TURNED
+    return plain if is_known else _OTHER_SYMBOLS.get(plain, name)
 
 
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
     """Return the wallpaper group `name`, one of `WALLPAPER_GROUPS`.
 
     The full symbol of the IUC ("p2mg" or "p 2 m g") and the orbifold's ("22*") name the same group as
-    the short one. "p11m", "p11g" and "p2gm" are pm, pg and pmg with the other axis first. Letters may
-    be large.
-    The lattice has basis vectors as columns, (2, 2); by default it is one of the group's system.
+    the short one. "p11m", "p11g", "c11m" and "p2gm" are pm, pg, cm and pmg with exchanged axes: the
+    mirror of pm, pg and cm maps the first axis a to -a, that of the others b to -b. Letters may be
+    large.
+    The lattice has basis vectors as columns, (2, 2); by default it is one of the group's system. That
+    of cm and cmm is primitive: its vectors are (a + b) / 2 and (a - b) / 2.
     Raises `GroupError` for an unknown name, or a lattice that is not of the group's system.
 
     >>> wallpaper_group("p6m").order
     12
     """
-    name = short_symbol(str(name).lower())
-    turned = _TURNED.get(name.replace(" ", ""))
-    if turned is not None:
-        name = turned
+    symbol = _plane_symbol(str(name).lower())
+    name = _TURNED.get(symbol, symbol)
     if name not in WALLPAPER_GROUPS:
         raise GroupError(
             f"unknown wallpaper group {name!r}; the 17 are {', '.join(WALLPAPER_GROUPS)}"
@@ -109,7 +111,9 @@ def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> Crystallogra
     basis = np.asarray(LATTICES[row.system] if lattice is None else lattice, dtype=np.float64)
     if checked_lattice(basis).shape != (2, 2):
         raise GroupError(f"a wallpaper group needs a (2, 2) lattice, got shape {basis.shape}")
-    generated_on = basis if turned is None else basis[:, ::-1]  # the other axis comes first
+    generated_on = basis
+    if symbol in _TURNED:  # b comes before a: in a centred cell, b - a is in the place of a - b
+        generated_on = basis * [1, -1] if row.system == "rhombic" else basis[:, ::-1]
     inverse = np.linalg.inv(generated_on)
     try:
         generators = [
@@ -213,7 +217,7 @@ def flat_manifold(name: str, cell: ArrayLike | None = None) -> CrystallographicG
     return group_from_operators(FLAT_MANIFOLDS[own], cell_lattice(cell), name=name)
 
 
-SYMBOL = re.compile(r"-?[PABCFIRH] ?[-1-6mabcden].*|[1-9]\d{0,2}|(?i:hall) ?[:=].*")
+SYMBOL = re.compile(r"-?[PABCFIRH] ?[-1-6mabcden].*|[1-9]\d{0,2}(?: ?: ?-?\w+)?|(?i:hall) ?[:=].*")
 """What the names of space groups look like."""
 
 
@@ -225,8 +229,8 @@ def is_group_name(name: object) -> bool:
     """
     if not isinstance(name, str):
         return False
-    tables = (WALLPAPER_GROUPS, FLAT_MANIFOLDS, ALIASES)
-    return any(short_symbol(name) in table for table in tables) or bool(SYMBOL.fullmatch(name))
+    tables = (WALLPAPER_GROUPS, _TURNED, FLAT_MANIFOLDS, ALIASES)
+    return any(_plane_symbol(name) in table for table in tables) or bool(SYMBOL.fullmatch(name))
 
 
 def group_by_name(name: str, cell: ArrayLike | None = None) -> CrystallographicGroup:
@@ -251,8 +255,9 @@ def group_by_name(name: str, cell: ArrayLike | None = None) -> CrystallographicG
             f"manifold ({', '.join((*FLAT_MANIFOLDS, *ALIASES))}) or a space group, such as "
             "'P 21 21 21'"
         )
-    if (plane := short_symbol(name)) in WALLPAPER_GROUPS:
-        return wallpaper_group(plane, None if cell is None else _plane_lattice(plane, cell))
+    plane = _plane_symbol(name)
+    if (row := WALLPAPER_GROUPS.get(_TURNED.get(plane, plane))) is not None:
+        return wallpaper_group(plane, None if cell is None else _plane_lattice(row.system, cell))
     if name in FLAT_MANIFOLDS or name in ALIASES:
         return flat_manifold(name, cell)
     from orbiflow.symmetry.space_groups import space_group
@@ -260,9 +265,8 @@ def group_by_name(name: str, cell: ArrayLike | None = None) -> CrystallographicG
     return space_group(name, cell)
 
 
-def _plane_lattice(name: str, cell: ArrayLike) -> Array:
-    """Return the primitive lattice (2, 2) of a plane group's conventional cell."""
-    system = WALLPAPER_GROUPS[name].system
+def _plane_lattice(system: str, cell: ArrayLike) -> Array:
+    """Return the primitive lattice (2, 2) of the conventional cell of a plane group."""
     shape = np.shape(cell)
     if shape == (2, 2):
         return checked_lattice(as_array(cell, "cell", (2, 2)))

@@ -83,7 +83,7 @@ def find_setting(gemmi: Any, name: str) -> Any | None:
     text = plain(name)
     exact = next((row for row in gemmi.spacegroup_table() if row.xhm() == text), None)
     settings = [exact] if exact is not None else settings_named(gemmi, name)
-    # the first listed of several: unique axis b before c and a, origin 1, hexagonal axes
+    # the first listed of several: unique axis b before c and a, hexagonal axes
     return settings[0] if len({setting.number for setting in settings}) == 1 else None
 
 
@@ -115,6 +115,11 @@ def settings_numbered(gemmi: Any, text: str) -> list[Any]:
         for row in gemmi.spacegroup_table()
         if row.number == int(found[1]) and _has_extension(row, extension)
     ]
+
+
+def has_two_origins(settings: Sequence[Any]) -> bool:
+    """Return whether the first of the settings that a name may mean is among them with both origins."""
+    return {"1", "2"} <= {row.ext for row in settings if row.hm == settings[0].hm}
 
 
 def find_hall(gemmi: Any, name: str) -> list[Any] | None:

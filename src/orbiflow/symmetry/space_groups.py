@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,7 @@ from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.group_symbols import (
     find_hall,
     find_setting,
+    has_two_origins,
     settings_named,
     settings_numbered,
 )
@@ -53,7 +54,9 @@ _NUMBERS = ("_space_group_it_number", "_symmetry_int_tables_number")
 _SYMBOLS = (*_HALL, *_NAMES, *_NUMBERS)
 
 
-def space_group(name: int | str, cell: ArrayLike | None = None) -> CrystallographicGroup:
+def space_group(
+    name: int | str, cell: ArrayLike | None = None, *, origin: Literal[1, 2] | None = None
+) -> CrystallographicGroup:
     """Return a space group by its number or symbol, on its primitive lattice.
 
     Needs the package gemmi, whose tables have 564 settings: `pip install "orbiflow[crystals]"`.
@@ -62,19 +65,22 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
         name: A number from 1 to 230, perhaps with a setting ("227:2", "62:cab"); a Hermann-Mauguin
             symbol as it is typeset or typed ("P2_1/c", "P 21/c", "P2(1)/c", "P 1 21/c 1", "Fd-3m:2",
             "R -3 m:R"); or a Hall symbol: "Hall: P 2", or without that word where nothing else is
-            written so ("-P 2ybc", "F 4d 2 3 -1d"). Without more it means origin 1, hexagonal axes and
-            the unique axis b.
+            written so ("-P 2ybc", "F 4d 2 3 -1d"). Without more it means the unique axis b, and
+            hexagonal axes unless only rhombohedral ones fit the cell. Where International Tables
+            have two origins, which 24 groups have, the name says which one: "227:1" or "227:2".
         cell: The conventional cell, as for `cell_lattice`. Default: one of its system with a = 1.
+        origin: The origin of a name that does not say it, for work in which it does not matter.
 
-    Raises `GroupError` for an unknown name, or a cell that the group does not fit.
+    Raises `GroupError` for an unknown name, one that may mean two origins, or a cell that the group
+    does not fit.
 
     >>> space_group("P 21 21 21", (5.0, 6.0, 7.0)).order
     4
-    >>> diamond = space_group(227)
+    >>> diamond = space_group("227:1")
     >>> diamond.name, diamond.order, round(diamond.cell_volume, 9)
     ('F d -3 m:1', 48, 0.25)
     """
-    label, texts = _named(name)
+    label, texts = _named(name, origin)
     if cell is None:
         linear = np.stack([parse_operator(text, 3)[:, :3] for text in texts])
         a, b, c, *angles = fitting_cell(linear, cell_lattice(_TYPICAL)) or _TYPICAL
@@ -87,14 +93,22 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
             r':|^[-H]|[HR"]$', str(name).strip(), re.IGNORECASE
         ):
             raise
-        return group_from_operators(_named(axes)[1], cell_lattice(cell), name=axes)
+        return group_from_operators(_named(axes, None)[1], cell_lattice(cell), name=axes)
 
 
-def _named(name: int | str) -> tuple[str, list[str]]:
+def _named(name: int | str, origin: int | None) -> tuple[str, list[str]]:
     """Return the name that a group goes by, and all its operators in the conventional cell."""
     gemmi, text = _gemmi(), str(name).strip()
-    numbered = settings_numbered(gemmi, text)
-    if known := numbered[0] if numbered else find_setting(gemmi, text):
+    rows = settings_numbered(gemmi, text)
+    if known := rows[0] if rows else find_setting(gemmi, text):
+        if has_two_origins(rows or settings_named(gemmi, text)):
+            if origin is None:
+                raise GroupError(
+                    f"{described(name)} has two origins in International Tables: write "
+                    f"{text + ':1'!r} for the first, on a site of the highest symmetry, or "
+                    f"{text + ':2'!r} for the second, on a centre of inversion"
+                )
+            known = gemmi.find_spacegroup_by_name(f"{known.hm}:{origin}")
         return known.xhm(), [op.triplet() for op in known.operations()]
     if found := find_hall(gemmi, text):
         known = gemmi.find_spacegroup_by_ops(gemmi.GroupOps(found))
@@ -130,7 +144,8 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
         listed = next((values[tag] for tag in _OPERATORS if tag in values), None)
         names, settings = _names(values)
         if listed is None:
-            group = space_group(names[0], cell)
+            one = (name for name in names if not has_two_origins(_settings(_gemmi(), name)))
+            group = space_group(next(one, names[0]), cell)
         else:
             basis = cell_lattice(cell)
             group = group_from_operators(listed, basis, name="".join(names[:1]).removeprefix(_SAID))

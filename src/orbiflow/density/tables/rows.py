@@ -38,7 +38,13 @@ from orbiflow.density.data import (
 from orbiflow.density.tables.conditions import conditions_of, rows_where
 from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.guesses import check_hemispheres, tell_of_calm, tell_of_counts
-from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
+from orbiflow.density.tables.settings import (
+    SPACES,
+    RowSettings,
+    SpaceSettings,
+    TableSettings,
+    group_of,
+)
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
 from orbiflow.errors import Advice, SettingError, literal
 from orbiflow.runtime import Note, Sink
@@ -415,7 +421,8 @@ def _name(path: Path, column: str, header: bool | None) -> str:
 def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     """Return the unit of angles, and tell the user of doubts about a space's data.
 
-    The user is also told of a cell that was not given: data of another size would be folded into it.
+    The user is also told in which setting a space group is, and of a cell that was not given: data of
+    another size would be folded into it.
     """
     space = where.space
     doubts: list[Doubt] = []
@@ -428,10 +435,15 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     if not table.columns:
         _tell_doubts(doubts, tell)
         return where.unit or "radians"
-    if space not in SPACES and where.cell is None:
-        tell(
-            Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
-        )
+    if space not in SPACES:
+        group = group_of(space, where.cell)
+        if group.dim == 3 and group.name.replace(" ", "") != space.replace(" ", ""):
+            tell(Note(f"{space} is read as {group.name}"))  # say, of several axes or cells
+        if where.cell is None:
+            words = (
+                "no cell was given: its lengths are taken to be about 1, in the unit of the data"
+            )
+            tell(Note(words))
     asked, form = _asked_unit(where, table), where.rotation_form(table.columns)
     unit, more = check_values(space, table.values, table.columns, asked, CURE, form)
     doubts += more

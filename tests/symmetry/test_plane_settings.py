@@ -1,0 +1,83 @@
+"""Plane groups by all their symbols, against operators typed from the International Tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orbiflow.errors import GroupError
+from orbiflow.symmetry import group_by_name, group_from_operators, wallpaper_group
+
+# International Tables for Crystallography, volume A, the 17 plane groups: short and full symbol, cell,
+# and the coordinates of the general position. Those of cells that are centred have (1/2, 1/2)+ beside.
+THREE = "x,y -y,x-y -x+y,-x "
+SIX = THREE + "-x,-y y,-x+y x-y,x "
+FOUR = "x,y -x,-y -y,x y,-x "
+ACROSS, ALONG = "-y,-x -x+y,y x,x-y ", "y,x x-y,-y -x,-x+y "
+TABLES = {
+    ("p1",): ("oblique", "x,y"),
+    ("p2", "p211"): ("oblique", "x,y -x,-y"),
+    ("pm", "p1m1"): ("rectangular", "x,y -x,y"),
+    ("pg", "p1g1"): ("rectangular", "x,y -x,y+1/2"),
+    ("cm", "c1m1"): ("centred", "x,y -x,y"),
+    ("pmm", "p2mm"): ("rectangular", "x,y -x,-y -x,y x,-y"),
+    ("pmg", "p2mg"): ("rectangular", "x,y -x,-y -x+1/2,y x+1/2,-y"),
+    ("pgg", "p2gg"): ("rectangular", "x,y -x,-y -x+1/2,y+1/2 x+1/2,-y+1/2"),
+    ("cmm", "c2mm"): ("centred", "x,y -x,-y -x,y x,-y"),
+    ("p4",): ("square", FOUR),
+    ("p4m", "p4mm"): ("square", FOUR + "-x,y x,-y y,x -y,-x"),
+    ("p4g", "p4gm"): ("square", FOUR + "-x+1/2,y+1/2 x+1/2,-y+1/2 y+1/2,x+1/2 -y+1/2,-x+1/2"),
+    ("p3",): ("hexagonal", THREE),
+    ("p3m1",): ("hexagonal", THREE + ACROSS),
+    ("p31m",): ("hexagonal", THREE + ALONG),
+    ("p6",): ("hexagonal", SIX),
+    ("p6m", "p6mm"): ("hexagonal", SIX + ACROSS + ALONG),
+    # the other setting, in which a and b are exchanged
+    ("p11m",): ("rectangular", "x,y x,-y"),
+    ("p11g",): ("rectangular", "x,y x+1/2,-y"),
+    ("c11m",): ("centred", "x,y x,-y"),
+    ("p2gm",): ("rectangular", "x,y -x,-y -x,y+1/2 x,-y+1/2"),
+}
+CELLS = {
+    "oblique": (1.3, 0.9, 73.0),
+    "rectangular": (1.0, 1.7),
+    "centred": (1.0, 1.7),
+    "square": (2.0, 2.0),
+    "hexagonal": (1.5, 1.5),
+}
+CENTRED = [[0.5, 0.5], [0.5, -0.5]]  # its primitive vectors (a + b) / 2 and (a - b) / 2, by columns
+ROWS = [(name, *row) for names, row in TABLES.items() for name in names]
+
+
+def basis_of(system: str) -> np.ndarray:
+    """Return the conventional vectors of a cell, as columns."""
+    a, b, *angle = CELLS[system]
+    gamma = np.radians(angle[0] if angle else 120 if system == "hexagonal" else 90)
+    return np.array([[a, b * np.cos(gamma)], [0.0, b * np.sin(gamma)]])
+
+
+@pytest.mark.parametrize(("name", "system", "general"), ROWS, ids=[row[0] for row in ROWS])
+def test_groups_have_the_general_positions_of_the_tables(
+    name: str, system: str, general: str
+) -> None:
+    listed, basis = general.split(), basis_of(system)
+    if system == "centred":
+        listed.append("x+1/2,y+1/2")
+    wanted = group_from_operators(listed, basis)
+    assert wanted.order == len(general.split())
+    primitive = basis @ CENTRED if system == "centred" else basis
+    assert wallpaper_group(name, primitive) == wanted
+    spaced = " ".join(name)
+    for written in (name, spaced, f"${name}$"):
+        assert group_by_name(written, CELLS[system]) == wanted
+        assert wallpaper_group(written.upper(), primitive) == wanted
+
+
+def test_settings_differ_and_cells_of_neither_are_refused() -> None:
+    for one, other in (("pm", "p11m"), ("pg", "p11g"), ("cm", "c11m"), ("pmg", "p2gm")):
+        assert wallpaper_group(one) != wallpaper_group(other)
+    for name in ("c12m", "c1m", "p1m", "c2mg", "c11g"):
+        with pytest.raises(GroupError, match=name):
+            wallpaper_group(name)
+    with pytest.raises(GroupError, match="rhombic"):
+        wallpaper_group("c11m", np.diag([1.0, 2.0]))
