@@ -17,10 +17,7 @@ from orbiflow.typed_torch import listed
 
 Kind = Literal["field", "map", "invariant"]
 SCANNED = 4096  # points of the default that are each compared with one image
-EVERYWHERE, STEEPEST = (
-    32,
-    32,
-)  # those of them that are compared with all: the first, and the steepest
+EVERYWHERE, STEEPEST = 32, 32  # how many of them, the first and the steepest, are compared with all
 ROUNDING = 1e-13  # of values that come out as zero: of fields in cells, of invariants as they are
 _LAWS = {"field": "V(g p) = R_g V(p)", "map": "D(g p) = g D(p)", "invariant": "f(g p) = f(p)"}
 
