@@ -151,17 +151,28 @@ def is_thread(shape: Polygon, length: float) -> bool:
     return shape.buffer(-MAX_THREAD_WIDTH / 2 * length).is_empty
 
 
-def rounded(geometry: BaseGeometry, width: float) -> Polygon:
-    """Return the largest part, filled, without gaps and then without limbs narrower than `width`."""
-    solid = closed(geometry, width)
-    parts = polygons_in(opened(solid, width))
-    return simplified(max(parts, key=lambda part: part.area, default=Polygon()), width / 50)
+def rounded(shape: Polygon, seen: BaseGeometry, width: float) -> Polygon:
+    """Return a shape, filled, without gaps and then without limbs narrower than `width`.
+
+    Gaps between it and other parts of what was `seen`, which covers it, are closed, too.
+    """
+
+    def own(geometry: BaseGeometry) -> Polygon:
+        parts = polygons_in(geometry)
+        return max(parts, key=lambda part: part.intersection(shape).area, default=Polygon())
+
+    solid = filled(own(_without_gaps(seen, width)))
+    return simplified(own(opened(solid, width)), width / 50)
 
 
 def closed(geometry: BaseGeometry, width: float) -> Polygon:
     """Return the largest part, filled, without gaps narrower than `width` (a morphological closing)."""
-    parts = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
+    parts = polygons_in(_without_gaps(geometry, width))
     return filled(max(parts, key=lambda part: filled(part).area, default=Polygon()))
+
+
+def _without_gaps(geometry: BaseGeometry, width: float) -> BaseGeometry:
+    return geometry.buffer(width / 2).buffer(-width / 2)
 
 
 def opened(geometry: BaseGeometry, width: float, overreach: float = 1.0) -> BaseGeometry:

@@ -148,9 +148,7 @@ def _polygon(level: Level, shape: _Mask) -> tuple[Polygon, bool]:
     regions = [Polygon(contour) for contour in _contours(level, shape)]
     largest = max(regions, key=lambda polygon: polygon.area)
     height, width = shape.shape
-    # A level that equals the cut at a pixel's centre can pinch the contour there.
-    whole = largest if largest.is_valid else largest.buffer(0)
-    parts = polygons_in(whole.intersection(box(0, 0, width, height)))
+    parts = polygons_in(largest.intersection(box(0, 0, width, height)))
     # Each vertex lies on one line of pixel centres and anywhere between two of them: stepped if
     # nearly all cut their line at the same fraction.
     fraction: Array = np.mod(outer_ring(largest) - 0.5, 1.0).sum(axis=1)
