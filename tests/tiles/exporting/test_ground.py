@@ -18,9 +18,9 @@ from orbiflow.tiles.write import write_scene
 PALETTE = "202020,203040,402020,404040,paper=ffffff"  # nothing but paper is lighter than 40
 
 
-def drawn(content: Any, form: str, dpi: float) -> np.ndarray:
+def drawn(content: Any, form: str, dpi: int) -> np.ndarray:
     if form == "pdf":
-        image = pypdfium2.PdfDocument(content)[0].render(scale=dpi / 72).to_pil()
+        image = pypdfium2.PdfDocument(content)[0].render(scale=dpi // 72 + 1).to_pil()
     else:
         image = Image.open(io.BytesIO(bytes(resvg_py.svg_to_bytes(svg_string=content, dpi=dpi))))
     return np.asarray(image.convert("RGB")).max(axis=2)

@@ -30,6 +30,7 @@ MIN_RELATIVE_SIZE = 1e-9
 MIN_SIZE = 1e-100
 MIN_RELATIVE_AREA = 1e-9  # Relative to the square of the longer side of the bounding box.
 MAX_THREAD_WIDTH = 0.06  # greatest width, of the length; animals have at least 0.14
+MIN_PART_SHARE = 1e-3  # of the largest part's area: what is smaller is a speck and no part
 # Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
 CLEARANCE_DIGITS = 12
 DISC_OVERREACH = 1.005  # of the radius: without it, slivers are left along the outline
@@ -198,6 +199,7 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     components = polygons_in(geometry)
     solid = polygons_in(shapely.unary_union([filled(part) for part in components]))
     shape = filled(max(solid, key=lambda part: part.area))
+    solid = [part for part in solid if part.area >= MIN_PART_SHARE * shape.area]
     own = shapely.intersection(geometry, shape)
     holes = sum(len(part.interiors) for part in polygons_in(own))
     kept = shape.area / sum(part.area for part in solid)
