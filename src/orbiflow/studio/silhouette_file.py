@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFilter
 
-from orbiflow.drawing import png_bytes
+from orbiflow.drawing import DEFAULT_PALETTE, palette, png_bytes
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic, write_json
 from orbiflow.studio.words import OF_PICTURE, page_words
@@ -21,6 +21,7 @@ from orbiflow.tiles import (
     FileContent,
     ReadingSettings,
     Target,
+    are_told_apart,
     doubts,
     open_image,
     page_picture,
@@ -194,6 +195,17 @@ def _is_coloured(picture: Image.Image, ring: Any, read: Any) -> bool:
     return bool(others.sum() > MIN_COLOURED_SHARE * inside.sum())
 
 
+def _are_told_apart(picture: Image.Image, ring: Any) -> bool:
+    """Whether copies that carry what lies in a ring of a picture can be told apart."""
+    size = SAMPLED_PIXELS, SAMPLED_PIXELS
+    small, mask = picture.convert("RGBA").resize(size), Image.new("1", size)
+    laid = Image.alpha_composite(Image.new("RGBA", size, (*PAPER, 255)), small).convert("RGB")
+    shares = np.asarray(ring) / picture.size * SAMPLED_PIXELS
+    ImageDraw.Draw(mask).polygon(list(map(tuple, shares.tolist())), fill=1)
+    outline = palette(DEFAULT_PALETTE).outline
+    return are_told_apart(np.asarray(laid) / 255, np.asarray(mask), outline)
+
+
 def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]:
     """Return what a browser needs of the silhouette, in pixels of the backdrop.
 
@@ -212,6 +224,7 @@ def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]
         "outline": outline,
         "mark": hashlib.sha256(json.dumps(outline).encode()).hexdigest()[:12],
         "coloured": _is_coloured(picture, outline, pixels(read.outline)),
+        "told_apart": _are_told_apart(picture, outline),
         "width": size[0],
         "height": size[1],
         "notes": [page_words(note) for note in target.notes if not note.startswith(twice)],

@@ -18,6 +18,7 @@ from .outlines import with_corners as with_corners
 from .pins import Pins as Pins
 from .readers.files import read_outline as read_outline
 from .readers.image_files import open_image as open_image
+from .readers.photographs import lab_of as lab_of
 from .readers.pictures import read_mask_array as read_mask_array
 from .readers.reading import FileContent as FileContent
 from .readers.reading import Reading as Reading
