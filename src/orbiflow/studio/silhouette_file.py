@@ -91,6 +91,7 @@ def load_target(home: Path, number: int = 0) -> Target:
     except FileNotFoundError:
         raise InputFileError("there is no silhouette yet; choose a picture first") from None
     stored["outline"] = np.array(stored["outline"])
+    stored["seen"] = shapely.from_wkt(stored.get("seen"))
     stored["size"] = stored["size"] and tuple(stored["size"])
     return Target(**{**stored, "corner": tuple(stored["corner"]), "notes": tuple(stored["notes"])})
 
@@ -103,7 +104,12 @@ def marks_of(home: Path) -> list[str]:
 
 def _stored(target: Target) -> dict[str, Any]:
     names = ("y_down", "kind", "size", "notes", "corner", "source")
-    return {"outline": target.outline.tolist(), **{name: getattr(target, name) for name in names}}
+    seen = None if target.seen is None else target.seen.wkt
+    return {
+        "outline": target.outline.tolist(),
+        "seen": seen,
+        **{name: getattr(target, name) for name in names},
+    }
 
 
 def _picture(target: Target, content: FileContent) -> Image.Image:

@@ -3,6 +3,7 @@ from .bending import unfolded as unfolded
 from .checks import doubts as doubts
 from .checks import holes_filled as holes_filled
 from .checks import is_mere_line as is_mere_line
+from .checks import left_out_share as left_out_share
 from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
 from .mesh import Mesh as Mesh

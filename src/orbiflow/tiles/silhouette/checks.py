@@ -42,6 +42,12 @@ def parts_left_out(target: Target) -> list[Polygon]:
     ]
 
 
+def left_out_share(target: Target) -> float:
+    """Return the share of what was seen that is in parts left out of the silhouette."""
+    seen = 0.0 if target.seen is None else float(target.seen.area)
+    return sum(part.area for part in parts_left_out(target)) / seen if seen else 0.0
+
+
 def holes_filled(target: Target) -> list[Polygon]:
     """Return the holes in what was seen that the silhouette fills."""
     outline = Polygon(target.outline)
@@ -58,8 +64,7 @@ def doubts(target: Target) -> list[Advice]:
 def _lost_parts(target: Target) -> list[str]:
     found: list[str] = []
     lost, holes, is_image = parts_left_out(target), holes_filled(target), target.kind == "image"
-    seen = 0.0 if target.seen is None else float(target.seen.area)
-    share = sum(part.area for part in lost) / seen if seen else 0.0
+    share = left_out_share(target)
     level = ", or try another {threshold}, or a plain ground of another colour for a photograph"
     if share > MAX_LEFT_OUT_SHARE:
         parts = "a part" if len(lost) == 1 else f"{len(lost)} parts"
