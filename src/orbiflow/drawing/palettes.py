@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from typing import Annotated, NamedTuple
 
 from orbiflow.arguments import is_a
-from orbiflow.drawing.raster import rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.kinds import Parsed
 
@@ -30,8 +29,8 @@ class Palette(NamedTuple):
         >>> Palette(("#000000", "#ff8000"), "#000000", "#ffffff").mean([0, 1])
         '#804000'
         """
-        bands = zip(*(rgb(self.fill(index)) for index in indices), strict=True)
-        return "#" + "".join(f"{round(sum(band) / len(band)):02x}" for band in bands)
+        fills = [bytes.fromhex(self.fill(index)[1:]) for index in indices]
+        return "#" + bytes(round(sum(band) / len(fills)) for band in zip(*fills, strict=True)).hex()
 
     def shaded(self, shares: Sequence[int]) -> Palette:
         """Return a palette of so many shades of each colour in turn, unless its colours are a user's.
