@@ -28,6 +28,20 @@ def test_nodes_above_the_level_are_inside(grid: np.ndarray, joined: bool) -> Non
     assert (shapely.contains(area, nodes) == (values[off] > level)).all()
 
 
+@given(
+    arrays(np.int64, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=st.integers(0, 2)),
+    st.booleans(),
+)
+def test_no_curve_touches_itself_or_another(grid: np.ndarray, joined: bool) -> None:
+    # many nodes lie at the level itself
+    curves = level_curves(np.pad(grid, 1), 1.0, joined=joined)
+    lines = np.array([shapely.LinearRing(curve) for curve in curves], dtype=object)
+    assert all(line.is_simple for line in lines)
+    tree = shapely.STRtree(lines)
+    first, second = tree.query(lines, predicate="intersects")
+    assert (first == second).all()
+
+
 @pytest.mark.parametrize(("joined", "count"), [(False, 2), (True, 1)])
 def test_corners_hold_together_if_asked(joined: bool, count: int) -> None:
     values = np.pad(np.eye(2), 1)

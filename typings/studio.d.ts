@@ -124,6 +124,7 @@ interface Silhouette {
   notes: string[];
   left_out?: Point[][];
   coloured?: boolean;
+  told_apart?: boolean;
   mark?: string;
 }
 

@@ -15,6 +15,12 @@ from orbiflow.arrays import Array
 
 TOP, RIGHT, BOTTOM, LEFT = range(4)
 
+MIN_NODE_DISTANCE = 1e-3
+"""Least distance of a curve from the grid's nodes, in sides of its cells.
+
+Through a node whose value is the level itself, several pieces of curves would go and touch there.
+"""
+
 # The sides of a cell that a curve enters and leaves by, with what is above the level to its right, for
 # each set of its corners above the level: 1 upper left, 2 upper right, 4 lower right, 8 lower left
 _STEPS = {
@@ -38,7 +44,7 @@ _JOINED = {5: [(TOP, RIGHT), (BOTTOM, LEFT)], 10: [(LEFT, TOP), (RIGHT, BOTTOM)]
 def level_curves(values: Array, level: float, *, joined: bool = False) -> list[Array]:
     """Return the closed curves between values (H, W) above a level and the others.
 
-    Values are linear along the sides between neighbours.
+    Values are linear along the sides between neighbours. No curve touches itself or another.
 
     Args:
         values: The grid; its outermost values are not above the level.
@@ -106,5 +112,5 @@ def _crossings(values: Array, sides: Array, level: float) -> Array:
     down, node = np.divmod(sides, values.size)
     row, column = np.divmod(node, values.shape[1])
     start, end = values[row, column], values[row + down, column + 1 - down]
-    share = (level - start) / (end - start)
+    share = ((level - start) / (end - start)).clip(MIN_NODE_DISTANCE, 1 - MIN_NODE_DISTANCE)
     return np.stack([row + down * share, column + (1 - down) * share], axis=1)

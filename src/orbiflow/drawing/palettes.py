@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Annotated, NamedTuple
 
 from orbiflow.arguments import is_a
@@ -22,6 +22,15 @@ class Palette(NamedTuple):
         """Return colour number `index`; after the last they start again, mixed with the paper."""
         turn, place = divmod(index, len(self.colours))
         return _mixed(self.colours[place], self.paper, 0.5**turn)
+
+    def mean(self, indices: Iterable[int]) -> str:
+        """Return the mean of some of the colours.
+
+        >>> Palette(("#000000", "#ff8000"), "#000000", "#ffffff").mean([0, 1])
+        '#804000'
+        """
+        fills = [bytes.fromhex(self.fill(index)[1:]) for index in indices]
+        return "#" + bytes(round(sum(band) / len(fills)) for band in zip(*fills, strict=True)).hex()
 
     def shaded(self, shares: Sequence[int]) -> Palette:
         """Return a palette of so many shades of each colour in turn, unless its colours are a user's.

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFilter
 
-from orbiflow.drawing import png_bytes
+from orbiflow.drawing import DEFAULT_PALETTE, palette, png_bytes
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic, write_json
 from orbiflow.studio.words import OF_PICTURE, page_words
@@ -21,6 +21,7 @@ from orbiflow.tiles import (
     FileContent,
     ReadingSettings,
     Target,
+    are_told_apart,
     doubts,
     open_image,
     page_picture,
@@ -90,6 +91,7 @@ def load_target(home: Path, number: int = 0) -> Target:
     except FileNotFoundError:
         raise InputFileError("there is no silhouette yet; choose a picture first") from None
     stored["outline"] = np.array(stored["outline"])
+    stored["seen"] = shapely.from_wkt(stored.get("seen"))
     stored["size"] = stored["size"] and tuple(stored["size"])
     return Target(**{**stored, "corner": tuple(stored["corner"]), "notes": tuple(stored["notes"])})
 
@@ -102,7 +104,12 @@ def marks_of(home: Path) -> list[str]:
 
 def _stored(target: Target) -> dict[str, Any]:
     names = ("y_down", "kind", "size", "notes", "corner", "source")
-    return {"outline": target.outline.tolist(), **{name: getattr(target, name) for name in names}}
+    seen = None if target.seen is None else target.seen.wkt
+    return {
+        "outline": target.outline.tolist(),
+        "seen": seen,
+        **{name: getattr(target, name) for name in names},
+    }
 
 
 def _picture(target: Target, content: FileContent) -> Image.Image:
@@ -194,6 +201,17 @@ def _is_coloured(picture: Image.Image, ring: Any, read: Any) -> bool:
     return bool(others.sum() > MIN_COLOURED_SHARE * inside.sum())
 
 
+def _are_told_apart(picture: Image.Image, ring: Any) -> bool:
+    """Whether copies that carry what lies in a ring of a picture can be told apart."""
+    size = SAMPLED_PIXELS, SAMPLED_PIXELS
+    small, mask = picture.convert("RGBA").resize(size), Image.new("1", size)
+    laid = Image.alpha_composite(Image.new("RGBA", size, (*PAPER, 255)), small).convert("RGB")
+    shares = np.asarray(ring) / picture.size * SAMPLED_PIXELS
+    ImageDraw.Draw(mask).polygon(list(map(tuple, shares.tolist())), fill=1)
+    outline = palette(DEFAULT_PALETTE).outline
+    return are_told_apart(np.asarray(laid) / 255, np.asarray(mask), outline)
+
+
 def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]:
     """Return what a browser needs of the silhouette, in pixels of the backdrop.
 
@@ -212,6 +230,7 @@ def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]
         "outline": outline,
         "mark": hashlib.sha256(json.dumps(outline).encode()).hexdigest()[:12],
         "coloured": _is_coloured(picture, outline, pixels(read.outline)),
+        "told_apart": _are_told_apart(picture, outline),
         "width": size[0],
         "height": size[1],
         "notes": [page_words(note) for note in target.notes if not note.startswith(twice)],

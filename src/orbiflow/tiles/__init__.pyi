@@ -69,6 +69,7 @@ from .motifs.carried import Over as Over
 from .motifs.carried import read_over as read_over
 from .motifs.carried import with_map as with_map
 from .motifs.page_pictures import page_picture as page_picture
+from .motifs.telling_apart import are_told_apart as are_told_apart
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animation as animation
 from .motion.writers import still as still

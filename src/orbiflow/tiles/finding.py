@@ -155,11 +155,12 @@ def _figures(tile: EscherTile, own: EscherTile) -> dict[str, str]:
 def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> list[Note]:
     """What was written, or why nothing was; and the silhouette's doubts again, if they explain it."""
     from orbiflow.tiles.search import rounded_for, why_poor
-    from orbiflow.tiles.silhouette import doubts, is_mere_line
+    from orbiflow.tiles.silhouette import doubts, is_mere_line, left_out_share
 
     explains = not result.tiles or any(map(is_mere_line, result.targets))
-    texts = [text for target in result.targets for text in doubts(target)]
-    again = [Note(text, warning=True) for text in texts] if explains else []
+    # beside the stars, which are of what was read
+    told = result.targets if explains else filter(left_out_share, result.targets)
+    again = [Note(text, warning=True) for target in told for text in doubts(target)]
     if poor := why_poor(result.tiles[0]) if result.tiles else "":
         again = [Note(poor), *again]
     if rounded := rounded_for(result.tiles):

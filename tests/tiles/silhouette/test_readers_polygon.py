@@ -184,7 +184,7 @@ def test_image_settings_are_refused_for_polygons(tmp_path: Path) -> None:
     path = write(tmp_path, json.dumps(SQUARE), "a.json")
     with pytest.raises(OrbiflowError, match="threshold applies to images only"):
         read_outline(path, threshold=0.5)
-    with pytest.raises(OrbiflowError, match="invert applies to images only"):
+    with pytest.raises(OrbiflowError, match="invert applies to images and drawings"):
         read_outline(path, invert=True)
 
 

@@ -279,10 +279,10 @@ def test_what_counts_as_shape(body: str, area: float, note: str) -> None:
 
 
 def test_a_page_with_a_hole_is_the_shape_and_said() -> None:
-    note = "the silhouette is all but the whole page; if the hole in it is the shape, fill that"
     for hole, is_said in ((FISH.split('"')[1], True), ("M40 40H50V50H40z", False)):
         reading = read(f'<path fill-rule="evenodd" d="M0 0H100V100H0z{hole}"/>')
-        assert (note in reading.notes) is is_said
+        said = [note for note in reading.notes if "hole" in note and "invert" in note]
+        assert bool(said) is is_said
         assert shapely.Polygon(reading.outline).area == pytest.approx(1e4)
 
 

@@ -60,6 +60,14 @@ class Rating:
         slope, base = OVERLAP_MARKS
         return cls.of_mark(slope * score + base)
 
+    def of_share(self, share: float) -> Rating:
+        """Return the rating of a tile that is like so much of the silhouette alone.
+
+        >>> [str(Rating(5).of_share(share)) for share in (0.98, 0.6, 0.1)]
+        ['★★★★★', '★★★', '★']
+        """
+        return Rating(max(1.0, round(2 * self.stars * share) / 2))
+
     @property
     def word(self) -> str:
         """The same in a word: excellent, good, fair or poor."""

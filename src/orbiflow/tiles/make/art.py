@@ -32,6 +32,7 @@ from orbiflow.tiles.motifs import (
     bilinear,
     carried_raster,
     figure_paint,
+    notes_on_dark_pictures,
     paint_motif,
     require_figures,
     rgb_of,
@@ -151,7 +152,12 @@ def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over 
         pictures=on.pictures,
         motifs=on.motifs,
         tint=on.tint,
-        notes=(*on.notes, *filter(None, [told]), *page.palette(chosen).shortage(page.count)),
+        notes=(
+            *on.notes,
+            *notes_on_dark_pictures(tile, overs, chosen),
+            *filter(None, [told]),
+            *page.palette(chosen).shortage(page.count),
+        ),
     )
 
 

@@ -22,7 +22,13 @@ from orbiflow.tiles.make.pieces import pieces_scenes
 from orbiflow.tiles.make.sheets import calibrated, registered, split
 from orbiflow.tiles.make.skeletons import skeleton_scenes
 from orbiflow.tiles.make.templates import template_scene
-from orbiflow.tiles.motifs import Over, read_overs, require_figures, with_map
+from orbiflow.tiles.motifs import (
+    Over,
+    notes_on_dark_pictures,
+    read_overs,
+    require_figures,
+    with_map,
+)
 from orbiflow.tiles.page import Scene, flattened, shades
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import EscherTile, TileSource
@@ -159,6 +165,8 @@ def laid_out(
     if overs:
         motifs = tuple(drawn_on(placed, number, over) for number, over in enumerate(overs))
         placed = replace(placed, motifs=motifs, has_picture=any(pictures))
+        if settings.coloured:
+            notes = (*notes_on_dark_pictures(given, overs, palette(settings.palette)), *notes)
         carried = [note for part in given.figures for note in part.figure.notes]
         notes = (*carried, *(note for over in overs for note in over.notes), *notes)
     return placed, notes

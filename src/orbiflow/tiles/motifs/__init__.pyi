@@ -24,3 +24,5 @@ from .raster import ring_sides as ring_sides
 from .raster import runs as runs
 from .settings import MotifSettings as MotifSettings
 from .settings import TintSettings as TintSettings
+from .telling_apart import are_told_apart as are_told_apart
+from .telling_apart import notes_on_dark_pictures as notes_on_dark_pictures

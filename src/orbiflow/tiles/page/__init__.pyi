@@ -5,6 +5,7 @@ from .flattening import boundary as boundary
 from .flattening import cut_off as cut_off
 from .flattening import expanded as expanded
 from .flattening import flattened as flattened
+from .flattening import ground_of as ground_of
 from .flattening import lines_of as lines_of
 from .flattening import polylines as polylines
 from .flattening import region_of as region_of

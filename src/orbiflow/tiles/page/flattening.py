@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import shapely
 from PIL import Image, ImageChops, ImageDraw
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arrays import Array
 from orbiflow.drawing import png_bytes
 from orbiflow.tiles.geometry import orient, polygons_in
 from orbiflow.tiles.page.scene import (
@@ -122,6 +123,20 @@ def lines_of(part: Part) -> BaseGeometry:
 def region_of(part: Part) -> BaseGeometry:
     """Return the region that a part fills."""
     return fill([curve.flattened(FINE) for curve in part.curves if curve.closed])
+
+
+SEAM_OVERLAP, GROUND_INSET = 0.01, 0.05  # distances in mm
+
+
+def ground_of(rings: Iterable[Array]) -> BaseGeometry:
+    """Return what lies under tiles (N, 2), so that no paper shows in the seams between neighbours.
+
+    Viewers smooth the edge of each tile by itself, and two half covered pixels are no whole one.
+    """
+    tiles = np.array([shapely.Polygon(ring) for ring in rings], dtype=object)
+    grown = shapely.buffer(tiles, SEAM_OVERLAP, quad_segs=1, join_style="mitre")
+    whole = shapely.union_all(grown).buffer(-SEAM_OVERLAP - GROUND_INSET)
+    return whole.simplify(GROUND_INSET)
 
 
 def boundary(region: BaseGeometry) -> tuple[Curve, ...]:

@@ -13,7 +13,8 @@ import shapely
 from orbiflow.arrays import Array, Integers, Window, checked_window
 from orbiflow.drawing import Palette
 from orbiflow.symmetry import Isometry, rotation_matrix
-from orbiflow.tiles.geometry import Place
+from orbiflow.tiles.geometry import Place, polygons_in
+from orbiflow.tiles.page.flattening import GROUND_INSET, boundary, ground_of
 from orbiflow.tiles.page.scene import (
     Box,
     Curve,
@@ -49,6 +50,7 @@ MOTIF = "motif"
 """The name of what lies on every tile, among a scene's motifs."""
 
 MARK = 20.0  # length in mm of registration marks, around which nothing else may lie
+MIN_COVERING_WIDTH = 0.1  # width in mm of lines that cover the seams between tiles
 # Places along each side of a lattice cell that are tried for a page with most whole tiles
 SHIFTS = 10
 # Number of tiles on a page beyond which a few more are not worth looking for
@@ -261,6 +263,10 @@ class Page:
         if chosen is not None:
             chosen = self.palette(chosen)
             layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(self.box),))]
+            if line.width < MIN_COVERING_WIDTH:
+                ground = Style(fill=chosen.mean({*self.colours.tolist()}))
+                under = self._ground([*symbols.values()], clipped)
+                layers.append(Layer("ground", "paper", ground, under))
         layers += self._tile_layers(chosen, line, clipped, seam, drawn, tint)
         named = {symbol_of(k, MOTIF): motif for k, motif in drawn.items()}
         if chosen is not None and tint:
@@ -270,6 +276,15 @@ class Page:
                 for k, motif in drawn.items()
             }
         return Scene(*self.size, tuple(layers), symbols, self.box, motifs=named, **more)
+
+    def _ground(self, outlines: Sequence[Curve], clipped: bool) -> tuple[Curve, ...]:
+        """Return what lies under copies of outlines about the middle of each prototile."""
+        if clipped and self.whole is None:
+            return (rectangle(self.box),)
+        rings = [curve.flattened(GROUND_INSET / 2) for curve in outlines]
+        copies = (own for kind, ring in enumerate(rings) for own in self.uses(kind).images(ring))
+        parts = polygons_in(ground_of(copies))
+        return tuple(curve for part in parts for curve in boundary(shapely.Polygon(part.exterior)))
 
     def empty(self, layers: Iterable[Layer], **more: Any) -> Scene:
         """Return the page as a scene of other layers."""

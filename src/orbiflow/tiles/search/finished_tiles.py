@@ -27,7 +27,7 @@ from orbiflow.tiles.likeness import (
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
-from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Target, is_mere_line
+from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Target, is_mere_line, left_out_share
 from orbiflow.tiles.tile import EscherTile, SearchFacts
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Tile
@@ -148,7 +148,8 @@ def recogniser(target: Target) -> Recogniser:
 def rated(tiles: Sequence[EscherTile], *targets: Target) -> list[EscherTile]:
     """Return the tiles of a run with their ratings, in the same order.
 
-    That of a tile that figures divide is the worst one's.
+    That of a tile that figures divide is the worst one's. Where a reading left parts of a picture out,
+    they count as lost.
     """
     return [_rated(tile, targets) for tile in tiles]
 
@@ -164,7 +165,9 @@ def _rated(tile: EscherTile, targets: Sequence[Target]) -> EscherTile:
     if is_mere_line(targets[0]):
         return tile.changed(rating=Rating(1))
     of_score = Rating.of_likeness if tile.likeness.fidelity else Rating.of_overlap
-    return tile.changed(rating=of_score(tile.score))
+    rating = of_score(tile.score)
+    # stars are of what the user brought: a tile lacks what the reading left out, too
+    return tile.changed(rating=rating.of_share(1 - left_out_share(targets[0])))
 
 
 POOR_SCORE = 0.4  # the score below which a note explains what makes the best likeness poor

@@ -3,6 +3,7 @@ from .bending import unfolded as unfolded
 from .checks import doubts as doubts
 from .checks import holes_filled as holes_filled
 from .checks import is_mere_line as is_mere_line
+from .checks import left_out_share as left_out_share
 from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
 from .mesh import Mesh as Mesh
@@ -19,6 +20,7 @@ from .outlines import with_corners as with_corners
 from .pins import Pins as Pins
 from .readers.files import read_outline as read_outline
 from .readers.image_files import open_image as open_image
+from .readers.photographs import lab_of as lab_of
 from .readers.pictures import read_mask_array as read_mask_array
 from .readers.reading import FileContent as FileContent
 from .readers.reading import Reading as Reading

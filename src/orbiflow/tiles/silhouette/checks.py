@@ -7,13 +7,21 @@ from shapely import Polygon
 
 from orbiflow.errors import Advice
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import MAX_THREAD_WIDTH, filled, is_thread, opened, percent
+from orbiflow.tiles.silhouette.outlines import (
+    MAX_THREAD_WIDTH,
+    MIN_PART_SHARE,
+    filled,
+    is_thread,
+    opened,
+    percent,
+)
 from orbiflow.tiles.silhouette.target import Target
 
 MAX_LEFT_OUT_SHARE = 0.02  # of what was seen
 # Shares of the silhouette: smaller holes are eyes; larger ones are what the line of a drawing encloses.
 MIN_HOLE_SHARE, MAX_HOLE_SHARE = 0.02, 0.3
 MIN_CONVEX_SHARE = 0.95  # of its convex hull: what a frame fills
+MAX_CUT_OUT_SHARE = 0.7  # of a card: what the line of a drawing encloses is larger
 MAX_INSIDE_SHARE = 0.1  # of the silhouette: more that lies in a hole is a shape of its own
 MIN_LENGTH_PIXELS = 40
 THIN_PIXELS = 3.0  # pixels
@@ -23,10 +31,21 @@ MAX_LEG_SHARE = 0.45  # of the outline's length: on thinner parts than this the 
 
 
 def parts_left_out(target: Target) -> list[Polygon]:
-    """Return the parts of what was seen that are not in the silhouette."""
+    """Return the parts of what was seen that are not in the silhouette, but for specks."""
     outline = Polygon(target.outline)
     parts = [] if target.seen is None else polygons_in(target.seen)
-    return [part for part in parts if not outline.intersects(part.representative_point())]
+    least = MIN_PART_SHARE * target.area
+    return [
+        part
+        for part in parts
+        if part.area >= least and not outline.intersects(part.representative_point())
+    ]
+
+
+def left_out_share(target: Target) -> float:
+    """Return the share of what was seen that is in parts left out of the silhouette."""
+    seen = 0.0 if target.seen is None else float(target.seen.area)
+    return sum(part.area for part in parts_left_out(target)) / seen if seen else 0.0
 
 
 def holes_filled(target: Target) -> list[Polygon]:
@@ -45,8 +64,7 @@ def doubts(target: Target) -> list[Advice]:
 def _lost_parts(target: Target) -> list[str]:
     found: list[str] = []
     lost, holes, is_image = parts_left_out(target), holes_filled(target), target.kind == "image"
-    seen = 0.0 if target.seen is None else float(target.seen.area)
-    share = sum(part.area for part in lost) / seen if seen else 0.0
+    share = left_out_share(target)
     level = ", or try another {threshold}, or a plain ground of another colour for a photograph"
     if share > MAX_LEFT_OUT_SHARE:
         parts = "a part" if len(lost) == 1 else f"{len(lost)} parts"
@@ -55,7 +73,12 @@ def _lost_parts(target: Target) -> list[str]:
             f"them to it in the drawing, or by a larger {{smooth}}{level * is_image}"
         )
     share = sum(hole.area for hole in holes) / target.area
-    if MIN_HOLE_SHARE < share < MAX_HOLE_SHARE:
+    if _is_card(target, holes):
+        found.append(
+            f"the silhouette is a card, of whose area a hole takes {percent(share)}: if the hole is "
+            "the shape, try another {invert}"
+        )
+    elif MIN_HOLE_SHARE < share < MAX_HOLE_SHARE:
         level = " or try another {threshold} or another {invert}" if is_image else ""
         found.append(
             "large holes were filled, because a tile has none: if one is background, open it to the "
@@ -72,16 +95,24 @@ def _lost_parts(target: Target) -> list[str]:
 
 def _share_inside(target: Target, holes: list[Polygon]) -> float:
     """Return the share of the silhouette, if it may be a frame, of the largest shape in its holes."""
-    outline = Polygon(target.outline)
-    if (
-        not holes
-        or target.seen is None
-        or outline.area < MIN_CONVEX_SHARE * outline.convex_hull.area
-    ):
+    if target.seen is None or not holes or not _is_convex(Polygon(target.outline)):
         return 0.0
     parts = [filled(part) for part in polygons_in(target.seen)]
     inside = [part for part in parts if any(hole.contains(part) for hole in holes)]
     return max((part.area for part in inside), default=0.0) / target.area
+
+
+def _is_card(target: Target, holes: list[Polygon]) -> bool:
+    """Return whether a silhouette is a plain shape, of which another shape has been cut out."""
+    hole = max(holes, key=lambda own: own.area, default=Polygon())
+    share = hole.area / target.area
+    is_cut_out = MIN_HOLE_SHARE < share < MAX_CUT_OUT_SHARE and not _is_convex(hole)
+    return is_cut_out and _is_convex(Polygon(target.outline))
+
+
+def _is_convex(shape: Polygon) -> bool:
+    """Return whether a shape is all but convex, as cards and frames are."""
+    return shape.area >= MIN_CONVEX_SHARE * shape.convex_hull.area
 
 
 def is_mere_line(target: Target) -> bool:

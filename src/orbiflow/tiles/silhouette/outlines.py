@@ -31,6 +31,7 @@ MIN_RELATIVE_SIZE = 1e-9
 MIN_SIZE = 1e-100
 MIN_RELATIVE_AREA = 1e-9  # Relative to the square of the longer side of the bounding box.
 MAX_THREAD_WIDTH = 0.06  # greatest width, of the length; animals have at least 0.14
+MIN_PART_SHARE = 1e-3  # of the largest part's area: what is smaller is a speck and no part
 # Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
 CLEARANCE_DIGITS = 12
 DISC_OVERREACH = 1.005  # of the radius: without it, slivers are left along the outline
@@ -163,17 +164,28 @@ def is_thread(shape: Polygon, length: float) -> bool:
     return shape.buffer(-MAX_THREAD_WIDTH / 2 * length).is_empty
 
 
-def rounded(geometry: BaseGeometry, width: float) -> Polygon:
-    """Return the largest part, filled, without gaps and then without limbs narrower than `width`."""
-    solid = closed(geometry, width)
-    parts = polygons_in(opened(solid, width))
-    return simplified(max(parts, key=lambda part: part.area, default=Polygon()), width / 50)
+def rounded(shape: Polygon, seen: BaseGeometry, width: float) -> Polygon:
+    """Return a shape, filled, without gaps and then without limbs narrower than `width`.
+
+    Gaps between it and other parts of what was `seen`, which covers it, are closed, too.
+    """
+
+    def own(geometry: BaseGeometry) -> Polygon:
+        parts = polygons_in(geometry)
+        return max(parts, key=lambda part: part.intersection(shape).area, default=Polygon())
+
+    solid = filled(own(_without_gaps(seen, width)))
+    return simplified(own(opened(solid, width)), width / 50)
 
 
 def closed(geometry: BaseGeometry, width: float) -> Polygon:
     """Return the largest part, filled, without gaps narrower than `width` (a morphological closing)."""
-    parts = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
+    parts = polygons_in(_without_gaps(geometry, width))
     return filled(max(parts, key=lambda part: filled(part).area, default=Polygon()))
+
+
+def _without_gaps(geometry: BaseGeometry, width: float) -> BaseGeometry:
+    return geometry.buffer(width / 2).buffer(-width / 2)
 
 
 def opened(geometry: BaseGeometry, width: float, overreach: float = 1.0) -> BaseGeometry:
@@ -199,6 +211,7 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     components = polygons_in(geometry)
     solid = polygons_in(shapely.unary_union([filled(part) for part in components]))
     shape = filled(max(solid, key=lambda part: part.area))
+    solid = [part for part in solid if part.area >= MIN_PART_SHARE * shape.area]
     own = shapely.intersection(geometry, shape)
     holes = sum(len(part.interiors) for part in polygons_in(own))
     kept = shape.area / sum(part.area for part in solid)

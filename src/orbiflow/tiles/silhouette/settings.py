@@ -19,7 +19,7 @@ class ReadingSettings(Settings, group="Reading the silhouette"):
     """Level between shape and background."""
 
     invert: Annotated[bool | None, DefaultText("found automatically")] = None
-    """Whether the shape is the light part."""
+    """Whether the shape is the light part of a picture, or the hole in what a drawing shows."""
 
     thicken: Annotated[float, Range(0, 0.2)] = 0.0
     """Grow legs and other parts thinner than this share of the silhouette's length, such as 0.04, to

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 
@@ -318,8 +319,9 @@ class Target(Reading):
         if share == 0:
             return self
         length = float(np.ptp(self.outline, axis=0).max())
-        own = Polygon(self.outline) if self.seen is None else self.seen
-        shape = rounded(own, share * length)
+        whole = Polygon(self.outline)  # which may be more than what was seen: what lines enclose
+        own = whole if self.seen is None else shapely.union_all([whole, self.seen.buffer(0)])
+        shape = rounded(whole, own, share * length)
         if shape.is_empty:
             raise OrbiflowError(
                 Advice(
@@ -327,7 +329,7 @@ class Target(Reading):
                     + f"{{smooth}} {share:g} leaves nothing of the silhouette; choose less"
                 )
             )
-        went = Polygon(self.outline).difference(shape)
+        went = whole.difference(shape)
         width = share * length
         parts = polygons_in(opened(went, SLIVER_WIDTHS * width))
         limbs = sum(_reach(part) > LIMB_WIDTHS * width for part in parts)

@@ -29,7 +29,9 @@ from orbiflow.tiles.page import (
     Scene,
     Style,
     bezier,
+    boundary,
     cut_off,
+    ground_of,
     outline,
     rectangle,
 )
@@ -332,6 +334,11 @@ def world_scene(
     outlines = [dict(world.outlines(kind)) for kind in kinds]
     page = rectangle(Box(0.0, 0.0, *world.view.size))
     layers = [Layer("paper", "paper", Style(chosen.paper), (page,))]
+    fills = {world.colour(k, kind) for kind in kinds for k in outlines[kind]}
+    ground = Style(chosen.mean(fills))
+    rings = (curve.flattened(TOLERANCE) for own in outlines for curve in own.values())
+    under = Part(boundary(ground_of(rings)), ground)
+    layers.append(Layer("ground", "paper", ground, (under,), clipped=True))
     plain = not any(own.paintings or any(motif.parts for motif in own.motifs) for own in worn)
     widths = {k: _width(world, k, line) for own in outlines for k in own}
     for kind, own in enumerate(outlines):

@@ -2,8 +2,8 @@
 
 import { newest } from "./dom.js";
 
-/** Whether tiles can show what lies under a silhouette: not if that is of one colour. */
-const isColoured = (own) => Boolean(own?.silhouette?.coloured);
+/** Whether tiles show what lies under a silhouette: not if that is of one colour, or dark as lines. */
+const shows = (own) => Boolean(own?.silhouette?.coloured && own.silhouette.told_apart !== false);
 
 /**
  * The look of a project's tiles.
@@ -21,7 +21,7 @@ export function lookOf(project, about) {
     tint: 0.35,
     drawn: true,
     ...closeup?.look, // where it was kept before
-    art: [project, project.second].some(isColoured),
+    art: [project, project.second].some(shows),
     ...look,
   };
 }

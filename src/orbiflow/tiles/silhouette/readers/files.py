@@ -5,12 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import shapely
 from shapely import Polygon
 
 from orbiflow.arguments import as_path
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import is_thread, outer_outline, outer_ring, thinned
+from orbiflow.tiles.silhouette.outlines import filled, is_thread, outer_outline, outer_ring, thinned
 from orbiflow.tiles.silhouette.readers.image_files import image_kind
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.point_lists import read_points
@@ -72,7 +73,8 @@ def read_outline(
 ) -> Reading:
     """Read the outline of the silhouette in the file at `path`, or in a `FileContent`.
 
-    `threshold` and `invert` are for images (see `read_image`). Raises `InputFileError` for a file
+    `threshold` is for images (see `read_image`); with `invert` the shape is the light part of one, or
+    what a drawing leaves out, such as a hole in a card. Raises `InputFileError` for a file
     that is missing, of an unknown kind, damaged, too large, or without a usable shape, and
     `OrbiflowError` for a setting that cannot be used.
     """
@@ -83,13 +85,33 @@ def read_outline(
     kind = _kind(path, read_head(path, _HEAD_BYTES))
     if kind == "image":
         return _bridged(read_image(path, threshold=threshold, invert=invert))
-    for name, value in (("threshold", threshold), ("invert", invert)):
-        if value is not None:
-            where = f"images only and {path} is a polygon or drawing"
-            raise OrbiflowError(f"{name} applies to {where}; leave it out")
+    given = {"threshold": threshold, "invert": None if kind == "svg" else invert}
+    for name in (name for name, value in given.items() if value is not None):
+        what = "images" if name == "threshold" else "images and drawings"
+        is_one = "a drawing" if kind == "svg" else "a polygon"
+        raise OrbiflowError(f"{name} applies to {what} only and {path} is {is_one}; leave it out")
     # extreme coordinates overflow in the geometry, whose result is then refused
     with np.errstate(all="ignore"):
-        return _bridged(_READERS[kind](path))
+        reading = _READERS[kind](path)
+        return _hole_of(reading, path) if invert else _bridged(reading)
+
+
+def _hole_of(reading: Reading, path: Source) -> Reading:
+    """Return the largest hole in what was seen, such as an animal that is cut out of a card."""
+    parts = [] if reading.seen is None else polygons_in(reading.seen.buffer(0))
+    holes = shapely.union_all([filled(part) for part in parts]).difference(shapely.union_all(parts))
+    if not holes.area > 0:
+        raise InputFileError(
+            Advice(
+                literal(f"{path}: there is no hole in the shape")
+                + ", and {invert} would take one; leave it out"
+            )
+        )
+    shape, kept = outer_outline(holes)
+    about = ("kept the largest", "filled", "the silhouette is")
+    notes = (note for note in reading.notes if not note.startswith(about))
+    notes = (*notes, "shape taken: the hole in what is drawn, as set", *kept)
+    return replace(reading, outline=outer_ring(shape), notes=notes, seen=holes)
 
 
 def _bridged(reading: Reading) -> Reading:

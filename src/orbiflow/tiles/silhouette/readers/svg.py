@@ -12,7 +12,7 @@ from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
-from orbiflow.errors import InputFileError
+from orbiflow.errors import Advice, InputFileError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import (
     clean_ring,
@@ -147,7 +147,9 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         if len(colours) > 1:
             notes.append(f"{all_but}; if that is a background, delete it")
         elif seen.area < (1 - MIN_HOLE_SHARE) * whole:
-            notes.append(f"{all_but}; if the hole in it is the shape, fill that")
+            notes.append(
+                Advice(f"{all_but}; if the hole in it is the shape, try another {{invert}}")
+            )
     elif _is_badge(seen, shown):
         notes.append(
             "the silhouette is a disc with a drawing on it; if it is a background, delete it"

@@ -19,7 +19,7 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.contours import level_curves
 from orbiflow.errors import Advice, InputFileError, literal
 from orbiflow.tiles.geometry import polygons_in, signed_area
-from orbiflow.tiles.silhouette.outlines import left_out, outer_ring, thinned
+from orbiflow.tiles.silhouette.outlines import MIN_PART_SHARE, left_out, outer_ring, thinned
 from orbiflow.tiles.silhouette.readers.reading import Source
 
 MIN_AREA = 30.0  # square pixels
@@ -60,6 +60,12 @@ def trace(
     """
     mask, notes = _without_dust(level.values > level.cut)
     shape, parts = _largest(mask)
+    if shape.all() and (inner := _within_border(mask)).any():
+        mask, notes = (
+            inner,
+            [*notes, "left out what reaches around the shape at the image's border"],
+        )
+        shape, parts = _largest(mask)
     notes += parts
     if shape.all():
         raise InputFileError(
@@ -91,6 +97,13 @@ def trace(
     rings = [shapely.LinearRing(contour) for contour in _contours(level, mask)]
     seen = shapely.build_area(shapely.GeometryCollection(rings)).simplify(tolerance)
     return ring, scaled(seen, scale, scale, origin=(0, 0)), notes
+
+
+def _within_border(mask: _Mask) -> _Mask:
+    """Return the mask without what touches the image's border."""
+    border = np.ones_like(mask)
+    border[1:-1, 1:-1] = False
+    return mask & ~scipy.ndimage.binary_propagation(border & mask, mask=mask)
 
 
 def _is_cut_off(shape: _Mask) -> bool:
@@ -126,10 +139,11 @@ def _largest(mask: _Mask) -> tuple[_Mask, list[str]]:
     """Return the component that is largest with its holes filled."""
     labels, areas = _labelled(scipy.ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS))
     shape = labels == areas.argmax()
+    areas = areas[areas >= max(1, MIN_PART_SHARE * areas.max())]
     holes = shape & ~mask
     n_holes = scipy.ndimage.label(holes, structure=_ACROSS_CORNERS)[1]
     kept, bare = areas.max() / max(areas.sum(), 1), holes.sum() / max(shape.sum(), 1)
-    return shape, left_out(len(areas) - 1, kept, n_holes, bare)
+    return shape, left_out(len(areas), kept, n_holes, bare)
 
 
 def _contours(level: Level, mask: _Mask) -> list[Array]:
@@ -148,9 +162,7 @@ def _polygon(level: Level, shape: _Mask) -> tuple[Polygon, bool]:
     regions = [Polygon(contour) for contour in _contours(level, shape)]
     largest = max(regions, key=lambda polygon: polygon.area)
     height, width = shape.shape
-    # A level that equals the cut at a pixel's centre can pinch the contour there.
-    whole = largest if largest.is_valid else largest.buffer(0)
-    parts = polygons_in(whole.intersection(box(0, 0, width, height)))
+    parts = polygons_in(largest.intersection(box(0, 0, width, height)))
     # Each vertex lies on one line of pixel centres and anywhere between two of them: stepped if
     # nearly all cut their line at the same fraction.
     fraction: Array = np.mod(outer_ring(largest) - 0.5, 1.0).sum(axis=1)

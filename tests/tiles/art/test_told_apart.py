@@ -1,0 +1,55 @@
+"""Copies that carry a picture as dark as their outlines cannot be told apart: it is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from artworks import art_settings, flat, squirrel
+from orbiflow.drawing import PALETTES
+from orbiflow.studio.silhouette_file import read_input, silhouette_file
+from orbiflow.tiles import Over, ReadingSettings, are_told_apart, artwork
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 1.0])
+@pytest.mark.parametrize("name", sorted({*PALETTES} - {"pastel"}))  # its lines are not dark
+def test_light_ink_is_told_apart_from_dark_lines(share: float, name: str) -> None:
+    colours, inside = np.full((40, 40, 3), 0.08), np.ones((40, 40), dtype=bool)
+    colours[:, : round(40 * share)] = 0.8
+    outline = PALETTES[name].outline
+    # an eye on a black icon is not enough; lines that are light themselves are
+    assert are_told_apart(colours, inside, outline) == (share > 0.25)
+    assert are_told_apart(colours, inside, "#ffffff") == (share < 0.75)
+
+
+@pytest.mark.parametrize(
+    ("colour", "palette", "is_said"),
+    [("#101010", "delft", True), ("#c0a040", "delft", False), ("#101010", "delft-light", False)],
+)
+def test_a_dark_picture_that_is_asked_for_is_laid_and_said(
+    colour: str, palette: str, is_said: bool
+) -> None:
+    tile = squirrel("IH4")
+    chosen = palette if palette in PALETTES else "1d4e79,f4ecdc,outline=ffffff"
+    made = artwork(tile, art_settings(palette=chosen), Over(flat(tile, colour)))
+    assert made.pictures[0] is not None
+    assert any("told apart" in note for note in made.notes) == is_said
+
+
+@pytest.mark.parametrize(("ink", "is_told"), [((16, 16, 16), False), ((60, 140, 90), True)])
+def test_the_studio_begins_without_the_picture_of_a_black_icon(
+    tmp_path: Path, ink: tuple[int, int, int], is_told: bool
+) -> None:
+    image = Image.new("RGB", (300, 220), "white")
+    pen = ImageDraw.Draw(image)
+    pen.ellipse((40, 30, 260, 190), fill=ink)
+    pen.ellipse((90, 60, 112, 82), fill="white")
+    image.save(tmp_path / "input.png")
+    read_input(tmp_path, "icon.png", ReadingSettings())
+    shown = json.loads(silhouette_file(tmp_path).read_text())["shown"]
+    assert shown["told_apart"] == is_told
+    assert shown["coloured"]

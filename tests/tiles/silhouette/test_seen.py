@@ -1,0 +1,83 @@
+"""What was seen of a picture covers the outline, whatever the level that parts shape and ground."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.errors import InputFileError
+from orbiflow.tiles import Target, polygons_in
+
+STEPS = 10
+"""Levels of the pictures: thresholds are among them, so that many pixels lie on one."""
+
+
+@st.composite
+def pictures(draw: st.DrawFn) -> np.ndarray:
+    """Draw a small picture of dark blobs on a light ground in few levels."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    blobs = gaussian_filter(rng.random((30, 36)), draw(st.floats(0.8, 4)))
+    low, high = blobs.min(), blobs.max()
+    return np.pad(np.round((blobs - low) / (high - low) * STEPS) / STEPS, 2, constant_values=1.0)
+
+
+def filled(target: Target) -> BaseGeometry:
+    assert target.seen is not None
+    return shapely.union_all([shapely.Polygon(p.exterior) for p in polygons_in(target.seen)])
+
+
+@settings(max_examples=80)
+@given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.0, 0.02, 0.06]))
+def test_what_was_seen_covers_the_outline(
+    picture: np.ndarray, threshold: int, thicken: float
+) -> None:
+    try:
+        target = Target.from_mask(picture, threshold=threshold / STEPS, invert=False)
+    except InputFileError:  # specks alone
+        assume(False)
+        raise
+    target = target.thickened(thicken)
+    outline = shapely.Polygon(target.outline)
+    assert target.seen is not None
+    assert target.seen.is_valid
+    assert filled(target).buffer(0.5).covers(outline)  # but for what simplifies each
+    assert filled(target).intersection(outline).area > 0.98 * outline.area
+
+
+@settings(max_examples=40)
+@given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.02, 0.05]))
+def test_smoothing_keeps_the_shape_that_was_read(
+    picture: np.ndarray, threshold: int, share: float
+) -> None:
+    try:
+        target = Target.from_mask(picture, threshold=threshold / STEPS, invert=False)
+    except InputFileError:
+        assume(False)
+        raise
+    outline, width = shapely.Polygon(target.outline), share * np.ptp(target.outline, axis=0).max()
+    kept = max(polygons_in(outline.buffer(-width / 2)), key=lambda part: part.area, default=None)
+    assume(kept is not None and kept.area > 0.5 * outline.area)
+    smooth = shapely.Polygon(target.smoothed(share).outline)
+    assert smooth.buffer(width / 10).covers(kept)
+
+
+def test_smoothing_what_broken_lines_enclose_keeps_it() -> None:
+    # an outline drawn with gaps: only its lines were seen, and the silhouette is what they enclose
+    turns = np.radians(np.arange(360))
+    ring = np.stack([200 + 150 * np.cos(turns), 200 + 100 * np.sin(turns)], axis=1)
+    lines = "".join(
+        f"M{'L'.join(f'{x:.2f} {y:.2f}' for x, y in ring[start : start + 118])}"
+        for start in (0, 120, 240)
+    )
+    svg = (
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 400">'
+        f'<path d="{lines}" fill="none" stroke="black" stroke-width="4"/></svg>'
+    )
+    target = Target.from_bytes(svg.encode(), "a.svg")
+    assert target.area == pytest.approx(np.pi * 150 * 100, rel=0.06)
+    assert target.smoothed(0.03).area == pytest.approx(target.area, rel=0.02)
