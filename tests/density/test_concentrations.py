@@ -115,8 +115,10 @@ def test_rows_of_many_coordinates_have_a_von_mises_fisher_density(width: int) ->
     found = fit.parameters()["concentration"]
     length = float(np.linalg.norm(rows.mean(axis=0)))
     assert exact(found.value, width)[1] == pytest.approx(length, rel=1e-9)
-    assert found.low is not None and found.high is not None
-    assert found.low < 1 / 0.02**2 < found.high and found.low < found.value < found.high
+    assert found.low is not None
+    assert found.high is not None
+    assert found.low < 1 / 0.02**2 < found.high
+    assert found.low < found.value < found.high
 
 
 def test_too_many_coordinates_are_refused_as_such() -> None:

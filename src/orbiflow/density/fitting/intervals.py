@@ -183,8 +183,8 @@ def concentration(resultant: float, width: int, below: float | None = None) -> f
     short = 1 - resultant if below is None else below
     if short <= ((width - 1) / (2 * MAX_CONCENTRATION) if below is None else SAME):
         return None
-    given = (torch.tensor(one, dtype=torch.float64) for one in (resultant, short))
-    return float(concentration_for(*given, width))
+    mean, apart = torch.tensor([resultant, short], dtype=torch.float64)
+    return float(concentration_for(mean, apart, width))
 
 
 def _resultant_cdf(resultant: float, kappa: float, rows: float, width: int) -> float:

@@ -63,9 +63,10 @@ def moments(kappa: Tensor, width: int) -> Moments:
     rest = (1 / (2 * root) + high / root**2 * slope / series) / root
     across, below = 1 / (root + high) - rest, (high + high**2 / (root + kappa)) / (root + high)
     below = below + kappa * rest
-    for own in torch.arange(high, order, -1).tolist():
-        lower = 1 / (2 * own + kappa**2 * across)
-        across, below = lower, (2 * own - kappa * below) * lower
+    for step in range(steps):
+        twice = 2 * (high - step)
+        lower = 1 / (twice + kappa**2 * across)
+        across, below = lower, (twice - kappa * below) * lower
         logs = logs - across.log()
     mean = kappa * across
     wide = kappa > SERIES_CONCENTRATION * width
