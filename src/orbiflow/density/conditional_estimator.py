@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import described, is_a
+from orbiflow.arguments import as_whole, described, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.covariates import (
     ConditionalDensity,
@@ -21,8 +21,8 @@ from orbiflow.density.covariates import (
     check_complete,
     fit_conditional,
 )
-from orbiflow.density.data import alongside, as_data, as_numbers, cells_of, columns_of
-from orbiflow.density.estimator import DensityEstimator, RandomState
+from orbiflow.density.data import alongside, as_data, as_numbers, cells_of, columns_of, frame_of
+from orbiflow.density.estimator import DensityEstimator, RandomState, seed_of
 from orbiflow.density.fitting import Progress, mean_of, weighed
 from orbiflow.density.inference import Trend, axes_named, trend_of
 from orbiflow.density.spaces import MixedTorus, Space, Torus, check_measure
@@ -152,10 +152,31 @@ class ConditionalEstimator(DensityEstimator):
     def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, n_samples: int = 1, given: Any = None, random_state: RandomState = None
     ) -> Any:
-        """New data (n_samples, k), where the covariates are as `given`: one value for each name."""
+        """New data (n_samples, k), where the covariates are as `given`.
+
+        Args:
+            n_samples: How many.
+            given: One value for each name, or as many rows as samples, of which each has one: a data
+                frame, columns by name, or an array. A single value among columns is that of all rows.
+            random_state: As for `DensityEstimator.sample`.
+
+        Raises:
+            OrbiflowError: As `score_samples`, and for another number of rows.
+        """
         if given is None:
             return super().sample(n_samples, random_state)
-        return self.at(given).sample(n_samples, random_state)
+        own, count = self._conditional(), as_whole(n_samples, "n_samples", 1)
+        cells = _rows_given(given, own.covariates.names, count)
+        x = self._x(cells, len(next(iter(cells.values()))))
+        generator = torch.Generator().manual_seed(seed_of(random_state))
+        points = torch.empty((count, own.space.chart_dim), dtype=torch.float64)
+        _, first, number = np.unique(x.numpy(), axis=0, return_index=True, return_inverse=True)
+        places = np.broadcast_to(number.ravel(), count)
+        for k, row in enumerate(first.tolist()):
+            those = np.flatnonzero(places == k)
+            points[those] = own.at(x[row]).sample((len(those),), generator).double()
+        rows = own.space.from_chart(points)
+        return frame_of(rows, self._column_names(), getattr(self, "output_", "default"))
 
     def at(self, given: Mapping[str, Any] | None = None, /, **values: Any) -> DensityEstimator:
         """The density where covariates have some values: a `DensityEstimator` that is fitted.
@@ -331,6 +352,22 @@ def columns_given(given: Any, names: Sequence[str] | None = None) -> dict[str, V
     if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
         raise OrbiflowError(f"given: the columns must be of one length, got {sorted(shapes)}")
     return found
+
+
+def _rows_given(given: Any, names: Sequence[str], count: int) -> dict[str, Values]:
+    """Return covariates as columns of one cell or of `count`; a single value becomes a column."""
+    if is_a(given, Mapping):
+        rows = [np.atleast_1d(np.asarray(cells)) for cells in given.values()]
+        most = max(map(len, rows), default=0)
+        rows = [np.repeat(cells, most) if len(cells) == 1 else cells for cells in rows]
+        given = dict(zip(given, rows, strict=True))
+    cells = columns_given(given, names)
+    found = len(next(iter(cells.values())))
+    if found not in (1, count):
+        raise OrbiflowError(
+            f"given has {found} rows, and n_samples is {count}: give one row, or one for each sample"
+        )
+    return cells
 
 
 def _features(covariates: Covariates, cells: Mapping[str, Values], rows: int) -> torch.Tensor:

@@ -103,8 +103,9 @@ def is_joint_possible(space: Space, number: Tensor) -> bool:
 def joint_torus(space: Torus, covariates: int) -> Torus:
     """Return the torus of a torus' columns and as many circles more."""
     if isinstance(space, MixedTorus):
-        return MixedTorus([*space.axes, *[None] * covariates], unit=str(space.unit))
-    return Torus(space.dim + covariates, unit=str(space.unit))
+        axes = [*space.axes, *[None] * covariates]
+        return MixedTorus(axes, unit=str(space.unit), from_zero=space.from_zero)
+    return Torus(space.dim + covariates, unit=str(space.unit), from_zero=space.from_zero)
 
 
 def covariate_turns(x: Tensor, number: Tensor) -> Tensor:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import torch
-from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.density.fitting.rows import Rows, gain_of
@@ -19,6 +18,7 @@ from orbiflow.density.models import (
     VonMisesNetwork,
     at_scales,
     chained,
+    concentration_for,
     log_conditional,
     seen_angles,
 )
@@ -274,20 +274,15 @@ def _local(center: Tensor) -> Tensor:
 def concentration(resultant: Tensor, dim: int = 1) -> Tensor:
     """Return kappa of von Mises-Fisher densities on S^dim that have these mean cosines.
 
-    Banerjee et al. (2005), then Newton. On the circle the mean cosine is I1(kappa) / I0(kappa), on the
-    sphere coth(kappa) - 1 / kappa.
+    On the circle, where it is asked for at every step of a fit, by torch's own Bessel functions.
     """
     r = resultant.clamp(1e-6, 1 - 1e-8)
-    kappa = r * (dim + 1 - r**2) / (1 - r**2)
+    if dim > 1:
+        return concentration_for(r, 1 - r, dim + 1).clamp(1e-6, 1e8)
+    kappa = r * (2 - r**2) / (1 - r**2)
     for _ in range(4):
-        if dim == 1:
-            ratio = special.i1e(kappa) / special.i0e(kappa)
-        elif dim == 2:
-            ratio = 1 / torch.tanh(kappa) - 1 / kappa
-        else:
-            upper, lower = (ive((dim + k) / 2, kappa.numpy()) for k in (1, -1))
-            ratio = torch.as_tensor(upper / lower)
-        kappa = (kappa - (ratio - r) / (1 - ratio**2 - dim * ratio / kappa)).clamp(1e-6, 1e8)
+        ratio = special.i1e(kappa) / special.i0e(kappa)
+        kappa = (kappa - (ratio - r) / (1 - ratio**2 - ratio / kappa)).clamp(1e-6, 1e8)
     return kappa
 
 

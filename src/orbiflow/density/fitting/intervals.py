@@ -15,6 +15,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.fitting.maximum import Local
 from orbiflow.density.fitting.parameters import Parameter
+from orbiflow.density.models import concentration_for, moments
 from orbiflow.typed_torch import linalg, listed
 
 LEVEL = 0.95
@@ -168,19 +169,6 @@ def concentration_interval(shortfall: float, rows: float, width: int) -> tuple[f
     return float(low), float(found)
 
 
-def mean_cosine(kappa: float, width: int) -> float:
-    """Return the mean resultant length of a von Mises-Fisher density of this concentration."""
-    return float(special.ive(width / 2, kappa) / special.ive(width / 2 - 1, kappa))
-
-
-def cosine_variance(kappa: float, width: int) -> float:
-    """Return the variance of the cosine, the slope of `mean_cosine`."""
-    if kappa > 1e5:
-        return (width - 1) / (2 * kappa**2)  # the difference below would lose its digits
-    mean = mean_cosine(kappa, width)
-    return 1 - mean**2 - (width - 1) * mean / kappa
-
-
 def concentration(resultant: float, width: int, below: float | None = None) -> float | None:
     """Return the likeliest concentration of a von Mises-Fisher distribution, None if it is infinite.
 
@@ -190,25 +178,19 @@ def concentration(resultant: float, width: int, below: float | None = None) -> f
     (1.159, 1.797)
     """
 
-    def excess(kappa: float) -> float:
-        return mean_cosine(kappa, width) - resultant
-
     if resultant <= 1e-12:
         return 0.0
-    if below is not None and below < 1 / MAX_CONCENTRATION:
-        return None if below < SAME else (width - 1) / (2 * below)
-    if excess(MAX_CONCENTRATION) <= 0:
+    short = 1 - resultant if below is None else below
+    if short <= ((width - 1) / (2 * MAX_CONCENTRATION) if below is None else SAME):
         return None
-    return float(optimize.brentq(excess, 1e-12, MAX_CONCENTRATION, xtol=1e-12, rtol=1e-12))
+    mean, apart = torch.tensor([resultant, short], dtype=torch.float64)
+    return float(concentration_for(mean, apart, width))
 
 
 def _resultant_cdf(resultant: float, kappa: float, rows: float, width: int) -> float:
     """Return the probability of a mean resultant length up to `resultant`, for a normal mean vector."""
-    if kappa < 1e-6:
-        mean, along, across = kappa / width, 1 / width, 1 / width
-    else:
-        mean = mean_cosine(kappa, width)
-        across, along = mean / kappa, cosine_variance(kappa, width)
+    found = moments(torch.tensor(kappa, dtype=torch.float64), width)
+    mean, along, across = float(found.mean), float(found.along), float(found.across)
     levels = (np.arange(QUANTILES) + 0.5) / QUANTILES
     first = mean + math.sqrt(along / rows) * special.ndtri(levels)
     rest = np.maximum(resultant**2 - first**2, 0.0) * rows / across

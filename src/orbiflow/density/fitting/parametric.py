@@ -23,7 +23,6 @@ from orbiflow.density.fitting.intervals import (
     MAX_CONCENTRATION,
     Writing,
     concentration_interval,
-    cosine_variance,
     direction_parameters,
     shape_parameters,
 )
@@ -39,7 +38,7 @@ from orbiflow.density.fitting.rows import (
     weighed,
     weights_note,
 )
-from orbiflow.density.models import AdaptiveKernels, Density, images_of
+from orbiflow.density.models import AdaptiveKernels, Density, images_of, moments
 from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.typed_torch import linalg
@@ -354,7 +353,8 @@ def _inverted(one: Parameter, cloud: Cloud, count: float) -> Parameter:
     length = linalg.vector_norm(cloud.mean)
     chords = cloud.weights @ ((cloud.vectors - cloud.mean / length) ** 2).sum(dim=1)
     low, high = concentration_interval(float(chords) / 2, count, cloud.width)
-    error = (count * cosine_variance(one.value, cloud.width)) ** -0.5
+    kappa = torch.tensor(one.value, dtype=torch.float64)
+    error = (count * float(moments(kappa, cloud.width).along)) ** -0.5
     return replace(one, error=error, low=low, high=high)
 
 

@@ -14,6 +14,7 @@ from .doubts import refuse_codes_beside as refuse_codes_beside
 from .fitted import FittedFigures as FittedFigures
 from .partial import conditional as conditional
 from .partial import marginal as marginal
+from .shortest import shortest_intervals as shortest_intervals
 from .textures import fractions_near as fractions_near
 from .textures import misorientations as misorientations
 from .textures import pole_density as pole_density

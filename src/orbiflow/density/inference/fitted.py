@@ -10,6 +10,7 @@ from torch import Tensor
 from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.inference.angles import axes_named
+from orbiflow.density.inference.shortest import shortest_intervals
 from orbiflow.density.inference.trends import Trend, pair_alone, trend
 from orbiflow.density.models import Density, Estimate
 from orbiflow.density.spaces import Space
@@ -36,16 +37,36 @@ class FittedFigures:
         return self.space_.from_chart(self._fitted().mode[None])[0]
 
     def cdf(self, X: ArrayLike) -> Array:
-        """The masses (N,) up to data (N, 1) of the only column, from half a turn before 0 on.
+        """The masses (N,) up to data (N, 1) of the only column, from where it begins.
 
-        A real column begins at minus infinity. Of several columns take `marginal` first.
+        A circle is cut opposite its mean direction, `mean`, wherever the data are (half a turn from 0
+        if it has none), so angles may be written in any turn; a real column begins at minus infinity.
+        Of several columns take `marginal` first.
         """
         return self._fitted().cdf(self._chart(self._checked(X))).numpy()
 
     def quantile(self, masses: ArrayLike) -> Array:
-        """The values (N,) of the only column up to which there are these masses (N,), from 0 to 1."""
+        """The values (N,) of the only column up to which there are these masses (N,), from 0 to 1.
+
+        Masses begin where those of `cdf` do: the median is 0.5. Angles are as the data of the fit: from
+        0 to a whole turn if none was negative and one beyond half a turn, otherwise from minus half a
+        turn. So a quantile may be written as less than a lower one (350, 10): for an interval ask
+        `interval`.
+        """
         points = self._fitted().icdf(as_tensor(masses, "masses").reshape(-1))
         return self.space_.from_chart(points)[:, 0]
+
+    def interval(self, mass: float) -> Array:
+        """The ends (m, 2) of the shortest interval of the only column, or intervals, that hold a mass.
+
+        Where the density in natural measure has one peak, there is one, otherwise there may be several
+        that hold it together, in order. On a circle they are arcs: each begins at an angle that is
+        written as data are (see `quantile`), and its end is more, if need be more than any data: an arc
+        through north is from 350 to 370, or from -10 to 10.
+
+        Raises `OrbiflowError` for a mass below 0.001 or above 0.999999, and for several columns.
+        """
+        return shortest_intervals(self._fitted(), mass)
 
     def entropy(self, *, measure: str = "natural") -> Estimate:
         """-E[log p] in nats with its standard error, the same every time."""

@@ -37,7 +37,8 @@ class Trend(NamedTuple):
     - `at`: Those values (n,), in the data's unit.
     - `mean`: The mean direction, or the mean of a real column, (n,).
     - `low`, `high`: The ends (n, L) of intervals of the masses `levels`. Of an angle they are
-      counted from the direction opposite to the mean, and not beyond half a turn from it.
+      counted from the direction opposite to the mean, and not beyond half a turn from it: means are
+      written as data are, and ends about them, so that 350 to 370 goes through north.
     - `log_density`: The log density (n,) of the values in natural measure: how many data speak there.
       None of covariates, which have no density.
     """

@@ -6,6 +6,8 @@ from .chains import Factor as Factor
 from .chains import VonMisesChains as VonMisesChains
 from .chains import chained as chained
 from .chains import waves as waves
+from .concentrations import concentration_for as concentration_for
+from .concentrations import moments as moments
 from .density import LEVELS as LEVELS
 from .density import Density as Density
 from .density import Pixel as Pixel

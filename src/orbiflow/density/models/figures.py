@@ -28,6 +28,34 @@ FIRST_CELLS, MOST_CELLS, MASS_ERROR = 2**11, 2**14, 1e-7
 """Cells of a line of turns at first and at most, and the error of the mass that is small enough."""
 
 
+LEAST_RESULTANT = 1e-9
+"""Mean resultant length below which a circle has no mean direction."""
+
+
+class Cumulative(NamedTuple):
+    """The masses of a density of one column, from its start on.
+
+    - `log_prob`: The density per turn at points (..., 1).
+    - `start`: Where the column starts, in turns.
+    - `ends`, `below`: Ends (N + 1,) of even cells from there on, and the masses below them.
+    """
+
+    log_prob: Callable[[Tensor], Tensor]
+    start: float
+    ends: Tensor
+    below: Tensor
+
+    def masses(self, shares: Tensor) -> Tensor:
+        """Return the masses (...,) up to turns (...,) from the start on, from 0 to 1."""
+        cell = (shares * (len(self.ends) - 1)).long().clamp(max=len(self.ends) - 2)
+        low, width = self.ends[cell], shares - self.ends[cell]
+        rest = torch.zeros_like(shares)
+        for node, weight in NODES:
+            at = low + width * (node + 1) / 2
+            rest += weight * width / 2 * self.log_prob(at[..., None] + self.start).exp()
+        return (self.below[cell] + rest).clamp(0, 1)
+
+
 class Estimate(NamedTuple):
     """A number with its standard error, both in nats."""
 
@@ -137,23 +165,13 @@ class WithFigures(Distribution):
     def cdf(self, value: Tensor) -> Tensor:
         """Return the mass (...,) from the start of the only column up to points (..., 1) of the chart.
 
-        An angle starts half a turn before 0, as data do; a real column at minus infinity. The error is
-        below 1e-7, unless bumps are narrower than 1e-4 turns.
+        A circle is cut opposite its mean direction (`mean`); a real column begins at minus infinity.
+        The error is below 1e-7, unless bumps are narrower than 1e-4 turns.
 
         Raises `OrbiflowError` if there are several columns: take a marginal density.
         """
-        points = self._only(value)
-        return self._masses_below((points[..., 0].double() - self._start) % 1, *self._table())
-
-    def _masses_below(self, shares: Tensor, ends: Tensor, below: Tensor) -> Tensor:
-        """Return the masses (...,) up to turns from the start on, by the table of cells."""
-        cell = (shares * (len(ends) - 1)).long().clamp(max=len(ends) - 2)
-        low, width = ends[cell], shares - ends[cell]
-        rest = torch.zeros_like(shares)
-        for node, weight in NODES:
-            at = low + width * (node + 1) / 2
-            rest += weight * width / 2 * self.log_prob(at[..., None] + self._start).exp()
-        return (below[cell] + rest).clamp(0, 1)
+        points, own = self._only(value), self.cumulative()
+        return own.masses((points[..., 0].double() - own.start) % 1)
 
     @torch.no_grad()
     def icdf(self, value: Tensor) -> Tensor:
@@ -164,19 +182,14 @@ class WithFigures(Distribution):
         masses = as_tensor(value, "masses").double()
         if not bool(((masses >= 0) & (masses <= 1)).all()):
             raise OrbiflowError("masses are from 0 to 1")
-        ends, below = self._table()
-        high_end = torch.searchsorted(below, masses.contiguous()).clamp(1, len(ends) - 1)
-        low, high = ends[high_end - 1].clone(), ends[high_end].clone()
+        own = self.cumulative()
+        high_end = torch.searchsorted(own.below, masses.contiguous()).clamp(1, len(own.ends) - 1)
+        low, high = own.ends[high_end - 1].clone(), own.ends[high_end].clone()
         for _ in range(40):
             middle = (low + high) / 2
-            less = self._masses_below(middle, ends, below) < masses
+            less = own.masses(middle) < masses
             low, high = torch.where(less, middle, low), torch.where(less, high, middle)
-        return (((low + high) / 2 + self._start) % 1)[..., None]
-
-    @property
-    def _start(self) -> float:
-        real = isinstance(self.space, MixedTorus) and bool(self.space.is_real[0])
-        return 0.0 if real else 0.5
+        return (((low + high) / 2 + own.start) % 1)[..., None]
 
     def _only(self, value: Any) -> Tensor:
         points = as_tensor(value, "points")
@@ -190,19 +203,34 @@ class WithFigures(Distribution):
             raise OrbiflowError(f"expected points (..., 1), got {tuple(points.shape)}")
         return points
 
-    def _table(self) -> tuple[Tensor, Tensor]:
-        """Return ends (N + 1,) of cells of turns from the start on, and the masses below them."""
+    @torch.no_grad()
+    def cumulative(self) -> Cumulative:
+        """Return the masses of the only column from its start on, by which `cdf` and `icdf` are found.
+
+        Refusals are those of `cdf`.
+        """
         self._only(torch.zeros(1))
-        cells = FIRST_CELLS
+        start, cells = self._start(), FIRST_CELLS
         while True:
             turns, weights = _nodes(cells)
-            masses = weights * self.log_prob(turns[:, None] + self._start).exp()
+            masses = weights * self.log_prob(turns[:, None] + start).exp()
             total = float(masses.sum())
             if abs(total - 1) < MASS_ERROR or cells >= MOST_CELLS:
                 sums = masses.reshape(cells, -1).sum(dim=1).cumsum(0) / total
                 ends = torch.linspace(0, 1, cells + 1, dtype=torch.float64)
-                return ends, torch.cat([sums.new_zeros(1), sums])
+                return Cumulative(self.log_prob, start, ends, torch.cat([sums.new_zeros(1), sums]))
             cells *= 8
+
+    def _start(self) -> float:
+        """Return the turn at which the only column starts."""
+        if isinstance(self.space, MixedTorus) and bool(self.space.is_real[0]):
+            return 0.0
+        turns, weights = _nodes(FIRST_CELLS)
+        masses, angle = weights * self.log_prob(turns[:, None]).exp(), 2 * math.pi * turns
+        east, north = float(masses @ angle.cos()), float(masses @ angle.sin())
+        if math.hypot(east, north) < LEAST_RESULTANT:
+            return 0.5  # no direction is opposite to a mean that there is not
+        return (math.atan2(north, east) / (2 * math.pi) + 0.5) % 1
 
     def entropy(
         self, count: int = DRAWS, *, measure: str = CHART, generator: torch.Generator | None = None

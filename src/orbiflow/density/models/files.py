@@ -105,7 +105,7 @@ def density_parts(
             f'class {type(density).__name__}(Density, kind="...")'
         )
     own = density.space
-    if space is not None and (space.name, space.settings()) != (own.name, own.settings()):
+    if space is not None and space != own:
         raise OrbiflowError(
             f"the {name} is on {own!r}, the density on {space!r}: make both on one space"
         )

@@ -23,8 +23,9 @@ from orbiflow.typed_torch import linalg
 NODES = 200
 """Points of the contour on one side of the real axis; half as many change no digit."""
 
-LEAST_LOG, REACH = 45.0, 400
-"""By how much the integrand has fallen, in nats, where the contour ends, and ends that are tried."""
+LEAST_LOG, MOST_GROWTH, REACH = 45.0, 1e-9, 400
+"""By how much the integrand has fallen, in nats, where the contour ends, by how much it may have grown
+before, and ends that are tried."""
 
 MOST_TRIES = 10_000
 """Rounds of rejection after which a sampler gives up, which none has reached."""
@@ -87,20 +88,22 @@ def _saddle(values: Array, vector: Array) -> tuple[float, float]:
 def _parabola(gaps: Array, vector: Array, distance: float) -> tuple[float, float]:
     """Return how far the focus is from the saddle point, and where the contour ends.
 
-    About the highest eigenvalue the integrand falls fastest, unless a component of a at a lower one
-    lifts it before it has fallen far enough: then the focus is the lowest of these, and no term grows.
+    About the highest eigenvalue the integrand falls fastest, unless many lower eigenvalues, or
+    components of a at them, lift it before it has fallen far enough: then the focus is the nearest of
+    these for which it does not grow.
     """
-    lower = (vector != 0) & (gaps > 0)
-    if not lower.any():
-        return distance, math.sqrt(LEAST_LOG / distance)
-    middle, squares = gaps[lower] + distance, vector[lower] ** 2 / 4
-    back = np.linspace(0.0, 0.9 * float(middle.min()), REACH)[:, None]
-    falls = back[:, 0] - (squares * (1 / (middle - back) - 1 / middle)).sum(axis=1)
-    enough = np.flatnonzero(falls >= LEAST_LOG)
-    if len(enough):
-        return distance, math.sqrt(float(back[enough[0], 0]) / distance)
-    focus = float(middle.max())
-    return focus, math.sqrt(LEAST_LOG / focus)
+    middle, squares = gaps + distance, vector**2 / 4
+    back = np.linspace(0.0, 2 * LEAST_LOG, REACH)[:, None]
+    focus, end = distance, LEAST_LOG
+    for focus in np.unique(middle).tolist():
+        away = -back + 2j * np.sqrt(focus * back)
+        at = middle + away
+        logs = away[:, 0] - (np.log(at / middle) / 2 + squares * away / (at * middle)).sum(axis=1)
+        enough = np.flatnonzero(logs.real <= -LEAST_LOG)
+        end = float(back[enough[0], 0]) if len(enough) else LEAST_LOG
+        if len(enough) and logs.real[: enough[0]].max() < MOST_GROWTH:
+            break
+    return focus, math.sqrt(end / focus)
 
 
 def images_of(space: Space, vector: Tensor | None = None) -> int:

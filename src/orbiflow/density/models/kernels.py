@@ -9,18 +9,17 @@ from typing import Any, Self
 
 import numpy as np
 import torch
-from scipy.special import ive
 from torch import Tensor
-from torch.autograd import Function
 
 from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
+from orbiflow.density.models.concentrations import moments
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted, in_order
 from orbiflow.density.models.rotation_kernels import RotationKernels
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
 from orbiflow.density.spaces import CHART, RotationSpace, Space, by_sphere
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import applied, fft, special
+from orbiflow.typed_torch import fft, special
 
 MOST_KERNELS = 1_000_000
 """The most kernels that a file may hold."""
@@ -31,9 +30,6 @@ BLOCK_ENTRIES = 250_000
 MAX_CONCENTRATION = 1e16
 """The largest concentration whose kernels keep seven digits: a deviation of 1e-8 radians, 6 cm on the
 earth."""
-
-ASYMPTOTIC_CONCENTRATION = 1e8
-"""Concentration from which Bessel functions are their asymptotic series."""
 
 
 class AdaptiveKernels(Density, kind="kernels"):
@@ -223,7 +219,7 @@ def kernel_peaks(space: Space, kappa: Tensor) -> Tensor:
         own = zip(space.parts, torch.split(kappa, widths, dim=1), strict=True)
         return torch.stack([kernel_peaks(part, some) for part, some in own]).sum(dim=0)
     if space.is_round:
-        return _round_peaks(kappa[:, 0], space.dim)
+        return -moments(kappa[:, 0], space.dim + 1).log_mass
     return -(special.i0e(kappa) * space.sides.to(kappa)).log().sum(dim=1)
 
 
@@ -241,43 +237,6 @@ def drawn_about(space: Space, centers: Tensor, kappa: Tensor, rng: np.random.Gen
     return space.project(centers + space.from_turns(angle / (2 * math.pi)))
 
 
-def _round_peaks(kappa: Tensor, dim: int) -> Tensor:
-    """Return logarithms of the largest values of von Mises-Fisher kernels on S^dim, per its area."""
-    if dim != 2:
-        order = (dim - 1) / 2
-        return order * kappa.log() - (order + 1) * math.log(2 * math.pi) - _log_ive(order, kappa)
-    return (kappa / (2 * math.pi)).log() - (-torch.expm1(-2 * kappa)).log()
-
-
-def _log_ive(order: float, kappa: Tensor) -> Tensor:
-    """Return log I(kappa) - kappa of a modified Bessel function, which SciPy has up to 1e9 only."""
-    first = (1 - 4 * order**2) / (8 * kappa)  # DLMF 10.40.1
-    large = torch.log1p(first * (1 + (9 - 4 * order**2) / (16 * kappa)))
-    large -= (2 * math.pi * kappa).log() / 2
-    small = applied(_LogIve, order, kappa.clamp_max(ASYMPTOTIC_CONCENTRATION))
-    return torch.where(kappa < ASYMPTOTIC_CONCENTRATION, small, large)
-
-
-class _LogIve(Function):
-    """SciPy's log I(kappa) - kappa of some order, with its derivative."""
-
-    @staticmethod
-    def forward(ctx: Any, order: float, kappa: Tensor) -> Tensor:
-        ctx.order = order
-        ctx.save_for_backward(kappa)
-        return _ive(order, kappa).log()
-
-    @staticmethod
-    def backward(ctx: Any, *grads: Tensor) -> tuple[None, Tensor]:
-        (kappa,) = ctx.saved_tensors
-        ratio = _ive(ctx.order + 1, kappa) / _ive(ctx.order, kappa)
-        return None, grads[0] * (ratio + ctx.order / kappa - 1)  # DLMF 10.29.2
-
-
-def _ive(order: float, kappa: Tensor) -> Tensor:
-    return torch.as_tensor(ive(order, kappa.detach().double().cpu().numpy())).to(kappa)
-
-
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:
     """Return log kernels as linear functions of the space's `features`: rows (N, m), offsets (N,).
 
@@ -291,8 +250,7 @@ def _von_mises_fisher(centers: Array, kappa: Array, rng: np.random.Generator) ->
     """Return one draw (N, m) about each of `centers` (Wood, Simulation of the von Mises Fisher
     distribution, 1994; closed form on the sphere)."""
     if centers.shape[1] == 3:
-        u = rng.uniform(size=len(centers))
-        below = -np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
+        below = -np.log1p(rng.uniform(size=len(centers)) * np.expm1(-2 * kappa)) / kappa
     else:
         below = _wood(kappa, centers.shape[1] - 1, rng)
     across = rng.normal(size=centers.shape)

@@ -211,7 +211,8 @@ def _along_covariate(
         at = np.arange(float(len(values))) if column.words else values
         trends[word] = inference.trend_of(densities(), axis, at, levels=settings.levels)
     own = torus.axes[axis] if isinstance(torus, MixedTorus) else None
-    space = MixedTorus([own, (0.0, 1.0)], unit=str(torus.unit))
+    kept = [0] if axis in torus.from_zero else []
+    space = MixedTorus([own, (0.0, 1.0)], unit=str(torus.unit), from_zero=kept)
     return _Drawn(trends, (names[axis], along), space, column.words, beside)
 
 

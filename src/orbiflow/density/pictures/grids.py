@@ -93,9 +93,7 @@ def flat_data(density: Density, axes: tuple[int, ...] | None = None) -> dict[str
 
 def _drawn(space: Space, axes: tuple[int, ...] | None) -> Space:
     """Return the space of the angles that are drawn."""
-    if axes is None or not space.is_torus:
-        return space
-    return type(space)(**{**space.settings(), "dim": len(axes)})
+    return space if axes is None or not space.is_torus else space.of_axes(axes)
 
 
 def _middles(count: int) -> Tensor:

@@ -28,6 +28,16 @@ def whole_turn(unit: str) -> float:
     return TURN[as_choice(unit, tuple(TURN), "unit")]
 
 
+def from_zero(data: Array, period: float) -> list[int]:
+    """Return the numbers of columns (N, d) of angles that are written from 0 to a whole turn.
+
+    These are those in which nothing is negative and something is beyond half a turn.
+    """
+    with np.errstate(invalid="ignore"):
+        least, most = (end(data, axis=0, initial=0.0) for end in (np.fmin.reduce, np.fmax.reduce))
+    return np.flatnonzero((least >= 0) & (most > period / 2)).tolist()
+
+
 @lru_cache(maxsize=16)
 def _lattice_group(dim: int) -> CrystallographicGroup:
     return CrystallographicGroup.generate(np.eye(dim), name="p1")
@@ -58,6 +68,8 @@ class Torus(_AngleSpace):
     Args:
         dim: Number of angles, 1 to 64.
         unit: Unit of the data, "radians", "degrees" or "turns". Angles may be any real numbers.
+        from_zero: Numbers from 0 of the angles that are written from 0 to a whole turn; all others are
+            from minus half a turn. Spaces that differ in this alone are equal.
 
     >>> space = Torus(2, unit="degrees")
     >>> space.to_chart([[90.0, -90.0]]).tolist()
@@ -66,16 +78,20 @@ class Torus(_AngleSpace):
 
     name = "torus"
 
-    def __init__(self, dim: int = 2, *, unit: str = "radians") -> None:
+    def __init__(
+        self, dim: int = 2, *, unit: str = "radians", from_zero: Sequence[int] = ()
+    ) -> None:
         dim = as_whole(dim, "dim", 1, MAX_DIM)
         super().__init__(unit=unit)
+        numbers = {as_whole(axis, "from_zero", 0, dim - 1) for axis in from_zero}
+        self.from_zero = tuple(sorted(numbers))
         self.group = named_group("torus") if dim == 2 else _lattice_group(dim)
         self.columns = tuple(f"angle{k + 1}" for k in range(dim))
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del seed
-        return cls(data.shape[1], unit=unit)
+        return cls(data.shape[1], unit=unit, from_zero=from_zero(data, whole_turn(unit)))
 
     @property
     def volume(self) -> float:
@@ -97,8 +113,7 @@ class Torus(_AngleSpace):
 
     def first_turn(self, axis: int) -> float:
         """Return the turn at which a column of the data begins."""
-        del axis
-        return -0.5
+        return 0.0 if axis in self.from_zero else -0.5
 
     def even_line(self, axis: int, count: int) -> Array:
         """Return even values (count,) of a column, from its first turn on."""
@@ -109,16 +124,22 @@ class Torus(_AngleSpace):
         return 0
 
     def of_axes(self, axes: Sequence[int]) -> Torus:
-        return Torus(len(axes), unit=str(self.unit))
+        return Torus(len(axes), unit=str(self.unit), from_zero=self._from_zero_of(axes))
+
+    def _from_zero_of(self, axes: Sequence[int]) -> list[int]:
+        """Return the numbers, among some axes, of those that are written from 0."""
+        return [k for k, axis in enumerate(axes) if axis in self.from_zero]
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
         del data, points
         return gradient.numpy() / self.period
 
     def from_chart(self, points: Tensor) -> Array:
-        """Return angles (N, dim) in [-1/2, 1/2) turns."""
+        """Return angles (N, dim) in [-1/2, 1/2) turns, or [0, 1) turns of those `from_zero`."""
         x = self._checked(points).detach().double().cpu().numpy()
-        return (x - np.floor(x + 0.5)) * self.period
+        first = np.full(self.dim, -0.5)
+        first[list(self.from_zero)] = 0.0
+        return (x - np.floor(x - first)) * self.period
 
     def project(self, points: Tensor) -> Tensor:
         points = self._checked(points)
@@ -130,7 +151,8 @@ class Torus(_AngleSpace):
         return difference - difference.detach().round()
 
     def settings(self) -> dict[str, Any]:
-        return {"dim": self.dim, **super().settings()}
+        own = {"from_zero": list(self.from_zero)} if self.from_zero else {}
+        return {"dim": self.dim, **super().settings(), **own}
 
 
 class KleinBottle(_AngleSpace):

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.spaces.flat import Torus
+from orbiflow.density.spaces.flat import Torus, from_zero, whole_turn
 from orbiflow.density.spaces.space import checked_table
 from orbiflow.errors import OrbiflowError
 
@@ -102,6 +102,7 @@ class MixedTorus(Torus):
         axes: For each column None, if it is an angle, its period, such as 24 of hours, or the centre
             and scale of a real one.
         unit: The unit of the angles, "radians", "degrees" or "turns".
+        from_zero: Angles that are written from 0, as in `Torus`.
 
     >>> space = MixedTorus([None, (10.0, 2.0)], unit="degrees")
     >>> space.to_chart([[90.0, 12.0]]).numpy().round(4).tolist()
@@ -112,9 +113,11 @@ class MixedTorus(Torus):
 
     name = "mixed"
 
-    def __init__(self, axes: Sequence[Axis], *, unit: str = "radians") -> None:
+    def __init__(
+        self, axes: Sequence[Axis], *, unit: str = "radians", from_zero: Sequence[int] = ()
+    ) -> None:
         self.axes = tuple(map(_checked_axis, axes))
-        super().__init__(len(self.axes), unit=unit)
+        super().__init__(len(self.axes), unit=unit, from_zero=from_zero)
         lines = [own if isinstance(own, Line) else None for own in self.axes]
         self.lines = tuple(lines)
         self.is_real = np.array([own is not None for own in lines])
@@ -142,7 +145,8 @@ class MixedTorus(Torus):
             own = periods.get(k)
             return Line.of(data[:, k], names[k]) if k in periods and own is None else own
 
-        return cls([axis(k) for k in range(data.shape[1])], unit=unit)
+        angles = [k for k in from_zero(data, whole_turn(unit)) if k not in periods]
+        return cls([axis(k) for k in range(data.shape[1])], unit=unit, from_zero=angles)
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -193,7 +197,7 @@ class MixedTorus(Torus):
         return turns_at(line.share(values))
 
     def from_chart(self, points: Tensor) -> Array:
-        """Return angles in [-1/2, 1/2) turns, and other columns in their own units: (N, dim).
+        """Return angles as `Torus` does, and other columns in their own units: (N, dim).
 
         Those of a period of their own are from 0 up to it.
         """
@@ -232,7 +236,9 @@ class MixedTorus(Torus):
 
     def of_axes(self, axes: Sequence[int]) -> Torus:
         kept = [self.axes[axis] for axis in axes]
-        return MixedTorus(kept, unit=str(self.unit)) if any(kept) else super().of_axes(axes)
+        if not any(kept):
+            return super().of_axes(axes)
+        return MixedTorus(kept, unit=str(self.unit), from_zero=self._from_zero_of(axes))
 
     def step_angle(self, step: float) -> float:
         lines = enumerate(self.lines)
@@ -241,4 +247,5 @@ class MixedTorus(Torus):
 
     def settings(self) -> dict[str, Any]:
         axes = [list(own) if isinstance(own, Line) else own for own in self.axes]
-        return {"axes": axes, "unit": self.unit}
+        own = {"from_zero": list(self.from_zero)} if self.from_zero else {}
+        return {"axes": axes, "unit": self.unit, **own}

@@ -370,12 +370,16 @@ class Space(ABC):
         return shares if self.has_square else shares @ cast_like(self.group.lattice, shares).T
 
     def __eq__(self, other: object) -> bool:
-        """Return whether both have the same class, settings and group."""
+        """Return whether both have the same class, settings and group.
+
+        From where angles are written makes no other space.
+        """
         if not isinstance(other, Space):
             return NotImplemented
+        here, there = ({**own.settings(), "from_zero": None} for own in (self, other))
         return (
             type(other) is type(self)
-            and other.settings() == self.settings()
+            and here == there
             and (not self.has_chart or other.group == self.group)
         )
 

@@ -137,7 +137,13 @@ class Hypersphere(UnitVectorSpace):
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del unit, seed
-        return cls(data.shape[1] - 1)
+        width = data.shape[1]
+        if not 2 <= width <= MAX_DIM + 1:
+            raise OrbiflowError(
+                f"unit vectors on the {cls.name} have 2 to {MAX_DIM + 1} coordinates, not {width}: "
+                "project them to fewer coordinates first"
+            )
+        return cls(width - 1)
 
     def settings(self) -> dict[str, Any]:
         return {"dim": self.dim}
