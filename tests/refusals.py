@@ -1,4 +1,4 @@
-"""Errors and warnings by their class and by what they are about, whatever the words of their sentences."""
+"""Errors and warnings by their class and by what they are about, whatever the words around it."""
 
 from __future__ import annotations
 
