@@ -38,7 +38,7 @@ GROUPS = {
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Run the command line: exit status 0, 1 (nothing found), 2 (a mistake) or 130 (Ctrl-C, SIGTERM)."""
+    """Run the command line: exit status 0, 1 (nothing found), 2 (a mistake) or 130 (stopped)."""
     sys.exit(run(sys.argv[1:] if words is None else words))
 
 
