@@ -79,8 +79,8 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
     are not sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles
     that connect two points of the outline through the inside are halved, so that every triangle can
     follow when the outline moves. Next to the outline inner points are `spacing` apart, by default the
-    mean length of a side. Raises `OrbiflowError` for a ring that crosses itself, has a point twice or is
-    too thin.
+    mean length of a side. Raises `OrbiflowError` for a ring that crosses itself, has a point
+    twice or is too thin.
     """
     polygon, n = shapely.Polygon(ring), len(ring)
     if not polygon.is_valid or not polygon.area > 0 or len(np.unique(ring, axis=0)) < n:
