@@ -96,6 +96,7 @@ interface FigureView {
   silhouette_track: Point[];
   tile_track: Point[];
   map: TileMap | null;
+  no_map?: string;
   covered: [Point, Point] | null;
   y_down: boolean;
   place?: Matrix;

@@ -1,4 +1,4 @@
-"""Ctrl-C during a run: what was found is kept, and no process stays behind."""
+"""Ctrl-C or SIGTERM during a run: what was found is kept, and no process stays behind."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import LAUNCH
-from orbiflow.cli.terminal import stopped_by_interrupt
+from orbiflow.cli.terminal import stopped_by_signals
 from orbiflow.runtime import Cancel
 
 BOOT = [[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]
+STOPS = [signal.SIGINT, signal.SIGTERM]
 NAMES = ["IH7", "IH1", "IH2", "IH4"]
 TESTS = str(Path(__file__).parents[1])
 
@@ -72,12 +73,13 @@ def wait_for(process: subprocess.Popen[str], text: str) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize("whole_group", [False, True], ids=["to the process", "to the group"])
-def test_what_was_finished_is_written(whole_group: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("stop", STOPS)
+def test_what_was_finished_is_written(whole_group: bool, stop: int, tmp_path: Path) -> None:
     out = tmp_path / "out"
     with running(tmp_path, before=FIRST_IS_SHORT) as process:
         wait_for(process, "IH1: tile found")
         # a terminal sends Ctrl-C to the whole foreground group, workers included
-        (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)
+        (os.killpg if whole_group else os.kill)(process.pid, stop)
         # returns once the last process that holds the pipes has ended
         rest, errors = process.communicate()
     assert "Traceback" not in errors, errors
@@ -102,27 +104,29 @@ def test_a_second_one_ends_at_once(tmp_path: Path) -> None:
     assert errors == "interrupted\n"
 
 
-def test_the_token_of_ctrl_c() -> None:
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+@pytest.mark.parametrize("stop", STOPS)
+def test_the_token_of_a_stop(stop: int) -> None:
+    usual = signal.default_int_handler if stop == signal.SIGINT else signal.SIG_DFL
+    before = signal.signal(stop, usual)
     try:
         cancel = Cancel()
-        with stopped_by_interrupt(cancel):
+        with stopped_by_signals(cancel):
             assert not cancel.cancelled
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(stop)
             assert cancel.cancelled
-            with pytest.raises(KeyboardInterrupt):
-                signal.raise_signal(signal.SIGINT)
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+            assert signal.getsignal(stop) is usual  # what a second one meets
+        assert signal.getsignal(stop) is usual
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(stop, before)
 
 
-def test_a_shell_that_ignores_ctrl_c_is_obeyed() -> None:
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+@pytest.mark.parametrize("stop", STOPS)
+def test_a_shell_that_ignores_it_is_obeyed(stop: int) -> None:
+    before = signal.signal(stop, signal.SIG_IGN)
     try:
         cancel = Cancel()
-        with stopped_by_interrupt(cancel):
-            signal.raise_signal(signal.SIGINT)
+        with stopped_by_signals(cancel):
+            signal.raise_signal(stop)
             assert not cancel.cancelled
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(stop, before)

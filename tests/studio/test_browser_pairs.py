@@ -43,6 +43,10 @@ def pair_fixture() -> EscherTile:
 @pytest.fixture(name="project")
 def project_fixture(studio: RunningStudio, pair: EscherTile, tmp_path: Path) -> dict[str, Any]:
     """A project of two pictures with a tile of both."""
+    return with_pair(studio, pair, tmp_path)
+
+
+def with_pair(studio: RunningStudio, pair: EscherTile, tmp_path: Path) -> dict[str, Any]:
     inputs = dict(zip(("input.dat", "input-2.dat"), NAMES, strict=True))
     for file, name in inputs.items():
         (tmp_path / file).write_bytes((FOLDER / name).read_bytes())
@@ -53,6 +57,22 @@ def project_fixture(studio: RunningStudio, pair: EscherTile, tmp_path: Path) -> 
     write_project(tmp_path, document, tmp_path / "both.orbiflow")
     content = (tmp_path / "both.orbiflow").read_bytes()
     return studio.client.post("projects/open", content=content).json()
+
+
+def test_long_names_stay_on_their_card(page, studio, pair: EscherTile, tmp_path: Path) -> None:
+    names = ("a gecko of the garden behind the house", "a_night_monkey_in_a_very_very_tall_tree")
+    parts = [
+        part._replace(figure=part.figure.changed(name=name))
+        for part, name in zip(pair.parts, names, strict=True)
+    ]
+    project = with_pair(studio, pair.changed(parts=tuple(parts)), tmp_path)
+    page.set_viewport_size({"width": 360, "height": 800})
+    page.goto(f"/#/p/{project['id']}")
+    stars = page.locator(".card .stars")
+    stars.wait_for()
+    assert all(name in stars.inner_text() for name in names)
+    right = "own => own.getBoundingClientRect().right"
+    assert stars.evaluate(right) <= page.locator(".card .facts").evaluate(right)
 
 
 def test_a_second_picture_is_added_seen_and_taken_away(

@@ -9,13 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 from bent_tiles import bent_tile
+from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import ItemDone, ignore
+from orbiflow.studio.silhouette_file import load_target
 from orbiflow.studio.tile_files import put_tile, tile_number
 from orbiflow.studio.words import is_outdated
-from orbiflow.tiles import EscherTile, certify, read_result
+from orbiflow.tiles import Emphasis, EscherTile, Pins, certify, read_result
 from studio.served import SQUARE, Client, done, join_tasks, new_project, studio
 
 
@@ -25,6 +29,14 @@ def project(client: Client) -> str:
     address = new_project(client)
     done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
     put_card(client, address, 900)
+    return address
+
+
+@pytest.fixture(scope="module")
+def house(client: Client) -> str:
+    """A project with a silhouette."""
+    address = new_project(client)
+    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
     return address
 
 
@@ -125,10 +137,38 @@ def test_what_is_painted_is_called_by_what_the_page_calls_it(client: Client) -> 
     own = client.get(address).json()["silhouette"]
     mask = Image.new("L", (own["width"], own["height"]))
     mask.putpixel((0, 0), 255)
-    client.put(f"{address}/pins", content=painted(mask))
-    task = make(client, address, "search", effort="fast", classes=["IH4"])
-    assert task["error"].startswith("what you painted with “Keep its shape”: ")
-    assert "pins" not in task["error"]
+    told = client.put(f"{address}/pins", content=painted(mask)).json()["refused"]
+    assert told.startswith("what you painted with “Keep its shape”: ")
+    assert "pins" not in told
+    assert "mask" not in told
+
+
+@pytest.mark.parametrize("mask", ["pins", "emphasis"])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(radius=st.sampled_from([0, 1, 2, 4, 8, 30, 120, 2000]), at=st.tuples(*[st.floats(0, 1)] * 2))
+def test_what_a_search_would_not_take_is_said_where_it_is_painted(
+    client: Client, house: str, mask: str, radius: int, at: tuple[float, float]
+) -> None:
+    own = client.get(house).json()["silhouette"]
+    size = own["width"], own["height"]
+    x, y = np.array(at) * size
+    brush = Image.new("L", size)
+    ImageDraw.Draw(brush).ellipse((x - radius, y - radius, x + radius, y + radius), fill=255)
+    refused = client.put(f"{house}/{mask}", content=painted(brush)).json()["refused"]
+    home = client.studio.store.home(house.split("/")[-1])
+    target = load_target(home)
+    read = {"pins": lambda: Pins.read([home / "pins.png"], target)}.get(
+        mask, lambda: Emphasis.read(home / "emphasis.png", target)
+    )
+    if refused:
+        with pytest.raises(OrbiflowError):
+            read()
+        body = {"operation": "search", "settings": {"effort": "fast", "classes": ["IH4"]}}
+        answer = client.post(f"{house}/tasks", json=body)
+        assert (answer.status_code, answer.json()["error"]) == (422, refused)
+    else:
+        read()
+    assert client.delete(f"{house}/{mask}").json() == {"mask": None, "refused": ""}
 
 
 def painted(shape: Any) -> bytes:

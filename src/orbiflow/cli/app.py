@@ -38,7 +38,7 @@ GROUPS = {
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Run the command line: exit status 0, 1 (nothing found), 2 (a mistake) or 130 (Ctrl-C)."""
+    """Run the command line: exit status 0, 1 (nothing found), 2 (a mistake) or 130 (stopped)."""
     sys.exit(run(sys.argv[1:] if words is None else words))
 
 
@@ -220,13 +220,13 @@ def _do(operation: Operation, given: dict[str, Any]) -> int:
     """Run an operation on the terminal and return the exit status."""
     call = operation.call(given)
 
-    from orbiflow.cli.terminal import Terminal, stopped_by_interrupt
+    from orbiflow.cli.terminal import Terminal, stopped_by_signals
 
     use_one_thread()
     with Terminal(_namer(operation)) as terminal:
         cancel = Polled(terminal.watch)
         # only what keeps a part has something to stop for
-        with stopped_by_interrupt(cancel) if operation.keeps_partial else nullcontext():
+        with stopped_by_signals(cancel) if operation.keeps_partial else nullcontext():
             return call.run(terminal, cancel).exit_status
 
 

@@ -168,23 +168,25 @@ def _writable(text: str) -> str:
 
 
 @contextmanager
-def stopped_by_interrupt(cancel: Cancel) -> Generator[None]:
-    """Let the first Ctrl-C in this block cancel a token; a second raises `KeyboardInterrupt`.
+def stopped_by_signals(cancel: Cancel) -> Generator[None]:
+    """Let the first Ctrl-C or SIGTERM in this block cancel a token; a second does as it did before.
 
     A shell may have made this process ignore Ctrl-C, as with `nohup` or `&` in a script: then it
     stays ignored.
     """
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 
-    def interrupted(_number: int, _frame: object) -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    def stopped(number: int, _frame: object) -> None:
+        signal.signal(number, usual[signal.Signals(number)])
         cancel.cancel()
 
-    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    if ignored or threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, interrupted)
+    heard = [number for number in usual if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, stopped) for number in heard}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -29,6 +29,9 @@ POLL_SECONDS = 0.05
 GRACE_SECONDS = 2.0
 """Seconds that workers have to end by themselves when they are told to stop."""
 
+STOPS = {signal.SIGINT, signal.SIGTERM}
+"""What ends a run early: a worker ignores the first, which its parent hears, and dies of the second."""
+
 
 @dataclass(frozen=True, eq=False)
 class News:
@@ -227,7 +230,7 @@ def _serve(channel: Connection, inherited: Iterable[Connection], function: Funct
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)
     for other in inherited:
         other.close()
     use_one_thread()
@@ -260,11 +263,11 @@ def _send(channel: Connection, value: Any) -> None:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Generator[None]:
-    """Let Ctrl-C wait while a process starts, until the process ignores it."""
+    """Let Ctrl-C and SIGTERM wait while a process starts, until the process handles them itself."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOPS)
     try:
         yield
     finally:

@@ -48,8 +48,8 @@ def fill(
     """Find a solid that looks like a mesh and whose copies fill space without a gap, and prove it.
 
     Writes overview.png, index.html, which turns it, and solids.json; and for each solid a folder with
-    tile.stl, sheet.png, stack.gif, page.html and solid.safetensors. Where it is stopped by Ctrl-C, it
-    writes the solids that were found by then.
+    tile.stl, sheet.png, stack.gif, page.html and solid.safetensors. Where it is stopped, by Ctrl-C or
+    SIGTERM, it writes the solids that were found by then.
 
     Args:
         mesh: The mesh: STL, OBJ, PLY, 3MF, glTF or GLB, in mm.

@@ -25,7 +25,14 @@ from orbiflow.drawing import PALETTES, Palette
 from orbiflow.errors import OrbiflowError, advice_of
 from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
-from orbiflow.studio import density_routes, project_routes, shape_routes, solid_routes
+from orbiflow.studio import (
+    density_routes,
+    mask_routes,
+    offers,
+    project_routes,
+    shape_routes,
+    solid_routes,
+)
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema, presets
@@ -78,7 +85,7 @@ def create_app(
         await asyncio.to_thread(queue.close)
         store.close()
 
-    topics = (density_routes, solid_routes, project_routes, shape_routes)
+    topics = (density_routes, solid_routes, project_routes, mask_routes, offers, shape_routes)
     every = [*routes, *(own for topic in topics for own in topic.routes)]
     pages = GZipMiddleware(StaticFiles(directory=STATIC, html=True))  # a third of their size
     kinds = (Refused, OrbiflowError, HTTPException, Exception)

@@ -33,6 +33,7 @@ from orbiflow.studio.words import (
     NAMES,
     OF_PICTURE,
     is_outdated,
+    own_names,
     plain_name,
     shown_project,
     shown_summary,
@@ -175,6 +176,8 @@ async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
     if not isinstance(operation, str) or not is_object(settings):
         raise OrbiflowError("a task has an operation and settings")
     settings = with_what_is_drawn(here, project, settings)
+    if operation == "search":
+        await run_in_threadpool(check_painted, here, project)
     if kind_of_work(operation).makes or operation == "film":
         settings = {**settings, "called": here.store.project(project)["name"]}
     return await here.submit(project, operation, settings)
@@ -206,7 +209,6 @@ async def events(request: Request, project: str, here: Studio, after: int = 0) -
     )
 
 
-PNG = b"\x89PNG\r\n\x1a\n"
 PLAIN_ENDING = re.compile("[.][a-z0-9]{1,7}")
 
 
@@ -215,7 +217,7 @@ async def upload(
     request: Request, project: str, here: Studio, name: str = "", number: int = 0
 ) -> dict[str, Any]:
     """Take a picture or drawing of any kind, as raw bytes."""
-    end = _end(here, project, number)
+    end = end_of(here, project, number)
     called = plain_name(name, "picture")
     ending = PurePosixPath(called).suffix.lower()
     ending = ending if PLAIN_ENDING.fullmatch(ending) else ".bin"
@@ -228,7 +230,7 @@ async def upload(
 async def animal(request: Request, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Take one of the bundled animals."""
     name = str((await body_object(request)).get("name"))
-    end = _end(here, project, number)
+    end = end_of(here, project, number)
     own = animal_file(name)
     file = here.store.home(project) / f"input{end}{own.suffix}"
     file.write_bytes(own.read_bytes())
@@ -258,7 +260,7 @@ async def delete_second(project: str, here: Studio) -> dict[str, Any]:
     return {}
 
 
-def _end(here: Studio, project: str, number: int) -> str:
+def end_of(here: Studio, project: str, number: int) -> str:
     """Return what the names of the files of a picture end in."""
     here.store.project(project)
     if number not in range(len(OF_PICTURE)):
@@ -293,10 +295,11 @@ async def _new_input(
     if here.store.project(project)["name"] in NAMES.values():
         here.store.change(project, name=PurePosixPath(name).stem)
     here.store.change(project)
-    return await _read_anew(here, project, number)
+    return await read_anew(here, project, number)
 
 
-async def _read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
+async def read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
+    """Read a picture anew, as it and its settings are now."""
     whole = here.store.project(project)
     own = whole["second"] if number else whole
     if own is None or own["input"] is None:
@@ -311,50 +314,10 @@ async def _read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
 @routes("PUT", "/projects/{project}/reading")
 async def reading(request: Request, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Read a picture anew, with other settings."""
-    _end(here, project, number)
+    end_of(here, project, number)
     given = {k: v for k, v in (await body_object(request)).items() if v is not None}
     here.store.change(project, "silhouette", number, reading=ReadingSettings(**given).to_json())
-    return await _read_anew(here, project, number)
-
-
-@routes("PUT", "/projects/{project}/{mask}")
-async def put_mask(
-    request: Request, project: str, mask: str, here: Studio, number: int = 0
-) -> dict[str, Any]:
-    """Take what was painted over a picture."""
-    file = _mask_file(here, project, mask, number)
-    fresh = file.with_suffix(".new")
-    await save_body(request, fresh)
-    with fresh.open("rb") as start:
-        if start.read(len(PNG)) != PNG:
-            raise OrbiflowError("what is painted must be a PNG")
-    fresh.replace(file)
-    return await _mask_changed(here, project, mask, number)
-
-
-@routes("DELETE", "/projects/{project}/{mask}")
-async def delete_mask(project: str, mask: str, here: Studio, number: int = 0) -> dict[str, Any]:
-    """Forget what was painted over a picture."""
-    _mask_file(here, project, mask, number).unlink(missing_ok=True)
-    return await _mask_changed(here, project, mask, number)
-
-
-def _mask_file(here: Studio, project: str, mask: str, number: int) -> Path:
-    if mask not in MASKS:
-        raise Refused(404, "there is nothing here; go back to the start page")
-    end = _end(here, project, number)
-    if number and here.store.project(project)["second"] is None:
-        raise Missing("there is no second picture (any more); add one first")
-    return here.store.home(project) / f"{mask}{end}.png"
-
-
-async def _mask_changed(here: Studio, project: str, mask: str, number: int) -> dict[str, Any]:
-    """Return the address of what is painted now, by which a page knows it from what others paint."""
-    here.store.change(project, "silhouette")
-    shown = shown_project(here.store, here.store.project(project), "silhouette")
-    address = (shown["second"] if number else shown)[mask]
-    task = await _read_anew(here, project, number) if mask == "mend" else {}
-    return {"mask": address, **task}
+    return await read_anew(here, project, number)
 
 
 @routes("GET", "/projects/{project}/{picture}.png")
@@ -438,6 +401,17 @@ async def live_preview(request: Request, project: str, tile: int, here: Studio) 
     if task["state"] != "done":
         raise OrbiflowError(task["error"] or "another preview has taken the place of this one")
     return task["result"]
+
+
+def check_painted(here: Studio, project: str) -> None:
+    """Refuse a search, before it begins, that what is painted over a picture would end."""
+    from orbiflow.studio.silhouette_file import why_not_painted
+
+    own = here.store.project(project)
+    for number in range(len(OF_PICTURE)):
+        for mask in MASKS:
+            if why := why_not_painted(here.store.home(project), mask, number):
+                raise OrbiflowError(own_names(why, own))
 
 
 def with_what_is_drawn(here: Studio, project: str, settings: dict[str, Any]) -> dict[str, Any]:

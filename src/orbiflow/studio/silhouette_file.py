@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -14,11 +15,13 @@ import shapely
 from PIL import Image, ImageDraw, ImageFilter
 
 from orbiflow.drawing import DEFAULT_PALETTE, palette, png_bytes
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import write_atomic, write_json
 from orbiflow.studio.words import OF_PICTURE, page_words
 from orbiflow.tiles import (
+    Emphasis,
     FileContent,
+    Pins,
     ReadingSettings,
     Target,
     are_told_apart,
@@ -94,6 +97,22 @@ def load_target(home: Path, number: int = 0) -> Target:
     stored["seen"] = shapely.from_wkt(stored.get("seen"))
     stored["size"] = stored["size"] and tuple(stored["size"])
     return Target(**{**stored, "corner": tuple(stored["corner"]), "notes": tuple(stored["notes"])})
+
+
+def why_not_painted(home: Path, mask: str, number: int = 0) -> str:
+    """Return why a search would refuse what is painted over a picture, "" if it takes it."""
+    file = home / f"{mask}{OF_PICTURE[number]}.png"
+    if mask == "mend" or not file.exists() or not silhouette_file(home, number).exists():
+        return ""
+    try:
+        target = load_target(home, number)
+        if mask == "pins":
+            Pins.read([file], target)
+        else:
+            Emphasis.read(file, target)
+    except OrbiflowError as error:
+        return page_words(str(error)).replace(f"{home}{os.sep}", "")
+    return ""
 
 
 def marks_of(home: Path) -> list[str]:

@@ -63,7 +63,9 @@ def with_drawing(
     for number, (own, part) in enumerate(zip(drawings, tile.figures, strict=False)):
         end, prefix = OF_PICTURE[number], PREFIXES[number]
         under: Path | None = files.get(f"{prefix}picture")
-        if under is not None and under.suffix not in PICTURE_ENDINGS:
+        if settings.get("world") and settings.get("format") == "html":
+            under = None  # a page to turn shows lines, but no pixels
+        elif under is not None and under.suffix not in PICTURE_ENDINGS:
             under = under.with_name(f"backdrop{end}.png")
         made = drawing_settings(own, part.figure, scratch, under, f"drawing{end}")
         if made["picture"] is not None:

@@ -93,7 +93,7 @@ def figure_view(tile: EscherTile, number: int) -> dict[str, Any]:
     - `silhouette_track`, `tile_track`: The silhouette's outline and where its points go; both are the
       figure's polygon where there is no map.
     - `map`: The triangles of the map, whose points `rest` are in the silhouette's own coordinates, or
-      None.
+      None; then `no_map` says why, if that is known.
     - `covered`: The corners, least and greatest, of what the silhouette's picture covers, in its own.
     - `y_down`: Whether y points down in these.
     - `place`: Where these lie, as a matrix for a canvas.
@@ -105,6 +105,7 @@ def figure_view(tile: EscherTile, number: int) -> dict[str, Any]:
         "silhouette_track": own,
         "tile_track": own,
         "map": None,
+        "no_map": figure.no_map,
         "covered": None,
         "y_down": figure.y_down,
         "place": [*place.linear.T.ravel().tolist(), *place.offset.tolist()],

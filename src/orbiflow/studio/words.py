@@ -50,6 +50,12 @@ IN_PLAIN_WORDS = {
     r"the image is blank, every pixel .*": (
         "the picture is empty, it has one colour all over; choose another one"
     ),
+    r"the light \(or opaque\) part of the mask does not touch the silhouette, or is only a speck; .*": (
+        "it is only a speck, or beside the animal; paint more of it on the animal, or undo it"
+    ),
+    r"the pins hold (.*) of the outline, so that nothing is left to bend; .*": (
+        r"what keeps its shape is \1 of the outline, so that nothing is left to bend; undo some of it"
+    ),
     r"averaged \d+ x \d+ pixels into one before tracing": "the picture was made smaller to read it",
     r"shape taken: the opaque part \(.*?\)": "the shape is what is not transparent",
     r" \([01][.]\d\d of 1\)": "",

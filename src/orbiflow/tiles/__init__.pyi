@@ -184,6 +184,7 @@ from .tilings.tiling import Tiling as Tiling
 from .tilings.tiling import as_tiling as as_tiling
 from .tilings.tiling import dirichlet_tile as dirichlet_tile
 from .tilings.tiling import dirichlet_tiling as dirichlet_tiling
+from .worlds.choosing import why_not_in as why_not_in
 from .write.dxf import write_dxf as write_dxf
 from .write.formats import write_scene as write_scene
 from .write.json import write_json as write_json

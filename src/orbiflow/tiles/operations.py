@@ -190,6 +190,8 @@ def art(
         overs = [own for over, figure in both for own in motifs.read_overs((over,), figure)]
     if settings.world or settings.metamorphosis:
         made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs, begin=first)
+        cancel.check()
+        on_event(Progress(0.2, "drawing"))
         content = worlds.world_file(made, settings.file_format, cancel=cancel)
     else:
         made = make.artwork(given, settings, *overs)

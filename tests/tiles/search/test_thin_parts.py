@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.errors import CertificationError
+from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
     Emphasis,
@@ -34,7 +34,7 @@ from orbiflow.tiles import (
 from orbiflow.tiles.flowing.starts import template_starts
 from orbiflow.tiles.geometry import polygons_in, resampled
 from orbiflow.tiles.likeness import fidelity_to_original
-from orbiflow.tiles.search import Goal, SearchMethod, rounded_for, why_poor
+from orbiflow.tiles.search import Goal, SearchMethod, finished_tiles, rounded_for, why_poor
 from orbiflow.tiles.search.candidates import OnProgress, StillTiles
 from orbiflow.tiles.search.likeness_search import ROUNDED_SHARES
 from orbiflow.tiles.search.search_method import Sketches
@@ -171,3 +171,15 @@ def test_what_was_said_to_matter_is_not_rounded_off() -> None:
 def test_nothing_is_left_of_a_silhouette_that_is_all_hair() -> None:
     hair = Target.from_polygon([[0, 0], [100, 0], [100, 1], [0, 1]])
     assert all(own.target is hair for _, own in LikenessSearch().goals(Goal(hair)))
+
+
+@pytest.mark.usefixtures("small_searches")
+def test_a_tile_without_a_map_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def folded(*_: object) -> None:
+        raise OrbiflowError("it would fold")
+
+    monkeypatch.setattr(finished_tiles, "map_of_bent", folded)
+    target = Target.from_polygon([[0, 0], [60, 0], [60, 20], [30, 25], [28, 70], [0, 70]])
+    settings = EscherizeSettings(effort="fast", classes=("IH1",), workers=1)
+    (tile,) = escherize(target, settings).tiles
+    assert (tile.bending, tile.no_map) == (None, "it would fold")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from awkward import NOT_SIMPLE, STRANGE
 from orbiflow.arguments import as_array
@@ -93,3 +94,10 @@ def test_strange_polygons(name: str) -> None:
 def test_what_crosses_itself_is_refused(name: str) -> None:
     with pytest.raises(OrbiflowError, match="cannot be triangulated"):
         triangulate(np.array(NOT_SIMPLE[name], dtype=np.float64))
+
+
+@given(dyadic_rings(), st.data())
+def test_a_point_twice_is_refused(ring: Array, data: st.DataObject) -> None:
+    place = data.draw(st.integers(0, len(ring) - 1))
+    with pytest.raises(OrbiflowError, match="twice"):
+        triangulate(np.insert(unit(orient(ring)), place, unit(orient(ring))[place], axis=0))

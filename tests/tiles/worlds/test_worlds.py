@@ -20,8 +20,10 @@ from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import ArtSettings, EscherTile, art
 from orbiflow.tiles.geometry import orient, signed_area
+from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.worlds import Unfolding, colours, copies, unfolded, world_of, world_scene
 from orbiflow.tiles.worlds.curved import disc_of, facing, form
+from orbiflow.tiles.worlds.outlines import with_points
 from orbiflow.tiles.worlds.sheet import TOLERANCE
 from small_pairs import pair_result
 from swirled_tiles import is_sound, swirled_tile
@@ -86,6 +88,20 @@ def test_edges_match_and_areas_add_up(tile: Any, data: Any) -> None:
 def test_cones_that_are_nearly_vertices_are_vertices() -> None:
     found = world(swirled_tile("IH2", 0, 3.1415926e-07), (2,))
     assert area(found) == pytest.approx(np.pi, rel=1e-8)
+
+
+@given(st.floats(0, 1), st.floats(0.1, 0.9))
+def test_of_vertices_near_a_cone_one_goes_there(along: float, apart: float) -> None:
+    """Two that went there would be one, and a mesh would halve the side between them without end."""
+    near = 0.2
+    side = np.array([[0.0, 0.0], [1.0, 0.0], [1.0 + apart * near, 0.0], [3.0, 0.0]])
+    ring = np.concatenate([side, [[3.0, 2.0], [0.0, 2.0]]])
+    cone = np.array([[1.0 + along * apart * near, 0.0]])
+    found = with_points(ring, cone, near)
+    assert len(np.unique(found, axis=0)) == len(found) == len(ring)
+    assert (found == cone[0]).all(axis=1).sum() == 1
+    assert shapely.Polygon(found).area == pytest.approx(6.0)
+    triangulate(found, near)
 
 
 @settings(max_examples=8)

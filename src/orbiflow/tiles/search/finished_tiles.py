@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -120,9 +119,11 @@ def with_bent(
         rings = original.without_fur, original.to_normal(rest), original.to_normal(ends)
         kept = fidelity_to_original(*rings, near, kept.cost)
     tile, simple = _region(result.tile.polygon)
-    body, maps, bending = placed.bent.orientation.fine, result.map, None
-    with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
+    body, maps, bending, no_map = placed.bent.orientation.fine, result.map, None, ""
+    try:
         bending = map_of_bent(*placed, result.normal_tile)
+    except OrbiflowError as error:  # hairs that no triangulation follows
+        no_map = str(error)
     likeness = replace(
         result.likeness,
         rest=rest,
@@ -136,6 +137,7 @@ def with_bent(
         likeness=likeness,
         search=replace(result.search, objective="likeness"),
         map_source=None if maps is None else replace(maps, bending=bending),
+        no_map=no_map,
     )
 
 

@@ -17,6 +17,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import doubled_areas, subdivided
 
 MAX_HALVINGS = 24  # the number of times that missing sides of the outline are halved
+MOST_PIECES = 200  # of sides, for each of the outline: more come only where points coincide
 FLAT_AREA = 1e-12  # twice the area, in areas of the polygon, below which a triangle counts as flat
 
 
@@ -78,12 +79,14 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
     are not sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles
     that connect two points of the outline through the inside are halved, so that every triangle can
     follow when the outline moves. Next to the outline inner points are `spacing` apart, by default the
-    mean length of a side. Raises `OrbiflowError` for a ring that crosses itself or is too thin.
+    mean length of a side. Raises `OrbiflowError` for a ring that crosses itself, has a point
+    twice or is too thin.
     """
-    polygon = shapely.Polygon(ring)
-    if not polygon.is_valid or not polygon.area > 0:
-        raise OrbiflowError("a polygon that crosses itself or has no area cannot be triangulated")
-    n = len(ring)
+    polygon, n = shapely.Polygon(ring), len(ring)
+    if not polygon.is_valid or not polygon.area > 0 or len(np.unique(ring, axis=0)) < n:
+        raise OrbiflowError(
+            "a polygon that crosses itself, has a point twice or has no area cannot be triangulated"
+        )
     spacing = spacing or polygon.exterior.length / n
     inside = _inside(polygon, spacing)
     number, after = np.arange(n), (np.arange(n) + 1) % n
@@ -94,6 +97,8 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
         points = np.concatenate([ring, extra, inside])
         triangles = Delaunay(points).simplices.astype(np.int64)
         missing = ~_are_sides(pieces[:, :2].astype(np.int64), triangles, len(points))
+        if len(pieces) > MOST_PIECES * n:
+            break
         if not missing.any():
             sides = placed[:, 0].astype(np.int64)
             return _divided(_kept(Mesh(points, triangles, sides, placed[:, 1], n), polygon))

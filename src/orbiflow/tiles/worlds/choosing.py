@@ -10,10 +10,12 @@ from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import complex_points, resampled, signed_area
 from orbiflow.tiles.likeness import Measures, Rating, kept_of
+from orbiflow.tiles.make import CURVED
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.worlds.curved import disc_of, facing
 from orbiflow.tiles.worlds.unfolding import (
     Unfolding,
+    check_world,
     distortion,
     order_count,
     unfolded,
@@ -58,6 +60,16 @@ class Seen:
 def flip_of(tile: EscherTile) -> Array:
     """Return what makes a tile's coordinates (..., 2) those of a world, whose y points upwards."""
     return np.array([1.0, -1.0 if tile.y_down else 1.0])
+
+
+def why_not_in(tile: EscherTile, world: str) -> str:
+    """Return why a tile has no pattern in a world of `art`, found without drawing it; "" if it has."""
+    try:
+        if world in CURVED:
+            check_world(tile.tiling, CURVED[world])
+    except OrbiflowError as error:
+        return str(error)
+    return ""
 
 
 def in_world(

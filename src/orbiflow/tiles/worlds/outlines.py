@@ -40,12 +40,13 @@ def with_centres(ring: Array, pattern: Pattern, spacing: float, near: float) -> 
 def with_points(ring: Array, points: Array, near: float) -> Array:
     """Return an outline (N, 2) with those points (K, 2) that are nearer to it among its own.
 
-    A vertex that is so near to one of them is moved there: near a cone, what is off by a millionth is
-    off by a thousandth in the image.
+    The nearest vertex is moved there if it is so near: near a cone, what is off by a millionth is off
+    by a thousandth in the image.
     """
     away = np.linalg.norm(ring[:, None] - np.reshape(points, (1, -1, 2)), axis=2)
-    for k, j in zip(*np.nonzero(away < near), strict=True):
-        ring = np.concatenate([ring[:k], points[j : j + 1], ring[k + 1 :]])
+    ring = ring.copy()
+    for j in np.flatnonzero(away.min(axis=0) < near):
+        ring[away[:, j].argmin()] = points[j]
     line, found = shapely.LinearRing(ring), list[tuple[float, Array]]()
     for point in points:
         others = np.array([*ring, *(own for _, own in found)])

@@ -276,6 +276,16 @@ def _check_group(group: CrystallographicGroup, sign: int) -> None:
         )
 
 
+def check_world(tiling: Tiling, sign: int) -> None:
+    """Check, without much work, that a tiling has a pattern on a sphere, 1, or a disc, -1.
+
+    Raises:
+        OrbiflowError: If its group has none there, or a centre of rotation is inside of the tile.
+    """
+    _check_group(tiling.group.primitive(), sign)
+    _check_inside(tiling, ring_of(tiling))
+
+
 def unfolded(
     tiling: Tiling,
     orders: Sequence[int],

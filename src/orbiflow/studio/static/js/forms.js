@@ -27,8 +27,8 @@ function read(given, found) {
 }
 
 /**
- * The control of one setting: {root, box, now(), value(), usual(value)}. What it shows is `now`; `value` is undefined
- * where that is the default, which `usual` changes.
+ * The control of one setting: {root, box, now(), value(), usual(value), show(value), reset()}. What it shows is `now`;
+ * `value` is undefined where that is the default, which `usual` changes.
  */
 function control(name, schema, words, changed) {
   const id = unique(name);
@@ -104,19 +104,14 @@ function control(name, schema, words, changed) {
     h("label", { for: id, class: "label" }, unit && !options ? `${title} (${unit})` : title),
     box,
   ];
-  return {
-    root: h("div", { class: "field" }, named, some, about),
-    box,
-    now: get,
-    value,
-    usual,
-    standard,
-  };
+  const root = h("div", { class: "field" }, named, some, about);
+  return { root, box, now: get, value, usual, standard, show, reset: () => show(standard) };
 }
 
 /**
  * A form: the settings named in `first` on top, the rest folded away in their groups.
- * `words`: titles and the like by setting; in them `some`: texts to choose from; `not`: values of others that rule it out.
+ * `words`: titles and the like by setting; in them `some`: texts to choose from; `not`: values of others that rule it out;
+ * `sets`: whether its choice begins all others anew, but those in `keeps`.
  * `hidden`: settings that the page sets itself. `start`: values to begin with.
  * `.values()`: what differs from the defaults and applies. `.refuse(name, text)`: show what is wrong beside the
  * setting that the text begins with; false if it names none.
@@ -127,14 +122,27 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
   const names = Object.keys(schema.properties).filter((name) =>
     !hidden.includes(name) && !("const" in schema.properties[name])
   );
-  const heard = () => {
+  const heard = ({ target }) => {
+    const { sets, keeps = [] } = words[target.name] ?? {};
+    const others = sets
+      ? names.filter((name) => name !== target.name && !keeps.includes(name))
+      : [];
+    for (const name of others) {
+      const { root, box, reset } = controls.get(name);
+      reset();
+      root.querySelector(".error")?.remove();
+      box.removeAttribute("aria-invalid");
+    }
     fit();
     changed(values());
   };
   for (const name of names) {
     controls.set(name, control(name, schema.properties[name], words[name], heard));
-    if (start[name] !== undefined) controls.get(name).box.value = start[name];
   }
+  const begin = () =>
+    names.filter((name) => start[name] !== undefined).forEach((name) =>
+      controls.get(name).show(start[name])
+    );
 
   /** Show the defaults that other choices give, and hide what does not apply to the rest, so that only what works can be set. */
   function fit() {
@@ -203,7 +211,10 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     if (focus) box.focus();
     return true;
   }
-  fit();
+  for (const _ of [1, 2]) { // what others are by a choice is known only after it
+    begin();
+    fit();
+  }
   const known = (name) => (controls.has(name) ? now(name) : undefined);
   return Object.assign(made, { now: known, values, refuse });
 }

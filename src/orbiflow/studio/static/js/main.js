@@ -30,25 +30,34 @@ let close = () => {};
 /** @type {Feed | null} */
 let feed = null;
 let turn = 0;
+/** Where each step of the history was scrolled to, by its number, and what is shown. */
+const places = {};
+let [here, path] = [0, ""];
+history.scrollRestoration = "manual";
 
 /**
  * Go to a page; `replace` leaves no step in the history.
  *
- * @param {string} path
+ * @param {string} to
  */
-export function navigate(path, { replace = false, quiet = false } = {}) {
+export function navigate(to, { replace = false, quiet = false } = {}) {
   if (quiet) {
-    history.replaceState(null, "", `#/${path}`);
-    shownTile = Number(path.match(/\/t\/(\d+)$/)?.[1]) || shownTile;
+    path = to;
+    history.replaceState(history.state, "", `#/${to}`);
+    shownTile = Number(to.match(/\/t\/(\d+)$/)?.[1]) || shownTile;
     links();
     return;
   }
-  if (replace) location.replace(`#/${path}`);
-  else location.hash = `#/${path}`;
+  if (replace) location.replace(`#/${to}`);
+  else location.hash = `#/${to}`;
 }
 
 async function show() {
-  const path = decodeURIComponent(location.hash.replace(/^#\/?/, ""));
+  places[here] = scrollY;
+  here = history.state ?? performance.timeOrigin + performance.now();
+  history.replaceState(here, "");
+  const before = path;
+  path = decodeURIComponent(location.hash.replace(/^#\/?/, ""));
   const mine = (turn += 1);
   const [pattern, load, step] = ROUTES.find(([known]) => known.test(path)) ?? [null];
   const [, id, tileId] = pattern ? path.match(pattern) : [];
@@ -77,7 +86,7 @@ async function show() {
     });
     if (mine !== turn) shown?.();
     else close = shown ?? (() => {});
-    head();
+    head(before, places[here]);
   } catch (error) {
     if (mine !== turn) return;
     drawBar();
@@ -97,13 +106,15 @@ async function show() {
   }
 }
 
-/** The title of the window, and where readers of screens begin. */
-function head() {
+/** The title of the window, and where readers of screens begin: on the way back, where one was. */
+function head(before, top) {
   const title = page.querySelector("h1");
   const name = feed?.project.name;
   document.title = [title?.textContent, name, "orbiflow studio"].filter(Boolean).join(" · ");
-  title?.focus({ preventScroll: true });
-  scrollTo(0, 0);
+  /** @type {HTMLElement} */
+  const link = top >= 0 ? page.querySelector(`a[href="#/${before}"]`) : null;
+  if (!page.contains(document.activeElement)) (link ?? title)?.focus({ preventScroll: true });
+  scrollTo(0, top ?? 0);
 }
 
 /** Fetch the project of a page and hear its events, unless it is the one that is heard already. */

@@ -66,7 +66,7 @@ export const number = (count, one, many = `${one}s`) => `${count} ${count === 1 
 /** @typedef {Pick<Card, "stars" | "figures">} Starred */
 
 /**
- * "★★★½" for sight and "3.5 of 5 stars" for hearing; of two figures those of each.
+ * "★★★½" for sight and "3.5 of 5 stars" for hearing; of two figures those of each, on a line.
  *
  * @param {Starred} card
  * @returns {string}
@@ -74,10 +74,8 @@ export const number = (count, one, many = `${one}s`) => `${count} ${count === 1 
 export function starText({ stars, figures = [] }) {
   if (!figures.length) return `${"★".repeat(Math.floor(stars))}${stars % 1 ? "½" : ""}`;
   const one = figures.every(({ name }) => name === figures[0].name);
-  return figures.map((own) =>
-    `${one ? "" : `${brief(own.name)} `}${starText({ stars: own.stars })}`
-  )
-    .join(" · ");
+  return figures.map((own) => `${one ? "" : `${own.name} `}${starText({ stars: own.stars })}`)
+    .join(one ? " · " : "\n");
 }
 /**
  * @param {Starred} card

@@ -3,7 +3,7 @@
 import { button, h, put } from "../dom.js";
 import { skinsOf } from "../skin.js";
 import { figuresOf, paintCard } from "../tiling.js";
-import { capital, isOutdated, STAGES, starText, starWords } from "../words.js";
+import { capital, sentence, STAGES, starText, starWords } from "../words.js";
 
 /**
  * A card of a tile and what was pulled from it, that can be told to change: {root, update(versions, palette), paint()}.
@@ -21,6 +21,7 @@ export function cardView(project, actions) {
   const lies = h("span", { class: "lies" });
   const name = h("span", { class: "tag" });
   const stage = h("span", { class: "stage-word" });
+  const why = h("span", { class: "soft small" });
   const link = h(
     "a",
     { class: "open" },
@@ -30,6 +31,7 @@ export function cardView(project, actions) {
       { class: "facts" },
       h("span", { class: "row" }, stars, word, h("span", { class: "grow" }), stage),
       h("span", { class: "row" }, lies, h("span", { class: "grow" }), name),
+      why,
     ),
   );
   const more = button("More like this", () => actions.more(shown), { kind: "quiet" });
@@ -72,6 +74,10 @@ export function cardView(project, actions) {
     const found = await actions.api.get(`projects/${project.id}/tiles/${id}`).catch(() => null);
     if (asked !== `${id} ${stage}`) return;
     view = found;
+    const lacks = found && figuresOf(found).find(({ map }) => !map);
+    why.textContent = lacks
+      ? sentence(`Without your picture: ${lacks.no_map || "the search left no map of it"}`)
+      : "";
     paint();
   }
 
@@ -127,13 +133,7 @@ export function cardView(project, actions) {
     word.textContent = card.stars && !card.figures ? capital(card.word) : "";
     lies.textContent = capital(card.arrangement);
     name.textContent = card.parent ? `${card.class_name}, by hand` : card.class_name;
-    const old = isOutdated(card, project);
-    root.classList.toggle("old", old);
-    stage.textContent = old
-      ? "of an earlier outline"
-      : card.stage === "final"
-      ? ""
-      : STAGES[card.stage] ?? "";
+    stage.textContent = card.stage === "final" ? "" : STAGES[card.stage] ?? "";
     const about = `${capital(card.word || "a tile")}, ${card.arrangement}`;
     link.setAttribute(
       "aria-label",

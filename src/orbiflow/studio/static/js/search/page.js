@@ -59,6 +59,9 @@ class SearchPage {
       if (pointerType === "mouse") this.touched = performance.now();
     };
     this.grid = h("ul", { class: "cards", onpointermove: moved });
+    this.past = h("ul", { class: "cards" });
+    this.summary = h("summary");
+    this.earlier = h("details", this.summary, this.past);
     this.said = h("p", { class: "state-words", role: "status" });
     this.noted = h("div", { role: "status" });
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
@@ -88,7 +91,9 @@ class SearchPage {
       this.noted,
       this.empty,
       this.grid,
+      this.earlier,
     );
+    this.earlier.ontoggle = () => this.views.forEach((view) => view.paint(false));
     this.watch = new ResizeObserver(() => this.views.forEach((view) => view.paint(false)));
     this.watch.observe(this.grid);
     this.off = ["card", "gone", "refresh", "silhouette", "task"].map((kind) =>
@@ -176,23 +181,11 @@ class SearchPage {
     if (task?.state === "waiting") this.bar.removeAttribute("value");
     else this.bar.value = task?.share ?? 0;
     const said = task?.result?.notes ?? [];
-    const old = this.groups.filter(([first]) => isOutdated(first, project)).length;
-    const told = JSON.stringify([said, old, alive(task)]);
-    if (told !== this.told) put(this.noted, old > 0 && this.earlier(old, task), notes(said));
+    const told = JSON.stringify(said);
+    if (told !== this.told) put(this.noted, notes(said));
     this.told = told;
     this.empty.hidden = Boolean(project.tiles.length) || alive(task);
     this.offer(task);
-  }
-
-  /** Say that tiles are of an outline that has been changed since. */
-  earlier(count, task) {
-    const tiles = number(count, "tile was", "tiles were");
-    return h(
-      "div",
-      { class: "notice row" },
-      h("span", { class: "grow" }, `${tiles} found before you changed the picture.`),
-      !alive(task) && button("Search anew", () => this.search(), { image: "arrow" }),
-    );
   }
 
   /**
@@ -219,18 +212,17 @@ class SearchPage {
     return performance.now() - this.turned > LATE && this.start("The search begins.");
   }
 
-  /** The tiles, each with what was pulled from it, best first; those of an earlier outline last. */
+  /** The tiles, each with what was pulled from it, best first. */
   get groups() {
     const groups = new Map();
     for (const card of [...this.project.tiles].sort((a, b) => a.id - b.id)) {
       const own = card.root ?? card.id;
       groups.set(own, [...(groups.get(own) ?? []), card]);
     }
-    const old = ([first]) => Number(isOutdated(first, this.project));
-    return [...groups.values()].sort((a, b) => old(a) - old(b) || better(a[0], b[0]));
+    return [...groups.values()].sort((a, b) => better(a[0], b[0]));
   }
 
-  /** Show the cards in their order; cards that stay move there calmly, but not away from the mouse. */
+  /** Show the cards in their order; but not away from the mouse. */
   arrange() {
     const { views, grid, groups } = this;
     const key = ([{ id, root }]) => root ?? id;
@@ -245,7 +237,15 @@ class SearchPage {
     const keys = groups.map(key);
     for (const id of [...views.keys()]) if (!keys.includes(id)) views.delete(id);
     for (const id of keys) if (!views.has(id)) views.set(id, cardView(this.project, this));
-    reordered(grid, [...keys.map((id) => views.get(id).root), ...this.ghosts()]);
+    const roots = (own) => own.map((group) => views.get(key(group)).root);
+    const isOld = ([first]) => isOutdated(first, this.project);
+    const old = groups.filter(isOld);
+    reordered(this.past, roots(old));
+    this.earlier.hidden = !old.length;
+    this.summary.textContent = `Found before you changed the picture: ${
+      number(old.length, "tile")
+    }`;
+    reordered(grid, [...roots(groups.filter((own) => !isOld(own))), ...this.ghosts()]);
     groups.forEach((group) => views.get(key(group)).update(group, this.palette));
   }
 

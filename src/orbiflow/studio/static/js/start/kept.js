@@ -74,7 +74,7 @@ export class Kept {
       this.on.own()[layer] = this.known[LAYERS.indexOf(layer)] = answer.mask;
       marks.of(layer, strokes).forEach((stroke) => this.#unsent.delete(stroke));
       if (layer === "mend") this.sent = strokes.length;
-      this.on.began(answer);
+      this.on.began({ ...answer, layer });
     } finally {
       this.#sending -= 1;
     }

@@ -100,18 +100,3 @@ export function tinted(marks, layer) {
   context.fillRect(0, 0, own.width, own.height);
   return own;
 }
-
-/**
- * Whether a stroke meets a ring.
- *
- * @param {{ points: Point[], size: number }} stroke
- * @param {Point[]} ring
- */
-export function touches({ points, size }, ring) {
-  const context = document.createElement("canvas").getContext("2d");
-  const path = pathOf(ring);
-  context.lineWidth = size;
-  return points.some(([x, y]) =>
-    context.isPointInPath(path, x, y) || context.isPointInStroke(path, x, y)
-  );
-}

@@ -7,7 +7,7 @@ import { alive, sentence } from "../words.js";
 import { paintingControls, readingControls } from "./controls.js";
 import { findings } from "./findings.js";
 import { Kept, LAYERS } from "./kept.js";
-import { paintBrush, paintSilhouette, paintStrokes, tinted, touches } from "./overlay.js";
+import { paintBrush, paintSilhouette, paintStrokes, tinted } from "./overlay.js";
 import { pointing } from "./pointing.js";
 import { addSecond, bothPictures } from "./second.js";
 import { States } from "./states.js";
@@ -65,6 +65,7 @@ class PicturePage {
     this.picture = undefined;
     this.shown = ""; // the address of the picture
     this.tints = new Map(); // the marks in their colours, painted anew when strokes change
+    this.refused = {}; // why a search would not take what is painted, by layer
     this.known = 0; // strokes that the outline on the screen knows
     this.read = newest(async () =>
       this.began(await api.put(`${this.place}/reading?number=${number}`, this.reading))
@@ -322,13 +323,6 @@ class PicturePage {
     const { stroke } = this;
     this.stroke = null;
     if (!stroke || (stroke.shape === "lasso" && stroke.points.length < 3)) return this.paint();
-    if (
-      ["pins", "emphasis"].includes(stroke.layer) &&
-      !touches(stroke, this.own.silhouette.outline)
-    ) {
-      toast("Paint on the animal itself: that is outside of it.");
-      return this.paint();
-    }
     this.kept.add(stroke);
     this.states.add(this.state);
     this.slid = -Infinity;
@@ -354,7 +348,8 @@ class PicturePage {
   }
 
   /** Take note of a reading that has begun, if its events have not told of it already. */
-  began({ task }) {
+  began({ task, layer, refused }) {
+    if (layer) this.refused[layer] = refused;
     if (task && !this.project.tasks.some(({ id }) => id === task.id)) {
       this.events.apply("task", task);
     }
@@ -384,6 +379,7 @@ class PicturePage {
       task?.state,
       task?.error,
       this.project.tasks.some(alive),
+      this.refused,
       silhouette && { ...silhouette, outline: null },
     ]);
     if (told === this.told) return; // what is open stays open
@@ -394,6 +390,7 @@ class PicturePage {
       put(
         this.said,
         error,
+        Object.values(this.refused).map((why) => why && h("p", { class: "error" }, sentence(why))),
         findings(silhouette, (thicken) => this.controls.take({ thicken })),
       );
     } else {put(

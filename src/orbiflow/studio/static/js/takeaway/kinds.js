@@ -64,6 +64,8 @@ export const KINDS = {
       purpose: {
         title: "What is it for?",
         about: "This sets everything else so that it suits.",
+        sets: true,
+        keeps: ["palette"],
         options: {
           laser: "Laser cutter",
           print: "Poster or mug",
@@ -151,7 +153,12 @@ export const KINDS = {
       },
       format: {
         ...FORMAT,
-        options: { png: "PNG", svg: "SVG", pdf: "PDF", html: "HTML (to turn by hand)" },
+        options: {
+          png: "PNG",
+          svg: "SVG",
+          pdf: "PDF",
+          html: "HTML (to turn by hand, without pictures)",
+        },
       },
     }),
   },

@@ -20,6 +20,8 @@ const ON = {
   picture: ["export", "art", "animate"],
 };
 const NEVER = "tile result out force picture drawing eyes second_eyes tint".split(" "); // what the page itself sets, or drawings hold
+/** What was chosen for tiles of each project: the kind, and the settings of each kind. */
+const KEPT = {};
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 /**
@@ -31,9 +33,13 @@ export async function show(root, page) {
   if (!card) throw new Error("This tile is not there any more.");
   await style("takeaway");
   const own = new TakeawayPage(page, card);
-  own.view = await page.api.get(`projects/${page.project.id}/tiles/${card.id}`);
+  const place = `${own.place}/tiles/${card.id}`;
+  [own.view, own.cannot] = await Promise.all([
+    page.api.get(place),
+    page.api.get(`${place}/cannot`),
+  ]);
   own.build(root);
-  await own.choose("export");
+  await own.choose(own.kept.kind);
   return () => own.close();
 }
 
@@ -49,12 +55,15 @@ class TakeawayPage {
     this.navigate = navigate;
     this.card = card;
     this.place = `projects/${project.id}`;
+    this.kept = KEPT[project.id] ??= { kind: "export" };
     this.about = about;
     this.look = lookOf(project, about);
     this.keepLook = keeper(api, project);
     this.pictures = new Pictures(() => this.paint());
     /** @type {TileView | null} */
     this.view = null;
+    /** @type {Record<string, { setting: string, values: string[], why: string, instead: number }[]>} */
+    this.cannot = {};
     this.schemas = new Map();
     this.making = new Making(api, project, {
       asked: () => [this.kind, this.settings()],
@@ -90,7 +99,7 @@ class TakeawayPage {
     const kinds = choice(
       "What shall it be?",
       kindChoices,
-      "export",
+      this.kept.kind,
       (kind) => trying(() => this.choose(kind)),
     );
     put(
@@ -184,7 +193,7 @@ class TakeawayPage {
 
   /** Show the settings of another kind of thing. */
   async choose(kind) {
-    this.kind = kind;
+    this.kind = this.kept.kind = kind;
     if (!this.schemas.has(kind)) {
       this.schemas.set(kind, await this.api.get(`operations/${kind}/schema`));
     }
@@ -193,12 +202,12 @@ class TakeawayPage {
     const { palette } = schema.properties;
     const { options, value } = colours(this.look, this.about);
     if (palette) palette.enum = Object.keys(options);
-    const { first, words: names } = KINDS[kind];
+    const { first, words: names, start } = KINDS[kind];
     this.form = form(schema, {
       first,
-      words: { ...names, palette: { ...names.palette, options } },
+      words: { ...names, palette: { ...names.palette, options }, ...this.without(kind, schema) },
       hidden: NEVER,
-      start: { ...KINDS[kind].start, ...(palette && { palette: value }) },
+      start: { ...start, ...this.kept[kind], ...(palette && { palette: value }) },
     }, () => {
       this.keepLooks();
       this.changed();
@@ -212,6 +221,28 @@ class TakeawayPage {
     );
     this.making.task = null;
     this.changed();
+  }
+
+  /** Take choices out of a schema that this tile does not have; returns words on why, by setting. */
+  without(kind, schema) {
+    const { kept, project: { id } } = this;
+    const [told, words] = [KINDS[kind].words, {}];
+    for (const { setting, values, why, instead } of this.cannot[kind] ?? []) {
+      const property = schema.properties[setting];
+      for (const own of [property, ...(property.anyOf ?? [])]) {
+        if (own.enum) own.enum = own.enum.filter((value) => !values.includes(value));
+      }
+      const names = values.map((value) => told[setting].options[value]).join(", ");
+      const other = instead && h("a", {
+        href: `#/p/${id}/take/${instead}`,
+        onclick: () => {
+          kept[kind] = { [setting]: values[0] };
+        },
+      }, "Take a tile that can.");
+      const about = [...(words[setting]?.about ?? []), `Not ${names}: ${sentence(why)} `, other];
+      words[setting] = { ...told[setting], about };
+    }
+    return words;
   }
 
   /** What can be laid on the tiles: {name, box, text} of each. */
@@ -277,13 +308,16 @@ class TakeawayPage {
     if (!box) return;
     if (suits !== this.suits) box.checked = suits && this.look.art;
     this.suits = suits;
-    const holds = purpose !== "plotter" && !["dxf", "json"].includes(format);
-    may(box, !plain && (holds || this.project.input?.type === "svg"));
+    const turns = this.kind === "art" && format === "html";
+    const holds = purpose !== "plotter" && !turns && !["dxf", "json"].includes(format);
+    const curves = this.project.input?.type === "svg" && !(turns && drawing?.checked);
+    may(box, !plain && (holds || curves));
   }
 
   /** Show the size at once; what was said or made before is past. */
   changed() {
     this.fitLayers();
+    this.kept[this.kind] = this.form.values();
     const size = lengthIn(this.form.now("tile_size"));
     this.real.hidden = !(size && KINDS[this.kind].solid);
     if (!this.real.hidden) this.size.show(size, this.form.now("warn_neck"));

@@ -1,0 +1,146 @@
+"""What is offered of a tile is what it can do, and the tile that can is one click away."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bent_tiles import bent_tile
+from orbiflow.runtime import ignore
+from orbiflow.studio.project_file import write_project
+from orbiflow.studio.tile_files import put_tile, tile_number
+from orbiflow.tiles import EscherTile, why_not_in
+from studio.browser import RunningStudio
+from studio.served import Client, new_project, worked
+
+CLASSES = ["IH1", "IH2", "IH4", "IH6", "IH7", "IH21", "IH28"]
+
+
+@pytest.fixture(scope="module", name="tiles")
+def tiles_fixture(client: Client) -> dict[str, str]:
+    """The addresses of tiles of a project, by class."""
+    project = new_project(client)
+    store, own = client.studio.store, project.split("/")[-1]
+    found = dict[str, str]()
+    for place, name in enumerate(CLASSES):
+        number = tile_number(900, place)
+        put_tile(store.home(own), number, "final", EscherTile(bent_tile(name, 40.0)), ignore)
+        folder = store.home(own) / "tiles" / str(number) / "final"
+        store.put_card(own, number, json.loads((folder / "card.json").read_text()))
+        found[name] = f"{project}/tiles/{number}"
+    return found
+
+
+@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("world", ["sphere", "disc", "half-plane", "band"])
+def test_what_is_not_offered_is_what_would_be_refused(
+    client: Client, tiles: dict[str, str], name: str, world: str
+) -> None:
+    told = client.get(f"{tiles[name]}/cannot").json().get("art", [])
+    refused = {value: own for own in told for value in own["values"]}
+    number = int(tiles[name].rsplit("/", 1)[1])
+    body = {"operation": "art", "settings": {"tile": number, "world": world, "area": "200x200px"}}
+    answer = client.post(f"{tiles[name]}/preview", json={**body, "side": 200})
+    assert (answer.status_code == 200) == (world not in refused), answer.text
+    if world in refused:
+        other = refused[world]["instead"]
+        able = next(key for key, own in tiles.items() if own.endswith(f"/{other}"))
+        assert not why_not_in(EscherTile(bent_tile(able, 40.0)), world)
+
+
+def test_a_ball_is_offered_where_a_sphere_is(client: Client, tiles: dict[str, str]) -> None:
+    for name in CLASSES:
+        told = client.get(f"{tiles[name]}/cannot").json()
+        lacks = {value for own in told.get("solid", []) for value in own["values"]}
+        assert lacks == (
+            set() if name in ("IH7", "IH21", "IH28") else {"ball", "ball-piece", "lamp"}
+        )
+
+
+def test_a_page_to_turn_has_what_was_drawn(client: Client, tiles: dict[str, str]) -> None:
+    address = tiles["IH28"]
+    project, _, number = address.rpartition("/tiles/")
+    stroke = {"colour": "#d02030", "width": 1.5, "points": [[0.0, 0.0], [4.0, 2.0]]}
+    client.patch(project, json={"view": {"drawing": {"strokes": [stroke], "eyes": []}}})
+    settings = {"tile": int(number), "world": "sphere", "format": "html", "drawing": True}
+    task = worked(client, project, "art", **settings)
+    assert task["state"] == "done", task["error"]
+    file = task["result"]["files"][0]["name"]
+    page = client.get(f"/api/takeaways/{task['result']['takeaway']}/files/{file}").text
+    assert "#d02030" in page
+
+
+@pytest.fixture(name="project")
+def project_fixture(studio: RunningStudio, tmp_path: Path) -> dict[str, Any]:
+    """A project with eight tiles, of which one goes to a sphere."""
+    every = ["IH6", "IH4", "IH2", "IH1", "IH3", "IH5", "IH28", "IH4"]
+    for place, name in enumerate(every):
+        put_tile(tmp_path, 7000 + place, "final", EscherTile(bent_tile(name, 40.0)), ignore)
+    tiles = [{"id": 7000 + place, "parent": None} for place in range(len(every))]
+    document = {"name": "eight", "kind": "tile", "view": {}, "tiles": tiles}
+    empty = {"input": None, "reading": {}, "second": None}
+    write_project(tmp_path, {**document, **empty}, tmp_path / "eight.orbiflow")
+    content = (tmp_path / "eight.orbiflow").read_bytes()
+    return studio.client.post("projects/open", content=content).json()
+
+
+def value(page: Any, name: str) -> str:
+    return page.locator(f"[name={name}]").input_value()
+
+
+def test_a_purpose_sets_everything_anew(page: Any, project: dict[str, Any]) -> None:
+    page.goto(f"/#/p/{project['id']}/take/{project['tiles'][0]['id']}")
+    page.wait_for_selector(".form")
+    page.evaluate("document.querySelectorAll('.form details').forEach((own) => (own.open = true))")
+    usual = {name: value(page, name) for name in ("cut", "tile_size", "margin", "bed")}
+    for purpose, own in (("laser", {"cut": "pieces", "tile_size": "31"}), ("print", {"bed": "A4"})):
+        page.select_option("[name=purpose]", purpose)
+        for name, given in own.items():
+            box = page.locator(f"[name={name}]")
+            box.select_option(given) if name == "cut" else box.fill(given)
+            box.blur()
+            assert value(page, name) == given
+        page.select_option("[name=purpose]", "share")
+        assert {name: value(page, name) for name in usual} == usual
+        page.locator("[aria-busy=true]").wait_for(state="detached")
+        assert page.locator(".form .error").count() == 0
+
+
+def test_the_tile_that_can_is_one_click_away(page: Any, project: dict[str, Any]) -> None:
+    able = next(own for own in project["tiles"] if own["class_name"] == "IH28")
+    page.goto(f"/#/p/{project['id']}/take/{project['tiles'][0]['id']}")
+    page.locator("label", has_text="Picture").click()
+    offered = page.locator("[name=world] option")
+    offered.first.wait_for(state="attached")
+    assert "sphere" not in [own.get_attribute("value") for own in offered.all()]
+    page.get_by_role("link", name="Take a tile that can").click()
+    page.wait_for_url(f"**/take/{able['id']}")
+    page.locator("[name=world] option[value=sphere]").wait_for(state="attached")
+    assert value(page, "world") == "sphere"
+
+
+def test_back_leads_to_the_place_and_to_what_was_chosen(page: Any, project: dict[str, Any]) -> None:
+    page.goto(f"/#/p/{project['id']}")
+    card = page.locator(".card a.open").nth(6)
+    card.scroll_into_view_if_needed()
+    top, place = page.evaluate("scrollY"), card.get_attribute("href")
+    assert top > 0
+    card.click()
+    page.wait_for_url(f"**/{place}")
+    page.wait_for_selector("h1:focus")
+    assert page.evaluate("scrollY") == 0
+    page.go_back()
+    page.wait_for_selector(f'a[href="{place}"]:focus')
+    assert page.evaluate("scrollY") == pytest.approx(top, abs=2)
+    page.goto(f"/#/p/{project['id']}/take/{project['tiles'][0]['id']}")
+    page.select_option("[name=purpose]", "stickers")
+    page.locator("[name=tile_size]").fill("33")
+    page.locator("[name=tile_size]").blur()
+    page.goto(f"/#/p/{project['id']}")
+    page.wait_for_selector(".card")
+    page.go_back()
+    page.wait_for_selector(".form")
+    assert (value(page, "purpose"), value(page, "tile_size")) == ("stickers", "33")
