@@ -121,7 +121,9 @@ class DataColumns:
         sides = {k: periods[column] for k, column in enumerate(order[count:])}
         labels = [called[k] for k in order[count:]]
         beside = MixedTorus.for_columns(values[:, count:], sides, labels)
-        return DataInSpace(ProductSpace(base, beside.axes), values, names)
+        return DataInSpace(
+            ProductSpace(base, beside.axes, from_zero=beside.from_zero), values, names
+        )
 
     def _periods(self, names: Sequence[str]) -> dict[int, float | None]:
         """Return the periods of columns by number, None of real ones."""

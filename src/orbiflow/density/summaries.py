@@ -21,9 +21,9 @@ from scipy import special
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
-from orbiflow.density.data import alongside, as_data, data_of, unit_of
+from orbiflow.density.data import alongside, as_data, data_of, unit_of, written_from_zero
 from orbiflow.density.fitting import SAME, concentration
-from orbiflow.density.spaces import to_vectors, whole_turn
+from orbiflow.density.spaces import to_latlon, to_vectors, whole_turn
 from orbiflow.density.uniformity import bingham_p, kuiper_p, rao_p, rayleigh_p, watson_p
 from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
 
@@ -40,8 +40,8 @@ class AngleSummary:
 
     - `rows`: Number of rows that have a value and a weight.
     - `mean`, `half_width`: Mean direction, and what to add on both sides for its interval. None where
-      the resultant is too short to tell (Fisher, 1993, equation 4.22). The mean is from 0 to one turn,
-      or to half a turn either way if the column has negative angles.
+      the resultant is too short to tell (Fisher, 1993, equation 4.22). The mean is written
+      as the column is: from 0 to one turn, or to half a turn either way.
     - `resultant`: Mean resultant length, from 0 (no direction) to 1.
     - `concentration`: Likeliest concentration of a von Mises distribution, None if all rows are equal.
     - `deviation`: Circular standard deviation, sqrt(-2 log resultant), None without a resultant.
@@ -173,8 +173,8 @@ def _angle_summary(name: str, turns: Array, turn: float, rows: WeighedRows) -> A
     per_radian = turn / (2 * np.pi)
     middle = deviation = None
     if mean is not None:
-        least = -0.5 * turn if (turns < 0).any() else 0.0
-        middle = (math.atan2(mean[1], mean[0]) * per_radian - least) % turn + least
+        middle = math.atan2(mean[1], mean[0]) * per_radian
+        middle += turn * (middle < 0 and bool(written_from_zero(turns[:, None], 1.0)))
         deviation = math.sqrt(-2 * math.log1p(-below)) * per_radian
     return AngleSummary(
         name=name,
@@ -309,7 +309,10 @@ def _written(vector: Array, table: Array, *, end: bool = False) -> tuple[float, 
     x, y, z = -vector if end and vector[2] < 0 else vector
     if table.shape[1] == 3:
         return float(x), float(y), float(z)
-    return math.degrees(math.asin(max(-1.0, min(1.0, z)))), math.degrees(math.atan2(y, x))
+    lat, lon = to_latlon(
+        np.array([[x, y, z]]), from_zero=bool(written_from_zero(table[:, 1:], 360.0))
+    )[0].tolist()
+    return lat, lon
 
 
 def _degrees(angle: float | None) -> float | None:

@@ -58,3 +58,4 @@ from .values import doubts_of_other_columns as doubts_of_other_columns
 from .values import fraction_doubts as fraction_doubts
 from .values import seeming_unit as seeming_unit
 from .values import unit_of as unit_of
+from .values import written_from_zero as written_from_zero

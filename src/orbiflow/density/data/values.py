@@ -331,3 +331,13 @@ def fraction_doubts(values: Array, lengths: Sequence[float]) -> list[Doubt]:
         "give that option (fractional)"
     )
     return [Doubt(text, True)]
+
+
+def written_from_zero(data: Array, period: float) -> list[int]:
+    """Return the numbers of columns (N, d) of angles that are written from 0 to a whole turn.
+
+    These are those in which nothing is negative and something is half a turn or more.
+    """
+    with np.errstate(invalid="ignore"):
+        least, most = (end(data, axis=0, initial=0.0) for end in (np.fmin.reduce, np.fmax.reduce))
+    return np.flatnonzero((least >= 0) & (most >= period / 2)).tolist()

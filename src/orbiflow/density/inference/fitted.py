@@ -49,8 +49,8 @@ class FittedFigures:
         """The values (N,) of the only column up to which there are these masses (N,), from 0 to 1.
 
         Masses begin where those of `cdf` do: the median is 0.5. Angles are as the data of the fit: from
-        0 to a whole turn if none was negative and one beyond half a turn, otherwise from minus half a
-        turn. So a quantile may be written as less than a lower one (350, 10): for an interval ask
+        0 to a whole turn if none was negative and one half a turn or more, otherwise from minus half
+        a turn. So a quantile may be written as less than a lower one (350, 10): for an interval ask
         `interval`.
         """
         points = self._fitted().icdf(as_tensor(masses, "masses").reshape(-1))

@@ -244,6 +244,7 @@ def _roses(rows: TableRows, columns: list[dict[str, Any]], unit: str, file: Path
     import numpy as np
 
     from orbiflow.density import pictures
+    from orbiflow.density.data import written_from_zero
     from orbiflow.density.spaces import whole_turn
     from orbiflow.drawing import Sheet
 
@@ -255,7 +256,9 @@ def _roses(rows: TableRows, columns: list[dict[str, Any]], unit: str, file: Path
             None if entry[key] is None else entry[key] / turn for key in ("mean", "half_width")
         )
         place = (mean, entry["resultant"], spread)
-        roses.append(pictures.Rose(entry["name"], column[kept] / turn, weights, None, place))
+        turns = column[kept] / turn
+        first = 0.0 if written_from_zero(turns[:, None], 1.0) else -0.5
+        roses.append(pictures.Rose(entry["name"], turns, weights, None, place, first))
     form: Any = file.suffix.lower()[1:]
     sheet = Sheet.screen() if form == "png" else Sheet.column("double", form)
     words = "The line is the mean direction, as long as the resultant, and the arc its interval"

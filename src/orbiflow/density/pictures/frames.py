@@ -18,7 +18,7 @@ from torch import Tensor, tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.pictures.colours import Shade, bar_ticks, minor_places
-from orbiflow.density.spaces import MixedTorus, Space, whole_turn
+from orbiflow.density.spaces import MixedTorus, Space, Torus, whole_turn
 from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError, SettingError
 
@@ -38,7 +38,7 @@ LETTER_EMS = 0.56
 class View(NamedTuple):
     """A window of side 1 onto the chart of a space, with names for the data's columns.
 
-    - `low`: Its lower corner (d,). It is 0 except on the torus.
+    - `low`: Its lower corner (d,): on the torus where data are written from, elsewhere 0.
     """
 
     space: Space
@@ -112,8 +112,10 @@ def view_of(
                 f"{{center}} applies to the torus and to maps, not to the {space.name}"
             )
         return View(space, names, np.zeros(space.dim))
-    middle = np.zeros(space.dim) if center is None else np.array(center, dtype=float)
-    turns = middle / whole_turn(space.unit or "")
+    torus = cast(Torus, space)
+    first = np.array([torus.first_turn(axis) for axis in range(space.dim)])
+    turn = whole_turn(space.unit or "")
+    turns = first + 0.5 if center is None else np.array(center, dtype=float) / turn
     if turns.shape != (space.dim,) or not np.isfinite(turns).all():
         raise SettingError(
             f"{{center}} must be {space.dim} angles, one for each column, got {list(center or ())}"
@@ -121,7 +123,8 @@ def view_of(
     # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
     even = np.round(24 * turns) / 24
     turns = np.where(abs(turns - even) < 1e-3, even, turns)
-    turns[_own_axes(space)] = 0.5
+    own = _own_axes(space)
+    turns[own] = first[own] + 0.5
     return View(space, names, turns - 0.5)
 
 
@@ -207,7 +210,8 @@ def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
     if axis in _own_axes(view.space):
         period = cast(MixedTorus, view.space).period_of(axis)
         if len(f"{period / 4:g}") > QUARTER_LETTERS:
-            return axis_label(view, axis), *_ticks(0.0, period)
+            low = float(view.low[axis])
+            return axis_label(view, axis), *_ticks(low * period, (low + 1) * period)
     if view.space.is_torus:
         low = float(view.low[axis])
         quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
@@ -228,7 +232,8 @@ def turn_text(space: Space, axis: int, turns: float) -> str:
     """Return a value of a periodic column as text: an angle in its unit, or a number."""
     if axis not in _own_axes(space):
         return angle_text(turns, space.unit)
-    return f"{turns * cast(MixedTorus, space).period_of(axis):g}"
+    text = f"{turns * cast(MixedTorus, space).period_of(axis):g}"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def _ticks(least: float, most: float) -> tuple[list[float], list[str]]:

@@ -114,7 +114,7 @@ class Map(Ground):
         for each in (*map(parallel, lats), *map(meridian, lons)):
             for piece in projection.pieces(each):
                 axes.plot(*piece.T, **style, zorder=3, solid_capstyle="butt")
-        labels = _Labels(axes, projection, sheet, 72 * side / self.width, panel.light)
+        labels = _Labels(axes, self, sheet, 72 * side / self.width, panel.light)
         if self.coastlines:
             self._draw_coastlines(axes, sheet, _TOLERANCE / labels.size, panel.light)
         if isinstance(projection, WorldMap):
@@ -164,7 +164,7 @@ class Map(Ground):
         lat, lon = projection.center
         if self.space.columns[0] != "lat":
             frame = "; latitudes are from the x, y plane towards z, longitudes from x towards y"
-        middle = degrees_text((lon + 180) % 360 - 180, "EW")
+        middle = longitude_text(lon, "EW", from_zero=cast(RoundSpace, self.space).from_zero)
         if not isinstance(projection, Azimuthal):
             return f"The sphere in {projection.title}, about {middle}{frame}"
         if projection.flipped:
@@ -233,14 +233,20 @@ def meridian(lon: float) -> Array:
     return np.stack([lat, np.full_like(lat, lon)], axis=-1)
 
 
+def longitude_text(lon: float, letters: str, *, from_zero: bool) -> str:
+    """Return a longitude as text, from -180 to 180 or from 0 to 360 degrees."""
+    first = 0 if from_zero else -180
+    return degrees_text((lon - first) % 360 + first, letters)
+
+
 class _Labels:
     """The degrees beside the lines of a graticule, `size` points a unit, none of which touch."""
 
-    def __init__(
-        self, axes: Axes, projection: Projection, sheet: Sheet, size: float, light: bool
-    ) -> None:
+    def __init__(self, axes: Axes, ground: Map, sheet: Sheet, size: float, light: bool) -> None:
+        projection = ground.projection
         self.axes, self.projection, self.sheet, self.light = axes, projection, sheet, light
         self.size, self.is_net = size, isinstance(projection, Azimuthal) and projection.flipped
+        self.from_zero = self.is_net or cast(RoundSpace, ground.space).from_zero
         self.north_south, self.east_west = ("", "") if self.is_net else ("NS", "EW")
         self.boxes: list[Array] = []
 
@@ -248,7 +254,7 @@ class _Labels:
         return degrees_text(lat, self.north_south)
 
     def longitude(self, lon: float) -> str:
-        return degrees_text(lon % 360 if self.is_net else lon, self.east_west)
+        return longitude_text(lon, self.east_west, from_zero=self.from_zero)
 
     def along_the_sides(self, lats: list[float], lons: list[float]) -> None:
         """Write latitudes at the left and longitudes below, or on the equator if poles are points."""
@@ -268,7 +274,7 @@ class _Labels:
         for turn in turns:
             lon = np.array([[at, middle + turn - 1e-7 * np.sign(turn)]])
             place = projection.forward(lon)[0]
-            text = self.longitude((middle + turn + 180) % 360 - 180)
+            text = self.longitude(middle + turn)
             if not inside:
                 self._outside(text, place, (0.0, -gap), ha="center", va="top")
             elif abs(turn) != 180:

@@ -57,6 +57,7 @@ class Rose(NamedTuple):
 
     - `name`: Name of the column. `turns`: Its angles (N,). `weights`: What each counts, (N,), or None.
     - `curve`: Values of a density per turn, at even steps from 0 to 1.
+    - `first`: The turn from which they are written, 0 or -1/2.
     - `mean`: Mean direction, resultant length, and half the width of the mean's interval, in turns.
     """
 
@@ -65,6 +66,7 @@ class Rose(NamedTuple):
     weights: Array | None = None
     curve: Array | None = None
     mean: tuple[float | None, float, float | None] = (None, 0.0, None)
+    first: float = 0.0
 
 
 def rose_picture(
@@ -75,9 +77,8 @@ def rose_picture(
     view = frames.view_of(density.space, settings.names, settings.center)
     line = torch.linspace(0, 1, 721, dtype=torch.float64)[:, None]
     curve = density_at(density, line, "square")
-    rose = Rose(
-        view.names[0], frames.chart_points(density.space, points)[:, 0].numpy(), None, curve
-    )
+    turns = frames.chart_points(density.space, points)[:, 0].numpy()
+    rose = Rose(view.names[0], turns, None, curve, first=float(view.low[0]))
     words = f"{len(points)} {what}, and the density as a line"
     return roses_picture([rose], view.space.unit or "", words, settings.sheet)
 
@@ -163,7 +164,8 @@ def _draw(axes: PolarAxes, rose: Rose, unit: str, sheet: Sheet) -> None:
     axes.set_ylim(0, rim)
     axes.set_yticks([rim / 2], [""])
     quarters = [0.0, 0.25, 0.5, 0.75]
-    axes.set_xticks([around * t for t in quarters], [frames.angle_text(t, unit) for t in quarters])
+    written = [t if t <= rose.first + 1 else t - 1 for t in quarters]
+    axes.set_xticks([around * t for t in quarters], [frames.angle_text(t, unit) for t in written])
     axes.tick_params(labelsize=sheet.small, pad=0.1 * sheet.text, colors=frames.INK)
     axes.grid(color="#c8c8c4", linewidth=sheet.pen(0.6))
     axes.spines["polar"].set(color="#8a8a86", linewidth=sheet.pen(0.8))

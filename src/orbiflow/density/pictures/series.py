@@ -64,7 +64,8 @@ def along_of(density: Density, names: tuple[str, ...], settings: PlotSettings) -
     period = space.beside.period_of(number)
     values = settings.at
     if values is None and period:
-        values = tuple(period * (k + 0.5) / PANELS for k in range(PANELS))
+        low = space.beside.first_turn(number)
+        values = tuple(period * (low + (k + 0.5) / PANELS) for k in range(PANELS))
     elif values is None:
         alone = marginal(density, chosen_columns(space, [first + number], len(names)).axes)
         masses = (torch.arange(PANELS, dtype=torch.float64) + 0.5) / PANELS

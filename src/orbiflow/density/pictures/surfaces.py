@@ -11,7 +11,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -23,7 +23,7 @@ from orbiflow.density.models import Density
 from orbiflow.density.pictures import colours, frames
 from orbiflow.density.pictures.grounds import SMALLER, thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.spaces import RoundSpace, Space, to_vectors
+from orbiflow.density.spaces import RoundSpace, Space, Torus, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 
@@ -377,10 +377,13 @@ def _labels(view: frames.View) -> list[dict[str, Any]]:
     if space.is_round:
         texts = ("+x", "+y", "+z", "−x", "−y", "−z")
         if space.columns[0] == "lat":
-            texts = ("0°", "90° E", "N", "180°", "90° W", "S")
+            west = "270° E" if cast(RoundSpace, space).from_zero else "90° W"
+            texts = ("0°", "90° E", "N", "180°", west, "S")
         places = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
     else:
-        turns = (0, 0.25, 0.5, -0.25) if space.is_torus else (0, 0.125, 0.25, 0.375)
+        turns = (0, 0.125, 0.25, 0.375)
+        if isinstance(space, Torus):
+            turns = (0, 0.25, 0.5, 0.75 if 0 in space.from_zero else -0.25)
         texts = [
             f"{frames.cut(view.names[0], frames.MAX_NAME)} {frames.angle_text(t, space.unit)}"
             for t in turns

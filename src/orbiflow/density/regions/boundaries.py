@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 import torch
 from numpy.typing import NDArray
+from shapely import affinity
 from shapely.geometry.polygon import orient
 from torch import Tensor
 
@@ -18,7 +19,7 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
 from orbiflow.density.regions.grid import Block, filled, refined, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
-from orbiflow.density.spaces import MixedTorus, RoundSpace, Space, to_latlon, to_vectors, whole_turn
+from orbiflow.density.spaces import MixedTorus, RoundSpace, Space, Torus, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import unique
@@ -73,10 +74,7 @@ class Outline:
 
     def rings(self) -> list[list[Array]]:
         """Return for each polygon its outer ring (n, 2), closed, and then its holes."""
-        return [
-            [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
-            for part in self.shape.geoms
-        ]
+        return _rings(self.shape)
 
     def to_json(self) -> dict[str, Any]:
         """Return an object for `json.dumps`."""
@@ -90,6 +88,13 @@ class Outline:
             "vertices_off": self.off,
             "notes": list(self.notes),
         }
+
+
+def _rings(shape: shapely.MultiPolygon) -> list[list[Array]]:
+    return [
+        [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
+        for part in shape.geoms
+    ]
 
 
 @one_thread()
@@ -202,9 +207,14 @@ def _peaks(density: Density) -> Tensor:
     return places[chosen[:MAX_PEAKS]]
 
 
+def _parts(shapes: Any) -> list[shapely.Polygon]:
+    """Return the polygons of which shapes consist."""
+    parts = shapely.get_parts(shapes).tolist()
+    return [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 0]
+
+
 def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.MultiPolygon:
-    parts = [p for p in shapely.get_parts(shape) if isinstance(p, shapely.Polygon)]
-    simple = [shapely.simplify(p, SIMPLIFIED * min(step, np.sqrt(p.area))) for p in parts]
+    simple = [shapely.simplify(p, SIMPLIFIED * min(step, np.sqrt(p.area))) for p in _parts(shape)]
     kept = [orient(p) for p in simple if p.is_valid and p.area > 0]
     if longest < np.inf:
         kept = [shapely.segmentize(p, longest) for p in kept]
@@ -247,7 +257,7 @@ class Window:
     def canonical(self, points: Array) -> Array:
         """Return points (N, 2) beside the rectangle as points of it."""
         if self.on_globe:
-            points = np.stack([points[:, 0], np.clip(points[:, 1], -90, 90)], axis=1)
+            points = np.stack([points[:, 0] % 360, np.clip(points[:, 1], -90, 90)], axis=1)
         return self.from_chart(self.to_chart(points))
 
     def area(self, shape: shapely.MultiPolygon) -> float:
@@ -271,22 +281,23 @@ def _round(space: RoundSpace) -> Window:
 
     def from_chart(points: Tensor) -> Array:
         data = space.from_chart(points)
-        return (to_latlon(data) if data.shape[1] == 3 else data)[:, ::-1]
+        return (space.latlon(data) if data.shape[1] == 3 else data)[:, ::-1]
 
     half = len(space.features(to_chart(np.zeros((1, 2))))) > 1
-    edges = "longitude -180 is longitude 180"
+    first = 0.0 if space.from_zero else -180.0
+    edges = f"longitude {first:g} is longitude {first + 360:g}"
     if half:
         edges += "; on the equator, a point is that opposite; polygons are of northern ends"
-    low, high = np.array([-180.0, 0.0 if half else -90.0]), np.array([180.0, 90.0])
+    low, high = np.array([first, 0.0 if half else -90.0]), np.array([first + 360, 90.0])
     cells = (180, 45 if half else 90)
     return Window(("lon", "lat"), low, high, cells, edges, True, to_chart, from_chart)
 
 
 def _flat(space: Space) -> Window:
     period = whole_turn(str(space.unit))
-    if space.is_torus:
-        low = np.full(2, -period / 2)
-        high, edges = -low, "opposite edges are one"
+    if isinstance(space, Torus):
+        low = np.array([space.first_turn(axis) * period for axis in range(2)])
+        high, edges = low + period, "opposite edges are one"
     else:
         low, high = np.array([0.0, -period / 4]), np.array([period / 2, 3 * period / 4])
         theta, phi = space.columns
@@ -308,6 +319,21 @@ def _steradians(polygon: shapely.Polygon) -> float:
 
 DIGITS = 7
 """Digits after the point of degrees in GeoJSON: a centimetre on the ground."""
+
+
+def _about_greenwich(outline: Outline) -> shapely.MultiPolygon:
+    """Return polygons of longitudes from -180 to 180, cut at the antimeridian and nowhere else."""
+    if outline.window.low[0] < 0:
+        return outline.shape
+    halves = [
+        affinity.translate(part, -2 * west)
+        for west in (0.0, 180.0)
+        for part in _parts(
+            shapely.intersection(list(outline.shape.geoms), shapely.box(west, -90, west + 180, 90))
+        )
+    ]
+    whole = shapely.union_all(halves, grid_size=10.0**-DIGITS)
+    return shapely.MultiPolygon([orient(part) for part in _parts(whole)])
 
 
 def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
@@ -340,7 +366,8 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
             "polygons_mass": outline.mass,
             "polygons_mass_error": outline.error,
         }
-        rings = [[np.round(ring, DIGITS).tolist() for ring in rings] for rings in outline.rings()]
+        parts = _rings(_about_greenwich(outline))
+        rings = [[np.round(ring, DIGITS).tolist() for ring in part] for part in parts]
         geometry = {"type": "MultiPolygon", "coordinates": rings}
         features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     return {"type": "FeatureCollection", "features": features}

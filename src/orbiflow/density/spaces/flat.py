@@ -14,6 +14,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_choice, as_whole
 from orbiflow.arrays import Array
+from orbiflow.density.data import written_from_zero
 from orbiflow.density.spaces.space import Space, checked_table, named_group
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -26,16 +27,6 @@ MAX_DIM = 64
 def whole_turn(unit: str) -> float:
     """Return a whole turn in a unit."""
     return TURN[as_choice(unit, tuple(TURN), "unit")]
-
-
-def from_zero(data: Array, period: float) -> list[int]:
-    """Return the numbers of columns (N, d) of angles that are written from 0 to a whole turn.
-
-    These are those in which nothing is negative and something is beyond half a turn.
-    """
-    with np.errstate(invalid="ignore"):
-        least, most = (end(data, axis=0, initial=0.0) for end in (np.fmin.reduce, np.fmax.reduce))
-    return np.flatnonzero((least >= 0) & (most > period / 2)).tolist()
 
 
 @lru_cache(maxsize=16)
@@ -91,7 +82,7 @@ class Torus(_AngleSpace):
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del seed
-        return cls(data.shape[1], unit=unit, from_zero=from_zero(data, whole_turn(unit)))
+        return cls(data.shape[1], unit=unit, from_zero=written_from_zero(data, whole_turn(unit)))
 
     @property
     def volume(self) -> float:
@@ -124,10 +115,10 @@ class Torus(_AngleSpace):
         return 0
 
     def of_axes(self, axes: Sequence[int]) -> Torus:
-        return Torus(len(axes), unit=str(self.unit), from_zero=self._from_zero_of(axes))
+        return Torus(len(axes), unit=str(self.unit), from_zero=self.from_zero_of(axes))
 
-    def _from_zero_of(self, axes: Sequence[int]) -> list[int]:
-        """Return the numbers, among some axes, of those that are written from 0."""
+    def from_zero_of(self, axes: Sequence[int]) -> list[int]:
+        """Return the numbers, among some columns, of those that are written from 0."""
         return [k for k, axis in enumerate(axes) if axis in self.from_zero]
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
@@ -136,10 +127,13 @@ class Torus(_AngleSpace):
 
     def from_chart(self, points: Tensor) -> Array:
         """Return angles (N, dim) in [-1/2, 1/2) turns, or [0, 1) turns of those `from_zero`."""
+        return self._own_turns(points) * self.period
+
+    def _own_turns(self, points: Tensor) -> Array:
+        """Return turns (N, dim), each from the first one of its column on."""
         x = self._checked(points).detach().double().cpu().numpy()
-        first = np.full(self.dim, -0.5)
-        first[list(self.from_zero)] = 0.0
-        return (x - np.floor(x - first)) * self.period
+        first = [self.first_turn(axis) for axis in range(self.dim)]
+        return x - np.floor(x - first)
 
     def project(self, points: Tensor) -> Tensor:
         points = self._checked(points)

@@ -13,7 +13,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.spaces.flat import Torus, from_zero, whole_turn
+from orbiflow.density.data import written_from_zero
+from orbiflow.density.spaces.flat import Torus, whole_turn
 from orbiflow.density.spaces.space import checked_table
 from orbiflow.errors import OrbiflowError
 
@@ -102,7 +103,8 @@ class MixedTorus(Torus):
         axes: For each column None, if it is an angle, its period, such as 24 of hours, or the centre
             and scale of a real one.
         unit: The unit of the angles, "radians", "degrees" or "turns".
-        from_zero: Angles that are written from 0, as in `Torus`.
+        from_zero: Angles and periodic columns that are written from 0, as in `Torus`. Default: those
+            that have a period of their own.
 
     >>> space = MixedTorus([None, (10.0, 2.0)], unit="degrees")
     >>> space.to_chart([[90.0, 12.0]]).numpy().round(4).tolist()
@@ -114,9 +116,11 @@ class MixedTorus(Torus):
     name = "mixed"
 
     def __init__(
-        self, axes: Sequence[Axis], *, unit: str = "radians", from_zero: Sequence[int] = ()
+        self, axes: Sequence[Axis], *, unit: str = "radians", from_zero: Sequence[int] | None = None
     ) -> None:
         self.axes = tuple(map(_checked_axis, axes))
+        if from_zero is None:
+            from_zero = [k for k, own in enumerate(self.axes) if isinstance(own, float)]
         super().__init__(len(self.axes), unit=unit, from_zero=from_zero)
         lines = [own if isinstance(own, Line) else None for own in self.axes]
         self.lines = tuple(lines)
@@ -138,15 +142,17 @@ class MixedTorus(Torus):
     ) -> Self:
         """Return the space of data (N, k), of which columns have periods by their numbers.
 
-        None is that of a real column; those without one are angles.
+        None is that of a real column; those without one are angles. Columns with periods are written
+        from 0 unless something in them is negative.
         """
 
         def axis(k: int) -> Axis:
             own = periods.get(k)
             return Line.of(data[:, k], names[k]) if k in periods and own is None else own
 
-        angles = [k for k in from_zero(data, whole_turn(unit)) if k not in periods]
-        return cls([axis(k) for k in range(data.shape[1])], unit=unit, from_zero=angles)
+        from_zero = [k for k in written_from_zero(data, whole_turn(unit)) if k not in periods]
+        from_zero += [k for k, own in periods.items() if own and not (data[:, k] < 0).any()]
+        return cls([axis(k) for k in range(data.shape[1])], unit=unit, from_zero=from_zero)
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -199,18 +205,16 @@ class MixedTorus(Torus):
     def from_chart(self, points: Tensor) -> Array:
         """Return angles as `Torus` does, and other columns in their own units: (N, dim).
 
-        Those of a period of their own are from 0 up to it.
+        Those of a period of their own begin where angles do, at 0 or minus half of it.
         """
-        found = super().from_chart(points)
-        x = self._checked(points).detach().double().cpu().numpy()
-        turns = x - np.floor(x)
+        found = self._own_turns(points)
         for axis, own in enumerate(self.axes):
             if isinstance(own, Line):
-                share = _share(torch.tensor(turns[..., axis])).numpy()
+                share = _share(torch.tensor(found[..., axis])).numpy()
                 away = 2 * share / np.sqrt(np.maximum(1 - share**2, LEAST_REST))
                 found[..., axis] = own.centre + own.scale * away
-            elif own is not None:
-                found[..., axis] = own * turns[..., axis]
+            else:
+                found[..., axis] *= self.period_of(axis)
         return found
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
@@ -225,7 +229,7 @@ class MixedTorus(Torus):
         return self.period if own is None else 0.0 if isinstance(own, Line) else own
 
     def first_turn(self, axis: int) -> float:
-        return 0.0 if self.axes[axis] is not None else super().first_turn(axis)
+        return 0.0 if self.is_real[axis] else super().first_turn(axis)
 
     def even_line(self, axis: int, count: int) -> Array:
         """Return even values (count,) of a column; of a real one, over four deviations on each side."""
@@ -238,7 +242,7 @@ class MixedTorus(Torus):
         kept = [self.axes[axis] for axis in axes]
         if not any(kept):
             return super().of_axes(axes)
-        return MixedTorus(kept, unit=str(self.unit), from_zero=self._from_zero_of(axes))
+        return MixedTorus(kept, unit=str(self.unit), from_zero=self.from_zero_of(axes))
 
     def step_angle(self, step: float) -> float:
         lines = enumerate(self.lines)
@@ -247,5 +251,4 @@ class MixedTorus(Torus):
 
     def settings(self) -> dict[str, Any]:
         axes = [list(own) if isinstance(own, Line) else own for own in self.axes]
-        own = {"from_zero": list(self.from_zero)} if self.from_zero else {}
-        return {"axes": axes, "unit": self.unit, **own}
+        return {"axes": axes, "unit": self.unit, "from_zero": list(self.from_zero)}

@@ -31,6 +31,7 @@ class ProductSpace(Space):
     Args:
         base: A space that is no torus (for which there is `MixedTorus`), or its settings and "name".
         axes: The other columns, as in `MixedTorus`: periods, or centres and scales of real ones.
+        from_zero: Those of `axes` that are written from 0, as in `MixedTorus`.
 
     >>> from orbiflow.density.spaces import Sphere
     >>> space = ProductSpace(Sphere(), [(10.0, 5.0), 24.0])
@@ -41,7 +42,13 @@ class ProductSpace(Space):
     name = "product"
     has_chart = False
 
-    def __init__(self, base: Space | Mapping[str, Any], axes: Sequence[Axis]) -> None:
+    def __init__(
+        self,
+        base: Space | Mapping[str, Any],
+        axes: Sequence[Axis],
+        *,
+        from_zero: Sequence[int] | None = None,
+    ) -> None:
         if isinstance(base, Mapping):
             own = dict(base)
             base = make_space(str(own.pop("name", None)), **own)
@@ -50,7 +57,7 @@ class ProductSpace(Space):
             raise OrbiflowError(
                 f"the base of a product is no {base.name}: take a MixedTorus of all"
             )
-        self.beside = MixedTorus(axes)
+        self.beside = MixedTorus(axes, from_zero=from_zero)
         if self.beside.is_angle.any():
             raise OrbiflowError(
                 "each column beside a space needs a period, or a centre and a scale"
@@ -197,10 +204,13 @@ class ProductSpace(Space):
             raise OrbiflowError(
                 f"the columns of the {self.base.name} have a meaning together alone: name all, or none"
             )
-        kept = [self.beside.axes[axis - chart] for axis in axes if axis >= chart]
+        others = [axis - chart for axis in axes if axis >= chart]
+        if not others:
+            return self.base
         if not own:
-            return MixedTorus(kept)
-        return ProductSpace(self.base, kept) if kept else self.base
+            return self.beside.of_axes(others)
+        kept = [self.beside.axes[axis] for axis in others]
+        return ProductSpace(self.base, kept, from_zero=self.beside.from_zero_of(others))
 
     def factors_of(self, axes: Sequence[int]) -> list[int]:
         shift = len(self.base.spheres) - self.base.chart_dim
@@ -209,4 +219,5 @@ class ProductSpace(Space):
 
     def settings(self) -> dict[str, Any]:
         base = {"name": self.base.name, **self.base.settings()}
-        return {"base": base, "axes": self.beside.settings()["axes"]}
+        beside = self.beside.settings()
+        return {"base": base, "axes": beside["axes"], "from_zero": beside["from_zero"]}

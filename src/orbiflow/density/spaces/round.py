@@ -22,7 +22,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_choice, as_instance
 from orbiflow.arrays import Array
-from orbiflow.density.data import CODES
+from orbiflow.density.data import CODES, written_from_zero
 from orbiflow.density.spaces.space import Space, checked_table, named_group, row_count
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import linalg
@@ -169,12 +169,17 @@ def _cause(value: float, otherwise: str) -> str:
     return code if abs(value) in CODES else otherwise
 
 
-def to_latlon(vectors: Array) -> Array:
-    """Return degrees (N, 2) of unit vectors (N, 3): latitude, and longitude in [-180, 180)."""
+def to_latlon(vectors: Array, *, from_zero: bool = False) -> Array:
+    """Return degrees (N, 2) of unit vectors (N, 3): latitude, and longitude in [-180, 180).
+
+    Longitudes are in [0, 360) instead if they are written `from_zero`.
+    """
     x, y, z = vectors.T
     lon: Array = np.degrees(np.arctan2(y, x))
     lat = np.degrees(np.arctan2(z, np.hypot(x, y)))
-    return np.stack([lat, np.where(lon >= 180, lon - 360, lon)], axis=-1)
+    first = 0.0 if from_zero else -180.0
+    lon -= 360 * np.floor((lon - first) / 360)
+    return np.stack([lat, np.where(lon >= first + 360, first, lon)], axis=-1)
 
 
 def to_unit(table: Array) -> Array:
@@ -206,6 +211,8 @@ class RoundSpace(Space):
             both.
         rotation: Rotation (3, 3) of the sphere in front of the chart. Densities are least flexible at
             the cone points, so it should move these away from the data (`clear_rotation`).
+        from_zero: Whether `from_chart` writes longitudes from 0 to 360, otherwise from -180 to 180.
+            Spaces that differ in this alone are equal.
     """
 
     power: int
@@ -214,16 +221,20 @@ class RoundSpace(Space):
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del unit  # angles of directions are in degrees
-        form = "vector" if data.shape[1] == 3 else "latlon"
-        return cls(form=form, rotation=clear_rotation(cls(form=form), data, seed=seed))
+        rotation = clear_rotation(cls(), data, seed=seed)
+        if data.shape[1] == 3:
+            return cls(form="vector", rotation=rotation)
+        return cls(rotation=rotation, from_zero=bool(written_from_zero(data[:, 1:], 360.0)))
 
-    def __init__(self, *, form: str = "latlon", rotation: ArrayLike | None = None) -> None:
+    def __init__(
+        self, *, form: str = "latlon", rotation: ArrayLike | None = None, from_zero: bool = False
+    ) -> None:
         turn = np.eye(3) if rotation is None else checked_table(rotation, (3,), "rotation")
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
             raise OrbiflowError("rotation must be an orthogonal (3, 3) matrix")
         self.form = as_choice(form, tuple(FORMS), "form")
         self.columns = FORMS[self.form]
-        self.rotation = turn
+        self.rotation, self.from_zero = turn, as_instance(from_zero, bool, "from_zero")
         self.group = named_group(self.name)
 
     @property
@@ -294,7 +305,11 @@ class RoundSpace(Space):
 
     def from_chart(self, points: Tensor) -> Array:
         vectors = self._representatives(self.vectors(points))
-        return vectors if self.form == "vector" else to_latlon(vectors)
+        return vectors if self.form == "vector" else self.latlon(vectors)
+
+    def latlon(self, vectors: Array) -> Array:
+        """Return degrees (N, 2) of unit vectors (N, 3), written as those of the data."""
+        return to_latlon(vectors, from_zero=self.from_zero)
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         vectors = torch.randn(count, 3, dtype=torch.float64, generator=generator)
@@ -308,7 +323,8 @@ class RoundSpace(Space):
         return to_sphere(cones, self.power).numpy() @ self.rotation
 
     def settings(self) -> dict[str, Any]:
-        return {"form": self.form, "rotation": self.rotation.tolist()}
+        own = {"from_zero": True} if self.from_zero else {}
+        return {"form": self.form, "rotation": self.rotation.tolist(), **own}
 
     def _representatives(self, vectors: Array) -> Array:
         return vectors

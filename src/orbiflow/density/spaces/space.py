@@ -376,6 +376,8 @@ class Space(ABC):
         """
         if not isinstance(other, Space):
             return NotImplemented
+        if self.parts:
+            return self.parts == other.parts
         here, there = ({**own.settings(), "from_zero": None} for own in (self, other))
         return (
             type(other) is type(self)
