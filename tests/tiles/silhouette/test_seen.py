@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import shapely
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import Target, polygons_in
 
 STEPS = 10
@@ -64,6 +66,40 @@ def test_smoothing_keeps_the_shape_that_was_read(
     assume(kept is not None and kept.area > 0.5 * outline.area)
     smooth = shapely.Polygon(target.smoothed(share).outline)
     assert smooth.buffer(width / 10).covers(kept)
+
+
+@settings(max_examples=40)
+@given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.01, 0.05, 0.15]))
+def test_smoothing_counts_the_parts_that_it_left_out(
+    picture: np.ndarray, threshold: int, share: float
+) -> None:
+    try:
+        target = Target.from_mask(picture, threshold=threshold / STEPS, invert=False)
+        smooth = target.smoothed(share)
+    except InputFileError:
+        assume(False)
+        raise
+    except OrbiflowError:  # nothing is left
+        assume(False)
+        raise
+    outline = shapely.Polygon(smooth.outline)
+    apart = [part for part in polygons_in(filled(target)) if not part.intersects(outline)]
+    areas = [part.area for part in apart if part.area >= 1e-3 * outline.area]
+    said = [re.findall(r"[\d.]+", note) for note in smooth.notes if " components " in note]
+    assert len(said) == bool(areas)
+    if said:
+        count, percent = map(float, said[0][:2])
+        assert count == len(areas) + 1
+        assert percent == pytest.approx(100 * outline.area / (outline.area + sum(areas)), abs=0.06)
+
+
+def test_smoothing_that_joins_all_parts_leaves_none_out() -> None:
+    mask = np.zeros((100, 200), bool)
+    mask[20:80, 10:100] = mask[30:70, 104:160] = True
+    target = Target.from_mask(mask)
+    assert any("2 components" in note for note in target.notes)
+    assert not any("components" in note for note in target.smoothed(0.1).notes)
+    assert any("2 components" in note for note in target.smoothed(0.01).notes)
 
 
 def test_smoothing_what_broken_lines_enclose_keeps_it() -> None:

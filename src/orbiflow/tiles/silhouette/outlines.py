@@ -208,8 +208,7 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     Components are compared by their area with holes filled; one in another's hole goes with that
     hole.
     """
-    components = polygons_in(geometry)
-    solid = polygons_in(shapely.unary_union([filled(part) for part in components]))
+    solid = _solids(geometry)
     shape = filled(max(solid, key=lambda part: part.area))
     solid = [part for part in solid if part.area >= MIN_PART_SHARE * shape.area]
     own = shapely.intersection(geometry, shape)
@@ -218,12 +217,27 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     return shape, left_out(len(solid), kept, holes, 1 - own.area / shape.area)
 
 
+def _solids(geometry: BaseGeometry) -> list[Polygon]:
+    """Return the components of a geometry with their holes filled."""
+    return polygons_in(shapely.unary_union([filled(part) for part in polygons_in(geometry)]))
+
+
+def still_left_out(shape: Polygon, seen: BaseGeometry) -> list[str]:
+    """Return the note on components of what was seen that lie apart from a shape, if any do."""
+    areas = [part.area for part in _solids(seen) if not part.intersects(shape)]
+    areas = [area for area in areas if area >= MIN_PART_SHARE * shape.area]
+    return left_out(1 + len(areas), shape.area / (shape.area + sum(areas)), 0, 0.0)
+
+
+LEFT_OUT = "kept the largest"  # how the note on components begins
+
+
 def left_out(components: int, kept: float, holes: int, filled: float) -> list[str]:
     """Return notes that one of these components was kept, and its holes filled, with their shares."""
     notes: list[str] = []
     if components > 1:
         notes.append(
-            f"kept the largest of {components} components ({percent(kept)} of the filled area)"
+            f"{LEFT_OUT} of {components} components ({percent(kept)} of the filled area)"
         )
     if holes:
         notes.append(f"filled {holes} hole{'s' * (holes > 1)} ({percent(filled)} of the area)")

@@ -20,12 +20,14 @@ from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
 from orbiflow.tiles.geometry import centroid, orient, polygons_in, signed_area
 from orbiflow.tiles.silhouette import readers  # read when a file is
 from orbiflow.tiles.silhouette.outlines import (
+    LEFT_OUT,
     clean_ring,
     closed,
     opened,
     outer_ring,
     percent,
     rounded,
+    still_left_out,
 )
 from orbiflow.tiles.silhouette.readers import FileContent, Reading
 from orbiflow.tiles.silhouette.thickening import thickened
@@ -307,8 +309,8 @@ class Target(Reading):
     def smoothed(self, share: float) -> Self:
         """Return the silhouette with what is narrower than a share of its length rounded off.
 
-        Gaps are closed first, between its parts, too, and then limbs and bumps go. A note says how
-        much of the silhouette went, and how many limbs.
+        Gaps are closed first, between its parts, too, and then limbs and bumps go. Notes say how many
+        parts are still left out, how much of the silhouette went, and how many limbs.
 
         Raises `OrbiflowError` if nothing is left.
 
@@ -338,7 +340,11 @@ class Target(Reading):
         note = (
             f"rounded off what is narrower than {percent(share)} of the length: {lost}{named} went"
         )
-        return replace(self, outline=outer_ring(shape), notes=(*self.notes, note))
+        notes = self.notes
+        if self.seen is not None and any(other.startswith(LEFT_OUT) for other in notes):
+            notes = (other for other in notes if not other.startswith(LEFT_OUT))
+            notes = (*notes, *still_left_out(shape, own))
+        return replace(self, outline=outer_ring(shape), notes=(*notes, note))
 
     def thickened(self, share: float) -> Self:
         """Return the silhouette with parts thinner than a share of its length grown to this width.

@@ -11,7 +11,14 @@ from shapely import Polygon
 from orbiflow.arguments import as_path
 from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import filled, is_thread, outer_outline, outer_ring, thinned
+from orbiflow.tiles.silhouette.outlines import (
+    LEFT_OUT,
+    filled,
+    is_thread,
+    outer_outline,
+    outer_ring,
+    thinned,
+)
 from orbiflow.tiles.silhouette.readers.image_files import image_kind
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.point_lists import read_points
@@ -108,7 +115,7 @@ def _hole_of(reading: Reading, path: Source) -> Reading:
             )
         )
     shape, kept = outer_outline(holes)
-    about = ("kept the largest", "filled", "the silhouette is")
+    about = (LEFT_OUT, "filled", "the silhouette is")
     notes = (note for note in reading.notes if not note.startswith(about))
     notes = (*notes, "shape taken: the hole in what is drawn, as set", *kept)
     return replace(reading, outline=outer_ring(shape), notes=notes, seen=holes)
@@ -130,7 +137,7 @@ def _bridged(reading: Reading) -> Reading:
         f"the largest part is no more than a line: took instead what the lines enclose when gaps of "
         f"up to {MAX_GAP_SHARE:.0%} of the drawing's size are closed"
     )
-    kept = [other for other in reading.notes if not other.startswith("kept the largest")]
+    kept = [other for other in reading.notes if not other.startswith(LEFT_OUT)]
     thin, _ = thinned(body, MAX_GAP_SHARE * size / 50)
     return replace(reading, outline=outer_ring(thin), notes=(*kept, note))
 
