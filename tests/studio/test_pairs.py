@@ -24,6 +24,7 @@ from orbiflow.studio.taking import with_drawing
 from orbiflow.studio.tasks import read, search
 from orbiflow.studio.tile_files import best_stage, put_tile, tile_folder
 from orbiflow.studio.tile_view import tile_card, tile_view
+from orbiflow.studio.words import is_outdated
 from orbiflow.tiles import EscherTile, colouring, read_result, save_tiles
 from outlines import FOLDER
 from small_pairs import NAMES, pair_result, small_pairs
@@ -263,3 +264,32 @@ def test_the_browser_pulls_the_path_between_two_figures(pair: EscherTile) -> Non
         points = np.array(answer["polygon"]).reshape(-1, 2)
         assert np.abs(points[:outer] - space["polygon"][:outer]).max() < 0.3 * pair.tile.radius
         assert pulled(pair, answer["parameters"]).certificate.valid
+
+
+OUTDATED = """
+import { isOutdated } from "MODULES/../words.js";
+const cases = JSON.parse((await import("node:fs")).readFileSync(0));
+console.log(JSON.stringify(cases.map(([card, project]) => isOutdated(card, project))));
+"""
+
+
+def test_a_tile_of_a_pair_is_of_an_earlier_picture_once_the_second_is_removed() -> None:
+    """The server and the browser say the same."""
+
+    def picture(mark: str | None) -> dict[str, Any]:
+        return {"silhouette": mark and {"mark": mark}}
+
+    pair, single, drawn = {"found_for": ["a", "b"]}, {"found_for": ["a"]}, dict[str, Any]()
+    cases = [
+        (pair, None, True),
+        (pair, picture("b"), False),
+        (pair, picture("c"), True),
+        (pair, picture(None), False),  # it is being read
+        (single, None, False),
+        (single, picture("b"), False),
+        (drawn, None, False),
+    ]
+    given = [(card, {**picture("a"), "second": second}) for card, second, _ in cases]
+    expected = [is_old for *_, is_old in cases]
+    assert [is_outdated(*case) for case in given] == expected
+    assert run_in_node(OUTDATED, given) == expected

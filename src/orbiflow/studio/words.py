@@ -182,9 +182,9 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
 
 
 def is_outdated(card: dict[str, Any], project: dict[str, Any]) -> bool:
-    """Whether a tile was found for an outline that has been changed since."""
-    pictures = [project, project["second"] or {}]
-    marks = [(own.get("silhouette") or {}).get("mark") for own in pictures]
+    """Whether a tile was found for an outline that has been changed or removed since."""
+    pictures = [project, project["second"]]
+    marks = [(own.get("silhouette") or {}).get("mark") if own else "none" for own in pictures]
     pairs = zip(card.get("found_for", ()), marks, strict=False)
     return any(mark and mark != own for own, mark in pairs)
 

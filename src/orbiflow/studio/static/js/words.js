@@ -52,7 +52,7 @@ export const alive = (task) => ["waiting", "running", "paused"].includes(task?.s
  * @param {Project} project
  */
 export function isOutdated({ found_for: marks = [] }, project) {
-  const now = [project, project.second].map((own) => own?.silhouette?.mark);
+  const now = [project, project.second].map((own) => own ? own.silhouette?.mark : "none");
   return marks.some((mark, k) => now[k] && now[k] !== mark);
 }
 
