@@ -476,7 +476,7 @@ def _docs(cls: type) -> dict[str, str]:
 
 def _condition(name: str, allowed: tuple[Any, ...]) -> str:
     """Return what must hold of another field, such as "{cut} none or skeleton"; True needs no word."""
-    words = [_word(value) for value in allowed if value is not None and value is not True]
+    words = ["none" if value is None else _word(value) for value in allowed if value is not True]
     return f"{{{name}}} {literal(one_of(words))}" if words else f"{{{name}}}"
 
 

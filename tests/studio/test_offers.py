@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from bent_tiles import bent_tile
+from orbiflow.errors import SettingError
 from orbiflow.runtime import ignore
 from orbiflow.studio.project_file import write_project
 from orbiflow.studio.tile_files import put_tile, tile_number
-from orbiflow.tiles import EscherTile, why_not_in
+from orbiflow.tiles import ArtSettings, EscherTile, why_not_in
 from studio.browser import RunningStudio
 from studio.served import Client, new_project, worked
 
@@ -58,6 +59,36 @@ def test_a_ball_is_offered_where_a_sphere_is(client: Client, tiles: dict[str, st
         assert lacks == (
             set() if name in ("IH7", "IH21", "IH28") else {"ball", "ball-piece", "lamp"}
         )
+
+
+GIVEN: dict[str, Any] = {
+    "tile_size": 20,
+    "rotate": 30,
+    "clip": False,
+    "area": "200x200px",
+    "order": "3",
+    "arms": "3,5",
+    "stages": 2,
+    "stretch": 0.05,
+}
+
+
+@pytest.mark.parametrize("chosen", ["world", "metamorphosis", "repeat"])
+def test_settings_that_would_be_refused_are_not_offered(client: Client, chosen: str) -> None:
+    properties = client.get("/api/operations/art/schema").json()["properties"]
+    choices = next(own["enum"] for own in properties[chosen]["anyOf"] if "enum" in own)
+    for value in choices:
+        for name, given in GIVEN.items():
+            needed = properties[name]["x-only-with"]
+            offered = all(
+                ({chosen: value}.get(other)) in allowed for other, allowed in needed.items()
+            )
+            try:
+                ArtSettings(**{chosen: value, name: given})
+            except SettingError:
+                assert not offered, (value, name)
+            else:
+                assert offered, (value, name)
 
 
 def test_a_page_to_turn_has_what_was_drawn(client: Client, tiles: dict[str, str]) -> None:
@@ -120,6 +151,11 @@ def test_the_tile_that_can_is_one_click_away(page: Any, project: dict[str, Any])
     page.wait_for_url(f"**/take/{able['id']}")
     page.locator("[name=world] option[value=sphere]").wait_for(state="attached")
     assert value(page, "world") == "sphere"
+    page.evaluate("document.querySelectorAll('.form details').forEach((own) => (own.open = true))")
+    size = page.locator("[name=tile_size]")
+    assert not size.is_visible()
+    page.select_option("[name=world]", "")
+    assert size.is_visible()
 
 
 def test_back_leads_to_the_place_and_to_what_was_chosen(page: Any, project: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import PathKind
 from orbiflow.runtime import Call, Operation, find
-from orbiflow.settings import Field, Hidden, OnlyWith
+from orbiflow.settings import Field, Hidden, NotWith, OnlyWith
 from orbiflow.studio.words import LABELS, plain_letters
 
 SERVER_SET = ("project", "task", "force", "workers", "tile", "picture")
@@ -98,6 +98,17 @@ def own_fields(operation: Operation) -> list[Field]:
     ]
 
 
+def _needed(entry: Field) -> dict[str, list[Any]]:
+    """Return the values that other settings must have where one applies, by their names."""
+    found: dict[str, list[Any]] = {}
+    for rule in entry.rules:
+        if isinstance(rule, OnlyWith):
+            found |= {name: list(values) for name, values in rule.others.items()}
+        elif isinstance(rule, NotWith):
+            found |= {name: [None, False] for name in rule.others}
+    return found
+
+
 def own_schema(operation: Operation) -> dict[str, Any]:
     """Return the JSON Schema of what a browser may set of an operation, and this machine can make."""
     properties = {
@@ -105,12 +116,7 @@ def own_schema(operation: Operation) -> dict[str, Any]:
             **deepcopy(entry.schema),
             "x-group": entry.group,
             "x-default": entry.default_text,
-            "x-only-with": {
-                name: list(values)
-                for rule in entry.rules
-                if isinstance(rule, OnlyWith)
-                for name, values in rule.others.items()
-            },
+            "x-only-with": _needed(entry),
         }
         for entry in own_fields(operation)
     }

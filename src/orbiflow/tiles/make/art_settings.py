@@ -32,6 +32,7 @@ SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
 World = Literal["sphere", "disc", "half-plane", "band", "spiral", "cylinder"]
 CURVED = {"sphere": 1, "disc": -1, "half-plane": -1, "band": -1}
 """The worlds that are curved as a sphere, 1, or hyperbolic, -1."""
+TURNED = ("sphere", "disc", "half-plane", "band", "spiral", None)
 COPIES = {"12": (2, 3, 3), "24": (2, 3, 4), "60": (2, 3, 5)}
 
 
@@ -85,13 +86,25 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
         DefaultText("3000x2000px"),
     ] = None
 
-    tile_size: Annotated[PageLength | None, DefaultText("about 25 tiles on the page")] = None
+    tile_size: Annotated[
+        PageLength | None,
+        OnlyWith(world=("cylinder", None), because="copies elsewhere have sizes of their own"),
+        DefaultText("about 25 tiles on the page"),
+    ] = None
 
     rotate: Annotated[
-        float, Range(-360, 360), Unit("degrees"), NotWith("repeat", because="it turns as it must")
+        float,
+        Range(-360, 360),
+        Unit("degrees"),
+        NotWith("repeat", because="it turns as it must"),
+        OnlyWith(world=TURNED, because="its page turns as it must"),
     ] = 0.0
 
-    clip: Annotated[bool, Option("--clip", off="--whole"), NotWith("repeat")] = True
+    clip: Annotated[
+        bool,
+        Option("--clip", off="--whole"),
+        NotWith("repeat", "world", "metamorphosis", because="it is of alike tiles on a page"),
+    ] = True
 
     palette: PaletteName = "earth"
 
@@ -164,22 +177,12 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
 
     def _check_world(self) -> None:
         """Check that nothing is asked for that another world, or a sheet that changes, has not."""
-        if self.world not in (None, "cylinder") and self.tile_size is not None:
-            raise SettingError(
-                "copies in another {world} have sizes of their own; leave out {tile_size}"
-            )
-        if self.world == "cylinder" and self.rotate:
-            raise SettingError("a cylinder's page turns as it must; leave out {rotate}")
         if self.world == "band" and self.page[0] > LONGEST_BAND * self.page[1]:
             raise SettingError(
                 f"a band can be {LONGEST_BAND} times as long as high: choose another {{area}}"
             )
         if self.world is not None and self.colour == "aspect":
             raise SettingError("{colour} is neighbour or one in another {world}")
-        if (self.world or self.metamorphosis) and not self.clip:
-            raise SettingError(
-                "{clip} is for a page of the plane whose tiles are all alike; leave it out"
-            )
 
 
 def check_size(*sides: float) -> None:
