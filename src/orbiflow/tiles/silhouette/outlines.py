@@ -236,9 +236,7 @@ def left_out(components: int, kept: float, holes: int, filled: float) -> list[st
     """Return notes that one of these components was kept, and its holes filled, with their shares."""
     notes: list[str] = []
     if components > 1:
-        notes.append(
-            f"{LEFT_OUT} of {components} components ({percent(kept)} of the filled area)"
-        )
+        notes.append(f"{LEFT_OUT} of {components} components ({percent(kept)} of the filled area)")
     if holes:
         notes.append(f"filled {holes} hole{'s' * (holes > 1)} ({percent(filled)} of the area)")
     return notes
