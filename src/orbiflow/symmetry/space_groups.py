@@ -80,6 +80,8 @@ def space_group(
     >>> diamond.name, diamond.order, round(diamond.cell_volume, 9)
     ('F d -3 m:1', 48, 0.25)
     """
+    if origin not in (None, 1, 2):
+        raise GroupError(f"origin must be 1 or 2, got {origin!r}")
     label, texts = _named(name, origin)
     if cell is None:
         linear = np.stack([parse_operator(text, 3)[:, :3] for text in texts])

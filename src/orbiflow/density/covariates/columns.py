@@ -20,6 +20,7 @@ from orbiflow.density.data import (
     doubts_of_number,
     missing_among,
     refuse_codes_of,
+    word_of,
 )
 from orbiflow.density.spaces import Line
 from orbiflow.errors import OrbiflowError
@@ -257,6 +258,8 @@ def is_text(cells: Values) -> bool:
 
 def _text(name: str, cells: Values) -> NDArray[np.str_]:
     _refuse_missing(name, missing_among(cells))
+    if cells.dtype.kind in "fO":
+        return np.array([word_of(cell) for cell in cells.tolist()], dtype=str)
     return cells.astype(str)
 
 
@@ -265,7 +268,19 @@ def _period_named(name: str, cells: Values, turn: float | None) -> float | None:
     if is_text(cells):
         return None
     numbers = _numbers(name, cells)
-    return cycle_named(name, float(numbers.min()), float(numbers.max()), turn)
+    found = cycle_named(name, float(numbers.min()), float(numbers.max()), turn)
+    if found is None:
+        suits = [cycle_named(name, value, value, turn) for value in numbers.tolist()]
+        others = numbers[[period is None for period in suits]]
+        if 0 < 2 * len(others) < len(numbers):
+            period = next(filter(None, suits))
+            raise OrbiflowError(
+                f"{name!r} is the name of a cycle of {period:g}, and the column has {others[0]:g} "
+                f"({len(others)} such rows): leave these rows out, or say what it is: "
+                f"cycles={{{name!r}: {period:g}}} or None there, {name}:{period:g} or {name}:real on "
+                "the command line"
+            )
+    return found
 
 
 def _numbers(name: str, cells: Values) -> Array:

@@ -40,6 +40,7 @@ from .row_labels import alongside as alongside
 from .row_labels import cells_of as cells_of
 from .row_labels import group_numbers as group_numbers
 from .row_labels import missing_among as missing_among
+from .row_labels import word_of as word_of
 from .strikes import DIP_DIRECTION as DIP_DIRECTION
 from .strikes import data_of as data_of
 from .strikes import dip_direction_among as dip_direction_among

@@ -119,6 +119,7 @@ def _codes_apart(distinct: Array, counts: NDArray[np.int64]) -> list[float]:
     wide = np.where(sure, LEAST_APART, LEAST_APART_ALONE) * (most - least)
     if len(inner) < FEW_VALUES:  # which may be all that there are
         wide = LEAST_APART_ALONE * max(most - least, -least, most)
+        named &= fills | (distinct < 0) | (distinct % 1 == 0)  # 99.99 and 999.99 are prices, too
     is_alone_below = sure & (distinct < 0) & (least >= 0)  # however far the others reach
     return distinct[named & (is_alone_below | (apart > wide))].tolist()
 

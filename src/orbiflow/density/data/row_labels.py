@@ -42,8 +42,19 @@ def cells_of(column: Any) -> Any:
         return column if is_a(column, np.ndarray) else np.asarray(column)
     cells = column.to_pylist() if hasattr(column, "to_pylist") else list(column)
     if is_category(kind):
-        cells = [None if is_missing(cell) else str(cell) for cell in cells]
+        cells = [None if is_missing(cell) else word_of(cell) for cell in cells]
     return np.array([*cells, None], dtype=object)[:-1]
+
+
+def word_of(cell: Any) -> str:
+    """Return the word that a cell is; a whole number is the same word whatever its type.
+
+    >>> word_of(2.0), word_of("2.0")
+    ('2', '2.0')
+    """
+    if isinstance(cell, numbers.Real) and not is_a(cell, bool) and float(cell).is_integer():
+        return str(int(float(cell)))
+    return str(cell)
 
 
 def is_missing(cell: Any) -> bool:
@@ -64,6 +75,8 @@ def missing_among(cells: NDArray[Any]) -> NDArray[np.bool_]:
         return np.array(found, dtype=bool)
     if cells.dtype.kind in "US":
         return np.char.strip(cells.astype(str)) == ""
+    if cells.dtype.kind in "mM":
+        return np.isnat(cells)
     return np.isnan(cells) if cells.dtype.kind == "f" else np.zeros(cells.shape, dtype=bool)
 
 

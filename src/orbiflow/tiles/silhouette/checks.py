@@ -76,7 +76,7 @@ def _lost_parts(target: Target) -> list[str]:
     if _is_card(target, holes):
         found.append(
             f"the silhouette is a card, of whose area a hole takes {percent(share)}: if the hole is "
-            "the shape, try another {invert}"
+            "the shape, change {invert}"
         )
     elif MIN_HOLE_SHARE < share < MAX_HOLE_SHARE:
         level = " or try another {threshold} or another {invert}" if is_image else ""

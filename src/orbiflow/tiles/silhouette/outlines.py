@@ -125,12 +125,14 @@ def percent(share: float) -> str:
 
 def outside(what: str, x: float, y: float, silhouette: Polygon) -> OrbiflowError:
     """Return the error that says that `what`, such as a pin, lies outside a silhouette."""
-    near = shapely.ops.nearest_points(silhouette, shapely.Point(x, y))[0]
     left, top, right, bottom = silhouette.bounds
+    well_inside = silhouette.buffer(-0.01 * max(right - left, bottom - top))
+    where = silhouette.representative_point() if well_inside.is_empty else well_inside
+    near = shapely.ops.nearest_points(where, shapely.Point(x, y))[0]
     return OrbiflowError(
-        f"{what} at {x:g},{y:g} lies outside the silhouette, whose nearest point is "
-        f"{near.x:.4g},{near.y:.4g}; its box spans x from {left:.4g} to {right:.4g} and y from "
-        f"{top:.4g} to {bottom:.4g}"
+        f"{what} at {x:g},{y:g} lies outside the silhouette, which spans x from {left:.4g} to "
+        f"{right:.4g} and y from {top:.4g} to {bottom:.4g}; the nearest place inside is "
+        f"{near.x:.4g},{near.y:.4g}"
     )
 
 

@@ -15,7 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import FINER, draw_line, fine_places, font, in_bands, limited, png_bytes, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import signed_area
-from orbiflow.tiles.page import Box, Curve, Layer, Part, Raster, Scene, Style, Words, flattened
+from orbiflow.tiles.page import INK, Box, Curve, Layer, Part, Raster, Scene, Style, Words, flattened
 
 INCH = 25.4
 """An inch in mm."""
@@ -194,7 +194,9 @@ Colour = int | tuple[int, int, int, int]
 
 
 def _colour(colour: str, table: Mapping[str, Colour]) -> Colour:
-    return table[colour] if table else (*rgb(colour), 255)
+    if table:
+        return table[colour]
+    return *rgb("#000000" if colour == INK else colour), 255  # a drawing's own ink is black
 
 
 def _draw_sheet(

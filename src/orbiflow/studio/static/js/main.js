@@ -61,6 +61,7 @@ async function show() {
   const mine = (turn += 1);
   const [pattern, load, step] = ROUTES.find(([known]) => known.test(path)) ?? [null];
   const [, id, tileId] = pattern ? path.match(pattern) : [];
+  if (id !== feed?.project.id) put(document.querySelector("#toasts"));
   const leave = close;
   close = () => {};
   await leave();

@@ -180,7 +180,8 @@ class SearchPage {
     this.bar.hidden = !alive(task);
     if (task?.state === "waiting") this.bar.removeAttribute("value");
     else this.bar.value = task?.share ?? 0;
-    const said = task?.result?.notes ?? [];
+    const doubts = [project, project.second].flatMap((own) => own?.silhouette?.doubts ?? []);
+    const said = [...doubts, ...task?.result?.notes ?? []];
     const told = JSON.stringify(said);
     if (told !== this.told) put(this.noted, notes(said));
     this.told = told;
