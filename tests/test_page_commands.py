@@ -184,8 +184,6 @@ def smaller(words: list[str]) -> list[str]:
     if "--folds" in words:
         given = words.index("--folds") + 1
         words = [*words[:given], "2", *words[given + 1 :]]
-    if "flow" in words:
-        words = [*words, "--seconds", "0"]
     for command, (option, value) in SMALLER.items():
         if " ".join(words).startswith(command) and not {option, "--repeat"} & {*words}:
             words = [*words, option, value]

@@ -112,16 +112,9 @@ def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
     assert done.status == 0, done.err
     out = folder / "d.csv"
     done = orbiflow(
-        "density",
-        "compare",
-        "-d",
-        folder / "good.csv",
-        "-d",
-        folder / "poor.csv",
-        *how,
-        "--out",
+        "density", "compare", "-d", folder / "good.csv", "-d", folder / "poor.csv", *how, "--out",
         out,
-    )
+    )  # fmt: skip
     names(done.out, "good", "poor")
     rows = {row["figure"]: row for row in table_of(out)}
     assert float(rows["p"]["value"]) == pytest.approx(0.01)

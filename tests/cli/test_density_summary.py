@@ -64,15 +64,9 @@ def test_what_little_tells_is_said(tmp_path: Path, orbiflow) -> None:
         (tmp_path / "few.csv").write_text("\n".join(["a,b", *rows]) + "\n")
         out = ("--out", tmp_path / "s.json")
         done = orbiflow(
-            "density",
-            "summary",
-            tmp_path / "few.csv",
-            "--space",
-            "torus",
-            "--unit",
-            "degrees",
+            "density", "summary", tmp_path / "few.csv", "--space", "torus", "--unit", "degrees",
             *out,
-        )
+        )  # fmt: skip
         assert done.status == 0, done.err
         assert said in " ".join(done.out.split())
         (first, _) = json.loads((tmp_path / "s.json").read_text())["columns"]

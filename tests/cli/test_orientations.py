@@ -97,16 +97,9 @@ def test_wrong_options_name_their_cure(
 ) -> None:
     (tmp_path / "a.csv").write_text("phi1,Phi,phi2\n" + "10,20,30\n" * 20)
     done = orbiflow(
-        "density",
-        "fit",
-        tmp_path / "a.csv",
-        "--unit",
-        "degrees",
-        "--space",
-        *options,
-        "-o",
+        "density", "fit", tmp_path / "a.csv", "--unit", "degrees", "--space", *options, "-o",
         tmp_path / "m",
-    )
+    )  # fmt: skip
     assert done.status == 2
     names(done.err, *WRONG[options].split())
 

@@ -18,15 +18,19 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
     Cancel,
     Cancelled,
+    Event,
+    Failed,
+    Finished,
+    Note,
     Operation,
     Outcome,
     Sink,
+    Started,
     call_from_json,
     find,
     ignore,
     operation,
 )
-from orbiflow.runtime.events import Event, Failed, Finished, Note, Started
 from orbiflow.settings import Needs, Range, SettingError, Settings
 from refusals import refused
 
