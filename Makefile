@@ -5,7 +5,8 @@ BIN := $(VENV)/bin
 export DENO_DIR := $(VENV)/deno
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test explore other-processor lint bench docs gallery paper wheel clean
+.PHONY: demo test test-tiles test-density test-solids test-studio test-core explore other-processor \
+	lint lint-scripts bench docs gallery paper wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/orbiflow escherize examples/silhouettes/turtle.png --out out/demo
@@ -14,6 +15,30 @@ demo: $(VENV)/.installed
 # threads of linear algebra would only be in their way.
 test: lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal -q
+
+# What a change in one part needs: its tests and examples, with the lint of its part. The core is all
+# that is of no other part, so that no test is forgotten.
+TILES := src/orbiflow/tiles tests/tiles tests/test_awkward_calls.py tests/test_gallery.py \
+	$(patsubst %,tests/cli/test_%.py,animate art batch escherize export mistakes solid tile_options)
+DENSITY := src/orbiflow/density tests/density tests/cli/test_orientations.py \
+	$(wildcard tests/cli/test_density*.py)
+SOLIDS := src/orbiflow/solids tests/solids
+STUDIO := src/orbiflow/studio tests/studio
+CORE := $(filter-out $(TILES) $(DENSITY) $(SOLIDS) $(STUDIO) tests/cli %/__pycache__, \
+	$(wildcard src/orbiflow/*.py tests/*.py tests/cli/*.py) reproduction \
+	$(patsubst %/,%,$(wildcard src/orbiflow/*/ tests/*/)))
+
+test-tiles: PART := $(TILES)
+test-density: PART := $(DENSITY)
+test-solids: PART := $(SOLIDS)
+test-studio: PART := $(STUDIO)
+test-studio: lint-scripts
+test-core: PART := $(CORE)
+test-tiles test-density test-solids test-studio test-core: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python --threads 2 $(PART)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal -q $(PART)
 
 # Random inputs that no run has had before: `make test` takes the same ones for everyone.
 explore: $(VENV)/.installed-dev
@@ -28,10 +53,12 @@ other-processor: $(VENV)/.installed-dev
 		tests/symmetry tests/fields tests/flows tests/tiles/tilings tests/tiles/geometry \
 		tests/studio/test_shapes.py
 
-lint: $(VENV)/.installed-dev
+lint: $(VENV)/.installed-dev lint-scripts
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python --threads 2
+
+lint-scripts: $(VENV)/.installed-dev
 	$(BIN)/deno fmt --check --quiet
 	$(BIN)/deno lint --quiet
 	$(BIN)/deno check --quiet src/orbiflow/studio/static/js src/orbiflow/tiles/write

@@ -15,6 +15,7 @@ from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry import translation, wallpaper_group
 from orbiflow.tiles.flowing.starts import outline_starts, template_starts
 from orbiflow.tiles.flowing.tile_model import extract_tile
+from refusals import refused
 
 Call = Callable[..., object]
 
@@ -61,7 +62,7 @@ def test_strange_polygons_are_taken(name: str, ring: Any) -> None:
 @pytest.mark.parametrize("name", polygon_functions)
 @pytest.mark.parametrize("ring", USELESS.values(), ids=USELESS)
 def test_what_is_no_polygon_is_refused(name: str, ring: Any) -> None:
-    with pytest.raises(OrbiflowError, match=r".{20}"):
+    with refused():
         polygon_functions[name](ring)
 
 
@@ -117,82 +118,82 @@ bow_tie, space, whole = (
 )
 hexagons = template_starts("IH4", turns=1, stretch=0.0, vertices=30)
 distance: Any = tiles.signed_distance
-REFUSED: list[tuple[Call, Any, str]] = [
-    (lambda g: Tile(SQUARE, g), "p4", "the tile's group must be a CrystallographicGroup, got 'p4'"),
-    (lambda g: Tile(SQUARE, g), KIND, r"isohedral_class\(name\).group\(\)"),
-    (lambda k: Tile(SQUARE, GROUP, k), KIND, 'give its name, "IH4"'),
-    (lambda c: Tile(SQUARE, GROUP, "", c), (0, 9), "from 0 to 3, got 9"),
-    (lambda c: Tile(SQUARE, GROUP, "", c), (0.5,), "whole number"),
-    (tiles.certify, SQUARE, r"the tile must be a Tile or a Tiling, got an array of shape \(4, 2\)"),
-    (tiles.neighbours, SQUARE, "must be a Tile"),
-    (tiles.colouring, SQUARE, "must be a Tile"),
-    (lambda t: patch(t, (0, 0, 1, 1)), SQUARE, "must be a Tile"),
-    (tiles.tiling_picture, SQUARE, "must be a Tile"),
-    (lambda t: tiles.certify(TILE, tolerance=t), np.nan, "tolerance must be"),
-    (lambda t: tiles.certify(TILE, tolerance=t), 0, "must be above 0, got 0"),
-    (lambda t: tiles.certify(TILE, tolerance=t), "1e-9", "got '1e-9'"),
-    (lambda w: patch(TILE, w), "all", r"a window is \(xmin"),
-    (lambda w: patch(TILE, w), None, r"a window is \(xmin"),
-    (lambda w: patch(TILE, w), [[0, 0], [1, 1]], "a window is"),
-    (lambda g: tiles.aspects(TILE, [g]), np.eye(2), "must be an Isometry"),
-    (lambda g: tiles.aspects(TILE, [g]), translation([0.3, 0]), "not an element"),
-    (tiles.isohedral_class, None, "unknown isohedral class None; there are IH1"),
-    (tiles.isohedral_class, ["IH4"], "unknown isohedral class a list of 1"),
-    (PENTAGON.template, [np.nan, 0], "shape parameters.*finite"),
-    (PENTAGON.template, "x", "real numbers"),
-    (KIND.stretch, 1.0, r"shape \(..., 2\), got .*\(\)"),
-    (lambda k: Model(k, 0.0), "IH94", "unknown isohedral class 'IH94'"),
-    (lambda k: Model(k, 0.0), GROUP, "unknown isohedral class"),
-    (lambda a: Model(KIND, a), [np.nan], "angles.*finite"),
-    (lambda a: Model(KIND, a), np.zeros((2, 2)), r"shape \(S,\)"),
-    (lambda a: Model(KIND, a), [], "S at least 1"),
-    (lambda a: Model(KIND, a), "IH4", "angles must be real numbers"),
-    (lambda a: Model(KIND, a), None, "needs angles or prototiles"),
-    (lambda m: Model(KIND, [0.0, 1.0], mirrored=m), [True], r"shape \(2,\)"),
-    (lambda d: Model(KIND, 0.0, dtype=d), torch.int64, "floating-point type"),
-    (lambda s: Model(KIND, 0.0, smoothness=s), np.nan, "smoothness must be"),
-    (lambda s: Model(KIND, 0.0, segments=s), 0, "segments must be"),
-    (lambda p: Model(KIND, prototiles=p), SQUARE, "must be a Prototiles"),
-    (lambda p: Model("IH7", prototiles=p), hexagons, "not of class IH7"),
-    (MODEL, torch.zeros(1, 3, 2), "points are torch.float32, the model is torch.float64"),
-    (MODEL.inverse, whole[None], "points are torch.int64"),
-    (MODEL.inverse, space, r"shape \(S, N, 2"),
-    (MODEL, [[0.0, 0.0, 0.0]], r"shape \(..., N, 2\)"),
-    (MODEL.take, [5], "from 0 to 0, got 5"),
-    (MODEL.take, [], "choose at least one"),
-    (Model.joined, [], "got none"),
-    (Model.joined, [MODEL, OTHER], r"\['IH4', 'IH7'\]"),
-    (extract_tile, "IH4", "the model must be a TileModel, got 'IH4'"),
-    (extract_tile, PAIR, "take one candidate first: this model holds 2"),
-    (tiles.as_map, "IH4", "must be a TileModel"),
-    (tiles.load_model, 3, "the model's file must be a path, got 3"),
-    (lambda t: tiles.fit_descent(t, KIND, FAST), BOOT, "must be a Target, got a list of 7"),
-    (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be a SearchMethod"),
-    (lambda t: tiles.OccupancySamples(t, 9, seed=0), BOOT, "must be a Target"),
-    (lambda r: tiles.OverlapSearch(resolutions=r), (35,), "divide boundary = 240"),
-    (tiles.SoftTarget, BOOT, "must be a Target"),
-    (lambda r: tiles.SoftTarget(TARGET, resolution=r), 0, "resolution must be"),
-    (lambda b: SOFT.occupancy(torch.zeros(1, 2), b), 0.0, "blur must be above 0"),
-    (lambda p: distance(p, torch.tensor(SQUARE)), SQUARE, "must be a Tensor"),
-    (lambda p: distance(p, p), whole, "floating-point"),
-    (lambda p: distance(p, p), space, r"shape \(..., N, 2\)"),
-    (tiles.Target.read, None, "must be a path or a binary stream; .*got None"),
-    (TARGET.to_input, [1, 2, 3], r"shape \(..., 2\), got an array of shape \(3,\)"),
-    (TARGET.to_normal, "x", "points must be real numbers"),
-    (TARGET.frame.to_normal, torch.zeros(3), r"shape \(..., 2\)"),
-    (lambda s: tiles.rank_score(s, 0.5), "a", "iou must be a number"),
-    (lambda s: tiles.rank_score(0.5, s), None, "recognisability must be"),
-    (lambda n: tiles.diverse([1, 2], n, lambda *_: 0.0), 1.5, "count must be a whole"),
-    (tiles.Overlap(SQUARE).iou, bow_tie, "not a simple polygon"),
-    (lambda m: Emphasis(m, (0, 0, 1, 1)), "x", "real numbers"),
-    (lambda b: Emphasis(np.eye(2), b), (0, 0, 1), r"shape \(4,\)"),
-    (Emphasis(np.eye(2), (-1, -1, 1, 1)).weight, [1, 2, 3], "points"),
+REFUSED: list[tuple[Call, Any, tuple[str, ...]]] = [
+    (lambda g: Tile(SQUARE, g), "p4", ("CrystallographicGroup", "p4")),
+    (lambda g: Tile(SQUARE, g), KIND, ("isohedral_class(name).group()",)),
+    (lambda k: Tile(SQUARE, GROUP, k), KIND, ('"IH4"',)),
+    (lambda c: Tile(SQUARE, GROUP, "", c), (0, 9), ("0", "3", "9")),
+    (lambda c: Tile(SQUARE, GROUP, "", c), (0.5,), ("0.5",)),
+    (tiles.certify, SQUARE, ("Tile", "Tiling")),
+    (tiles.neighbours, SQUARE, ("Tile",)),
+    (tiles.colouring, SQUARE, ("Tile",)),
+    (lambda t: patch(t, (0, 0, 1, 1)), SQUARE, ("Tile",)),
+    (tiles.tiling_picture, SQUARE, ("Tile",)),
+    (lambda t: tiles.certify(TILE, tolerance=t), np.nan, ("tolerance", "nan")),
+    (lambda t: tiles.certify(TILE, tolerance=t), 0, ("tolerance", "0")),
+    (lambda t: tiles.certify(TILE, tolerance=t), "1e-9", ("tolerance", "'1e-9'")),
+    (lambda w: patch(TILE, w), "all", ("window", "xmin")),
+    (lambda w: patch(TILE, w), None, ("window", "xmin")),
+    (lambda w: patch(TILE, w), [[0, 0], [1, 1]], ("window",)),
+    (lambda g: tiles.aspects(TILE, [g]), np.eye(2), ("Isometry",)),
+    (lambda g: tiles.aspects(TILE, [g]), translation([0.3, 0]), ("element",)),
+    (tiles.isohedral_class, None, ("None", "IH1")),
+    (tiles.isohedral_class, ["IH4"], ("isohedral", "list")),
+    (PENTAGON.template, [np.nan, 0], ("shape", "parameters")),
+    (PENTAGON.template, "x", ()),
+    (KIND.stretch, 1.0, ("2)", "()")),
+    (lambda k: Model(k, 0.0), "IH94", ("IH94",)),
+    (lambda k: Model(k, 0.0), GROUP, ("isohedral",)),
+    (lambda a: Model(KIND, a), [np.nan], ("angles",)),
+    (lambda a: Model(KIND, a), np.zeros((2, 2)), ("(S,)",)),
+    (lambda a: Model(KIND, a), [], ("S", "1")),
+    (lambda a: Model(KIND, a), "IH4", ("angles",)),
+    (lambda a: Model(KIND, a), None, ("angles", "prototiles")),
+    (lambda m: Model(KIND, [0.0, 1.0], mirrored=m), [True], ("mirrored", "(2,)")),
+    (lambda d: Model(KIND, 0.0, dtype=d), torch.int64, ("int64",)),
+    (lambda s: Model(KIND, 0.0, smoothness=s), np.nan, ("smoothness",)),
+    (lambda s: Model(KIND, 0.0, segments=s), 0, ("segments",)),
+    (lambda p: Model(KIND, prototiles=p), SQUARE, ("Prototiles",)),
+    (lambda p: Model("IH7", prototiles=p), hexagons, ("IH7",)),
+    (MODEL, torch.zeros(1, 3, 2), ("torch.float32", "torch.float64")),
+    (MODEL.inverse, whole[None], ("torch.int64",)),
+    (MODEL.inverse, space, ()),
+    (MODEL, [[0.0, 0.0, 0.0]], ("points",)),
+    (MODEL.take, [5], ("0", "5")),
+    (MODEL.take, [], ()),
+    (Model.joined, [], ("none",)),
+    (Model.joined, [MODEL, OTHER], ("IH4", "IH7")),
+    (extract_tile, "IH4", ("TileModel", "IH4")),
+    (extract_tile, PAIR, ("2",)),
+    (tiles.as_map, "IH4", ("TileModel",)),
+    (tiles.load_model, 3, ("3",)),
+    (lambda t: tiles.fit_descent(t, KIND, FAST), BOOT, ("Target", "7")),
+    (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", ("SearchMethod",)),
+    (lambda t: tiles.OccupancySamples(t, 9, seed=0), BOOT, ("Target",)),
+    (lambda r: tiles.OverlapSearch(resolutions=r), (35,), ("boundary", "240")),
+    (tiles.SoftTarget, BOOT, ("Target",)),
+    (lambda r: tiles.SoftTarget(TARGET, resolution=r), 0, ("resolution",)),
+    (lambda b: SOFT.occupancy(torch.zeros(1, 2), b), 0.0, ("blur", "0")),
+    (lambda p: distance(p, torch.tensor(SQUARE)), SQUARE, ("Tensor",)),
+    (lambda p: distance(p, p), whole, ("int64",)),
+    (lambda p: distance(p, p), space, ("points",)),
+    (tiles.Target.read, None, ("None",)),
+    (TARGET.to_input, [1, 2, 3], ("(3,)",)),
+    (TARGET.to_normal, "x", ("points",)),
+    (TARGET.frame.to_normal, torch.zeros(3), ("points",)),
+    (lambda s: tiles.rank_score(s, 0.5), "a", ("iou",)),
+    (lambda s: tiles.rank_score(0.5, s), None, ("recognisability",)),
+    (lambda n: tiles.diverse([1, 2], n, lambda *_: 0.0), 1.5, ("count",)),
+    (tiles.Overlap(SQUARE).iou, bow_tie, ("polygon",)),
+    (lambda m: Emphasis(m, (0, 0, 1, 1)), "x", ()),
+    (lambda b: Emphasis(np.eye(2), b), (0, 0, 1), ("(4,)",)),
+    (Emphasis(np.eye(2), (-1, -1, 1, 1)).weight, [1, 2, 3], ("points",)),
 ]
 
 
-@pytest.mark.parametrize(("call", "argument", "message"), REFUSED)
-def test_what_cannot_be_meant_is_refused(call: Call, argument: Any, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message) as caught:
+@pytest.mark.parametrize(("call", "argument", "about"), REFUSED)
+def test_what_cannot_be_meant_is_refused(call: Call, argument: Any, about: tuple[str, ...]) -> None:
+    with refused(*about) as caught:
         call(argument)
     assert not isinstance(caught.value, CertificationError)
 
@@ -225,5 +226,5 @@ BAD_SETTINGS: dict[type, dict[str, tuple[Any, ...]]] = {
     [(k, n, v) for k, rows in BAD_SETTINGS.items() for n, values in rows.items() for v in values],
 )
 def test_settings_that_cannot_be_used(kind: type, name: str, value: Any) -> None:
-    with pytest.raises(OrbiflowError, match=name):
+    with refused(name):
         kind(**{name: value})

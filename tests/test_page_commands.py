@@ -6,6 +6,7 @@ Searches and fits try little, and tables have few rows: what they find is tested
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import zlib
 from collections.abc import Iterator
@@ -55,9 +56,20 @@ FINDS = {
     "escherize examples/silhouettes/squirrel.dat --out out/squirrel": "--classes IH4",
     "escherize docs/gallery/silhouettes/seal.svg --out out/seal": "--classes IH5",
     "escherize docs/gallery/silhouettes/seal.svg docs/gallery/silhouettes/shark.svg --out out/pair": "",
-    "fill examples/meshes/koala.obj --out out/koala": "",
+    "fill examples/meshes/koala.obj --out out/koala": "--detail 5000 --groups P-1",
 }
 """What pages begin with, done once for all of them, and what makes it smaller."""
+
+SMALLER = {
+    "art": ("--area", "600x400px"),
+    "animate": ("--area", "120x80px"),
+    "batch": ("--classes", "IH4"),
+    "density cv": ("--folds", "2"),
+}
+"""Options of commands that do not have them, so that less is drawn or tried."""
+
+LARGE = {"3000x2000px": "600x400px", "594x420mm": "90x60mm", "300x200mm": "60x40mm", "9cm": "2cm"}
+"""Sizes of artwork, and what is drawn instead."""
 
 COLUMNS = {
     "his": "phi,psi,chi1,chi2,protein", "his-fitted": "phi,psi,protein", "trp": "phi,psi,protein",
@@ -76,6 +88,7 @@ OF_A_PAGE = {
     ("docs/summaries.md", "poles"): "plat,plon",
 }
 COAST = {"type": "LineString", "coordinates": [[0, 0], [20, 30], [60, 40]]}
+ROWS = 60
 LENGTHS = {"length", "temperature", "pressure", "depth", "x", "y", "z"}
 
 
@@ -96,9 +109,9 @@ def column(name: str, count: int, random: np.random.Generator) -> list[object]:
 def write_table(path: Path, columns: str) -> None:
     random = np.random.default_rng(zlib.crc32(path.stem.encode()))
     names = columns.split(",")
-    rows = zip(*(column(name, 60, random) for name in names), strict=True)
+    rows = zip(*(column(name, ROWS, random) for name in names), strict=True)
     if columns == "x,y,z,w":
-        rows = Rotation.random(60, rng=random).as_quat()
+        rows = Rotation.random(ROWS, rng=random).as_quat()
     path.write_text("\n".join([columns, *(",".join(map(str, row)) for row in rows)]) + "\n")
 
 
@@ -126,7 +139,8 @@ def little_fixture() -> Iterator[pytest.MonkeyPatch]:
 @pytest.fixture(scope="module", name="workshop")
 def workshop_fixture(tmp_path_factory: pytest.TempPathFactory, _little: object) -> Path:
     """A folder as readers have it who did what pages begin with; made once a run, never changed."""
-    folder = tmp_path_factory.getbasetemp().parent / "workshop"
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "workshop"
     with FileLock(f"{folder}.lock"), pytest.MonkeyPatch.context() as patch:
         if not folder.exists():
             new = folder.with_name("workshop-new")
@@ -146,7 +160,7 @@ def bring_files(folder: Path) -> None:
     shutil.copytree(ROOT / "examples", folder / "examples")
     write_obj(folder / "examples" / "meshes" / "koala.obj", creature())
     for table in (folder / "examples" / "density").glob("*.csv"):
-        table.write_text("".join(table.read_text().splitlines(keepends=True)[:100]))
+        table.write_text("".join(table.read_text().splitlines(keepends=True)[: ROWS + 1]))
     for name in ("animals", "angles"):
         (folder / name).mkdir()
     for animal in ("turtle.png", "barbet.svg"):
@@ -158,9 +172,22 @@ def bring_files(folder: Path) -> None:
     for name, shape in (("bird", "seal"), ("dolphin", "shark")):
         shutil.copy(ROOT / f"docs/gallery/drawings/{shape}.svg", folder / f"{name}.svg")
     (folder / "coast.geojson").write_text(json.dumps(COAST))
-    np.save(folder / "patches.npy", np.random.default_rng(0).normal(size=(60, 9)))
+    np.save(folder / "patches.npy", np.random.default_rng(0).normal(size=(ROWS, 9)))
     for name, columns in COLUMNS.items():
         write_table(folder / f"{name}.csv", columns)
+
+
+def smaller(words: list[str]) -> list[str]:
+    """The same command with less to draw or to try."""
+    if words[0] == "art":
+        words = [LARGE.get(word, word) for word in words]
+    if "--folds" in words:
+        given = words.index("--folds") + 1
+        words = [*words[:given], "2", *words[given + 1 :]]
+    for command, (option, value) in SMALLER.items():
+        if " ".join(words).startswith(command) and not {option, "--repeat"} & {*words}:
+            words = [*words, option, value]
+    return words
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -182,8 +209,7 @@ def test_a_page(
         words = line.words[1:]
         if " ".join(words) in FINDS or (NOT_HERE.keys() & {*words} and "rolled" not in words):
             continue
-        is_large = words[0] == "art" and not {"--area", "--repeat"} & {*words}
-        done = call_main(capsys.readouterr, *words, *(("--area", "600x400px") if is_large else ()))
+        done = call_main(capsys.readouterr, *smaller(words))
         if done.status:
             refused.append(f"{line.text}\n{done.err or done.out}")
     assert not refused, "\n".join(refused)

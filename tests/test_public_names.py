@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import orbiflow
+from refusals import refused
 
 ROOT = Path(__file__).parents[1]
 
@@ -47,7 +48,7 @@ def test_pages_import_what_is_public() -> None:
 
 
 def test_an_unknown_name_is_refused() -> None:
-    with pytest.raises(AttributeError, match="orbiflow"):
+    with refused("orbiflow", "tessellate", kind=AttributeError):
         _ = orbiflow.tessellate  # pyright: ignore[reportAttributeAccessIssue]
 
 

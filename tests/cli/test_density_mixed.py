@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from density.test_mixed import data_of
+from refusals import names
 
 
 def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    rows = data_of(200)
+    rows = data_of(120)
     text = "phi,length,temperature\n" + "\n".join(",".join(map(str, row)) for row in rows)
     Path("rows.csv").write_text(text)
     how = ["--space", "torus", "--unit", "degrees", "--linear", "length,temperature"]
@@ -25,7 +26,6 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     assert orbiflow("density", "score", "rows.csv", "-m", "fit", "-o", "s.csv").status == 0
     done = orbiflow("density", "conditional", "-m", "fit", "--given", "length=1.51", "-o", "part")
     assert done.status == 0, done.err
-    assert "per unit of each column" in done.out
     table = np.loadtxt("part/density.csv", delimiter=",", skiprows=1)
     assert table[:, 1].min() < 288 < 294 < table[:, 1].max()
     cell = 3.0 * np.diff(np.unique(table[:, 1])[:2])[0]
@@ -52,27 +52,27 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     less = np.loadtxt("p.csv", delimiter=",", skiprows=1, usecols=3)
     assert np.allclose(joint - less, given, atol=1e-6)
     done = orbiflow(
-        "density", "trend", "-m", "fit", "--of", "length", "--along", "phi", "-n", 9, "-o", "t.csv"
+        "density", "trend", "-m", "fit", "--of", "length", "--along", "phi", "-n", 5, "-o", "t.csv"
     )
     assert done.status == 0, done.err
     table = np.loadtxt("t.csv", delimiter=",", skiprows=1)
-    assert table.shape == (9, 7)
+    assert table.shape == (5, 7)
     assert (table[:, 2] < table[:, 1]).all()
     assert Path("t.png").read_bytes()[:4] == b"\x89PNG"
-    cv = ["--components", "kernels", "--folds", 3, "-o", "cv"]
+    cv = ["--components", "kernels", "--folds", 2, "-o", "cv"]
     done = orbiflow("density", "cv", "rows.csv", *how, *cv)
     assert done.status == 0, done.err
     found = json.loads(Path("cv/report.json").read_text())
     assert found["uniform"] < 0
-    for words, message in (
-        (["--space", "sphere", "--linear", "length"], "beyond 90 degrees"),
-        (["--space", "torus", "--unit", "degrees", "--linear", "speed"], "--period name speed"),
-        (["--space", "torus", "--period", "phi"], "columns with numbers above 0"),
-        (["--space", "torus", "--linear", "length", "--period", "length=2"], "is named twice"),
+    for words, about in (
+        (["--space", "sphere", "--linear", "length"], "90"),
+        (["--space", "torus", "--unit", "degrees", "--linear", "speed"], "--period speed"),
+        (["--space", "torus", "--period", "phi"], "--period 0"),
+        (["--space", "torus", "--linear", "length", "--period", "length=2"], "length"),
     ):
         done = orbiflow("density", "fit", "rows.csv", *words, "-o", "no")
         assert done.status == 2
-        assert message in done.err
+        names(done.err, *about.split())
 
 
 def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
@@ -93,20 +93,19 @@ def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
     assert done.status == 0, done.err
     done = orbiflow("density", "conditional", "-m", "fit", "--given", "day=91", "-o", "spring")
     assert done.status == 0, done.err
-    assert "per steradian times unit" in done.out
     done = orbiflow("density", "marginal", "-m", "spring", "--columns", "lat,lon", "-o", "place")
     assert done.status == 0, done.err
     assert Path("place/density.png").exists()
     done = orbiflow("density", "marginal", "-m", "fit", "--columns", "lat", "-o", "half")
     assert done.status != 0
-    assert "have a meaning together alone" in done.err
+    names(done.err, "sphere")
     pictures = ["--data", "rows.csv", "--along", "depth", "--at", "3,4", "-o", "p"]
     done = orbiflow("density", "plot", "-m", "fit", *pictures)
     assert done.status == 0, done.err
     assert {path.name for path in Path("p").iterdir()} >= {"series.png", "beside.png"}
     done = orbiflow("density", "plot", "-m", "fit", "--along", "lat", "-o", "q")
     assert done.status == 2
-    assert "--along must be a column beside the sphere: day, depth" in done.err
+    names(done.err, "--along", "day", "depth")
     done = orbiflow("density", "plot", "-m", "place", "--along", "day", "-o", "q")
     assert done.status == 2
     trend = ["--of", "depth", "--along", "day", "-n", 5, "-o", "t.csv"]
@@ -115,8 +114,6 @@ def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
     table = np.loadtxt("t.csv", delimiter=",", skiprows=1)
     assert table[[0, -1], 0].tolist() == [0, 365]
     assert table[1, 1] > table[3, 1] + 0.5
-    done = orbiflow("density", "cv", "rows.csv", *how, "--folds", 3, "-o", "cv")
-    assert done.status == 0, done.err
     done = orbiflow("density", "summary", "rows.csv", *how[:-2], "-o", "s.json")
     assert done.status == 2
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from orbiflow.density.spaces.patches import klein_patch
+from refusals import names
 
 
 def test_patches_to_angles(tmp_path: Path, orbiflow) -> None:
@@ -17,8 +18,7 @@ def test_patches_to_angles(tmp_path: Path, orbiflow) -> None:
     options = ("--unit", "degrees", "--farthest", 0.5, "--out", out)
     done = orbiflow("density", "patches", data, *options)
     assert done.status == 0, done.err
-    assert "49 patches" in done.out
-    assert "1 farther ones left out" in done.out
+    names(done.out, 49, 1)
     header, *rows = out.read_text().splitlines()
     assert header == "theta,phi,distance"
     values = np.array([row.split(",") for row in rows], dtype=float)
@@ -28,21 +28,17 @@ def test_patches_to_angles(tmp_path: Path, orbiflow) -> None:
 def test_mistakes(tmp_path: Path, orbiflow) -> None:
     data, out = tmp_path / "patches.csv", tmp_path / "angles.csv"
     data.write_text("1,2,3,1,2,3,1,2,3\n" + "5,5,5,5,5,5,5,5,5\n")
-    for arguments, message in (
-        ((data,), "row 2: a patch without contrast"),
-        (
-            (data, "--columns", "1,2,3"),
-            "9 pixel values or 8 DCT coordinates, and there are 3 columns",
-        ),
-        ((data, "--farthest", -1), "--farthest must be at least 0"),
-        ((tmp_path / "nowhere.csv",), "no such file"),
+    for arguments, about in (
+        ((data,), "2"),
+        ((data, "--columns", "1,2,3"), "9 8 3"),
+        ((data, "--farthest", -1), "--farthest 0"),
+        ((tmp_path / "nowhere.csv",), "nowhere.csv"),
     ):
         done = orbiflow("density", "patches", *arguments, "--out", out)
         assert done.status == 2
-        assert message in done.err
-        assert "Traceback" not in done.err
+        names(done.err, *about.split())
         assert not out.exists()
     data.write_text("0,0,0,0,1,0,0,0,0\n")
     done = orbiflow("density", "patches", data, "--farthest", 0.1, "--out", out)
     assert done.status == 2
-    assert "none of 1 patches is within 0.1" in done.err
+    names(done.err, 1, "0.1")

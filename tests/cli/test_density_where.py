@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from refusals import names
+
 TABLE = """site,angle,phase,count
 north,10,1,2
 north,20,1.0,2
@@ -44,7 +46,7 @@ def test_rows_are_chosen_by_values(summary, where: str, rows: int, mean: float) 
     done, columns = summary("--columns", "angle", "--where", where)
     assert done.status == 0, done.err
     assert (columns[0]["rows"], columns[0]["mean"]) == (rows, pytest.approx(mean, abs=1))
-    assert f"read {rows} of 5 rows" in done.out
+    names(done.out, f"{rows} of 5")
 
 
 def test_a_column_that_chooses_rows_is_no_data(summary) -> None:
@@ -56,7 +58,7 @@ def test_a_column_that_chooses_rows_is_no_data(summary) -> None:
 def test_missing_values_of_rows_that_are_read_are_refused_and_of_others_not(summary) -> None:
     done, _ = summary("--columns", "angle", "--where", "phase=2")
     assert done.status != 0
-    assert "in line 4, column 'angle'" in done.err
+    names(done.err, "line 4", "'angle'")
     done, columns = summary("--columns", "angle", "--where", "phase=2", "--drop-missing")
     assert columns[0]["rows"] == 1
     # counts are those of the rows that are read: one of the others has none
@@ -77,8 +79,7 @@ def test_missing_values_of_rows_that_are_read_are_refused_and_of_others_not(summ
 def test_what_chooses_no_row_is_refused(summary, where: str, words: str) -> None:
     done, _ = summary("--columns", "angle", "--where", where)
     assert done.status != 0
-    assert words in done.err
-    assert "Traceback" not in done.err
+    names(done.err, *words.split())
 
 
 def test_rows_that_are_not_read_have_no_score(tmp_path: Path, orbiflow: Any) -> None:
@@ -90,7 +91,7 @@ def test_rows_that_are_not_read_have_no_score(tmp_path: Path, orbiflow: Any) -> 
         "density", "fit", tmp_path / "a.csv", *how, "--where", "kind=a", "-o", tmp_path / "m"
     )
     assert done.status == 0, done.err
-    assert "read 30 of 60 rows" in done.out
+    names(done.out, "30 of 60")
     out = tmp_path / "scores.csv"
     done = orbiflow(
         *("density", "score", tmp_path / "a.csv", "--model", tmp_path / "m", "--where", "kind=b"),

