@@ -24,7 +24,7 @@ STEPS = {"FIRST_STEPS": 6, "LAST_STEPS": 6}
 
 @contextmanager
 def small_pairs() -> Iterator[None]:
-    """Search for pairs at the effort "fast" from few glues and in few steps, in this process and its forks."""
+    """Search for pairs at the effort "fast" in this process and its forks, in few steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(PairSearch.efforts, "fast", FEW)  # pyright: ignore[reportArgumentType]
         for name in ("glues", "placed", "held", "starts", "carved"):

@@ -19,6 +19,7 @@ from orbiflow.runtime import (
     call_from_json,
     find,
 )
+from refusals import refused
 from runtime.searches import check_order
 
 BOOT = "[[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]"
@@ -92,7 +93,7 @@ def test_settings_that_cannot_be(fields, message: str) -> None:
 
 
 def test_an_svg_has_no_pictures_per_second() -> None:
-    with pytest.raises(SettingError, match="fps applies only to format gif or mp4"):
+    with refused("fps", "format", "svg", kind=SettingError):
         animation(result="out", out="a.svg", fps=5).run()
 
 
