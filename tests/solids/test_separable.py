@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError, SettingError
-from orbiflow.solids import FillSettings, fill
+from orbiflow.solids import FillSettings, fill, separable
 from orbiflow.solids.assembly import greatest_overlap
 from orbiflow.solids.bodies import as_body, united
 from orbiflow.solids.certificate import certify_solid
@@ -42,7 +42,11 @@ def test_labels_are_sorted_as_well_as_can_be(count: int, length: int, seed: int)
         assert line[own, range(length)].sum() == pytest.approx(best)
 
 
-def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted() -> None:
+def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(separable, "FINE", 0.05)
+    monkeypatch.setattr(separable, "DIRECTIONS", 16)
     group, body = group_named("P -1"), creature()
     distance = SignedDistance.of_mesh(body, 0.05)
 

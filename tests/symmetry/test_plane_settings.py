@@ -78,7 +78,7 @@ def test_settings_differ_and_cells_of_neither_are_refused() -> None:
     for one, other in (("pm", "p11m"), ("pg", "p11g"), ("cm", "c11m"), ("pmg", "p2gm")):
         assert wallpaper_group(one) != wallpaper_group(other)
     for name in ("c12m", "c1m", "p1m", "c2mg", "c11g"):
-        with pytest.raises(GroupError, match=name):
+        with refused(name, kind=GroupError):
             wallpaper_group(name)
     with refused("cm", "[0.0, 2.0]", kind=GroupError):
         wallpaper_group("c11m", np.diag([1.0, 2.0]))

@@ -250,7 +250,7 @@ def test_rounded_operators_are_read_as_fractions_and_said(tmp_path, third, two):
     listed = OPERATORS.replace("1/3", third).replace("2/3", two)
     path = tmp_path / "rounded.cif"
     path.write_text(f"{CORE}{listed}\n", "utf-8")
-    with pytest.warns(RoundedOperatorsWarning, match=f"{third} as 1/3, {two} as 2/3"):
+    with warned(third, "1/3", two, "2/3", kind=RoundedOperatorsWarning):
         group = group_from_cif(path)
     assert group == space_group(154, (4.9134, 4.9134, 5.4052, 90, 90, 120))
 

@@ -113,16 +113,16 @@ def test_the_pieces_lie_in_the_tray() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "name"),
     [
-        ({"cut": "pieces", "tray": 10.0}, "tray applies only to cut jigsaw"),
-        ({"bed": (100.0, 80.0)}, "bed applies only to .*others are one sheet"),
-        ({"kerf": 0.1}, "kerf applies only to cut pieces"),
-        ({"clip": True}, "clip applies only to"),
+        ({"cut": "pieces", "tray": 10.0}, "tray"),
+        ({"bed": (100.0, 80.0)}, "bed"),
+        ({"kerf": 0.1}, "kerf"),
+        ({"clip": True}, "clip"),
     ],
 )
-def test_options_that_do_not_go_together(options, message: str) -> None:
-    with pytest.raises(SettingError, match=message):
+def test_options_that_do_not_go_together(options, name: str) -> None:
+    with refused(name, kind=SettingError):
         ExportSettings(**{**OPTIONS, **options})
 
 

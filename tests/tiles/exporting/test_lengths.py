@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.kinds import Refused, kind_of
 from orbiflow.units import (
     MILLIMETRES,
@@ -39,21 +38,21 @@ def test_points_are_those_of_an_inch() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "about"),
     [
-        ("40", "'40' has no unit; write 40mm, 40cm or 40in"),
-        ("40px", "unknown unit 'px'; use one of mm, cm, in, pt"),
-        ("mm", "'mm' is not a length; write a number and its unit, such as 40mm"),
-        ("", "is not a length"),
-        ("-3mm", "is not a length"),
-        ("1e9mm", "longer than 100 m"),
-        ("1e999mm", "longer than 100 m"),
-        ("nanmm", "is not a length"),
-        ("40mm cm", "is not a length"),
+        ("40", "40mm"),
+        ("40px", "'px'"),
+        ("mm", "40mm"),
+        ("", "length"),
+        ("-3mm", "-3mm"),
+        ("1e9mm", "100 m"),
+        ("1e999mm", "100 m"),
+        ("nanmm", "nanmm"),
+        ("40mm cm", "40mm cm"),
     ],
 )
-def test_no_lengths(text: str, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_no_lengths(text: str, about: str) -> None:
+    with refused(about):
         length(text)
 
 
@@ -65,17 +64,17 @@ def test_zero_where_it_is_one(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "about"),
     [
-        ("300x200", "has no unit; write 300x200mm"),
-        ("300mm", "not a width and a height; write both and their unit, such as 300x200mm"),
-        ("300x200x10mm", "not a width and a height"),
-        ("-3x200mm", "not a width and a height"),
-        ("300x200ft", "unknown unit 'ft'"),
+        ("300x200", "300x200mm"),
+        ("300mm", "300x200mm"),
+        ("300x200x10mm", "300x200mm"),
+        ("-3x200mm", "300x200mm"),
+        ("300x200ft", "'ft'"),
     ],
 )
-def test_no_sizes(text: str, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_no_sizes(text: str, about: str) -> None:
+    with refused(about):
         size(text)
 
 

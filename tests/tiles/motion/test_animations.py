@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageSequence
 
 from orbiflow.drawing import palette
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import CertificationError
 from orbiflow.settings import SettingError
 from orbiflow.tiles import (
     AnimationSettings,
@@ -250,22 +250,22 @@ def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None
 
 
 @pytest.mark.parametrize(
-    ("bad", "message"),
+    ("bad", "about"),
     [
-        ({"format": "webm"}, "format must be gif, mp4 or svg"),
-        ({"kind": "jump"}, "kind must be morph, bend or grow"),
+        ({"format": "webm"}, "format"),
+        ({"kind": "jump"}, "kind"),
         ({"seconds": 0}, "seconds"),
         ({"fps": 1000}, "fps"),
-        ({"area": "801x534px", "format": "mp4"}, "area is 801 x 534 pixels: choose even sides"),
-        ({"area": "60x40px"}, "choose sides from 64 to 8000 pixels"),
-        ({"kind": "morph", "clip": False}, "clip applies only to kind bend or grow"),
+        ({"area": "801x534px", "format": "mp4"}, "801 x 534"),
+        ({"area": "60x40px"}, "8000 pixels"),
+        ({"kind": "morph", "clip": False}, "clip"),
         ({"area": 1.5}, "area"),
-        ({"palette": "mud"}, "unknown palette"),
-        ({"format": "gif", "seconds": 120, "fps": 60}, "more than 2400"),
+        ({"palette": "mud"}, "palette"),
+        ({"format": "gif", "seconds": 120, "fps": 60}, 2400),
     ],
 )
-def test_settings_that_cannot_be_used(bad, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_settings_that_cannot_be_used(bad, about: object) -> None:
+    with refused(about):
         AnimationSettings(**bad)
 
 

@@ -74,9 +74,7 @@ def test_a_promise_that_is_not_kept_is_refused(n: int, more: int) -> None:
     if more == 0:
         assert len(read(text).outline) == n
     else:
-        with pytest.raises(
-            InputFileError, match=f"promises {n} vertices and {max(n + more, 0)} follow"
-        ):
+        with refused("line 1", n, max(n + more, 0), kind=InputFileError):
             read(text)
 
 
