@@ -209,7 +209,11 @@ def test_artwork_of_another_world_is_written(tmp_path: Path) -> None:
     )
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
     assert done.summary["tiles"] > 20
-    art(escher("IH7"), tmp_path / "b.png", ArtSettings(world="sphere", order=(2, 3, 5), dpi=50))
+    art(
+        escher("IH7"),
+        tmp_path / "b.png",
+        ArtSettings(world="sphere", order=(2, 3, 5), dpi=50, area=(60.0, 60.0)),
+    )
     art(escher("IH7"), tmp_path / "c.pdf", ArtSettings(world="cylinder", area=(120.0, 60.0)))
     assert (tmp_path / "c.pdf").read_bytes().startswith(b"%PDF")
     picture = np.asarray(Image.open(tmp_path / "b.png").convert("RGB")).astype(int)
