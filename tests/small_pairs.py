@@ -10,23 +10,27 @@ from typing import Any
 import pytest
 
 from orbiflow.tiles import EscherizeSettings, SearchResult, escherize
+from orbiflow.tiles.search import pair_search
 from orbiflow.tiles.search.pair_search import LOOK, PairSearch
 from outlines import animal
 
 NAMES = "squirrel.dat", "nagata/dolphin_60.dat"
 FEW: dict[str, Any] = {
-    "ratios": 1, "points": 64, "glues": 20, "placed": 80, "held": 8, "starts": 6, "carved": 3,
-    "ranked": 2, "finalists": 2,
+    "ratios": 1, "points": 40, "glues": 10, "placed": 40, "held": 4, "starts": 3, "carved": 2,
+    "ranked": 1, "finalists": 1,
 }  # fmt: skip
+STEPS = {"FIRST_STEPS": 6, "LAST_STEPS": 6}
 
 
 @contextmanager
 def small_pairs() -> Iterator[None]:
-    """Search for pairs at the effort "fast" from few glues, in this process and its forks."""
+    """Search for pairs at the effort "fast" in this process and its forks, in few steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(PairSearch.efforts, "fast", FEW)  # pyright: ignore[reportArgumentType]
         for name in ("glues", "placed", "held", "starts", "carved"):
             patch.setitem(LOOK, name, FEW[name])
+        for name, count in STEPS.items():
+            patch.setattr(pair_search, name, count)
         yield
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, palette
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 # Machado, Oliveira and Fernandes, "A physiologically-based model for simulation of color vision
 # deficiency", IEEE TVCG 15, 2009: severity 1, linear RGB.
@@ -78,7 +78,7 @@ def test_as_many_colours_as_needed() -> None:
 def test_names() -> None:
     own = palette("ink")._replace(paper="#eeeeee")
     assert palette(own) is own
-    with pytest.raises(OrbiflowError, match="okabe-ito"):
+    with refused("okabe-ito"):
         palette("puce")
 
 
@@ -102,10 +102,10 @@ def test_spelt_out() -> None:
     ],
 )
 def test_misspelt(text: str) -> None:
-    with pytest.raises(OrbiflowError, match="palette"):
+    with refused("palette"):
         palette(text)
 
 
 def test_one_of_each() -> None:
-    with pytest.raises(OrbiflowError, match="once"):
+    with refused("palette", "paper"):
         palette("e76f51,paper=ffffff,paper=000000")

@@ -13,9 +13,9 @@ from PIL import Image
 from orbiflow.arrays import Array
 from orbiflow.drawing import Sheet, field_picture, palette
 from orbiflow.drawing.canvas import flow_lines, symmetric_seeds
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import Tile, classes_png, isohedral_class, overlay_picture, tiling_picture
 from orbiflow.tiles.pictures.overlays import ADDED, COMMON, MISSING
+from refusals import refused
 
 
 def pixels(data: bytes) -> Array:
@@ -57,9 +57,9 @@ def test_overlay_of_awkward_targets() -> None:
     tile = Tile(square(1.0), isohedral_class("IH1").group())
     bow_tie = np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
     assert share(pixels(overlay_picture(tile, bow_tie).png(400)), ADDED) > 0.1
-    with pytest.raises(OrbiflowError, match="no area"):
+    with refused("target"):
         overlay_picture(tile, np.zeros((5, 2))).png()
-    with pytest.raises(OrbiflowError, match=r"outline is \(M >= 3, 2\)"):
+    with refused("outline", "(5, 3)"):
         overlay_picture(tile, np.zeros((5, 3))).png()
 
 
@@ -72,7 +72,7 @@ def test_y_down_turns_the_picture_over(bent_tile: Any) -> None:
 
 
 def test_absurd_sizes_are_refused(bent_tile: Any) -> None:
-    with pytest.raises(OrbiflowError, match="cannot be made"):
+    with refused("1000000 by 666667 pixels"):
         tiling_picture(bent_tile("IH1")).png(10**6)
 
 
@@ -108,9 +108,9 @@ def test_field_picture_has_the_symmetry_of_the_group() -> None:
 
 def test_field_must_return_vectors() -> None:
     group = isohedral_class("IH4").group()
-    with pytest.raises(OrbiflowError, match="finite vectors of shape"):
+    with refused("field", "(267, 400)"):
         field_picture(lambda p: p[..., 0], group, sheet=Sheet.screen(100)).file()
-    with pytest.raises(OrbiflowError, match="finite vectors of shape"):
+    with refused("field", "(267, 400, 2)"):
         field_picture(lambda p: p * np.nan, group, sheet=Sheet.screen(100)).file()
 
 

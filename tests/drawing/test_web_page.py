@@ -9,6 +9,7 @@ import pytest
 from jinja2 import UndefinedError
 
 from orbiflow.drawing import rendered
+from refusals import refused
 
 TEMPLATE = """{% extends "web_page.html" %}
 {% block style %}{% include "own.css" %}{% endblock %}
@@ -45,5 +46,5 @@ def test_a_page_that_is_never_dark(package: str) -> None:
 
 
 def test_a_name_that_is_not_given(package: str) -> None:
-    with pytest.raises(UndefinedError, match="text"):
+    with refused("text", kind=UndefinedError):
         rendered(package, "page.html", title="")

@@ -11,6 +11,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.fields import jacobian, symmetrize
 from orbiflow.fields.symmetrization import blend
 from orbiflow.symmetry import WALLPAPER_GROUPS, wallpaper_group
+from refusals import refused
 from strategies import (
     central_difference,
     equivariance_error,
@@ -210,9 +211,9 @@ def test_a_field_of_other_points_is_refused_with_words(periodic):
     )
     for field in (single, spatial):
         for call in (field, field.divergence):
-            with pytest.raises(OrbiflowError, match=r"evaluated at torch\.float64 points .* 2\)"):
+            with refused("float64", "(..., 2)"):
                 call(points)
-    with pytest.raises(OrbiflowError, match=r"got a tensor of shape \(4, 5, 1\)"):
+    with refused("(4, 5, 1)"):
         late(points)
 
 
@@ -227,7 +228,7 @@ def test_lists_arrays_and_dtypes_are_followed(periodic):
         torch.testing.assert_close(field.divergence(same), slope)  # pyright: ignore[reportArgumentType]
     assert field(points.float()).dtype == field.divergence(points.float()).dtype == torch.float32
     assert field(np.array([1, 2])).dtype == torch.float64
-    with pytest.raises(OrbiflowError, match="points must be real numbers"):
+    with refused("points", "ab"):
         field("ab")
 
 

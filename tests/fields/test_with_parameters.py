@@ -7,10 +7,10 @@ import torch
 from hypothesis import given, settings
 from torch import Tensor
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, SplineField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
+from refusals import refused
 from strategies import (
     largest,
     map_equivariance_error,
@@ -64,18 +64,18 @@ def test_a_spline_takes_one_row() -> None:
     with torch.no_grad():
         expected.parameters_.copy_(own)
     assert torch.equal(spline.with_parameters(own)(points), expected(points))
-    with pytest.raises(OrbiflowError, match=r"of shape \(\d+,\), got \(2, \d+\)"):
+    with refused("parameters", "(50,)", "(2, 50)"):
         spline.with_parameters(own.expand(2, -1))
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (2, 3), (2, 2, 50)])
 def test_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
     field = FourierField(SQUARE, 2)
-    with pytest.raises(OrbiflowError, match=r"shape \(50,\) or \(S, 50\), got"):
+    with refused("(50,)", "(S, 50)"):
         field.with_parameters(torch.zeros(shape, dtype=torch.float64))
 
 
 def test_another_dtype_is_refused() -> None:
     field = FourierField(SQUARE, 2)
-    with pytest.raises(OrbiflowError, match=r"dtype, torch.float64, got torch.float32"):
+    with refused("float64", "float32"):
         field.with_parameters(torch.zeros(field.size))

@@ -14,6 +14,7 @@ from orbiflow.errors import CoarseStepsWarning
 from orbiflow.fields import FourierField
 from orbiflow.flows import METHODS, Flow
 from orbiflow.symmetry import wallpaper_group
+from refusals import warned
 from strategies import (
     error_estimate,
     gentle_field,
@@ -59,7 +60,7 @@ def test_every_way_through_the_flow_is_looked_at(apply):
 
 @torch.no_grad()
 def test_any_callable_is_looked_at():
-    with pytest.warns(CoarseStepsWarning, match="1 euler steps"):
+    with warned("1 euler steps", kind=CoarseStepsWarning):
         Flow(lambda p: -3 * p, steps=1, method="euler")(POINTS)
 
 

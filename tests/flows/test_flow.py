@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from torch import Tensor, nn
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, symmetrize
 from orbiflow.flows import METHODS, Flow
 from orbiflow.symmetry import wallpaper_group
+from refusals import refused
 from strategies import (
     TABLED,
     error_estimate,
@@ -315,17 +315,17 @@ def test_shapes_of_points_are_kept(shape):
 
 @pytest.mark.parametrize("bad", [0, -3, 2.5, True])
 def test_steps_that_are_no_count_are_refused(bad):
-    with pytest.raises(OrbiflowError, match="steps must be"):
+    with refused("steps"):
         Flow(torch.sin, steps=bad)
 
 
 def test_an_unknown_method_is_refused():
-    with pytest.raises(OrbiflowError, match="unknown integrator 'heun'"):
+    with refused("heun"):
         Flow(torch.sin, method="heun")
 
 
 def test_a_flow_of_no_field_is_refused():
-    with pytest.raises(OrbiflowError, match="at least one vector field"):
+    with refused("field"):
         Flow([])
 
 
@@ -365,7 +365,7 @@ def test_fields_may_write_into_their_points(field: Any) -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "1", True])
 def test_numbers_are_finite(value: Any) -> None:
-    with pytest.raises(OrbiflowError, match="duration must be"):
+    with refused("duration"):
         Flow(lambda p: p, duration=value)
-    with pytest.raises(OrbiflowError, match="steps must be"):
+    with refused("steps"):
         Flow(lambda p: p, steps=value)

@@ -12,6 +12,7 @@ from orbiflow.errors import GroupError, OrbiflowError
 from orbiflow.fields import FourierField, PeriodicFeatures, SplineField, jacobian, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import IDENTIFICATION_SPACES, identification_group, wallpaper_group
+from refusals import refused
 from strategies import groups, neural_field, random_tensor
 
 P4 = wallpaper_group("p4")
@@ -26,12 +27,12 @@ PLANAR = {
 
 @pytest.mark.parametrize("kind", PLANAR)
 def test_three_columns_into_a_planar_field(kind):
-    with pytest.raises(OrbiflowError, match=r"points of shape \(\.\.\., 2\), got \(4, 3\)"):
+    with refused("(..., 2)", "(4, 3)"):
         Flow(PLANAR[kind], steps=1)(THREE)
     for apply in (P4.images, P4.wrap, P4.cosets[1], P4.cosets[1].push):
-        with pytest.raises(GroupError, match=r"shape \(\.\.\., 2\), got \(4, 3\)"):
+        with refused("(..., 2)", "(4, 3)", kind=GroupError):
             apply(THREE)
-        with pytest.raises(GroupError, match=r"shape \(\.\.\., 2\), got \(4, 3\)"):
+        with refused("(..., 2)", "(4, 3)", kind=GroupError):
             apply(THREE.numpy())
 
 
@@ -45,7 +46,7 @@ def test_a_float32_field_at_float64_points(kind):
     flow = Flow(make[kind](), steps=1)
     points = random_tensor(0, 4, 2)
     for apply in (flow, flow.inverse, flow.forward_and_log_det):
-        with pytest.raises(OrbiflowError, match=r"float32.*convert the points"):
+        with refused("float32", "points"):
             apply(points)
     assert flow(points.float()).dtype == torch.float32
     assert flow.double()(points).dtype == torch.float64
@@ -65,11 +66,11 @@ def test_points_that_are_none(points, message):
 
 
 def test_fields_that_are_none():
-    with pytest.raises(OrbiflowError, match="a callable from points to vectors, got 'p6m'"):
+    with refused("p6m"):
         Flow(["p6m"])  # type: ignore[list-item]
-    with pytest.raises(OrbiflowError, match=r"expected \(4, 3\), got \(4, 1\)"):
+    with refused("(4, 3)", "(4, 1)"):
         Flow(lambda p: p[..., :1])(THREE)
-    with pytest.raises(RuntimeError, match="mat1 and mat2"):  # the user's own
+    with refused("mat1", kind=RuntimeError):  # the user's own
         Flow(nn.Linear(2, 2).double())(THREE)
 
 
@@ -85,9 +86,9 @@ def test_fields_that_are_none():
     ids=["fourier", "spline", "symmetrize", "features", "network"],
 )
 def test_a_groups_name_in_place_of_a_group(make):
-    with pytest.raises(GroupError, match=r"expected a Crys.* got 'p6m'.*wallpaper_group\('p6m'\)"):
+    with refused("CrystallographicGroup", "p6m", kind=GroupError):
         make("p6m")
-    with pytest.raises(GroupError, match="got None"):
+    with refused("None", kind=GroupError):
         make(None)
 
 

@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 from safetensors.torch import load, save
 from torch import Tensor, nn
 
-from orbiflow.errors import InputFileError, OrbiflowError, OutputError
+from orbiflow.errors import InputFileError, OutputError
 from orbiflow.fields import FourierField, SplineField, symmetrize
 from orbiflow.flows import METHODS, Flow, load_flow, save_flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
+from refusals import refused
 from sealed import sealed
 from strategies import groups, neural_field, random_tensor, seeds, space_group
 
@@ -147,32 +148,30 @@ def test_fields_of_ones_own_are_asked_for_by_name(tmp_path: Path) -> None:
         fewer = {key: make for key, make in makers.items() if key != name}
         with pytest.raises(InputFileError, match=said):
             load_flow(path, modules=fewer)
-    with pytest.raises(InputFileError, match=r"must create a field.*3"):
+    with refused("own.safetensors", "shear", 3, kind=InputFileError):
         load_flow(path, modules={**makers, "shear": lambda: 3})
 
 
 def test_what_cannot_be_saved_is_named(tmp_path: Path) -> None:
     path = tmp_path / "flow"
-    with pytest.raises(OrbiflowError, match=r"segments\.0 is a function without a name"):
+    with refused("segments.0"):
         save_flow(Flow(lambda p: p), path)
     broken = filled(FourierField(wallpaper_group("p4"), 2), 1)
     with torch.no_grad():
         broken.parameters_[0] = float("nan")
-    with pytest.raises(
-        OrbiflowError, match=r"segments\.0\.parameters_ has values that are not fin"
-    ):
+    with refused("segments.0.parameters_"):
         save_flow(Flow(broken), path)
 
     class Mine(Flow):
         pass
 
-    with pytest.raises(OrbiflowError, match=r"the flow is a Mine; .* Flow\(flow\.fields\(\)"):
+    with refused("Mine", "flow.fields()"):
         save_flow(Mine(torch.sin), path)
-    with pytest.raises(OrbiflowError, match="the flow must be a Flow, got a FourierField"):
+    with refused("Flow", "FourierField"):
         save_flow(broken, path)
-    with pytest.raises(OrbiflowError, match="257 segments"):
+    with refused("257 segments"):
         save_flow(Flow([torch.sin] * 257), path)
-    with pytest.raises(OutputError, match="there is no folder"):
+    with refused("none", kind=OutputError):
         save_flow(Flow(torch.sin), tmp_path / "none" / "flow")
     assert not list(tmp_path.iterdir())
 
@@ -264,9 +263,9 @@ def headed(text: bytes) -> bytes:
 
 def test_files_that_are_no_flow(tmp_path: Path) -> None:
     path = tmp_path / "file"
-    with pytest.raises(InputFileError, match=r"cannot read .*file: No such file"):
+    with refused("file", kind=InputFileError):
         load_flow(path)
-    with pytest.raises(InputFileError, match="Is a directory"):
+    with refused("directory", kind=InputFileError):
         load_flow(tmp_path)
     for data in (
         b"",
@@ -277,16 +276,14 @@ def test_files_that_are_no_flow(tmp_path: Path) -> None:
         headed(b"7"),
     ):
         path.write_bytes(data)
-        with pytest.raises(InputFileError, match="not a flow saved by orbiflow, or damaged"):
+        with refused("file", kind=InputFileError):
             load_flow(path)
     path.write_bytes(save({"x": torch.ones(2)}, metadata={"orbiflow": "[" * 100_000}))
-    with pytest.raises(InputFileError, match="not a flow saved by orbiflow"):
+    with refused("file", kind=InputFileError):
         load_flow(path)
     with path.open("wb") as file:
         file.truncate(300 * 2**20)
-    with pytest.raises(
-        InputFileError, match="314,572,800 bytes, too large for a flow: at most 268,435,456"
-    ):
+    with refused("314,572,800", "268,435,456", kind=InputFileError):
         load_flow(path)
 
 
@@ -312,13 +309,13 @@ def test_every_flipped_bit_is_found(tmp_path: Path) -> None:
         data = bytearray(whole)
         data[bit // 8] ^= 1 << bit % 8
         path.write_bytes(data)
-        with pytest.raises(InputFileError, match=r"damaged|checksum") as caught:
+        with refused("flow", kind=InputFileError) as caught:
             load_flow(path)
         said.add("does not match" in str(caught.value))
     assert said == {True, False}
     for cut in (1, 8, 100):
         path.write_bytes(whole[:-cut])
-        with pytest.raises(InputFileError, match="damaged"):
+        with refused("flow", kind=InputFileError):
             load_flow(path)
 
 
@@ -327,7 +324,7 @@ def test_a_file_without_a_checksum_says_what_to_do(tmp_path: Path) -> None:
     header.pop("checksum")
     path = tmp_path / "old.safetensors"
     path.write_bytes(save(tensors, metadata={"orbiflow": json.dumps(header)}))
-    with pytest.raises(InputFileError, match=r"has no checksum, .* save it again"):
+    with refused("old.safetensors", kind=InputFileError):
         load_flow(path)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,16 @@ from orbiflow.drawing import write_stl
 from orbiflow.runtime import Event
 from orbiflow.solids import EscherSolid, FillSettings, fill, run_folder, search
 from orbiflow.solids.bodies import as_body
+from orbiflow.solids.closing import Function, ball_of_cells
+from orbiflow.symmetry import CrystallographicGroup
 from solids.known_bodies import creature
 
+CELLS = 1200  # settings ask for 5000 at least
 SMALL = FillSettings(effort="fast", groups=("P-1", "P21"), detail=5000, workers=1, size=60)
+
+
+def _few_cells(depth: Function, bounds: Any, group: CrystallographicGroup, _detail: int) -> Any:
+    return ball_of_cells(depth, bounds, group, CELLS)
 
 
 @contextmanager
@@ -24,10 +32,11 @@ def small_fills() -> Iterator[None]:
     """Search for solids from few poses and coarse bodies."""
     with pytest.MonkeyPatch.context() as patch:
         few = search.Effort(
-            groups=2, tried=100, climbed=2, steps=30, per_group=1, polishing=10, quick=2, full=2,
-            rough=0.16, fine=0.13, grain=0.05, stages=((0.5, 4), (2.0, 6), (8.0, 4)),
+            groups=2, tried=30, climbed=2, steps=12, per_group=1, polishing=4, quick=2, full=2,
+            rough=0.16, fine=0.13, grain=0.1, stages=((1.0, 3), (8.0, 3)),
         )  # fmt: skip
         patch.setitem(search.EFFORTS, "fast", few)
+        patch.setattr(search, "ball_of_cells", _few_cells)
         patch.setattr(run_folder, "SHEET_WIDTH", 480)
         patch.setattr(run_folder, "FRAMES", 3)
         yield

@@ -13,6 +13,7 @@ from orbiflow.errors import GroupError
 from orbiflow.solids.cell_shapes import cubes, tetrahedra, triangular_prisms
 from orbiflow.solids.complexes import cell_complex, conventional_group
 from orbiflow.symmetry import CrystallographicGroup, space_group, wallpaper_group
+from refusals import refused
 from solids.known_solids import CELLS, group_named, names, seeds
 
 SHAPES = {"P 21 3": "tetrahedra", "R 3": "triangular prisms", "P 3": "triangular prisms"}
@@ -62,7 +63,7 @@ def test_elements_take_cells_to_cells_of_their_orbit_and_their_corners_along(nam
 def test_cells_of_unlike_orbits_have_no_element_between_them():
     grid = cell_complex(group_named("P 21 21 21"), 300)
     cells = np.argwhere(grid.orbits != grid.orbits[0, 0, 0, 0])[:1]
-    with pytest.raises(GroupError, match="not of one orbit"):
+    with refused("orbit", kind=GroupError):
         grid.elements_between(np.zeros((1, 4), int), cells)
 
 
@@ -97,18 +98,18 @@ def test_discs_on_a_cube_are_one_connected_part_with_a_connected_rest():
 @given(st.sampled_from(["P 1 m 1", "P n m a", "P 4/m m m", "F d -3 m:1"]))
 @settings(max_examples=4)
 def test_groups_with_mirrors_are_refused(name):
-    with pytest.raises(GroupError, match="has mirrors"):
+    with refused(name, "mirrors", kind=GroupError):
         cell_complex(space_group(name), 500)
 
 
 def test_groups_of_the_plane_are_refused():
-    with pytest.raises(GroupError, match="dimension 2"):
+    with refused("dimension", 2, kind=GroupError):
         cell_complex(wallpaper_group("p1"), 500)
 
 
 def test_a_group_whose_origin_is_off_its_centres_is_refused_with_advice():
     group = group_named("P -1").conjugate(np.eye(3), [0.123, 0.0456, 0.0789])
-    with pytest.raises(GroupError, match="move the origin"):
+    with refused("P -1", "origin", kind=GroupError):
         cell_complex(group, 500)
 
 

@@ -9,11 +9,12 @@ import pytest
 import torch
 from hypothesis import given, settings
 
-from orbiflow.errors import GroupError, OrbiflowError
+from orbiflow.errors import GroupError
 from orbiflow.fields import symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import EquivarianceError, assert_equivariant, group_by_name, wallpaper_group
 from orbiflow.symmetry.equivariance import Kind
+from refusals import refused
 from strategies import groups, plane_groups, random_field, random_tensor, seeds, several
 
 
@@ -49,9 +50,9 @@ def test_the_message_names_the_coset_and_the_size():
     with pytest.raises(EquivarianceError, match=message):
         assert_equivariant(lambda p: field(p) + torch.tensor([0.0, 1.0]).to(p), p4)
     # a field is no map
-    with pytest.raises(EquivarianceError, match=r"D\(g p\)"):
+    with refused("D(g p)", kind=EquivarianceError):
         assert_equivariant(field, p4, kind="map")
-    with pytest.raises(EquivarianceError, match=r"f\(g p\)"):
+    with refused("f(g p)", kind=EquivarianceError):
         assert_equivariant(lambda p: p[:, 0], p4, kind="invariant")
 
 
@@ -62,7 +63,7 @@ def test_a_field_that_is_not_periodic_fails():
 
 
 def test_values_that_are_no_numbers_fail():
-    with pytest.raises(EquivarianceError, match="off by nan"):
+    with refused("nan", kind=EquivarianceError):
         assert_equivariant(lambda p: p * torch.nan, wallpaper_group("p1"))
 
 
@@ -146,9 +147,9 @@ def test_one_of_many_images_of_a_narrow_bump_is_missed_by_one_element(name: str)
 
 def test_mistakes_are_refused():
     p2 = wallpaper_group("p2")
-    with pytest.raises(OrbiflowError, match="kind must be"):
+    with refused("kind", "scalar"):
         assert_equivariant(torch.sin, p2, kind="scalar")  # type: ignore[arg-type]
-    with pytest.raises(GroupError, match="wallpaper_group"):
+    with refused("wallpaper_group", kind=GroupError):
         assert_equivariant(torch.sin, "p2")  # type: ignore[arg-type]
-    with pytest.raises(OrbiflowError, match=r"got \(\d+,\)"):
+    with refused("(4096, 2)", "(4096,)"):
         assert_equivariant(lambda p: p[:, 0], p2)

@@ -20,6 +20,7 @@ from orbiflow.symmetry import (
     translation,
     wallpaper_group,
 )
+from refusals import refused
 from strategies import (
     SPACE_GROUPS,
     angles,
@@ -208,31 +209,31 @@ def test_any_linear_map_conjugates_p2_to_p2(lattice, stretch, shear):
 
 @pytest.mark.parametrize("name", ["p3", "p4", "p6", "p4m", "pmm"])
 def test_a_shear_does_not_normalise_a_group_with_more_than_half_turns(name):
-    with pytest.raises(NotAnIsometryError, match="not orthogonal"):
+    with refused("orthogonal", kind=NotAnIsometryError):
         wallpaper_group(name).conjugate([[1.0, 0.3], [0.0, 1.0]])
 
 
 def test_a_singular_conjugation_is_refused():
-    with pytest.raises(GroupError, match="linearly dependent"):
+    with refused("lattice", kind=GroupError):
         wallpaper_group("p1").conjugate(np.ones((2, 2)))
 
 
 @pytest.mark.parametrize(("linear", "offset"), [(np.eye(3), None), (np.eye(2), np.zeros(3))])
 def test_a_conjugation_of_another_dimension_is_refused(linear, offset):
-    with pytest.raises(GroupError, match=r"expected a \(2, 2\) matrix"):
+    with refused("(2, 2)", np.shape(linear), kind=GroupError):
         wallpaper_group("p1").conjugate(linear, offset)
 
 
 def test_a_five_fold_rotation_is_refused_by_number():
     half_turn = rotation((0.0, 0.0), 2)
-    with pytest.raises(LatticeMismatchError, match=r"generator 1, .*does not map the lattice"):
+    with refused("generator 1", "lattice", kind=LatticeMismatchError):
         CrystallographicGroup.generate(np.eye(2), [half_turn, rotation((0.0, 0.0), 5)])
 
 
 @given(lattices("square"), st.floats(0.05, 0.7))
 def test_a_mirror_askew_to_the_lattice_is_refused(lattice, angle):
     direction = rotation_matrix(angle) @ lattice[:, 0]
-    with pytest.raises(LatticeMismatchError, match="generator 0"):
+    with refused("generator 0", kind=LatticeMismatchError):
         CrystallographicGroup.generate(lattice, [transflection(Line((0, 0), direction), 0.0)])
 
 
@@ -240,13 +241,13 @@ def test_a_mirror_askew_to_the_lattice_is_refused(lattice, angle):
 def test_an_irrational_glide_is_refused_by_number(number):
     generators = [transflection(Line((0.0, 0.0), (0.0, 1.0)), 0.0), rotation((0.0, 0.0), 2)]
     generators.insert(number, transflection(Line((0.0, 0.0), (1.0, 0.0)), np.sqrt(2)))
-    with pytest.raises(NotDiscreteError, match=f"more than 500 elements; generator {number}, "):
+    with refused(500, f"generator {number},", kind=NotDiscreteError):
         CrystallographicGroup.generate(np.eye(2), generators, max_order=500)
 
 
 def test_two_centres_at_an_irrational_distance_are_refused():
     centres = [(0.0, 0.0), (np.sqrt(2) / 3, 0.0)]
-    with pytest.raises(NotDiscreteError, match="generator 1, "):
+    with refused("generator 1,", kind=NotDiscreteError):
         CrystallographicGroup.generate(np.eye(2), [rotation(c, 2) for c in centres], max_order=100)
 
 
@@ -276,7 +277,7 @@ def test_degenerate_lattices_are_refused(lattice, match):
 
 
 def test_generators_of_another_dimension_are_refused():
-    with pytest.raises(GroupError, match=r"generator 0 acts on R\^3, but the lattice is in R\^2"):
+    with refused("generator 0", "R^3", "R^2", kind=GroupError):
         CrystallographicGroup.generate(np.eye(2), [identity(3)])
 
 
@@ -285,7 +286,7 @@ def test_a_lattice_is_kept_apart_from_the_callers_array():
     group = CrystallographicGroup.generate(lattice)
     lattice[0, 0] = 7.0
     assert group.cell_volume == 1.0
-    with pytest.raises(ValueError, match="read-only"):
+    with refused("read-only", kind=ValueError):
         group.lattice[0, 0] = 7.0
 
 

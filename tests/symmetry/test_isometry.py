@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError, NotAnIsometryError
 from orbiflow.symmetry import Isometry, identity, translation
+from refusals import refused
 from strategies import isometries, random_points, seeds
 
 dims = st.sampled_from((1, 2, 3, 5))
@@ -84,13 +85,13 @@ def test_parts_cannot_be_changed_from_outside():
     g = Isometry(linear, np.zeros(2))
     linear[0, 0] = 5.0
     assert g.linear[0, 0] == 1.0
-    with pytest.raises(ValueError, match="read-only"):
+    with refused("read-only", kind=ValueError):
         g.translation[0] = 1.0
 
 
 @given(single, st.floats(1e-7, 1.0))
 def test_a_stretch_is_refused(g, amount):
-    with pytest.raises(NotAnIsometryError, match="not orthogonal"):
+    with refused("orthogonal", kind=NotAnIsometryError):
         Isometry(g.linear * (1 + amount), g.translation)
 
 
@@ -104,22 +105,22 @@ def test_a_stretch_is_refused(g, amount):
     ],
 )
 def test_shapes_that_disagree_are_refused(linear, shift):
-    with pytest.raises(NotAnIsometryError, match="shapes"):
+    with refused(np.shape(linear), np.shape(shift), kind=NotAnIsometryError):
         Isometry(linear, shift)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_entries_that_are_not_finite_are_refused(bad):
-    with pytest.raises(NotAnIsometryError, match="NaN or infinite"):
+    with refused("NaN", kind=NotAnIsometryError):
         Isometry(np.eye(2), np.array([0.0, bad]))
 
 
 def test_dimensions_do_not_mix():
-    with pytest.raises(GroupError, match="R\\^2 and R\\^3"):
+    with refused("R^2", "R^3", kind=GroupError):
         _ = identity(2) @ identity(3)
     assert not identity(2).is_close(identity(3))
 
 
 def test_integer_tensors_are_refused_rather_than_truncated():
-    with pytest.raises(GroupError, match="floating-point"):
+    with refused("int64", kind=GroupError):
         identity(2)(torch.tensor([1, 2]))

@@ -17,7 +17,6 @@ from orbiflow.errors import (
     GroupError,
     InputFileError,
     LatticeMismatchError,
-    OrbiflowError,
     RoundedOperatorsWarning,
     SettingError,
 )
@@ -33,6 +32,7 @@ from orbiflow.symmetry import (
 )
 from orbiflow.symmetry.group import generated
 from orbiflow.symmetry.space_groups import element_counts
+from refusals import refused, warned
 
 SETTINGS = {row.xhm(): row for row in gemmi.spacegroup_table()}
 
@@ -122,7 +122,7 @@ def test_the_cure_of_a_wrong_cell_is_one(name):
     ],
 )
 def test_unknown_names_are_refused_with_examples(name):
-    with pytest.raises(GroupError, match=r'unknown space group .* such as "P 21 21 21"'):
+    with refused("space group", "P 21 21 21", kind=GroupError):
         space_group(name)
 
 
@@ -130,7 +130,7 @@ def test_unknown_names_are_refused_with_examples(name):
     "cell", [1, "abc", (1, 2), (1, 1, 1, 90, 90), np.eye(2), (1, 2, np.nan), (0, 1, 1), (1, -1, 1)]
 )
 def test_cells_that_are_none_are_refused(cell):
-    with pytest.raises(SettingError, match="cell must be"):
+    with refused("cell", kind=SettingError):
         space_group(1, cell)
 
 
@@ -142,7 +142,7 @@ def test_cells_without_volume_are_refused(cell):
 
 def test_without_gemmi_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "gemmi", None)
-    with pytest.raises(OrbiflowError, match=r"pip install 'orbiflow\[crystals\]'"):
+    with refused("orbiflow[crystals]"):
         space_group(1)
 
 
@@ -250,7 +250,7 @@ def test_rounded_operators_are_read_as_fractions_and_said(tmp_path, third, two):
     listed = OPERATORS.replace("1/3", third).replace("2/3", two)
     path = tmp_path / "rounded.cif"
     path.write_text(f"{CORE}{listed}\n", "utf-8")
-    with pytest.warns(RoundedOperatorsWarning, match=f"{third} as 1/3, {two} as 2/3"):
+    with warned(third, "1/3", two, "2/3", kind=RoundedOperatorsWarning):
         group = group_from_cif(path)
     assert group == space_group(154, (4.9134, 4.9134, 5.4052, 90, 90, 120))
 
@@ -380,7 +380,7 @@ def test_types_whose_elements_are_alike_are_told_apart(tmp_path, number, other, 
     path.write_text(f"{text}_space_group_IT_number {number}\n")
     assert group_from_cif(path).order == group.order
     path.write_text(f"{text}_space_group_IT_number {other}\n")
-    with pytest.raises(InputFileError, match="it contradicts itself"):
+    with refused("group.cif", other, kind=InputFileError):
         group_from_cif(path)
 
 
@@ -405,13 +405,13 @@ def test_rhombohedral_axes_and_unknown_names_are_named_after_what_was_read(tmp_p
 
 
 def test_files_that_are_none_or_too_large_are_refused(tmp_path, monkeypatch):
-    with pytest.raises(InputFileError, match="cannot be read"):
+    with refused("none.cif", kind=InputFileError):
         group_from_cif(tmp_path / "none.cif")
     monkeypatch.setattr("orbiflow.symmetry.space_groups.MAX_CIF_BYTES", 10)
     (tmp_path / "large.cif").write_text(CORE)
-    with pytest.raises(InputFileError, match="too large for a CIF"):
+    with refused("large.cif", "10 bytes", kind=InputFileError):
         group_from_cif(tmp_path / "large.cif")
-    with pytest.raises(GroupError, match="needs a group of 3 dimensions"):
+    with refused(3, 2, kind=GroupError):
         cif_text(own.identification_group("torus"))
 
 
@@ -439,7 +439,7 @@ def test_a_cif_with_a_quoted_sign_for_unknown_or_a_decimal_number(tmp_path, line
 
 def test_operators_without_a_name_that_make_the_lattice_finer_are_warned_of(tmp_path):
     loop = ("loop_", "_space_group_symop_operation_xyz", "'x,y,z'")
-    with pytest.warns(DataWarning, match="imply 3 translations within the cell and list 1"):
+    with warned(3, "1/3", kind=DataWarning):
         group_from_cif(cif_of(tmp_path, *loop, "'-x,y+1/3,-z'"))
 
 

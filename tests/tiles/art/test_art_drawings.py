@@ -16,7 +16,7 @@ from PIL import Image
 
 from artworks import EYE, art_settings, flat, squirrel
 from orbiflow.drawing import palette
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError
 from orbiflow.tiles import (
     CLASSES,
     Artwork,
@@ -32,6 +32,7 @@ from orbiflow.tiles import (
     write_pdf,
 )
 from orbiflow.tiles.page import INK, Part
+from refusals import refused
 
 PAGE = art_settings(area="300x200px", tile_size="130px", outline=0.0, samples=4)
 
@@ -177,7 +178,7 @@ def test_other_formats_hold_artwork_unless_it_is_pixels(tmp_path: Path) -> None:
     assert np.abs(np.asarray(shown.resize(pixels.shape[1::-1])) - pixels).mean() < 3.4
     assert write_dxf(scene, tolerance=0.1).startswith("  0\nSECTION")
     tile = squirrel("IH4")
-    with pytest.raises(OrbiflowError, match="made of pixels; choose SVG or PDF"):
+    with refused("DXF", "SVG"):
         write_dxf(art_scene(artwork(tile, PAGE, Over(flat(tile, "#c02040")))), tolerance=0.1)
 
 

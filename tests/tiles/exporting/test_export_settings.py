@@ -11,48 +11,49 @@ from exported import tile_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.tiles import ExportSettings, scenes
 from orbiflow.units import PAGES
+from refusals import refused
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "about"),
     [
-        ({"tile_size": 0.0}, "tile_size must be above 0"),
-        ({"tile_size": float("nan")}, "tile_size must be"),
-        ({"area": (0.0, 100.0)}, "area: entry 1: must be above 0"),
-        ({"area": (100.0,)}, "area must be a size"),
-        ({"area": 300}, "area must be a size .*got 300"),
-        ({"area": "300x200"}, "area: '300x200' has no unit"),
-        ({"area": (300, "200")}, "area: entry 2: must be a number above 0"),
-        ({"bed": {300, 200}}, "bed must be a size"),
-        ({"stroke": 5}, "stroke must be a colour .*got 5"),
-        ({"palette": 5}, "palette must be a palette's name, .*got 5"),
-        ({"bed": (100.0, -1.0)}, "bed: entry 2: must be above 0"),
-        ({"format": "bmp"}, "format must be svg, pdf, dxf, png, json or html, got 'bmp'"),
-        ({"cut": "half"}, "cut must be none, skeleton, pieces, jigsaw or template"),
-        ({"cut": "pieces", "copies": 0}, "copies must be .*at least 1"),
-        ({"copies": 3}, "copies applies only to cut pieces, not to none"),
-        ({"kerf": 0.1}, "kerf applies only to cut pieces"),
-        ({"cut": "skeleton", "clearance": 0.1}, "clearance applies only to cut pieces"),
-        ({"cut": "pieces", "clip": True}, "clip applies only to"),
-        ({"border": True}, "border applies only to cut skeleton"),
-        ({"border": True, "cut": "skeleton"}, "border applies only to clip"),
-        ({"kerf": -1.0, "cut": "pieces"}, "kerf must be"),
-        ({"tolerance": 10.0}, "tolerance of 10 mm .*tile of 40 mm; choose at most 2 mm"),
-        ({"palette": "neon"}, "palette: unknown palette 'neon'"),
-        ({"stroke": "red"}, "stroke: .*a colour"),
-        ({"warn_neck": -1.0}, "warn_neck must be .*from 0"),
-        ({"margin": 100.0}, "margin of 100 mm leaves nothing of a page of 300 x 200 mm"),
-        ({"dpi": 0.5}, "dpi must be .*from 1 to 10000"),
-        ({"dpi": 600.0, "format": "svg"}, "dpi applies only to format png"),
-        ({"purpose": "oven"}, "purpose must be laser"),
-        ({"purpose": "web", "colours": 3}, "no setting 'colours'"),
-        ({"cut": "skeleton", "colour": "one"}, "colour applies only to cut none"),
-        ({"cut": "skeleton", "outline": "none"}, "leaves cut skeleton without a line"),
-        ({"filled": False, "palette": "sea"}, "palette has no effect: .*filled"),
+        ({"tile_size": 0.0}, "tile_size"),
+        ({"tile_size": float("nan")}, "tile_size"),
+        ({"area": (0.0, 100.0)}, "area 1"),
+        ({"area": (100.0,)}, "area"),
+        ({"area": 300}, "area 300"),
+        ({"area": "300x200"}, "area '300x200'"),
+        ({"area": (300, "200")}, "area 2"),
+        ({"bed": {300, 200}}, "bed"),
+        ({"stroke": 5}, "stroke 5"),
+        ({"palette": 5}, "palette 5"),
+        ({"bed": (100.0, -1.0)}, "bed 2"),
+        ({"format": "bmp"}, "format svg bmp"),
+        ({"cut": "half"}, "cut template"),
+        ({"cut": "pieces", "copies": 0}, "copies 1"),
+        ({"copies": 3}, "copies cut"),
+        ({"kerf": 0.1}, "kerf cut"),
+        ({"cut": "skeleton", "clearance": 0.1}, "clearance cut"),
+        ({"cut": "pieces", "clip": True}, "clip"),
+        ({"border": True}, "border cut"),
+        ({"border": True, "cut": "skeleton"}, "border clip"),
+        ({"kerf": -1.0, "cut": "pieces"}, "kerf"),
+        ({"tolerance": 10.0}, "tolerance 10 40 2"),
+        ({"palette": "neon"}, "palette neon"),
+        ({"stroke": "red"}, "stroke"),
+        ({"warn_neck": -1.0}, "warn_neck"),
+        ({"margin": 100.0}, "margin 100 300"),
+        ({"dpi": 0.5}, "dpi 10000"),
+        ({"dpi": 600.0, "format": "svg"}, "dpi format"),
+        ({"purpose": "oven"}, "purpose laser"),
+        ({"purpose": "web", "colours": 3}, "'colours'"),
+        ({"cut": "skeleton", "colour": "one"}, "colour cut"),
+        ({"cut": "skeleton", "outline": "none"}, "cut skeleton"),
+        ({"filled": False, "palette": "sea"}, "palette filled"),
     ],
 )
-def test_refused(options, message: str) -> None:
-    with pytest.raises(SettingError, match=message):
+def test_refused(options, about: str) -> None:
+    with refused(*about.split(), kind=SettingError):
         ExportSettings(**options)
 
 
@@ -90,18 +91,18 @@ def test_a_file_s_ending_goes_before_the_purpose_and_after_the_format() -> None:
     assert paper.for_file(Path("a.SVG")).format == "svg"
     assert ExportSettings().for_file(Path("a")).format == "svg"
     assert ExportSettings(format="png").for_file(Path("a.eps")).format == "png"
-    with pytest.raises(SettingError, match=r"out ends in \.svg but format is png"):
+    with refused("out", ".svg", "format", "png", kind=SettingError):
         ExportSettings(format="png").for_file(Path("a.svg"))
-    with pytest.raises(SettingError, match=r"out ends in \.eps; give format"):
+    with refused("out", ".eps", "format", kind=SettingError):
         paper.for_file(Path("a.eps"))
-    with pytest.raises(SettingError, match="dpi applies only to format png, not to svg"):
+    with refused("dpi", "format", "svg", kind=SettingError):
         ExportSettings(dpi=600).for_file(Path("a.svg"))
 
 
 def test_a_page_smaller_than_a_tile_says_what_is_needed() -> None:
     tile = tile_of("IH2")
     small = ExportSettings(area=(35.0, 20.0))
-    with pytest.raises(OrbiflowError, match=r"it needs \d+\.\d x \d+\.\d mm; choose a larger"):
+    with refused("35 x 20 mm", "38.7 x 33.5 mm"):
         scenes(tile, small)
     message = ""
     try:

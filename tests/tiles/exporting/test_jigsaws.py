@@ -12,10 +12,11 @@ from shapely.affinity import translate
 
 from artworks import squirrel
 from exported import dxf_lines, svg_lines, tile_of
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import SettingError
 from orbiflow.tiles import ExportSettings, Scene, as_tile, scenes, sheet_content
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.make.jigsaws import LEAST_SHARE
+from refusals import refused
 
 AREA, MARGIN, SIZE = (150.0, 110.0), 5.0, 35.0
 OPTIONS = {"cut": "jigsaw", "area": AREA, "margin": MARGIN, "tile_size": SIZE}
@@ -112,19 +113,19 @@ def test_the_pieces_lie_in_the_tray() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "name"),
     [
-        ({"cut": "pieces", "tray": 10.0}, "tray applies only to cut jigsaw"),
-        ({"bed": (100.0, 80.0)}, "bed applies only to .*others are one sheet"),
-        ({"kerf": 0.1}, "kerf applies only to cut pieces"),
-        ({"clip": True}, "clip applies only to"),
+        ({"cut": "pieces", "tray": 10.0}, "tray"),
+        ({"bed": (100.0, 80.0)}, "bed"),
+        ({"kerf": 0.1}, "kerf"),
+        ({"clip": True}, "clip"),
     ],
 )
-def test_options_that_do_not_go_together(options, message: str) -> None:
-    with pytest.raises(SettingError, match=message):
+def test_options_that_do_not_go_together(options, name: str) -> None:
+    with refused(name, kind=SettingError):
         ExportSettings(**{**OPTIONS, **options})
 
 
 def test_a_rectangle_that_is_one_piece() -> None:
-    with pytest.raises(OrbiflowError, match="single piece; choose a larger area or smaller tiles"):
+    with refused("jigsaw", "area"):
         scenes(tile_of("IH4"), ExportSettings(cut="jigsaw", area=(41.0, 41.0), tile_size=40.0))

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.kinds import Refused, kind_of
 from orbiflow.units import (
     MILLIMETRES,
@@ -22,6 +21,7 @@ from orbiflow.units import (
     signed_length,
     size,
 )
+from refusals import refused
 
 
 @given(st.floats(1e-3, 1e3), st.sampled_from(list(MILLIMETRES)))
@@ -38,48 +38,48 @@ def test_points_are_those_of_an_inch() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "about"),
     [
-        ("40", "'40' has no unit; write 40mm, 40cm or 40in"),
-        ("40px", "unknown unit 'px'; use one of mm, cm, in, pt"),
-        ("mm", "'mm' is not a length; write a number and its unit, such as 40mm"),
-        ("", "is not a length"),
-        ("-3mm", "is not a length"),
-        ("1e9mm", "longer than 100 m"),
-        ("1e999mm", "longer than 100 m"),
-        ("nanmm", "is not a length"),
-        ("40mm cm", "is not a length"),
+        ("40", "40mm"),
+        ("40px", "'px'"),
+        ("mm", "40mm"),
+        ("", "length"),
+        ("-3mm", "-3mm"),
+        ("1e9mm", "100 m"),
+        ("1e999mm", "100 m"),
+        ("nanmm", "nanmm"),
+        ("40mm cm", "40mm cm"),
     ],
 )
-def test_no_lengths(text: str, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_no_lengths(text: str, about: str) -> None:
+    with refused(about):
         length(text)
 
 
 @pytest.mark.parametrize("text", ["0", "0.0 mm"])
 def test_zero_where_it_is_one(text: str) -> None:
     assert length(text) == kind_of(LengthOrZero).read(text) == 0
-    with pytest.raises(Refused, match="above 0"):
+    with refused(0, 20000, kind=Refused):
         kind_of(Length).read(text)
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "about"),
     [
-        ("300x200", "has no unit; write 300x200mm"),
-        ("300mm", "not a width and a height; write both and their unit, such as 300x200mm"),
-        ("300x200x10mm", "not a width and a height"),
-        ("-3x200mm", "not a width and a height"),
-        ("300x200ft", "unknown unit 'ft'"),
+        ("300x200", "300x200mm"),
+        ("300mm", "300x200mm"),
+        ("300x200x10mm", "300x200mm"),
+        ("-3x200mm", "300x200mm"),
+        ("300x200ft", "'ft'"),
     ],
 )
-def test_no_sizes(text: str, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_no_sizes(text: str, about: str) -> None:
+    with refused(about):
         size(text)
 
 
 def test_no_size_is_without_area() -> None:
-    with pytest.raises(Refused, match="entry 1: must be above 0"):
+    with refused("entry 1", "0.0", kind=Refused):
         kind_of(PageSize).read("0x200mm")
 
 
@@ -107,14 +107,14 @@ def test_sheets_of_paper_halve() -> None:
 
 @pytest.mark.parametrize("text", ["A9", "A4-upright", "paper", ""])
 def test_pages_that_nobody_knows(text: str) -> None:
-    with pytest.raises(OrbiflowError, match=r"is not a page; .*a4, a5, letter.*-landscape"):
+    with refused(text, "a4", "letter", "-landscape"):
         page_size(text)
 
 
 def test_posts_are_pixels_whatever_the_resolution() -> None:
     for dpi in (72, 600):
         assert page_size("Square", dpi) == pytest.approx((1080 * 25.4 / dpi, 1080 * 25.4 / dpi))
-    with pytest.raises(OrbiflowError, match="is not a page"):
+    with refused("page"):
         page_size("square")
 
 
@@ -125,14 +125,14 @@ def test_pixels_have_a_size_where_their_number_in_an_inch_is_known(
     assert math.isclose(length(f"{number!r}px", dpi), number * 25.4 / dpi)
     assert size(f"{number!r}x3px", dpi)[1] == pytest.approx(3 * 25.4 / dpi)
     assert length_or_none("None", dpi) == 0
-    with pytest.raises(OrbiflowError, match="unknown unit 'px'; use one of mm, cm, in, pt"):
+    with refused("px", "mm", "pt"):
         length(f"{number!r}px")
-    with pytest.raises(OrbiflowError, match=r"has no unit; write .*mm, .*cm, .*in or .*px"):
+    with refused("mm", "in", "px"):
         length(f"{number!r}", dpi)
 
 
 @given(st.floats(0.01, 1e3))
 def test_a_sign_before_a_length(number: float) -> None:
     assert signed_length(f" -{number!r}mm") == -signed_length(f"{number!r}mm") == -number
-    with pytest.raises(OrbiflowError, match="is not a length"):
+    with refused("length"):
         signed_length(f"--{number!r}mm")

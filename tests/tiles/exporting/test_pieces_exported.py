@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, ExportSettings, Tile, as_tile, scenes, sheet_content
 from orbiflow.tiles.make.layout import layout
 from orbiflow.tiles.make.nesting import Arrangement, on_sheet
 from orbiflow.tiles.make.offsets import cut_ring
+from refusals import refused
 
 
 def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:
@@ -85,7 +85,7 @@ def test_too_many_for_the_page() -> None:
     tile = tile_of("IH6")
     (sheet,) = cut(tile, area=(110.0, 90.0))
     fit = len(sheet)
-    with pytest.raises(OrbiflowError, match=rf"it holds {fit} pieces, so that 3 sheets are needed"):
+    with refused(2 * fit + 1, f"{fit} pieces", "110 x 90 mm"):
         cut(tile, copies=2 * fit + 1, area=(110.0, 90.0))
 
 
@@ -101,7 +101,7 @@ def test_a_single_piece_goes_in_whichever_way_it_fits() -> None:
 
 
 def test_a_sheet_smaller_than_a_piece() -> None:
-    with pytest.raises(OrbiflowError, match=r"does not hold a single piece, which takes 4\d\.\d x"):
+    with refused("30 x 30 mm", "27.9 mm"):
         cut(tile_of("IH4"), area=(30.0, 30.0))
 
 
@@ -110,17 +110,17 @@ DUMBBELL = np.array([*HALF, *([x, 4.0 - y] for x, y in reversed(HALF))])
 
 
 def test_a_kerf_wider_than_a_neck() -> None:
-    with pytest.raises(OrbiflowError, match=r"kerf of 0\.5 mm is wider than the piece's neck") as e:
+    with refused("kerf", "0.5 mm", "neck") as e:
         cut_ring(DUMBBELL, 0.5, 0.0)
     assert "0.40 mm wide 4.0 mm from its left and 2.0 mm from its top" in str(e.value)
     assert cut_ring(DUMBBELL, 0.3, 0.0) is not None
-    with pytest.raises(OrbiflowError, match=r"clearance of 0\.6 mm is wider"):
+    with refused("clearance", "0.6 mm", "neck"):
         cut_ring(DUMBBELL, 0.0, 0.6)
 
 
 def test_a_kerf_wider_than_a_slit() -> None:
     slit = np.array([[0, 0], [10, 0], [10, 2.9], [3, 2.9], [3, 3.1], [10, 3.1], [10, 6], [0, 6.0]])
-    with pytest.raises(OrbiflowError, match=r"wider than a slit of the piece: it is 0\.20 mm"):
+    with refused("kerf", "slit", "0.20 mm"):
         cut_ring(slit, 0.25, 0.0)
     assert shapely.Polygon(cut_ring(slit, 0.15, 0.0)).is_valid
 
@@ -164,5 +164,5 @@ def test_a_fit_test_cuts_two_neighbours_five_times() -> None:
         # half the kerf outside, half of the clearance inside
         wanted = area.area + area.length * (0.2 - step) / 2
         assert left == pytest.approx(wanted, abs=chosen.deviation * area.length)
-    with pytest.raises(OrbiflowError, match="does not hold the ten pieces of a test of fits"):
+    with refused("120 x 80 mm"):
         scenes(tile, chosen.replace(area=(120.0, 80.0)))

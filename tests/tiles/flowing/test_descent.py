@@ -7,7 +7,6 @@ import pytest
 import shapely
 import torch
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel, Event, Progress
 from orbiflow.tiles import (
     CLASSES,
@@ -32,6 +31,7 @@ from orbiflow.tiles.likeness import boundary_iou
 from orbiflow.tiles.search.candidates import silent
 from orbiflow.tiles.search.search_method import Goal
 from outlines import searched
+from refusals import refused
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)
@@ -149,13 +149,13 @@ def test_broken_prototiles_are_refused() -> None:
     )
     outline, corners = saved.arrays["prototile.outline"], saved.arrays["prototile.corners"]
     broken = {
-        "shape": {"prototile.outline": outline[:, :1]},
-        "must be finite": {"prototile.outline": np.full_like(outline, np.nan)},
+        "(N, 2)": {"prototile.outline": outline[:, :1]},
+        "finite": {"prototile.outline": np.full_like(outline, np.nan)},
         "increasing": {"prototile.corners": corners[::-1].copy()},
         "indices": {"prototile.corners": corners + len(outline)},
     }
     for word, arrays in broken.items():
-        with pytest.raises(OrbiflowError, match=word):
+        with refused(word):
             as_model(TileMap(saved.settings, {**saved.arrays, **arrays}))
 
 
@@ -226,24 +226,24 @@ def test_efforts_are_valid_settings(effort: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "name"),
     [
-        ({"max_frequency": -1}, "max_frequency must be from 0"),
-        ({"max_frequency": 61}, "from 0 to 60"),
-        ({"candidates": 0}, "candidates must be at least 1"),
-        ({"starts": "random"}, "starts must be outline or template"),
-        ({"boundary": 100}, "multiple of 30"),
-        ({"resolutions": (50,)}, "numbers that divide boundary"),
-        ({"stages": ()}, "stages must be from 1 to 1999 steps"),
-        ({"stages": ((3000, 1),)}, "from 1 to 1999 steps"),
-        ({"polish": -1}, "polish must be"),
-        ({"seed": -1}, "seed must be"),
+        ({"max_frequency": -1}, "max_frequency"),
+        ({"max_frequency": 61}, "max_frequency"),
+        ({"candidates": 0}, "candidates"),
+        ({"starts": "random"}, "starts"),
+        ({"boundary": 100}, "boundary"),
+        ({"resolutions": (50,)}, "resolutions"),
+        ({"stages": ()}, "stages"),
+        ({"stages": ((3000, 1),)}, "stages"),
+        ({"polish": -1}, "polish"),
+        ({"seed": -1}, "seed"),
     ],
 )
-def test_settings_are_checked(changes: dict[str, object], message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_settings_are_checked(changes: dict[str, object], name: str) -> None:
+    with refused(name):
         OverlapSearch(**changes)  # type: ignore[arg-type]
-    with pytest.raises(OrbiflowError, match="effort must be fast or normal"):
+    with refused("effort", "heroic"):
         OverlapSearch.for_effort("heroic")
-    with pytest.raises(OrbiflowError, match="has no setting 'magic'"):
+    with refused("magic"):
         OverlapSearch.for_effort("fast", magic=1)

@@ -8,11 +8,11 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import CLASSES, IsohedralClass, Tile, TileModel, certify
 from orbiflow.tiles.flowing.tile_model import extract_tile
+from refusals import refused
 from strategies import divided_start, largest, random_field, random_points, random_tensor, seeds
 
 GLIDES = ["IH2", "IH3", "IH5", "IH6"]
@@ -162,7 +162,7 @@ def test_boundary_is_even_on_every_edge() -> None:
 
 def test_a_stack_has_no_single_group() -> None:
     model = random_model(CLASSES["IH4"], 0, 2)
-    with pytest.raises(OrbiflowError, match="take one candidate first: this model holds 2"):
+    with refused("candidate", 2):
         extract_tile(model)
 
 

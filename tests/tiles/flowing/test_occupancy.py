@@ -11,7 +11,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
     CLASSES,
     Fit,
@@ -25,6 +24,7 @@ from orbiflow.tiles import (
 from orbiflow.tiles.flowing.occupancy import _distinct
 from orbiflow.tiles.flowing.tile_model import MAX_FREQUENCY
 from orbiflow.tiles.search.finished_tiles import best_tiles
+from refusals import refused
 from strategies import seeds
 
 SQUIRREL = Path(__file__).parents[3] / "examples" / "silhouettes" / "squirrel.dat"
@@ -138,21 +138,21 @@ def test_gradient_matches_differences(name: str, affine: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("setting", "value", "message"),
+    ("setting", "value"),
     [
-        ("max_frequency", -1, "max_frequency must be from 0"),
-        ("max_frequency", MAX_FREQUENCY + 1, f"from 0 to {MAX_FREQUENCY}, got {MAX_FREQUENCY + 1}"),
-        ("turns", 0, "turns must be at least 1, got 0"),
-        ("finalists", -3, "finalists must be at least 1, got -3"),
-        ("iterations", 0, "iterations must be at least 1, got 0"),
-        ("points", 0, "points must be at least 1, got 0"),
-        ("segments", 0, "segments must be at least 1, got 0"),
-        ("seed", -1, "seed must be from 0"),
-        ("seed", 2**32, "seed must be from 0"),
+        ("max_frequency", -1),
+        ("max_frequency", MAX_FREQUENCY + 1),
+        ("turns", 0),
+        ("finalists", -3),
+        ("iterations", 0),
+        ("points", 0),
+        ("segments", 0),
+        ("seed", -1),
+        ("seed", 2**32),
     ],
 )
-def test_settings_out_of_range(setting: str, value: int, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_settings_out_of_range(setting: str, value: int) -> None:
+    with refused(setting, value):
         replace(OccupancySearch(), **{setting: value})
 
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import MultiPolygon, Polygon, box
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import compare, dice, hausdorff, iou, pixel_accuracy
 from orbiflow.tiles.likeness.metrics import default_window
+from refusals import refused
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 
@@ -104,27 +104,27 @@ BOWTIE = [[0, 0], [2, 2], [2, 0], [0, 2]]
 
 
 @pytest.mark.parametrize(
-    ("bad", "message"),
+    "bad",
     [
-        (BOWTIE, "not a valid polygon: Self-intersection"),
-        (Polygon(BOWTIE), "not a valid polygon"),
-        ([[0, 0], [1, 1]], r"\(N, 2\)"),
-        ([[0, 0], [1, 1], [np.nan, 0]], "finite"),
-        (Polygon(), "no area"),
-        ("circle", "not a polygon"),
-        ([[0, 0], [1, 0], [2]], "not a polygon"),
+        BOWTIE,
+        Polygon(BOWTIE),
+        [[0, 0], [1, 1]],
+        [[0, 0], [1, 1], [np.nan, 0]],
+        Polygon(),
+        "circle",
+        [[0, 0], [1, 0], [2]],
     ],
 )
 @pytest.mark.parametrize("metric", [iou, dice, pixel_accuracy, hausdorff])
-def test_the_bad_argument_is_named(metric, bad: object, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=f"^a: .*{message}"):
+def test_the_bad_argument_is_named(metric, bad: object) -> None:
+    with refused("a: "):
         metric(bad, SQUARE)
-    with pytest.raises(OrbiflowError, match=f"^b: .*{message}"):
+    with refused("b: "):
         metric(SQUARE, bad)
 
 
 def test_compare_names_its_own_arguments() -> None:
-    with pytest.raises(OrbiflowError, match=r"^tile: "):
+    with refused("tile", "[1 1]"):
         compare(BOWTIE, SQUARE)
-    with pytest.raises(OrbiflowError, match=r"^target: "):
+    with refused("target", "[1 1]"):
         compare(SQUARE, BOWTIE)

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import diverse, rank_score
+from refusals import refused
 
 SHARES = st.floats(0, 1)
 
@@ -24,9 +24,9 @@ def test_rank_score_rises_with_both(iou: float, found: float, more: float) -> No
 
 @pytest.mark.parametrize("bad", [-0.1, 1.1, np.nan])
 def test_rank_score_names_what_is_out_of_range(bad: float) -> None:
-    with pytest.raises(OrbiflowError, match=r"^iou must be .*from 0 to 1"):
+    with refused("iou"):
         rank_score(bad, 0.5)
-    with pytest.raises(OrbiflowError, match=r"^recognisability must be .*from 0 to 1"):
+    with refused("recognisability"):
         rank_score(0.5, bad)
 
 
@@ -70,20 +70,20 @@ def test_variety_is_weighed_against_the_score() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("change", "name"),
     [
-        ({"scores": [[0.1]]}, "^scores must be"),
-        ({"scores": [np.nan]}, "^scores must be"),
-        ({"scores": ["best"]}, "^scores must be"),
-        ({"count": 0}, "^count must be at least 1"),
-        ({"twin": 1.5}, "^twin must be .*from 0 to 1"),
-        ({"variety": -1.0}, "^variety must be .*at least 0"),
-        ({"variety": np.inf}, "^variety must be .*at least 0"),
+        ({"scores": [[0.1]]}, "scores"),
+        ({"scores": [np.nan]}, "scores"),
+        ({"scores": ["best"]}, "scores"),
+        ({"count": 0}, "count"),
+        ({"twin": 1.5}, "twin"),
+        ({"variety": -1.0}, "variety"),
+        ({"variety": np.inf}, "variety"),
     ],
 )
-def test_bad_arguments(change: dict[str, object], message: str) -> None:
+def test_bad_arguments(change: dict[str, object], name: str) -> None:
     arguments: dict[str, object] = {"scores": [0.5], "count": 1, "similarity": lambda _i, _j: 0.0}
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(name):
         diverse(**(arguments | change))  # type: ignore[arg-type]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import SettingError
 from orbiflow.runtime import (
     Call,
     Cancel,
@@ -19,6 +19,7 @@ from orbiflow.runtime import (
     call_from_json,
     find,
 )
+from refusals import refused
 from runtime.searches import check_order
 
 BOOT = "[[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]"
@@ -76,33 +77,33 @@ def test_a_cancelled_one_writes_nothing(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fields", "message"),
+    ("fields", "about"),
     [
-        ({"out": "a.webm"}, "out .*ends in .gif, .mp4 or .svg"),
-        ({"area": "65x40px"}, "area is 65 x 40 pixels: choose sides from 64"),
-        ({"seconds": 0.1}, "seconds must be .*from"),
-        ({"fps": 100}, "fps must be .*from"),
-        ({"seconds": 120, "fps": 60, "format": "gif"}, "seconds .*fps .*more than 2400"),
-        ({"kind": "jump"}, "kind must be morph"),
+        ({"out": "a.webm"}, ("out", ".gif", ".mp4", ".svg")),
+        ({"area": "65x40px"}, ("area", "65 x 40")),
+        ({"seconds": 0.1}, ("seconds",)),
+        ({"fps": 100}, ("fps",)),
+        ({"seconds": 120, "fps": 60, "format": "gif"}, ("seconds", "fps", 2400)),
+        ({"kind": "jump"}, ("kind", "morph")),
     ],
 )
-def test_settings_that_cannot_be(fields, message: str) -> None:
-    with pytest.raises(SettingError, match=message):
+def test_settings_that_cannot_be(fields, about: tuple[object, ...]) -> None:
+    with refused(*about, kind=SettingError):
         animation(result="out", **fields)
 
 
 def test_an_svg_has_no_pictures_per_second() -> None:
-    with pytest.raises(SettingError, match="fps applies only to format gif or mp4"):
+    with refused("fps", "format", "svg", kind=SettingError):
         animation(result="out", out="a.svg", fps=5).run()
 
 
 def test_mistakes_are_said_before_the_work(folder: Path, tmp_path: Path) -> None:
-    for request, message in (
-        (small(folder, tmp_path / "none" / "a.gif"), "there is no folder"),
-        (small(folder, tmp_path / "a.gif", tile="IH1"), "holds no tile of IH1"),
-        (small(folder, tmp_path / "a.gif", kind="bend"), "no bent silhouette"),
-        (small(tmp_path, tmp_path / "a.gif"), "holds no result.json"),
+    for request, name in (
+        (small(folder, tmp_path / "none" / "a.gif"), "none"),
+        (small(folder, tmp_path / "a.gif", tile="IH1"), "IH1"),
+        (small(folder, tmp_path / "a.gif", kind="bend"), "kind"),
+        (small(tmp_path, tmp_path / "a.gif"), "result.json"),
     ):
-        with pytest.raises(OrbiflowError, match=message):
+        with refused(name):
             request.run()
     assert list(tmp_path.iterdir()) == []

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageSequence
 
 from orbiflow.drawing import palette
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import CertificationError
 from orbiflow.settings import SettingError
 from orbiflow.tiles import (
     AnimationSettings,
@@ -36,6 +36,7 @@ from orbiflow.tiles.motifs import Over, Picture
 from orbiflow.tiles.motion.kinds import BendingWay, eased, frames, motion
 from orbiflow.tiles.motion.writers import frame_image, frame_scene
 from orbiflow.tiles.write import scene_image
+from refusals import refused
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
@@ -224,49 +225,47 @@ def test_frames_with_a_picture_are_full_and_of_one_palette(bent: EscherTile) -> 
 
 
 def test_an_animated_svg_says_that_it_has_no_pictures(bent: EscherTile, tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match="plain colours"):
+    with refused("strokes", ".gif", kind=SettingError):
         AnimationSettings(format="svg", eyes=((150, 60),))
     picture = tmp_path / "own.png"
     Image.new("RGB", (10, 10)).save(picture)
-    with pytest.raises(SettingError, match="plain colours"):
+    with refused("picture", ".gif", kind=SettingError):
         animate(bent, tmp_path / "out.svg", picture=picture)
-    with pytest.raises(SettingError, match="two figures"):
+    with refused("second_picture", kind=SettingError):
         animate(bent, tmp_path / "out.gif", second_picture=picture)
 
 
 def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None:
     plain = Tile(bent.tile.polygon, bent.tile.group)
-    with pytest.raises(OrbiflowError, match="class is not known"):
+    with refused("class"):
         animation(plain, AnimationSettings(**SMALL))
-    with pytest.raises(
-        OrbiflowError, match="no bent silhouette: only tiles of a search for likeness"
-    ):
+    with refused("kind", "morph"):
         animation(EscherTile(bent.tile), AnimationSettings(kind="bend", **SMALL))
     crossed = Tile(0.9 * bent.tile.polygon, bent.tile.group, "IH4")
-    with pytest.raises(CertificationError, match=r"is not certified .* force animates it"):
+    with refused("IH4", "force", kind=CertificationError):
         animation(crossed, AnimationSettings(**SMALL))
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(OrbiflowError, match="an MP4 needs ffmpeg, which is not installed"):
+    with refused("ffmpeg", ".gif"):
         animation(bent, AnimationSettings(format="mp4", **SMALL))
 
 
 @pytest.mark.parametrize(
-    ("bad", "message"),
+    ("bad", "about"),
     [
-        ({"format": "webm"}, "format must be gif, mp4 or svg"),
-        ({"kind": "jump"}, "kind must be morph, bend or grow"),
+        ({"format": "webm"}, "format"),
+        ({"kind": "jump"}, "kind"),
         ({"seconds": 0}, "seconds"),
         ({"fps": 1000}, "fps"),
-        ({"area": "801x534px", "format": "mp4"}, "area is 801 x 534 pixels: choose even sides"),
-        ({"area": "60x40px"}, "choose sides from 64 to 8000 pixels"),
-        ({"kind": "morph", "clip": False}, "clip applies only to kind bend or grow"),
+        ({"area": "801x534px", "format": "mp4"}, "801 x 534"),
+        ({"area": "60x40px"}, "8000 pixels"),
+        ({"kind": "morph", "clip": False}, "clip"),
         ({"area": 1.5}, "area"),
-        ({"palette": "mud"}, "unknown palette"),
-        ({"format": "gif", "seconds": 120, "fps": 60}, "more than 2400"),
+        ({"palette": "mud"}, "palette"),
+        ({"format": "gif", "seconds": 120, "fps": 60}, 2400),
     ],
 )
-def test_settings_that_cannot_be_used(bad, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+def test_settings_that_cannot_be_used(bad, about: object) -> None:
+    with refused(about):
         AnimationSettings(**bad)
 
 
@@ -292,5 +291,5 @@ def test_an_mp4_is_what_ffmpeg_makes_of_all_frames(
     assert rest == 0
     assert count == pytest.approx(10, abs=2)
     fake.write_text("#!/bin/sh\necho 'no such codec' >&2\nexit 1\n")
-    with pytest.raises(OrbiflowError, match="ffmpeg failed: no such codec"):
+    with refused("ffmpeg", "no such codec"):
         animation(bent, AnimationSettings(format="mp4", **SMALL))

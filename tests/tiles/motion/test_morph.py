@@ -9,15 +9,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, Tile, certify, isohedral_class
 from orbiflow.tiles.motion.morph import Morph, Orbits
 from orbiflow.tiles.motion.own_frame import OwnFrame
 from orbiflow.tiles.silhouette import triangulate
+from refusals import refused
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(swirled, st.lists(st.floats(0, 1), min_size=2, max_size=4))
 def test_every_frame_tiles(tile: Tile, shares: list[float]) -> None:
     assume(is_sound(tile))
@@ -40,7 +40,7 @@ def test_where_the_straight_way_crosses_itself(name: str) -> None:
             break
     else:
         pytest.skip("no such tile among these")
-    frames = [morph.at(float(share)) for share in np.linspace(0, 1, 13)]
+    frames = [morph.at(float(share)) for share in np.linspace(0, 1, 7)]
     for frame in frames:
         certificate = certify(frame.tile(), tolerance=1e-6)
         assert certificate.valid, certificate.reasons
@@ -98,12 +98,12 @@ def test_a_way_whose_weights_are_hard_to_balance_stays_finite() -> None:
 def test_tiles_of_no_class_are_refused() -> None:
     kind = isohedral_class("IH4")
     template = kind.template()
-    with pytest.raises(OrbiflowError, match="class is not known"):
+    with refused("class"):
         OwnFrame.of(Tile(template, kind.group()))
-    with pytest.raises(OrbiflowError, match="corners or group"):
+    with refused("corners", "IH4"):
         OwnFrame.of(Tile(template, kind.group(), "IH4", (0, 1, 2)))
-    with pytest.raises(OrbiflowError, match="not in the order"):
+    with refused("corners"):
         OwnFrame.of(Tile(template, kind.group(), "IH4", (0, 1, 2, 3, 5, 4)))
     bent = template + np.array([[0.0, 0.1], *[[0.0, 0.0]] * 5])
-    with pytest.raises(OrbiflowError, match="not images of each other"):
+    with refused("edges", "IH4"):
         OwnFrame.of(Tile(bent, kind.group(), "IH4", (0, 1, 2, 3, 4, 5)))

@@ -33,6 +33,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.run_folder.html_page import TRIED
 from shell_lines import call_by_orbiflow
+from small_searches import FEW
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
 VOID = {"meta", "link", "img", "br", "path", "hr", "input"}
@@ -80,7 +81,7 @@ def target_fixture() -> Target:
 
 @pytest.fixture(scope="module", name="bent")
 def bent_fixture(target: Target) -> EscherTile:
-    small = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
+    small = LikenessSearch(**FEW)
     found = escherize_class(target, "IH4", small)
     assert isinstance(found, EscherTile)
     return found

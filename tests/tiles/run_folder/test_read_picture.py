@@ -14,6 +14,7 @@ from orbiflow.runtime import Event, Note
 from orbiflow.tiles import finding
 from orbiflow.tiles.run_folder import read_png, result_folder, show_reading
 from orbiflow.tiles.silhouette import Target
+from refusals import refused
 
 MAGENTA, ORANGE, BLUE = (230, 0, 126), (255, 140, 0), (0, 120, 255)
 
@@ -74,7 +75,7 @@ def test_it_is_told_at_once_and_the_next_run_may_replace_it(picture: Path, tmp_p
 def test_another_read_png_is_not_replaced(picture: Path, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     Image.new("L", (9, 9)).save(tmp_path / "out" / "read.png")
-    with pytest.raises(OutputError, match=r"read\.png, which is of no earlier run"):
+    with refused("read.png", kind=OutputError):
         show_reading(Target.read(picture), b"", tmp_path / "out")
 
 

@@ -28,13 +28,11 @@ from orbiflow.tiles.search.tile_space import _gains as every_gain
 from orbiflow.tiles.search.tile_space import edge_lengths
 from orbiflow.tiles.tilings import mixing
 from outlines import animal
+from small_pairs import FEW, NAMES, small_pairs
 from strategies import seeds
 
-NAMES = "squirrel.dat", "nagata/dolphin_60.dat"
 NINE = [isohedral_class(name) for name in CLASSES]
-SMALL = PairSearch(
-    ratios=1, points=48, glues=30, placed=120, held=12, starts=8, carved=4, finalists=2
-)
+SMALL = PairSearch(**FEW)
 
 
 def rings() -> tuple[Array, Array]:
@@ -148,7 +146,8 @@ def test_processes_find_what_one_does() -> None:
         assert isinstance(event, Progress)
         shares.append(event.share)
 
-    found = search_pair(goals, SMALL.replace(workers=2), on_event=tell)
+    with small_pairs():
+        found = search_pair(goals, SMALL.replace(workers=2), on_event=tell)
     assert [pair.marks for pair in found] == [pair.marks for pair in pairs()]
     assert [pair.glue for pair in found] == [pair.glue for pair in pairs()]
     assert shares == sorted(shares)
@@ -171,7 +170,8 @@ def test_a_pair_search_can_be_cancelled() -> None:
 def pairs() -> tuple[CarvedPair, ...]:
     """What a small search finds."""
     goals = [Goal(animal(name)) for name in NAMES]
-    return tuple(search_pair(goals, SMALL))
+    with small_pairs():
+        return tuple(search_pair(goals, SMALL))
 
 
 def test_a_search_finds_certified_pairs() -> None:

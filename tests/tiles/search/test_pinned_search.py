@@ -8,9 +8,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Call, Event, call_from_json
-from orbiflow.tiles import LikenessSearch
+from refusals import refused
 from runtime.searches import check_order, run
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -32,9 +31,8 @@ def pinned_call(folder: Path, pin: str) -> Call:
     return call_from_json(document)
 
 
-def test_what_was_pinned_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    small = {"placements": 20, "held": 4, "starts": 2, "rounds": 4, "multiples": (2,)}
-    monkeypatch.setitem(LikenessSearch.efforts, "fast", {**small, "phases": 1})  # pyright: ignore[reportArgumentType]
+@pytest.mark.usefixtures("small_searches")
+def test_what_was_pinned_is_told(tmp_path: Path) -> None:
     events: list[Event] = []
     run(pinned_call(tmp_path, HEAD), events.append)
     check_order(events, "IH4")
@@ -47,6 +45,6 @@ def test_what_was_pinned_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_pin_outside_is_refused_before_any_work(tmp_path: Path) -> None:
-    with pytest.raises(OrbiflowError, match="the pin at 900,20 lies outside the silhouette"):
+    with refused("900,20"):
         run(pinned_call(tmp_path, "900,20"))
     assert not (tmp_path / "out").exists()

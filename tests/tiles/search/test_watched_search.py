@@ -24,18 +24,10 @@ from orbiflow.tiles import (
 from orbiflow.tiles.likeness import Likeness
 from orbiflow.tiles.search.search_record import best_of
 from outlines import animal
+from small_searches import FEW as SMALL
 
 BOOT = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
-FEW = LikenessSearch(
-    placements=10,
-    held=3,
-    starts=2,
-    finalists=1,
-    rounds=2,
-    carved=0,
-    bodies=("firm",),
-    multiples=(2,),
-)
+FEW = LikenessSearch(**{**SMALL, "phases": 2})
 NAMES = ("IH4", "IH7")
 
 

@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw
 
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import Target
+from refusals import refused
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "silhouettes"
 FILES = ("turtle.png", "barbet.svg", "squirrel.dat")
@@ -94,9 +95,9 @@ def test_the_settings_are_those_of_images() -> None:
     frame = np.ones((40, 60), bool)
     frame[10:20, 10:20] = False
     assert Target.from_mask(frame, invert=True).area == pytest.approx(100, rel=0.02)
-    with pytest.raises(OrbiflowError, match="threshold parts gray levels"):
+    with refused("mask", "threshold"):
         Target.from_mask(frame, threshold=0.5)
-    with pytest.raises(OrbiflowError, match="threshold must lie between 0 and 1"):
+    with refused("threshold", 2):
         Target.from_mask(ramp, threshold=2)
 
 
@@ -136,32 +137,30 @@ def test_masks_that_cannot_be_used(mask, error, message) -> None:
 
 
 def test_bytes_that_cannot_be_used() -> None:
-    with pytest.raises(InputFileError, match=r"^cat\.png: there are no bytes in it"):
+    with refused("cat.png", kind=InputFileError):
         Target.from_bytes(b"", "cat.png")
-    with pytest.raises(InputFileError, match=r"^cat\.png: is no PNG image"):
+    with refused("cat.png", kind=InputFileError):
         Target.from_bytes(b"\0\1\2", "cat.png")
-    with pytest.raises(InputFileError, match=r"^bytes: the PNG image is damaged or cut short"):
+    with refused("bytes", "PNG", kind=InputFileError):
         Target.from_bytes(png(drawn())[:40])
-    with pytest.raises(OrbiflowError, match=r"data must be bytes, got 'cat\.png'; Target\.read"):
+    with refused("data", "cat.png"):
         Target.from_bytes("cat.png")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(InputFileError, match="larger than 16 MB"):
+    with refused("bytes", "16 MB", kind=InputFileError):
         Target.from_bytes(b"[" + b" " * (16 * 2**20))
-    with pytest.raises(InputFileError, match="larger than 64 MB"):
+    with refused("stream", "64 MB", kind=InputFileError):
         Target.read(io.BytesIO(png(drawn()) + b"\0" * (64 * 2**20)))
 
 
 @pytest.mark.parametrize("wrong", [b"bytes", 3, None, np.zeros((9, 9))])
 def test_what_is_no_file(wrong) -> None:
-    with pytest.raises(
-        OrbiflowError, match="the silhouette's file must be a path or a binary stream"
-    ):
+    with refused("path", "bytes"):
         Target.read(wrong)
 
 
 def test_streams_of_text_and_closed_ones_are_refused() -> None:
-    with pytest.raises(OrbiflowError, match="stream of text; open it in binary mode"):
+    with refused("stream", "rb"):
         Target.read(io.StringIO("[[0, 0]]"))  # pyright: ignore[reportArgumentType]
     closed = io.BytesIO(b"x")
     closed.close()
-    with pytest.raises(InputFileError, match="stream: cannot be read"):
+    with refused("stream", kind=InputFileError):
         Target.read(closed)

@@ -11,6 +11,7 @@ from shapely.geometry import Point, Polygon, box
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import Reading, hausdorff, iou, read_outline
 from orbiflow.tiles.silhouette.readers import svg
+from refusals import refused
 
 SQUARE = "M10 20 h30 v30 h-30 z"
 
@@ -133,9 +134,9 @@ def test_neighbours_that_all_but_share_an_edge_leave_no_crack(tmp_path: Path) ->
 
 
 def test_extreme_scales_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputFileError, match="encloses no area"):
+    with refused("drawing.svg", "polygon", kind=InputFileError):
         read(tmp_path, f'<g transform="scale(1e-300,1)"><path d="{SQUARE}"/></g>')
-    with pytest.raises(InputFileError, match="encloses no area"):
+    with refused("drawing.svg", "polygon", kind=InputFileError):
         read(tmp_path, '<polygon points="0,0 1e-3,0 0,1e11"/>', "")
 
 
@@ -193,12 +194,12 @@ def test_drawings_that_cannot_be_read(tmp_path: Path, body: str, message: str) -
 
 @pytest.mark.parametrize("value", ["0 0 0 9", "1 2 3", "a b c d", "0 0 nan 4", "0 0 -3 4"])
 def test_bad_view_box(tmp_path: Path, value: str) -> None:
-    with pytest.raises(InputFileError, match=r"<svg>: viewBox .* (is not four|has no area)"):
+    with refused("<svg>", "viewBox", kind=InputFileError):
         read(tmp_path, f'<path d="{SQUARE}"/>', f'viewBox="{value}"')
 
 
 def test_bad_size(tmp_path: Path) -> None:
-    with pytest.raises(InputFileError, match="<svg>: width 'wide' is not a length"):
+    with refused("<svg>", "width", "wide", kind=InputFileError):
         read(tmp_path, f'<path d="{SQUARE}"/>', 'width="wide" height="3"')
 
 
@@ -207,7 +208,7 @@ def test_entities_are_refused(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "bomb.svg"
     text = '<!DOCTYPE svg [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><svg>&b;</svg>'
     path.write_bytes(text.encode(encoding))
-    with pytest.raises(InputFileError, match="declares the XML entity 'b'"):
+    with refused("line 1", "entity 'b'", kind=InputFileError):
         read_outline(path)
 
 
@@ -215,21 +216,21 @@ def test_uses_that_multiply_are_refused(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr("orbiflow.tiles.silhouette.readers.svg_drawing.MAX_DRAWN", 1000)
     levels = "".join(f'<g id="l{i + 1}">' + f'<use href="#l{i}"/>' * 10 + "</g>" for i in range(12))
     start = time.perf_counter()
-    with pytest.raises(InputFileError, match="draws more than 1000 elements"):
+    with refused("1000 elements", kind=InputFileError):
         read(tmp_path, f'<defs><path id="l0" d="{SQUARE}"/>{levels}</defs><use href="#l12"/>')
     assert time.perf_counter() - start < 15
 
 
 def test_too_many_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputFileError, match="hold too much data"):
+    with refused("<path>", kind=InputFileError):
         read(tmp_path, f'<path d="M0 0{"l1 1" * 300_000}z"/>')
     monkeypatch.setattr(svg, "MAX_POINTS", 1000)
-    with pytest.raises(InputFileError, match="more than 1000 points"):
+    with refused("1000 points", kind=InputFileError):
         read(tmp_path, f'<path d="M0 0{"h1v1" * 600}z"/>')
 
 
 def test_scribbles_are_refused_before_they_are_resolved(tmp_path: Path) -> None:
     points = np.random.default_rng(0).uniform(0, 100, (20_000, 2)).round(2)
     path = " ".join(f"{x},{y}" for x, y in points)
-    with pytest.raises(InputFileError, match="crosses itself too often"):
+    with refused("drawing.svg", kind=InputFileError):
         read(tmp_path, f'<polygon points="{path}"/>')

@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import Target, polygons_in
 from orbiflow.tiles.silhouette import ReadingSettings, doubts
+from refusals import refused
 
 FOLDER = Path(__file__).parents[3] / "examples" / "silhouettes"
 
@@ -91,7 +90,7 @@ def test_growing_is_said_and_comes_before_smoothing() -> None:
     grown = ReadingSettings(thicken=0.04, smooth=0.03).shaped(target)
     assert grown.notes[-2].startswith("grew parts thinner than 4.0% of the length, by ")
     assert thinnest_across(grown, 130) > 0.035 * 300
-    with pytest.raises(OrbiflowError, match="thicken"):
+    with refused("thicken"):
         ReadingSettings(thicken=0.3)
 
 

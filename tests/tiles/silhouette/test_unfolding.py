@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import signed_area
 from orbiflow.tiles.silhouette import Mesh, triangulate, unfolded
 from orbiflow.tiles.silhouette.bending import _Distortion
 from outlines import ANIMALS, SHAPES, animal, disc
+from refusals import refused
 from strategies import seeds
 
 MESHES: dict[str, Mesh] = {
@@ -100,5 +100,5 @@ def test_determinants_far_above_and_below_the_bound() -> None:
 
 def test_an_outline_turned_over_is_refused() -> None:
     mesh = MESHES["disc"]
-    with pytest.raises(OrbiflowError, match="without folds"):
+    with refused("silhouette"):
         unfolded(mesh, mesh.points * (1.0, -1.0))

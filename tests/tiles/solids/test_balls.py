@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold, OpType
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import EscherTile, SolidSettings, make_solid, solid
 from orbiflow.tiles.worlds import copies, facing, joints, unfolded
+from refusals import refused
 from swirled_tiles import is_sound, swirled_tile
 
 COUNTS = {(2, 3, 3): 12, (2, 3, 4): 24, (2, 3, 5): 60}
@@ -22,7 +22,7 @@ tiles = st.builds(
 ).filter(is_sound)
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(tiles, st.sampled_from(list(COUNTS)))
 def test_balls_and_lamps_are_closed(tile: Any, order: Any) -> None:
     given_tile = EscherTile(tile)
@@ -39,7 +39,7 @@ def test_balls_and_lamps_are_closed(tile: Any, order: Any) -> None:
     assert 0 < open_body.volume() < 4 * np.pi * 45.0**2 * 2.0
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(tiles, st.sampled_from([(2, 3, 3), (2, 3, 4)]))
 def test_the_pieces_of_a_ball_are_the_ball(tile: Any, order: Any) -> None:
     given_tile = EscherTile(tile)
@@ -90,21 +90,21 @@ def test_magnets_have_holes_in_the_sides_of_pieces() -> None:
     missing = plain.volume() - holed.volume()
     assert missing == pytest.approx(count * np.pi * 1.5**2 * (depth - 0.1), rel=0.1)
     assert holed.genus() == 0
-    with pytest.raises(OrbiflowError, match="no room in a wall"):
+    with refused("magnet", "6 mm"):
         chosen.replace(magnet=6.0)
-    with pytest.raises(OrbiflowError, match="magnet"):
+    with refused("magnet"):
         make_solid(tile, chosen.replace(magnet=5.0, magnet_depth=40.0))
 
 
 def test_what_makes_no_ball_says_why(tmp_path: Path) -> None:
-    with pytest.raises(OrbiflowError, match="thirds, quarters or sixths"):
+    with refused("p2", "IH28"):
         make_solid(EscherTile(swirled_tile("IH4", 3, 0.1)), SolidSettings(kind="ball"))
     tile = EscherTile(swirled_tile("IH28", 3, 0.1))
-    with pytest.raises(OrbiflowError, match="not of the sphere"):
+    with refused("2, 3, 7"):
         make_solid(tile, SolidSettings(kind="ball", order=(2, 3, 7)))
-    with pytest.raises(OrbiflowError, match="quarter of"):
+    with refused("wall", "diameter"):
         SolidSettings(kind="lamp", wall=30.0)
-    with pytest.raises(OrbiflowError, match="diameter"):
+    with refused("diameter", "kind"):
         SolidSettings(kind="tile", diameter=30.0)
     solid(tile, tmp_path / "lamp.3mf", SolidSettings(kind="lamp", format="3mf"))
     assert (tmp_path / "lamp.3mf").exists()

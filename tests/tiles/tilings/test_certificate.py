@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from orbiflow.errors import CertificationError
 from orbiflow.symmetry import CrystallographicGroup, rotation, rotation_matrix
 from orbiflow.tiles import IsohedralClass, Tile, certify, isohedral_class, signed_area
+from refusals import refused
 
 
 def square(side: float = 1.0) -> Tile:
@@ -188,7 +189,7 @@ def test_tolerance_is_the_callers() -> None:
 
 def test_require() -> None:
     certify(square()).require()
-    with pytest.raises(CertificationError, match="does not tile the plane: its area"):
+    with refused("1.44", kind=CertificationError):
         certify(square(1.2)).require()
 
 

@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import identity
 from orbiflow.tiles import CLASSES, EdgeIdentification, IsohedralClass, isohedral_class, signed_area
 from orbiflow.tiles.tilings.tiling import coset_and_cell
+from refusals import refused
 
 GROUP_ORDERS = {"p1": 1, "p2": 2, "pg": 2, "pgg": 4, "p3": 3, "p4": 4, "p6": 6}
 
@@ -168,14 +168,14 @@ def test_names() -> None:
     for spelling in ("IH4", "ih4", "4", "IH04", " ih-4 ", 4):
         assert isohedral_class(spelling) is CLASSES["IH4"]
     for wrong in ("IH94", "four", "", "IH", -4):
-        with pytest.raises(OrbiflowError, match="IH1, IH2, IH3, IH4, IH5, IH6, IH7, IH21, IH28"):
+        with refused("IH1, IH2, IH3, IH4, IH5, IH6, IH7, IH21, IH28"):
             isohedral_class(wrong)
 
 
 def test_wrong_number_of_parameters() -> None:
-    with pytest.raises(OrbiflowError, match=r"IH21 has 2 shape parameters.*got \(3,\)"):
+    with refused("IH21", "shape", "(3,)"):
         isohedral_class("IH21").template(np.zeros(3))
-    with pytest.raises(OrbiflowError, match=r"IH7 has 0 stretch parameters"):
+    with refused("IH7", "stretch", "(2,)"):
         isohedral_class("IH7").stretch(torch.zeros(2))
 
 

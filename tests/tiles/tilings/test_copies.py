@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from exported import tile_of, tiles
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, Tile, colouring, copies_inside, copies_meeting, edges, patch
 from orbiflow.tiles.tilings.tiling import coset_and_cell
+from refusals import refused
 
 
 def window_of(tile: Tile, shift: tuple[float, float], size: tuple[float, float]) -> tuple:
@@ -83,5 +83,5 @@ def test_an_empty_window_of_whole_tiles() -> None:
 
 def test_too_many() -> None:
     tile = tile_of("IH1")
-    with pytest.raises(OrbiflowError, match="the most is 20000"):
+    with refused("window", 20000):
         copies_inside(tile, window_of(tile, (0, 0), (200, 200)))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import shapely
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import identity, translation
 from orbiflow.tiles import IsohedralClass, Tile, aspects, isohedral_class, patch
+from refusals import refused
 
 WINDOW = (-4.0, -3.0, 5.0, 2.5)
 
@@ -44,14 +44,14 @@ def test_aspects(kind: IsohedralClass, make_tile: Any) -> None:
 
 def test_foreign_isometry() -> None:
     tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
-    with pytest.raises(OrbiflowError, match="not an element"):
+    with refused("Isometry", "p1"):
         aspects(tile, [translation((0.1, 0.0))])
 
 
 @pytest.mark.parametrize("window", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, np.nan, 1), (0, 0, 1)])
 def test_windows_that_are_none(window: tuple[float, ...]) -> None:
     tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
-    with pytest.raises(OrbiflowError, match="a window is"):
+    with refused("window"):
         patch(tile, window)
 
 
@@ -64,5 +64,5 @@ def test_a_long_thin_window() -> None:
 @pytest.mark.parametrize("window", [(-500, -500, 500, 500), (0, 0, 1e9, 1)])
 def test_too_many_tiles(window: tuple[float, ...]) -> None:
     tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
-    with pytest.raises(OrbiflowError, match="a smaller window"):
+    with refused("window", 20000):
         patch(tile, window)

@@ -33,6 +33,7 @@ from orbiflow.tiles import (
     neighbours,
     patch,
 )
+from refusals import refused
 from some_tilings import (
     NAMED,
     SQUARE,
@@ -231,7 +232,7 @@ def test_two_prototiles_that_are_one() -> None:
     certificate = certify(Tiling(kept.group, [kept.polygon, twin]))
     assert not certificate.valid
     assert any("overlaps" in reason for reason in certificate.reasons)
-    with pytest.raises(OrbiflowError, match="points 0 and 1 of a Dirichlet tiling have the same"):
+    with refused("0 and 1"):
         dirichlet_tiling(kept.group, [(0.2, 0.3), kept.group.cosets[1](np.array([0.2, 0.3]))])
 
 
@@ -293,7 +294,7 @@ def test_a_tile_is_the_tiling_by_it_alone() -> None:
     tile = Tile(SQUARE, wallpaper_group("p4m"))
     assert certify(tile) == certify(tile.tiling)
     assert colouring(tile).count == colouring(tile.tiling).count == 2
-    with pytest.raises(OrbiflowError, match="must be a Tile or a Tiling, got 'p4m'"):
+    with refused("p4m", "Tile"):
         certify("p4m")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(OrbiflowError, match="from 0 to 0, got 1"):
+    with refused("prototile", 1):
         neighbours(tile, 1)

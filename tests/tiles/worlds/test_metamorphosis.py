@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from PIL import Image
 from scipy.spatial import KDTree
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, ArtSettings, EscherTile, art, isohedral_class
 from orbiflow.tiles.worlds import best_to_become, world_of
 from orbiflow.tiles.worlds.metamorphosis import Metamorphosis
+from refusals import refused
 from swirled_tiles import is_sound, swirled_tile
 
 tiles = st.builds(
@@ -24,7 +24,7 @@ tiles = st.builds(
 ).filter(is_sound)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(tiles, st.sampled_from(["right", "down", "middle"]), st.integers(1, 2))
 def test_nothing_gaps_or_overlaps(tile: Any, goes: Any, stages: int) -> None:
     chosen = ArtSettings(metamorphosis=goes, stages=stages, area=(150.0, 100.0))
@@ -73,11 +73,11 @@ def test_stages_go_there_and_back() -> None:
     assert isinstance(found, Metamorphosis)
     shares = found.shares(np.array([[0.0, 30.0], [150.0, 30.0], [300.0, 30.0], [75.0, 30.0]]))
     assert shares == pytest.approx([0, 1, 0, 0.5])
-    with pytest.raises(OrbiflowError, match="stages"):
+    with refused("stages", "metamorphosis"):
         ArtSettings(stages=2)
 
 
-@settings(max_examples=3)
+@settings(max_examples=1)
 @given(st.sampled_from(["IH1", "IH4", "IH5", "IH7", "IH21", "IH28"]), st.data())
 def test_a_tile_becomes_another_of_its_class(name: str, data: Any) -> None:
     drawn = st.builds(swirled_tile, st.just(name), st.integers(0, 999), st.floats(0.05, 0.25))
@@ -106,7 +106,7 @@ def test_a_tile_becomes_another_of_its_class(name: str, data: Any) -> None:
 
 def test_tiles_of_two_classes_do_not_become_each_other() -> None:
     first, last = (EscherTile(swirled_tile(name, 7, 0.15), name=name) for name in ("IH4", "IH5"))
-    with pytest.raises(OrbiflowError, match="one of its own class"):
+    with refused("IH4", "IH5"):
         world_of(last, ArtSettings(metamorphosis="right"), first)
     assert best_to_become([last], [first]) is None
     same = EscherTile(swirled_tile("IH5", 9, 0.15), name="same")
@@ -121,5 +121,5 @@ def test_drawings_appear_on_the_way(tmp_path: Path) -> None:
     picture = np.asarray(Image.open(tmp_path / "a.png").convert("L")).astype(float)
     left, right = np.array_split(picture, 2, axis=1)
     assert np.abs(np.diff(right)).mean() > 1.3 * np.abs(np.diff(left)).mean()
-    with pytest.raises(OrbiflowError, match="exclude each other"):
+    with refused("metamorphosis", "world"):
         ArtSettings(metamorphosis="right", world="disc")

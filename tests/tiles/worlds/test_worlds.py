@@ -25,6 +25,7 @@ from orbiflow.tiles.worlds import Unfolding, colours, copies, unfolded, world_of
 from orbiflow.tiles.worlds.curved import disc_of, facing, form
 from orbiflow.tiles.worlds.outlines import with_points
 from orbiflow.tiles.worlds.sheet import TOLERANCE
+from refusals import refused
 from small_pairs import pair_result
 from swirled_tiles import is_sound, swirled_tile
 
@@ -62,7 +63,7 @@ def area(found: Unfolding) -> float:
     return float(abs(2 * np.arctan2(volume, 1 + found.sign * sum(dots)).sum()))
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(sound(ORDERS), st.data())
 def test_edges_match_and_areas_add_up(tile: Any, data: Any) -> None:
     name = tile.isohedral_class
@@ -104,20 +105,20 @@ def test_of_vertices_near_a_cone_one_goes_there(along: float, apart: float) -> N
     triangulate(found, near)
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(tiles, st.sampled_from([(2, 3, 3), (2, 3, 4), (2, 3, 5), (3, 3, 4), (2, 3, 7)]))
 def test_neighbours_have_other_colours(tile: Any, orders: Any) -> None:
     check_colours(world(tile, orders))
 
 
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(sound(["IH1", "IH4", "IH5", "IH2"]))
 def test_neighbours_have_other_colours_without_rotations_by_less(tile: Any) -> None:
     check_colours(world(tile, ORDERS[tile.isohedral_class][0]))
 
 
 def check_colours(found: Unfolding) -> None:
-    motions = copies(found, lambda own: (own @ found.middle)[:, 2] < 30, 400)
+    motions = copies(found, lambda own: (own @ found.middle)[:, 2] < 15, 150)
     numbers, count = colours(found, motions)
     assert set(numbers.tolist()) <= set(range(count))
     middles = motions @ found.middle
@@ -137,7 +138,7 @@ def check_colours(found: Unfolding) -> None:
 def test_copies_cover_the_sphere_once(tile: Any, orders: Any, seed: int) -> None:
     found = world(tile, orders)
     motions = copies(found, lambda own: np.ones(len(own), bool), 200)
-    ways = np.random.default_rng(seed).normal(size=(3000, 3))
+    ways = np.random.default_rng(seed).normal(size=(800, 3))
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     polygon, place = seen_from_middle(found)
     count, doubtful = np.zeros(len(ways), int), np.zeros(len(ways), bool)
@@ -171,12 +172,15 @@ def escher(name: str) -> EscherTile:
     return EscherTile(swirled_tile(name, 3, 0.1))
 
 
-SEEN = [(model, "IH28") for model in ("sphere", "disc", "half-plane", "band", "spiral")]
-SEEN += [("disc", "IH1"), ("disc", "IH3"), ("disc", "IH4"), ("band", "IH5"), ("cylinder", "IH4")]
+SEEN = [
+    ("sphere", "IH28", False), ("disc", "IH28", True), ("half-plane", "IH28", False),
+    ("band", "IH28", True), ("spiral", "IH28", False), ("disc", "IH1", True),
+    ("disc", "IH3", False), ("band", "IH5", False), ("cylinder", "IH4", True),
+]  # fmt: skip
+"""Models, classes, and whether y points down: each of these somewhere."""
 
 
-@pytest.mark.parametrize(("model", "name"), SEEN)
-@pytest.mark.parametrize("y_down", [False, True])
+@pytest.mark.parametrize(("model", "name", "y_down"), SEEN)
 def test_pages_are_full_and_not_mirrored(model: Any, name: str, y_down: bool) -> None:
     seeds = (swirled_tile(name, seed, 0.2) for seed in range(3, 99))
     given_tile = EscherTile(next(own for own in seeds if is_sound(own)), y_down=y_down)
@@ -214,10 +218,18 @@ def test_curves_keep_their_tolerance() -> None:
 
 
 def test_artwork_of_another_world_is_written(tmp_path: Path) -> None:
-    done = art(escher("IH7"), tmp_path / "a.svg", ArtSettings(format="svg", world="disc"))
+    done = art(
+        escher("IH7"),
+        tmp_path / "a.svg",
+        ArtSettings(format="svg", world="disc", area=(60.0, 60.0)),
+    )
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
-    assert done.summary["tiles"] > 100
-    art(escher("IH7"), tmp_path / "b.png", ArtSettings(world="sphere", order=(2, 3, 5), dpi=50))
+    assert done.summary["tiles"] > 20
+    art(
+        escher("IH7"),
+        tmp_path / "b.png",
+        ArtSettings(world="sphere", order=(2, 3, 5), dpi=50, area=(60.0, 60.0)),
+    )
     art(escher("IH7"), tmp_path / "c.pdf", ArtSettings(world="cylinder", area=(120.0, 60.0)))
     assert (tmp_path / "c.pdf").read_bytes().startswith(b"%PDF")
     picture = np.asarray(Image.open(tmp_path / "b.png").convert("RGB")).astype(int)
@@ -227,20 +239,20 @@ def test_artwork_of_another_world_is_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "given_settings", "what"),
     [
-        ("IH4", {"world": "sphere"}, "thirds, quarters or sixths"),
-        ("IH2", {"world": "sphere"}, "thirds, quarters or sixths"),
-        ("IH4", {"world": "disc", "order": (2, 3, 7)}, "take 4 orders, such as 2,2,2,3"),
-        ("IH1", {"world": "disc", "order": (2, 2, 2, 3)}, "take 1 order, such as 2"),
-        ("IH4", {"world": "disc", "order": (2, 2, 2, 2)}, "not of the hyperbolic plane"),
-        ("IH7", {"world": "sphere", "order": (2, 3, 7)}, "not of the sphere"),
-        ("IH7", {"world": "disc", "order": (2, 3, 5)}, "not of the hyperbolic plane"),
-        ("IH7", {"world": "disc", "order": (3, 3, 3)}, "not of the hyperbolic plane"),
+        ("IH4", {"world": "sphere"}, "p3, p4 and p6"),
+        ("IH2", {"world": "sphere"}, "p3, p4 and p6"),
+        ("IH4", {"world": "disc", "order": (2, 3, 7)}, "2,2,2,3"),
+        ("IH1", {"world": "disc", "order": (2, 2, 2, 3)}, "1 order"),
+        ("IH4", {"world": "disc", "order": (2, 2, 2, 2)}, "2, 2, 2, 2"),
+        ("IH7", {"world": "sphere", "order": (2, 3, 7)}, "2, 3, 7"),
+        ("IH7", {"world": "disc", "order": (2, 3, 5)}, "2, 3, 5"),
+        ("IH7", {"world": "disc", "order": (3, 3, 3)}, "3, 3, 3"),
     ],
 )
 def test_what_has_no_such_world_says_why(
     name: str, given_settings: Any, what: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(OrbiflowError, match=what):
+    with refused(what):
         art(escher(name), tmp_path / "a.png", ArtSettings(**given_settings))
 
 
@@ -253,7 +265,7 @@ def test_a_long_band_has_no_hole() -> None:
     assert seen.difference(shapely.union_all(rings, grid_size=1e-4)).area < 0.001 * seen.area
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(sound(ORDERS), st.sampled_from([None, (2, 1), (-1, 3), (4, 0)]))
 def test_a_cylinder_meets_itself(tile: Any, arms: Any) -> None:
     chosen = ArtSettings(world="cylinder", area=(200.0, 80.0), arms=arms)
@@ -303,7 +315,7 @@ def test_pages_are_turned(model: Any) -> None:
 
 def test_settings_of_worlds_are_checked() -> None:
     every: Any = ({"order": (1, 3, 5)}, {"tile_size": 20.0}, {"clip": False}, {"colour": "aspect"})
-    with pytest.raises(OrbiflowError, match="as long as high"):
+    with refused("band", "area"):
         ArtSettings(world="band", area=(400.0, 30.0))
     for wrong in every:
         with pytest.raises(OrbiflowError):

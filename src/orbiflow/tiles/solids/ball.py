@@ -10,7 +10,7 @@ from manifold3d import Manifold, Mesh
 from scipy.spatial import KDTree
 
 from orbiflow.arrays import Array, Integers
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.tiles.geometry import border, orient, polygons_in, ring_length
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.solids.settings import SolidSettings
@@ -226,11 +226,11 @@ def _holes(
 def _with_holes(made: Manifold, holes: list[Manifold]) -> Manifold:
     for k, hole in enumerate(holes):
         if any((hole ^ other).volume() > 0 for other in holes[:k]):
-            raise OrbiflowError("magnets are in each other's way; choose a smaller {magnet}")
+            raise SettingError("magnets are in each other's way; choose a smaller {magnet}")
     for hole in holes:
         made = made - hole
     if made.genus() or len(made.decompose()) > 1:
-        raise OrbiflowError(
+        raise SettingError(
             "a hole for a magnet breaks through; choose a smaller {magnet}, or a larger {diameter}"
         )
     return made
