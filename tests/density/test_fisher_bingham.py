@@ -197,7 +197,7 @@ def test_refusals() -> None:
         FisherBingham(make_space("projective-plane"), numbers(0, 0, 1), torch.zeros(3, 3))
     with refused("symmetric"):
         FisherBingham(make_space("sphere"), torch.zeros(3), torch.eye(3).cumsum(0))
-    with refused("3"):
+    with refused("3 by 3"):
         FisherBingham(make_space("sphere"), torch.zeros(4), torch.zeros(4, 4))
     with refused("positive", "definite"):
         AngularCentralGaussian(make_space("sphere"), -torch.eye(3))

@@ -48,7 +48,7 @@ def test_five_angles(tmp_path: Path) -> None:
     ],
 )
 def test_settings_without_a_meaning_are_refused(settings: dict, named: str) -> None:
-    with refused(named, "torus", "5"):
+    with refused(*named.split(), "torus", 5):
         DensityEstimator("torus", unit="degrees", **settings).fit(data(20))
     with refused(*named.split()):
         DensityEstimator(Torus(5, unit="degrees"), **settings).fit(data(20))

@@ -189,7 +189,7 @@ def test_columns_that_cannot_be_real(space: str, linear: tuple, words: str) -> N
 def test_a_column_of_one_value_and_lines_that_are_none() -> None:
     data = data_of(50)[:, :2]
     data[:, 1] = 1.5
-    with refused("value"):
+    with refused("one value"):
         DensityEstimator("torus", unit="degrees", linear=(1,)).fit(data)
     wrongs: list[Any] = [[(1.0, 0.0)], [(np.nan, 1.0)], [(1.0,)], ["ab"]]
     for wrong in wrongs:

@@ -164,7 +164,7 @@ def test_nothing_is_done_twice(here: Here, tmp_path: Path) -> None:
     assert again(seed=1) == ALL
     assert again(folds=2) == [key for key in ALL if not key.endswith("3")]
     (out / "folds" / "mixture-1-02" / "scores.csv").unlink()
-    with refused("mixture-1-02.scores.csv"):
+    with refused("mixture-1-02", "scores.csv"):
         again(folds=2)
     (out / "folds" / "mixture-1-02" / "report.json").unlink()
     (out / "folds" / "mixture-1-02").rmdir()
