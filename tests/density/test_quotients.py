@@ -50,7 +50,7 @@ from orbiflow.symmetry import (
     rotation_matrix,
     wallpaper_group,
 )
-from refusals import names, refused
+from refusals import refused
 
 NAMES = (*WALLPAPER_GROUPS, *FLAT_MANIFOLDS)
 names = st.sampled_from(NAMES)
@@ -311,7 +311,7 @@ def test_what_is_refused() -> None:
     ):
         with pytest.raises((OrbiflowError, TypeError)) as caught:
             make()
-        names(str(caught.value), *message.split())
+        assert all(word in str(caught.value) for word in message.split()), caught.value
     with pytest.raises(GroupError):
         flat_manifold("bottle")
 
