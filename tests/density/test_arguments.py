@@ -25,9 +25,9 @@ from orbiflow.density import (
 )
 from orbiflow.density.models import kl_by_quadrature, midpoints
 from orbiflow.density.spaces import clear_rotation
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
+from refusals import refused
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 torus, sphere = Torus(2), Sphere()
@@ -47,87 +47,84 @@ QUICK: Any = {"max_frequency": 1, "segments": 1, "iterations": 1}
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "a name for a space": (
         lambda: FlowDensity("torus", Flow(lambda x: x)),  # type: ignore[arg-type]
-        "space must be an? Space, got 'torus'; see `make_space`",
+        "torus `make_space`",
     ),
-    "no flow": (lambda: FlowDensity(torus, None), "flow must be an? Flow"),  # type: ignore[arg-type]
+    "no flow": (lambda: FlowDensity(torus, None), "flow Flow"),  # type: ignore[arg-type]
     "no base": (
         lambda: FlowDensity(torus, Flow(lambda x: x), "uniform"),  # type: ignore[arg-type]
-        "base must be an? Density",
+        "base Density",
     ),
-    "three columns": (lambda: a_density().log_prob(torch.rand(5, 3)), r"got .*\(5, 3\)"),
-    "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), r"got .*\(\)"),
-    "text": (lambda: a_density().log_prob("points"), "points must be real numbers"),  # type: ignore[arg-type]
+    "three columns": (lambda: a_density().log_prob(torch.rand(5, 3)), "5 3"),
+    "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), ""),
+    "text": (lambda: a_density().log_prob("points"), "points"),  # type: ignore[arg-type]
     "complex": (
         lambda: a_density().log_prob(torch.rand(2, 2, dtype=torch.complex64)),
-        "points must be real numbers",
+        "points numbers",
     ),
-    "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points must be finite"),
+    "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points finite"),
     "measure": (
         lambda: a_density().log_prob(POINTS, measure=3),  # type: ignore[arg-type]
-        "measure must be natural, square or uniform",
+        "measure",
     ),
-    "sample text": (lambda: a_density().sample("five"), "a number or shape of samples"),
-    "sample less": (lambda: a_density().sample(-1), "a number or shape of samples"),
-    "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be a whole number"),  # type: ignore[arg-type]
-    "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), r"\(3,\) and \(4,\)"),
-    "a base's space": (lambda: UniformDensity("sphere"), "space must be an? Space"),  # type: ignore[arg-type]
+    "sample text": (lambda: a_density().sample("five"), "number samples"),
+    "sample less": (lambda: a_density().sample(-1), "number samples"),
+    "midpoints": (lambda: midpoints(torus, 2.5), "resolution number"),  # type: ignore[arg-type]
+    "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), "3 4"),
+    "a base's space": (lambda: UniformDensity("sphere"), "space Space"),  # type: ignore[arg-type]
     "kernels": (
         lambda: AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),  # type: ignore[arg-type]
-        "centers must be real numbers",
+        "centers numbers",
     ),
     "kernels' shapes": (
         lambda: AdaptiveKernels(torus, torch.tensor(1.0), torch.ones(1), torch.ones(1)),
-        "do not fit",
+        "fit",
     ),
-    "chains": (
-        lambda: VonMisesChains(sphere, HALVES, HALVES, HALVES),
-        "von Mises chains need a torus",
-    ),
+    "chains": (lambda: VonMisesChains(sphere, HALVES, HALVES, HALVES), "Mises chains"),
     "chains' shapes": (
         lambda: VonMisesChains(torus, [0.0], HALVES, HALVES),  # type: ignore[arg-type]
-        "log_weights has shape",
+        "log_weights",
     ),
     "a mixture of nothing": (
         lambda: Mixture([a_density(), None], [0.5, 0.5]),  # type: ignore[list-item]
-        "components must be an? Density",
+        "components Density",
     ),
-    "fit: a name": (lambda: fit_density("torus", POINTS), "space must be an? Space"),  # type: ignore[arg-type]
-    "fit: columns": (lambda: fit_density(sphere, torch.rand(30, 3)), r"\(N, 2\), got .*\(30, 3\)"),
-    "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), r"\(N, 2\), got .*\(2,\)"),
-    "fit: nan": (lambda: fit_density(sphere, POINTS / 0 * 0), "points must be finite"),
+    "fit: a name": (lambda: fit_density("torus", POINTS), "space Space"),  # type: ignore[arg-type]
+    "fit: columns": (lambda: fit_density(sphere, torch.rand(30, 3)), "2 30 3"),
+    "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), "2"),
+    "fit: nan": (lambda: fit_density(sphere, POINTS / 0 * 0), "points finite"),
     "fit: settings": (
         lambda: fit_density(sphere, POINTS, {"max_frequency": 2}),  # type: ignore[arg-type]
-        "settings must be an? FlowSettings",
+        "FlowSettings",
     ),
     "fit: other settings": (
         lambda: fit_density(sphere, POINTS, DensitySettings()),  # type: ignore[arg-type]
-        "settings must be an? FlowSettings",
+        "FlowSettings",
     ),
-    "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "3 dimensions at most"),
+    "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "dimensions 3"),
     "max_frequency": (
         lambda: FlowSettings(max_frequency=2.5),  # type: ignore[arg-type]
-        "max_frequency must be a whole number from 1 to 64",
+        "max_frequency 1 64",
     ),
     "frequency text": (
         lambda: FlowSettings(max_frequency="8"),  # type: ignore[arg-type]
-        "max_frequency must be a whole number",
+        "max_frequency",
     ),
-    "seed": (lambda: FlowSettings(seed=None), "seed must be a whole number"),  # type: ignore[arg-type]
-    "roughness": (lambda: FlowSettings(roughness=1e-3), "roughness must be a list"),  # type: ignore[arg-type]
-    "weights": (lambda: FlowSettings(roughness=("a",)), "roughness: entry 1: must be a number"),  # type: ignore[arg-type]
-    "validation": (lambda: FlowSettings(validation="a"), "validation must be .*below 1"),  # type: ignore[arg-type]
-    "dim": (lambda: Torus("2"), "dim must be a whole number from 1 to 64"),  # type: ignore[arg-type]
-    "unit": (lambda: Torus(2, unit=None), "unit must be radians"),  # type: ignore[arg-type]
-    "form": (lambda: Sphere(form=["latlon"]), "form must be latlon or vector"),  # type: ignore[arg-type]
-    "rotation": (lambda: Sphere(rotation="none"), "rotation: expected an array"),
-    "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "a RoundSpace"),  # type: ignore[arg-type]
+    "seed": (lambda: FlowSettings(seed=None), "seed"),  # type: ignore[arg-type]
+    "roughness": (lambda: FlowSettings(roughness=1e-3), "roughness"),  # type: ignore[arg-type]
+    "weights": (lambda: FlowSettings(roughness=("a",)), "roughness 1"),  # type: ignore[arg-type]
+    "validation": (lambda: FlowSettings(validation="a"), "validation 1"),  # type: ignore[arg-type]
+    "dim": (lambda: Torus("2"), "number 1 64"),  # type: ignore[arg-type]
+    "unit": (lambda: Torus(2, unit=None), "unit"),  # type: ignore[arg-type]
+    "form": (lambda: Sphere(form=["latlon"]), "form latlon"),  # type: ignore[arg-type]
+    "rotation": (lambda: Sphere(rotation="none"), "rotation"),
+    "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "RoundSpace"),  # type: ignore[arg-type]
     "make_space": (lambda: make_space(torus), "unknown space"),  # type: ignore[arg-type]
-    "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), r"got .*\(3, 3\)"),
-    "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), r"got .*\(3, 1\)"),
-    "project": (lambda: sphere.project(torch.rand(3, 5)), r"got .*\(3, 5\)"),
-    "to bytes": (lambda: density_to_bytes("density"), "density must be an? Density"),  # type: ignore[arg-type]
-    "read": (lambda: read_density(3), "the file must be a path, got 3"),  # type: ignore[arg-type]
-    "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown space 3"),  # type: ignore[arg-type]
+    "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), "3"),
+    "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), "3 1"),
+    "project": (lambda: sphere.project(torch.rand(3, 5)), "3 5"),
+    "to bytes": (lambda: density_to_bytes("density"), "density"),  # type: ignore[arg-type]
+    "read": (lambda: read_density(3), "file 3"),  # type: ignore[arg-type]
+    "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown 3"),  # type: ignore[arg-type]
     "estimator's data": (lambda: DensityEstimator().fit([1.0]), "shape"),
 }
 
@@ -135,7 +132,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
 @pytest.mark.parametrize("case", WRONG)
 def test_our_messages(case: str) -> None:
     call, message = WRONG[case]
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         call()
 
 

@@ -25,14 +25,14 @@ from orbiflow.density.fitting import COMPONENTS, KNOWN
 from orbiflow.density.fitting.parametric import families_of
 from orbiflow.density.fitting.settings import PARAMETRIC
 from orbiflow.density.models import midpoints
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 QUICK: dict[str, Any] = {
     "max_frequency": 2, "segments": 2, "iterations": 5, "roughness": (1e-3,)
 }  # fmt: skip
 
 
-def smooth(name: str, count: int = 400, seed: int = 0) -> torch.Tensor:
+def smooth(name: str, count: int = 300, seed: int = 0) -> torch.Tensor:
     """Two broad clusters."""
     rng = np.random.default_rng(seed)
     centers = np.where(rng.random((count, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]])
@@ -40,7 +40,7 @@ def smooth(name: str, count: int = 400, seed: int = 0) -> torch.Tensor:
 
 
 @pytest.mark.usefixtures("whole_fits")
-@pytest.mark.parametrize("name", ["torus", "projective-plane"])
+@pytest.mark.parametrize("name", ["torus"])
 def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     space, said = make_space(name), []
     settings = DensitySettings(**QUICK)
@@ -52,7 +52,7 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     with torch.no_grad():
         values = density.log_prob(grid)
         assert float(values.exp().mean()) == pytest.approx(1, abs=5e-3)
-        held = float(density.log_prob(smooth(name, 2000, 1)).mean())
+        held = float(density.log_prob(smooth(name, 1000, 1)).mean())
     assert report.mass == pytest.approx(1, abs=1e-3)
     assert report.weights is not None
     assert sum(report.weights.values()) == pytest.approx(1)
@@ -63,7 +63,7 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     assert sum(part.share for part in report.components) == pytest.approx(1, abs=0.05)
     assert report.repeats is not None
     assert report.repeats.rows == 0
-    assert report.notes[0].startswith("chosen by 400 rows held out, in 10 parts")
+    assert report.notes[0].startswith("chosen by 300 rows held out, in 10 parts")
     assert [done for done, _ in said] == sorted(done for done, _ in said)
     assert any("held-out part 2 of 10: mixture" in what for _, what in said)
     path = tmp_path / "density.safetensors"
@@ -91,7 +91,7 @@ def test_the_same_seed_gives_the_same_density() -> None:
     settings = [DensitySettings(**QUICK, seed=seed) for seed in (1, 1, 2)]
     with torch.no_grad():
         one, same, other = (
-            fit_automatic(space, smooth("sphere", 150), s)[0].log_prob(at) for s in settings
+            fit_automatic(space, smooth("sphere", 60), s)[0].log_prob(at) for s in settings
         )
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
@@ -179,19 +179,19 @@ def test_few_points(count: int) -> None:
 
 
 def test_what_cannot_be_chosen_is_refused() -> None:
-    with pytest.raises(OrbiflowError, match=r"components.* must be flow, kernels"):
+    with refused("components"):
         DensitySettings(components=("trees",))  # type: ignore[arg-type]
-    with pytest.raises(OrbiflowError, match="repeats must be"):
+    with refused("repeats"):
         DensitySettings(repeats="noise")  # type: ignore[arg-type]
-    with pytest.raises(OrbiflowError, match=r"Sphere.* cannot be made of chains alone"):
+    with refused("chains"):
         fit_automatic(
             make_space("sphere"), smooth("sphere"), DensitySettings(components=("chains",))
         )
-    with pytest.raises(OrbiflowError, match="a flow has 3 dimensions at most"):
+    with refused("flow", "3"):
         DensityEstimator("torus", unit="degrees", components="flow,chains").fit(
             np.random.default_rng(0).uniform(0, 360, (50, 5))
         )
-    with pytest.raises(OrbiflowError, match="at least 10 different points, got 3 among 30"):
+    with refused("different", "10", "3", "30"):
         fit_automatic(make_space("torus"), torch.rand(3, 2).repeat(10, 1))
 
 

@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import FlowDensity, FlowSettings, fit_density, make_space
+from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.likelihood import ITERATIONS_PER_SCORE, Budget, Spent, refine
-from orbiflow.density.fitting.rows import Rows
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
+from refusals import refused
 
 SMALL: dict[str, Any] = {"max_frequency": 2, "segments": 2, "roughness": (1e-3,)}
 
@@ -57,7 +58,7 @@ def test_a_budget_counts(limit: int, wanted: int) -> None:
     assert budget.used == min(limit, wanted)
     assert budget.notes() == []
     if wanted > limit:
-        with pytest.raises(Spent, match="evaluations"):
+        with refused("evaluations", kind=Spent):
             budget.spend()
         assert budget.used == limit
         assert budget.notes() == [f"stopped by the budget of {limit} evaluations"]
@@ -69,10 +70,7 @@ def test_without_a_limit_no_clock_is_asked(striking_after) -> None:
     assert clock.asked <= 5  # when budgets begin
 
 
-@pytest.mark.parametrize(
-    ("name", "looks"),
-    [("torus", 1), ("torus", 60), ("sphere", 20), ("klein-bottle", 60), ("projective-plane", 20)],
-)
+@pytest.mark.parametrize(("name", "looks"), [("torus", 1), ("sphere", 20), ("klein-bottle", 60)])
 def test_the_integral_does_not_depend_on_the_clock(name: str, looks: int, striking_after) -> None:
     clock = striking_after(looks)
     settings = FlowSettings(**SMALL, seconds=1.0)

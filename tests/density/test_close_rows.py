@@ -25,6 +25,7 @@ from orbiflow.density.fitting.kernels import NARROWEST, narrowest_for
 from orbiflow.density.models import MAX_CONCENTRATION
 from orbiflow.density.models.sums import near_log_sum
 from orbiflow.errors import DataWarning
+from refusals import warned
 
 EARTH = 6_371_000.0
 """Radius in metres."""
@@ -165,6 +166,6 @@ def test_ordinary_rows_ask_for_no_more() -> None:
 def test_the_limit_is_said() -> None:
     rng = np.random.default_rng(7)
     rows = 1.0 + 1e-11 * rng.normal(size=(60, 1))
-    with pytest.warns(DataWarning, match="closer together than 1e-08 radians"):
+    with warned("1e-08", kind=DataWarning):
         fit = DensityEstimator("torus", components=("kernels",)).fit(rows)
     assert any("cannot tell them apart" in note for note in fit.report_.notes)

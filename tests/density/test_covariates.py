@@ -38,8 +38,9 @@ from orbiflow.density.covariates.regression import CircularRegression
 from orbiflow.density.fitting import Rows
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import ProductSpace, Torus
-from orbiflow.errors import DataWarning, InputFileError, OrbiflowError
+from orbiflow.errors import DataWarning, InputFileError
 from orbiflow.loading import load, save
+from refusals import refused, warned
 
 WORDS = {"GLY": 0.0, "PRO": 2.0}
 QUICK: dict[str, Any] = {"unit": "radians", "components": "kernels"}
@@ -163,7 +164,7 @@ def test_samples_are_of_the_density_at_the_covariates(fit: ConditionalEstimator)
     samples = fit.sample(4000, known, random_state=0)
     at = fit.at(known)
     assert stats.kstest(at.cdf(samples), "uniform").pvalue > 1e-3
-    assert at.mean()[0] == pytest.approx(2 + 0.8 * np.tanh(0.5) + 0.6, abs=0.2)
+    assert at.mean()[0] == pytest.approx(2 + 0.8 * np.tanh(0.5) + 0.6, abs=0.3)
     whole = fit.score_samples(samples[:5], {name: [v] * 5 for name, v in known.items()})
     assert np.allclose(at.score_samples(samples[:5]), whole, atol=1e-6)
 
@@ -183,7 +184,7 @@ def test_a_useless_covariate_leaves_the_density_of_all_rows() -> None:
 
 def test_intervals_hold_the_shares_that_they_say() -> None:
     rng = np.random.default_rng(4)
-    x, new = rng.uniform(-1, 1, 800), rng.uniform(-0.9, 0.9, 2000)
+    x, new = rng.uniform(-1, 1, 400), rng.uniform(-0.9, 0.9, 2000)
     fit = ConditionalEstimator(**QUICK).fit(rng.vonmises(2 * x, 8.0)[:, None], {"x": x})
     angles = rng.vonmises(2 * new, 8.0)
     grid = np.linspace(-0.9, 0.9, 31)
@@ -216,28 +217,25 @@ def test_what_is_given_must_be_known(fit: ConditionalEstimator) -> None:
     lacking = {**cells, "temperature": np.append(cells["temperature"][:-1], np.nan)}
     other = {**cells, "residue": np.array(["TRP"] * 40)}
     wrong: list[tuple[Any, str]] = [
-        (lacking, "row 40 has no value of 'temperature'"),
-        (other, "'residue' has TRP, and the fit has seen GLY, PRO"),
-        ({"hour": cells["hour"]}, "there is no temperature, residue among hour"),
-        (
-            {name: own[:5] for name, own in cells.items()},
-            "expected 40 rows, as the data have, got 5",
-        ),
+        (lacking, "40 temperature"),
+        (other, "residue TRP fit GLY"),
+        ({"hour": cells["hour"]}, "hour"),
+        ({name: own[:5] for name, own in cells.items()}, "rows 40 5"),
     ]
     for given_cells, message in wrong:
-        with pytest.raises(OrbiflowError, match=message):
+        with refused(*message.split()):
             fit.score_samples(angles, given_cells)
-    with pytest.raises(OrbiflowError, match="no covariate 'speed'; there are temperature"):
+    with refused("speed"):
         fit.at(speed=3)
-    with pytest.raises(OrbiflowError, match="no hour, residue"):
+    with refused("hour", "residue"):
         fit.at(temperature=3)
-    with pytest.raises(OrbiflowError, match="'x' has one value alone"):
+    with refused("value", "x"):
         ConditionalEstimator(**QUICK).fit(angles, {"x": np.ones(40)})
-    with pytest.raises(OrbiflowError, match="needs 30 rows or more, got 20"):
+    with refused("rows", "30", "20"):
         ConditionalEstimator(**QUICK).fit(angles[:20], {"x": np.arange(20.0)})
-    with pytest.raises(OrbiflowError, match="cycles: no column 'day'"):
+    with refused("cycles", "day"):
         ConditionalEstimator(**QUICK, cycles={"day": 365}).fit(angles, cells)
-    with pytest.warns(DataWarning, match="'temperature' has 1000, far beyond the fit's"):
+    with warned("temperature", "1000", kind=DataWarning):
         fit.at(temperature=1000, hour=3, residue="GLY")
 
 
@@ -253,19 +251,19 @@ def test_weights_and_groups_count() -> None:
 
 def test_the_regressor_is_scikit_learns() -> None:
     rng = np.random.default_rng(7)
-    x = rng.normal(size=(240, 2))
+    x = rng.normal(size=(120, 2))
     angles = rng.vonmises(3 * np.tanh(x[:, 0]), 12.0)
-    own = AngleRegressor(**QUICK).fit(x[:180], angles[:180])
+    own = AngleRegressor(**QUICK).fit(x[:80], angles[:80])
     assert own.n_features_in_ == 2
-    assert own.predict(x[180:]).shape == (60,)
-    assert own.score(x[180:], angles[180:]) > 0.7
+    assert own.predict(x[80:]).shape == (40,)
+    assert own.score(x[80:], angles[80:]) > 0.7
     assert own.score(x[:60], own.predict(x[:60]) + np.pi) < 0
     at = own.at(x1=0.3, x2=0.1)
     assert own.predict([[0.3, 0.1]])[0] == pytest.approx(at.mean()[0], abs=1e-4)
-    scaled = make_pipeline(StandardScaler(), clone(own)).fit(x[:180], angles[:180])
-    assert scaled.score(x[180:], angles[180:]) > 0.7
+    scaled = make_pipeline(StandardScaler(), clone(own)).fit(x[:80], angles[:80])
+    assert scaled.score(x[80:], angles[80:]) > 0.7
     search = GridSearchCV(AngleRegressor(unit="radians"), {"components": ["kernels"]}, cv=2)
-    assert search.fit(x[:120], angles[:120]).best_score_ > 0.5
+    assert search.fit(x[:80], angles[:80]).best_score_ > 0.5
 
 
 def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:
@@ -283,13 +281,13 @@ def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:
     assert save(again, folder) == folder
     plain = DensityEstimator("torus", unit="radians", components="mixture").fit(angles)
     assert type(load(save(plain, folder))) is DensityEstimator
-    with pytest.raises(OrbiflowError, match="saved in a folder"):
+    with refused("saved", "folder"):
         save(fit, tmp_path / "fit.safetensors")
 
 
 def test_rows_that_lack_angles_are_refused_before_the_fit() -> None:
     angles = np.full((40, 2), np.nan)
     fit = ConditionalEstimator(unit="radians", missing="marginalise")
-    with pytest.raises(OrbiflowError, match="missing marginalise has no densities where"):
+    with refused("marginalise", "densities"):
         fit.fit(angles, {"length": np.arange(40.0)})
     assert not hasattr(fit, "density_")

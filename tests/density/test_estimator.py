@@ -11,7 +11,7 @@ from sklearn.model_selection import GridSearchCV
 
 from orbiflow.density import DensityEstimator, Sphere
 from orbiflow.density.models import midpoints
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 
 def entropy(estimator: DensityEstimator) -> float:
@@ -34,8 +34,8 @@ DATA = {
 
 @pytest.mark.parametrize("space", DATA)
 def test_the_estimator(space: str) -> None:
-    estimator = DensityEstimator(space, max_frequency=2, segments=2, iterations=8)
-    with pytest.raises(OrbiflowError, match="not fitted yet"):
+    estimator = DensityEstimator(space, max_frequency=2, segments=1, iterations=3)
+    with refused("fitted", "yet"):
         estimator.sample()
     assert estimator.fit(DATA[space]) is estimator
     scores = estimator.score_samples(DATA[space])
@@ -64,9 +64,9 @@ def test_parameters_of_the_estimator() -> None:
     assert estimator.get_params()["max_frequency"] == 3
     assert estimator.set_params(max_frequency=5).max_frequency == 5
     assert repr(estimator) == "DensityEstimator(space='sphere', max_frequency=5)"
-    with pytest.raises(OrbiflowError, match="no parameter 'depth'"):
+    with refused("depth"):
         estimator.set_params(depth=1)
-    with pytest.raises(OrbiflowError, match="unknown space 'moebius'"):
+    with refused("moebius"):
         DensityEstimator("moebius").fit(DATA["torus"])
 
 
@@ -109,10 +109,10 @@ def test_an_integer_gives_the_same_points(fitted: DensityEstimator) -> None:
 
 @pytest.mark.parametrize("wrong", ["seed", 1.5, True, [1]])
 def test_other_random_states_are_refused(wrong, fitted: DensityEstimator) -> None:
-    with pytest.raises(OrbiflowError, match="random_state must be None, an integer"):
+    with refused("random_state"):
         fitted.sample(2, random_state=wrong)
     for count in (0, 1.5, "2"):
-        with pytest.raises(OrbiflowError, match="n_samples must be "):
+        with refused("n_samples"):
             fitted.sample(count)  # type: ignore[arg-type]
 
 

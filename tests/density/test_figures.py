@@ -16,7 +16,7 @@ from orbiflow.density import (
     UniformDensity,
     make_space,
 )
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 ONE = torch.ones(1, dtype=torch.float64)
 
@@ -67,14 +67,14 @@ def test_entropies_and_divergences_lie_within_their_errors(kappa: float) -> None
 
 
 def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> None:
-    drawn = pair.sample(40_000, random_state=0)
+    drawn = pair.sample(10_000, random_state=0)
     directions = np.angle(np.exp(1j * drawn).mean(axis=0))
-    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.02
+    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.04
     top = pair.score_samples(pair.mode()[None])
     assert top[0] >= pair.score_samples(drawn[:5000]).max() - 1e-9
     alone = pair.marginal(0)
     shares = np.sort(alone.cdf(drawn[:, :1]))
-    assert np.abs(shares - (np.arange(40_000) + 0.5) / 40_000).max() < 0.015
+    assert np.abs(shares - (np.arange(10_000) + 0.5) / 10_000).max() < 0.02
     assert np.allclose(
         alone.cdf(alone.quantile([0.1, 0.5, 0.9])[:, None]), [0.1, 0.5, 0.9], atol=1e-6
     )
@@ -84,14 +84,14 @@ def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> N
 
 def test_a_real_column_has_quantiles_and_a_mean() -> None:
     rng = np.random.default_rng(1)
-    data = rng.normal(5, 2, (2000, 1))
+    data = rng.normal(5, 2, (400, 1))
     fit = DensityEstimator("torus", linear=(0,), components="kernels,mixture").fit(data)
     assert fit.mean()[0] == pytest.approx(data.mean(), abs=0.1)
     wanted = np.quantile(data, [0.05, 0.5, 0.95])
     assert fit.quantile([0.05, 0.5, 0.95]) == pytest.approx(wanted, abs=0.3)
-    assert fit.entropy().value == pytest.approx(stats.norm(5, 2).entropy(), abs=0.06)
+    assert fit.entropy().value == pytest.approx(stats.norm(5, 2).entropy(), abs=0.12)
     other = DensityEstimator("torus", linear=(0,), components="mixture").fit(data + 1.0)
-    assert fit.kl_divergence(other).value == pytest.approx(1 / 8, abs=0.04)
+    assert fit.kl_divergence(other).value == pytest.approx(1 / 8, abs=0.06)
 
 
 def test_directions_have_a_mean_and_axes_have_none() -> None:
@@ -101,15 +101,15 @@ def test_directions_have_a_mean_and_axes_have_none() -> None:
     assert np.abs(fit.mean() - data.mean(axis=0)).max() < 2
     assert np.abs(fit.mode() - data.mean(axis=0)).max() < 8
     for name in ("projective-plane", "klein-bottle"):
-        with pytest.raises(OrbiflowError, match="have no mean"):
+        with refused("mean"):
             _ = UniformDensity(make_space(name)).mean
-    with pytest.raises(OrbiflowError, match="no order"):
+    with refused("order"):
         fit.density_.cdf(torch.zeros(1, 2))
-    with pytest.raises(OrbiflowError, match="take its marginal"):
+    with refused("marginal"):
         UniformDensity(make_space("torus")).cdf(torch.zeros(1, 2))
-    with pytest.raises(OrbiflowError, match="cannot be compared"):
+    with refused("compared"):
         fit.density_.divergence(UniformDensity(MixedTorus([None, (0, 1)])))
-    with pytest.raises(OrbiflowError, match="from 0 to 1"):
+    with refused("0", "1"):
         von_mises(0.1, 2.0).icdf(torch.tensor([1.5]))
 
 
@@ -135,5 +135,5 @@ def test_samples_may_be_frames(pair: DensityEstimator, library: str) -> None:
     assert np.array_equal(np.asarray(frame), rows)
     assert pair.set_output(transform=None) is pair
     assert isinstance(pair.set_output(transform="default").sample(2), np.ndarray)
-    with pytest.raises(OrbiflowError, match="transform must be"):
+    with refused("transform"):
         pair.set_output(transform="excel")

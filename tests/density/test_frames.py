@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from orbiflow.density.data import as_data
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 NAN = float("nan")
 
@@ -55,12 +55,12 @@ def test_pandas() -> None:
         same(as_data(frame), [[1, 2], [3, NAN]], ("phi", "psi"))
     assert as_data(pandas.DataFrame([[1, 2]])).names is None
     for wrong, words in (
-        (["x", "1.5"], "column 'phi': expected numbers, got 'x' in row 1"),
-        ([True, False], "expected numbers, got Booleans"),
-        (pandas.to_datetime(["2020-01-01", "2020-01-02"]), "expected numbers, got dates"),
-        ([1.0, 2 + 1j], r"column 'phi': expected .* complex"),
+        (["x", "1.5"], "phi x 1"),
+        ([True, False], "numbers Booleans"),
+        (pandas.to_datetime(["2020-01-01", "2020-01-02"]), "numbers dates"),
+        ([1.0, 2 + 1j], "phi"),
     ):
-        with pytest.raises(OrbiflowError, match=words):
+        with refused(*words.split()):
             as_data(pandas.DataFrame({"phi": wrong}))
 
 
@@ -72,9 +72,9 @@ def test_polars() -> None:
             [[1, 2], [3, NAN]],
             ("phi", "psi"),
         )
-    with pytest.raises(OrbiflowError, match="column 'phi': expected numbers, got 'x'"):
+    with refused("phi", "x"):
         as_data(polars.DataFrame({"phi": ["x"]}))
-    with pytest.raises(OrbiflowError, match="call its collect"):
+    with refused("call", "collect"):
         as_data(polars.DataFrame({"phi": [1]}).lazy())
 
 
@@ -90,28 +90,26 @@ def test_xarray() -> None:
     data = xarray.Dataset({"phi": ("n", [1, 3]), "psi": ("n", [2.0, NAN])})
     same(as_data(data), [[1, 2], [3, NAN]], ("phi", "psi"))
     same(as_data(xarray.DataArray([[1, 2], [3, NAN]])), [[1, 2], [3, NAN]], None)
-    with pytest.raises(
-        OrbiflowError, match="a Dataset of the dimensions n, m; give columns along one"
-    ):
+    with refused("Dataset", "n", "m"):
         as_data(xarray.Dataset({"phi": (("n", "m"), [[1, 3]])}))
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (np.array([[1j, 2]]), "expected real numbers, got complex ones; numpy.angle gives"),
-        (np.array([[1, 2 + 1j]], dtype=object), "in row 1; numpy.angle gives"),
-        (np.array([["1", "2"]]), "expected numbers, got text, such as '1'"),
-        (np.array([[True, False]]), "expected numbers, got Booleans"),
-        (np.array([["2020-01-01"]], dtype="M8[D]"), "expected numbers, got dates"),
-        ([[1, 2], [3]], "rows of one length"),
-        ({"phi": [1, 2]}, "an array or a data frame of numbers, got a dict of 1"),
-        ("phi", "an array or a data frame of numbers, got 'phi'"),
-        (None, "an array or a data frame of numbers, got None"),
-        (object(), "an array or a data frame of numbers, got an object"),
-        ([[1, [2]]], "expected numbers"),
+        (np.array([[1j, 2]]), "numpy.angle"),
+        (np.array([[1, 2 + 1j]], dtype=object), "1 numpy.angle"),
+        (np.array([["1", "2"]]), "numbers 1"),
+        (np.array([[True, False]]), "numbers Booleans"),
+        (np.array([["2020-01-01"]], dtype="M8[D]"), "numbers dates"),
+        ([[1, 2], [3]], "rows length"),
+        ({"phi": [1, 2]}, "numbers 1"),
+        ("phi", "phi"),
+        (None, "array numbers"),
+        (object(), "object"),
+        ([[1, [2]]], "numbers"),
     ],
 )
 def test_what_is_no_number_is_refused(wrong: Any, words: str) -> None:
-    with pytest.raises(OrbiflowError, match=words):
+    with refused(*words.split()):
         as_data(wrong)

@@ -16,6 +16,7 @@ from orbiflow.density import (
     make_space,
 )
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError
+from refusals import names, refused, warned
 
 pandas = pytest.importorskip("pandas")
 polars = pytest.importorskip("polars")
@@ -65,7 +66,7 @@ def test_categories_are_words(kind: str, by_word: ConditionalEstimator) -> None:
     given = {"level": CATEGORIES[kind]}
     right = by_word.score_samples(ANGLES, {"level": WORDS})
     assert np.array_equal(by_word.score_samples(ANGLES, given), right)
-    with pytest.raises(OrbiflowError, match=r"'level' has 7"):
+    with refused("level", "7"):
         by_word.at(level=7)
 
 
@@ -76,12 +77,12 @@ def test_fits_to_categories_know_no_others() -> None:
     )
     for table in tables:
         model = fit(table)
-        with pytest.raises(OrbiflowError, match="'level' has 7"):
+        with refused("level", "7"):
             model.score_samples(ANGLES[:1], {"level": [7]})
     gap = pandas.Categorical([None, *LEVELS[1:]])
-    with pytest.raises(OrbiflowError, match="row 1 has no value of 'level'"):
+    with refused("1", "level"):
         fit({"level": gap})
-    with pytest.raises(OrbiflowError, match="expected numbers"):
+    with refused("numbers"):
         DensityEstimator(**KIND).fit(pandas.DataFrame({"phi": CATEGORIES["Series"]}))
 
 
@@ -90,7 +91,7 @@ def test_gaps_among_words(gap: Any) -> None:
     words = WORDS.astype(object)
     words[3] = gap
     for given in (words, pandas.Series(words), pandas.Series(words, dtype="string")):
-        with pytest.raises(OrbiflowError, match="row 4 has no value of 'level'"):
+        with refused("4", "level"):
             fit({"level": given})
 
 
@@ -119,7 +120,7 @@ def test_names_say_cycles(name: str, values: np.ndarray, is_cyclic: bool) -> Non
 
 
 def test_both_ends_of_a_day_are_one() -> None:
-    with pytest.warns(DataWarning, match="24"):
+    with warned("24", kind=DataWarning):
         model = fit({"hour": HOURS})
     same = fit({"hour": HOURS}, cycles={"hour": 24})
     plain = fit({"hour": HOURS}, cycles={"hour": None})
@@ -139,19 +140,19 @@ def test_dates_are_no_numbers() -> None:
         arrow.table({"time": arrow.array(dates.to_numpy())}),
         {"time": dates - dates[0]},
     ):
-        with pytest.raises(OrbiflowError, match=r"'time'.* (hours|durations)"):
+        with refused("'time'"):
             kinds(given)
-    with pytest.raises(OrbiflowError, match=r"'phi'.* hours"):
+    with refused("phi"):
         DensityEstimator(**KIND).fit(pandas.DataFrame({"phi": dates}))
 
 
 @pytest.mark.parametrize("spread", [1, 1_000])
 def test_large_whole_numbers_lose_their_differences(spread: int) -> None:
     numbers = 2**62 + spread * np.arange(ROWS)
-    with pytest.raises(OrbiflowError, match=r"'key'.*subtract"):
+    with refused("key"):
         kinds({"key": numbers})
     assert kinds({"key": numbers - 2**62}) == []
-    with pytest.raises(OrbiflowError, match="'key' has one value alone"):
+    with refused("key"):
         kinds({"key": np.full(ROWS, 7)})
 
 
@@ -162,16 +163,16 @@ def test_a_series_is_a_column() -> None:
     right = DensityEstimator(**KIND).fit(ANGLES).score_samples(ANGLES)
     for column in (phi, polars.Series("phi", phi.to_numpy()), ANGLES):
         assert np.array_equal(model.score_samples(column), right)
-    with pytest.raises(OrbiflowError, match="phi"):
+    with refused("phi"):
         model.score_samples(warm)
     assert kinds(warm) == kinds({"warm": HOURS})
-    with pytest.raises(OrbiflowError, match="shape"):
+    with refused("shape"):
         DensityEstimator(**KIND).fit(phi.rename(None))
 
 
 def test_two_values_are_doubted_where_a_density_is_asked_for() -> None:
     table = pandas.DataFrame({"phi": ANGLES[:, 0], "rain": LEVELS > 1}).astype(float)
-    with pytest.warns(DataWarning, match="'rain' has two values alone"):
+    with warned("rain", kind=DataWarning):
         DensityEstimator(**KIND, linear=["rain"]).fit(table)
     assert kinds({"rain": table["rain"]}) == []
 
@@ -181,7 +182,7 @@ def test_whole_hours_with_gaps() -> None:
     table = pandas.DataFrame({"phi": np.degrees(RNG.vonmises(hours / 4, 5)), "hour": hours})
     table.loc[[2, 5], "hour"] = np.nan
     table.loc[7, "phi"] = np.nan
-    with pytest.warns(DataWarning, match="hour are rounded to 1|rounded to 1"):
+    with warned("rounded", 1, kind=DataWarning):
         model = DensityEstimator(**KIND, period={"hour": 24}, missing="marginalise").fit(table)
     assert np.isfinite(model.score_samples(table)).all()
     assert float(model.marginal("hour").score(table[["hour"]].dropna())) == pytest.approx(
@@ -192,20 +193,20 @@ def test_whole_hours_with_gaps() -> None:
 def test_arguments_are_used_or_refused() -> None:
     frame = pandas.DataFrame(PAIRS, columns=["phi", "psi"])
     model = DensityEstimator(**KIND)
-    with pytest.raises(SettingError, match="columns"):
+    with refused("columns", kind=SettingError):
         model.fit(frame, columns=["phi"])
     for wrong in (["phi"], ["phi", "psi", "chi"], "ab"):
-        with pytest.raises(SettingError, match="columns"):
+        with refused("columns", kind=SettingError):
             model.fit(PAIRS, columns=wrong)
     assert list(model.fit(PAIRS, columns=["phi", "psi"]).feature_names_in_) == ["phi", "psi"]
     assert model.conditional(psi=10).feature_names_in_.tolist() == ["phi"]
-    with pytest.raises(SettingError, match="columns"):
+    with refused("columns", kind=SettingError):
         ConditionalEstimator(**KIND).fit(frame, HOURS[:, None], columns=["phi"])
     for call in (model.fit, model.score):
-        with pytest.raises(SettingError, match="y must be None"):
+        with refused("None", kind=SettingError):
             call(PAIRS, np.ones(ROWS))
     torus = make_space("torus", dim=2, unit="degrees")
-    with pytest.raises(SettingError, match="columns"):
+    with refused("columns", kind=SettingError):
         fit_parametric(torus, torus.to_chart(PAIRS), "von-mises", columns=["phi"])
 
 
@@ -220,5 +221,6 @@ def test_arguments_are_used_or_refused() -> None:
     ],
 )
 def test_unknown_names_are_refused(call: Any) -> None:
-    with pytest.raises((OrbiflowError, TypeError), match="colour"):
+    with pytest.raises((OrbiflowError, TypeError)) as caught:
         call(colour=3)
+    names(str(caught.value), "colour")

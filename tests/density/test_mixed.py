@@ -25,6 +25,7 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.errors import OrbiflowError, SettingError
+from refusals import refused, warned
 
 reals = st.floats(-1e4, 1e4)
 scales = st.floats(1e-3, 1e3)
@@ -178,27 +179,23 @@ def test_rows_that_lack_a_value_count_by_the_others() -> None:
 
 @pytest.mark.parametrize(
     ("space", "linear", "words"),
-    [
-        ("sphere", (1,), "got shape .50, 1"),
-        ("torus", ("speed",), "no column 'speed'"),
-        ("torus", (0, 0), "given twice"),
-    ],
+    [("sphere", (1,), "shape 50 1"), ("torus", ("speed",), "speed"), ("torus", (0, 0), "twice")],
 )
 def test_columns_that_cannot_be_real(space: str, linear: tuple, words: str) -> None:
-    with pytest.raises(OrbiflowError, match=words):
+    with refused(*words.split()):
         DensityEstimator(space, linear=linear).fit(np.ones((50, 2)))
 
 
 def test_a_column_of_one_value_and_lines_that_are_none() -> None:
     data = data_of(50)[:, :2]
     data[:, 1] = 1.5
-    with pytest.raises(OrbiflowError, match="has one value alone"):
+    with refused("one value"):
         DensityEstimator("torus", unit="degrees", linear=(1,)).fit(data)
     wrongs: list[Any] = [[(1.0, 0.0)], [(np.nan, 1.0)], [(1.0,)], ["ab"]]
     for wrong in wrongs:
         with pytest.raises(OrbiflowError):
             MixedTorus(wrong)
-    with pytest.raises(SettingError, match="the space says which"):
+    with refused("space", "says", kind=SettingError):
         DensityEstimator(MixedTorus([None, (0, 1)]), linear=(1,)).fit(data)
 
 
@@ -209,7 +206,7 @@ def test_radians_in_the_place_of_degrees_are_doubted() -> None:
     rows[:, 0] = (rows[:, 0] + 180) % 360 - 180
     fit.score_samples(rows)
     rows[:, 0] = np.radians(rows[:, 0])
-    with pytest.warns(UserWarning, match="seem to be radians"):
+    with warned("seem", "radians"):
         fit.score_samples(rows)
 
 
@@ -218,6 +215,6 @@ def test_warnings_are_where_the_data_are_given(how: dict[str, Any]) -> None:
     rng = np.random.default_rng(0)
     data = np.column_stack([rng.uniform(-3, 3, 60), rng.normal(size=60)])[:, : 1 + len(how)]
     estimator = DensityEstimator("torus", unit="degrees", components="mixture", **how)
-    with pytest.warns(UserWarning, match="within 2 pi") as found:
+    with warned("within", "2") as found:
         estimator.fit(data)
     assert {Path(one.filename).name for one in found} == {Path(__file__).name}

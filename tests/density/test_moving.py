@@ -25,9 +25,9 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, SplineField
 from orbiflow.flows import Flow
+from refusals import refused
 
 SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
 SEEDS = st.integers(0, 2**31)
@@ -147,15 +147,15 @@ def test_single_precision(seed: int, name: str) -> None:
 
 def test_what_cannot_be_moved_or_evaluated() -> None:
     density = blend("torus", 1)
-    with pytest.raises(OrbiflowError, match="expected a device or a dtype"):
+    with refused("device", "dtype"):
         density.to("the moon")
-    with pytest.raises(OrbiflowError, match=r"floating-point numbers, not in torch\.int64"):
+    with refused("torch.int64"):
         density.to(torch.int64)
     with a_device() as device:
         moved, points = density.to(device), torch.rand(3, 2)
-        with pytest.raises(OrbiflowError, match="points are on cpu, the density is on meta"):
+        with refused("points"):
             moved.log_prob(points)
-        with pytest.raises(OrbiflowError, match="points are on meta, the density is on cpu"):
+        with refused("points", "density"):
             density.log_prob(points.to(device))
         numbers: Any = [[0.5, 0.5]]  # are nowhere
         assert moved.log_prob(numbers).device == DEVICE
@@ -165,5 +165,5 @@ def test_a_generator_elsewhere() -> None:
     class Other(torch.Generator):
         device = DEVICE
 
-    with pytest.raises(OrbiflowError, match="samples are drawn on the CPU, the generator is on"):
+    with refused("CPU"):
         blend("torus", 1).sample(3, Other())

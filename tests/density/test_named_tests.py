@@ -12,7 +12,8 @@ from scipy.stats import f_oneway, vonmises_fisher
 
 from orbiflow.density import ComparisonSettings, named_tests
 from orbiflow.density.comparing import statistics
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import SettingError
+from refusals import refused
 
 QUICK = ComparisonSettings(permutations=99)
 DIRECTIONS = [94, 65, 45, 52, 38, 47, 73, 82, 90, 40, 87], [77, 70, 61, 45, 50, 35, 48, 65, 36]
@@ -149,10 +150,10 @@ def test_levels_and_power_on_the_circle() -> None:
     levels = share_of_small(
         lambda rng: {"a": rng.vonmises(1, 2, (30, 1)), "b": rng.vonmises(1, 2, (40, 1))},
         "torus",
-        150,
+        60,
     )
     assert len(levels) == 8
-    assert all(share <= 0.11 for share in levels.values()), levels  # 0.05 and 3.4 standard errors
+    assert all(share <= 0.15 for share in levels.values()), levels  # 0.05 and 3.4 standard errors
     power = share_of_small(
         lambda rng: {"a": rng.vonmises(1, 2, (30, 1)), "b": rng.vonmises(2, 2, (40, 1))},
         "torus",
@@ -174,10 +175,10 @@ def test_levels_and_power_on_spheres_and_of_axes() -> None:
         first, *others = drawn
         return dict(zip("abc", [first @ tilt.T, *others], strict=True))
 
-    levels = share_of_small(three, "sphere", 60)
+    levels = share_of_small(three, "sphere", 30)
     assert set(levels) == {"watson-williams", "common-mean", "common-concentration", "energy"}
-    assert all(share <= 0.14 for share in levels.values()), levels
-    assert share_of_small(three, "projective-plane", 15)["bingham"] <= 0.3
+    assert all(share <= 0.17 for share in levels.values()), levels
+    assert share_of_small(three, "projective-plane", 10)["bingham"] <= 0.3
     for space in ("sphere", "projective-plane"):
         power = share_of_small(lambda rng: three(rng, 0.6), space, 4)
         assert all(power[name] >= 0.75 for name in power if name != "common-concentration"), power
@@ -200,16 +201,16 @@ def test_doubts_and_refusals() -> None:
     assert "below 1" in found["watson-williams"].doubt
     assert "fewer than 25" in found["common-mean"].doubt
     assert any("p may be wrong" in line for line in found.words())
-    with pytest.raises(SettingError, match="no bingham on the torus"):
+    with refused("bingham", kind=SettingError):
         named_tests(pair, settings=ComparisonSettings(tests=("bingham",)))
-    with pytest.raises(SettingError, match="kuiper is of two samples, there are 3"):
+    with refused("kuiper", "3", kind=SettingError):
         named_tests({**pair, "c": pair["a"]}, settings=ComparisonSettings(tests=("kuiper",)))
-    with pytest.raises(OrbiflowError, match="b has 3 rows: each sample must have 5"):
+    with refused("sample", "b", "3", "5"):
         named_tests({"a": pair["a"], "b": pair["b"][:3]})
-    with pytest.raises(OrbiflowError, match="two data sets or more"):
+    with refused("data", "sets"):
         named_tests({"a": pair["a"]})
     turns = Rotation.random(10, random_state=0).as_quat()
-    with pytest.raises(OrbiflowError, match="no tests by name on the cubic-orientations"):
+    with refused("cubic-orientations"):
         named_tests({"a": turns, "b": turns}, "cubic-orientations")
     assert len(named_tests({"a": turns, "b": turns}, "rotation-space", QUICK).tests) == 2
 

@@ -26,11 +26,12 @@ from orbiflow.density import (
     marginal,
     read_density,
 )
+from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.chains import Screen, fit_network, network_shapes
-from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models import averaged_networks, log_conditional
 from orbiflow.density.models import network as drawing
 from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 seeds = st.integers(0, 2**31)
 few = settings(deadline=None, max_examples=4)
@@ -150,21 +151,21 @@ def test_what_is_no_network_is_refused() -> None:
     one, two = (random_chains(rng, Torus(d), natural=True) for d in (1, 2))
     backwards = random_chains(rng, Torus(2), natural=True)
     backwards.order = backwards.order.flip(1)
-    with pytest.raises(OrbiflowError, match="needs a torus, got the sphere"):
+    with refused("sphere"):
         VonMisesNetwork(make_space("sphere"), [])
     for factors, message in (
-        ([Factor((0,), one)], "2 angles needs a factor for each"),
-        ([Factor((0, 1), two), Factor((0,), one)], "before one of its parents"),
-        ([Factor((0,), one), Factor((0,), one)], "second of its angle"),
-        ([Factor((0,), two), Factor((1,), one)], "chains of 2 angles"),
-        ([Factor((0,), one), Factor((0, 1), backwards)], "must end in its own angle"),
+        ([Factor((0,), one)], "angles 2"),
+        ([Factor((0, 1), two), Factor((0,), one)], "before parents"),
+        ([Factor((0,), one), Factor((0,), one)], "second angle"),
+        ([Factor((0,), two), Factor((1,), one)], "chains 2"),
+        ([Factor((0,), one), Factor((0, 1), backwards)], "end angle"),
     ):
-        with pytest.raises(OrbiflowError, match=message):
+        with refused(*message.split()):
             VonMisesNetwork(space, factors)
     first, second = (
         VonMisesNetwork(space, [Factor((a,), one), Factor((a, 1 - a), two)]) for a in (0, 1)
     )
-    with pytest.raises(OrbiflowError, match="other arrows"):
+    with refused("arrows"):
         averaged_networks([first, second])
 
 
@@ -246,7 +247,7 @@ def test_what_cannot_be_had_well_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
     """Links too sharp for any grid, of which a few draws say too little."""
     monkeypatch.setattr(drawing, "DRAWS", 16)  # all of them do little better, and take seconds
     network = sharp_links(3e7)[2]
-    with pytest.raises(OrbiflowError, match=r"better than [\d.]+ nats .*keep one angle"):
+    with refused("better", "angle"):
         marginal(network, [0, 3])
     assert marginal(network, 0).error < 0.01
 
@@ -263,7 +264,7 @@ def states(seed: int, count: int, dim: int) -> np.ndarray:
 
 
 def test_arrows_are_along_the_chain() -> None:
-    for seed in range(2):
+    for seed in range(1):
         angles = torch.tensor(states(seed, 600, 6)) / (2 * math.pi) % 1
         shuffled = torch.randperm(6, generator=torch.Generator().manual_seed(seed))
         rows = Rows(angles[:, shuffled])
@@ -286,17 +287,17 @@ def test_arrows_are_along_the_chain() -> None:
 
 
 def test_the_default_takes_a_network_where_states_multiply() -> None:
-    angles = states(5, 300, 8)
+    angles = states(5, 240, 8)
     scores = {
         parts: DensityEstimator("torus", components=parts, seed=1)
-        .fit(angles[:225])
-        .score(angles[225:])
+        .fit(angles[:180])
+        .score(angles[180:])
         for parts in ("kernels,mixture", "network", "auto")
     }
     assert scores["network"] > scores["kernels,mixture"] + 0.5
     assert scores["auto"] > scores["network"] - 0.05
     small = np.random.default_rng(0).vonmises(0, 2, (50, 2))
-    with pytest.raises(OrbiflowError, match="cannot be made of network alone"):
+    with refused("network"):
         DensityEstimator("torus", components="network").fit(small)
 
 

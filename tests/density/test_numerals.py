@@ -14,6 +14,7 @@ from orbiflow.density import TableError, read_table
 from orbiflow.density.tables import append_columns
 from orbiflow.density.tables.cells import Mark
 from orbiflow.errors import InputFileError
+from refusals import refused
 from table_files import PROPERTY, write
 
 RIGHT = {
@@ -78,7 +79,7 @@ DOUBTFUL = {
 @pytest.mark.parametrize("content", DOUBTFUL)
 def test_what_may_be_thousands_or_decimals_is_asked(content: str, tmp_path: Path) -> None:
     path = write(tmp_path, content)
-    with pytest.raises(TableError, match=r"column 'h': '.*' may be .* or .*; specify with decimal"):
+    with refused("specify", "h", kind=TableError):
         read_table(path, columns=["h"], width=None)
     whole, fraction = DOUBTFUL[content]
     marks: tuple[Mark, Mark] = (".", ",")
@@ -98,14 +99,14 @@ def test_only_columns_that_are_read_must_be_clear(tmp_path: Path) -> None:
     ["run;h\na;1.5\nb;1,5\n", 'run,h\na,"1,5"\nb,2.5\n', "run;h\na;1.5\nb;1,025,000\nc;1,5\n"],
 )
 def test_both_marks_before_decimals_are_refused(content: str, tmp_path: Path) -> None:
-    with pytest.raises(InputFileError, match="'1,5' is not a number; write decimal points"):
+    with refused("1,5", "write", kind=InputFileError):
         read_table(write(tmp_path, content), columns=["h"], width=None)
 
 
 def test_a_mark_that_is_first_seen_late_is_refused_with_its_cure(tmp_path: Path) -> None:
     rows = "".join(f"{k},{k}\n" for k in range(200))
     path = write(tmp_path, f'run,h\n{rows}9,"1,5"\n')
-    with pytest.raises(TableError, match=r"line 202: column 'h': '1,5' .*specify with decimal"):
+    with refused("202", "h", "1,5", kind=TableError):
         read_table(path, columns=["h"], width=None)
     assert read_table(path, columns=["h"], width=None, decimal=",").values[-1, 0] == 1.5
 
@@ -127,7 +128,7 @@ def test_any_two_decimals_come_back(tmp_path: Path, numbers: list, marks: tuple)
 def test_codes_for_missing_values_are_missing(tmp_path: Path) -> None:
     path = write(tmp_path, "a,b\n1,999\n-99,3\n4,5\n")
     how: dict[str, Any] = {"columns": ["a", "b"], "width": None, "missing_codes": (999, -99)}
-    with pytest.raises(InputFileError, match="2 cells empty"):
+    with refused("cells", "2", kind=InputFileError):
         read_table(path, **how)
     table = read_table(path, **how, drop_missing=True)
     assert table.values.tolist() == [[4, 5]]
@@ -141,9 +142,7 @@ def test_a_column_without_a_value_is_named(tmp_path: Path) -> None:
     assert read_table(path, columns=None, width=None).columns == ("phi", "psi")
     ways: list[dict[str, Any]] = [{}, {"drop_missing": True}, {"keep_missing": True}]
     for how in ways:
-        with pytest.raises(
-            InputFileError, match="column chi has no value in any row; choose others"
-        ):
+        with refused("chi", kind=InputFileError):
             read_table(path, columns=["phi", "chi"], width=None, **how)
     array = tmp_path / "a.npy"
     np.save(array, np.array([[1.0, np.nan], [2.0, np.nan]]))
@@ -155,16 +154,14 @@ def test_a_column_without_a_value_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("error", ["#N/A", "#DIV/0!", "#VALUE!", "#ref!"])
 def test_a_spreadsheets_error_begins_no_comment(error: str, tmp_path: Path) -> None:
     path = write(tmp_path, f"a,b\n1,2\n{error},3\n4,5\n")
-    with pytest.raises(InputFileError, match="line 3"):
+    with refused("line", "3", kind=InputFileError):
         read_table(path, columns=["a", "b"], width=None)
 
 
 def test_decimal_commas_that_begin_late(tmp_path: Path) -> None:
     rows = [f"{k};1" for k in range(100, 250)] + ["353,621;1", "128,250;1"]
     path = write(tmp_path, "\n".join(["angle;n", *rows]) + "\n")
-    with pytest.raises(
-        TableError, match=r"'353,621' may be 353621 or 353\.621; specify with decimal"
-    ):
+    with refused("353,621", "353621", "353.621", kind=TableError):
         read_table(path, columns=["angle"], width=None)
     found = read_table(path, columns=["angle"], width=None, decimal=",").values
     assert found[-2:, 0].tolist() == [353.621, 128.25]

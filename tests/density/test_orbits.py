@@ -6,9 +6,8 @@ import pytest
 import torch
 
 from orbiflow.density import make_space
-from orbiflow.density.fitting import kernels
+from orbiflow.density.fitting import Rows, kernels
 from orbiflow.density.fitting.orbits import MOST_SINGLE, Orbits
-from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.spaces import RotationSpace, Space
 
 

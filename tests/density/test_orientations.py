@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from orbiflow.density import RotationSpace, summarize_orientations
 from orbiflow.density.inference import misorientations
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import SettingError
+from refusals import refused
 from strategies import seeds
 
 GROUPS = st.sampled_from(["C1", "C2y", "D2", "D3", "D6", "O"])
@@ -24,7 +25,7 @@ def about(mean: Rotation, degrees: float, count: int, seed: int) -> Rotation:
     return mean * Rotation.from_rotvec(steps)
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(crystal=GROUPS, specimen=GROUPS, seed=seeds)
 def test_the_mean_is_found_whatever_images_rows_are(crystal: str, specimen: str, seed: int) -> None:
     space = RotationSpace(symmetry=crystal, specimen=specimen)
@@ -51,15 +52,15 @@ def test_the_cone_holds_the_true_mean_as_often_as_it_says() -> None:
     space = RotationSpace(symmetry="O")
     truth, held = Rotation.from_euler("ZXZ", [20, 35, 10], degrees=True), 0
     target = torch.tensor(truth.as_quat())
-    for seed in range(200):
+    for seed in range(60):
         found, _ = summarize_orientations(
             space, about(truth, 4.0, 40, seed).as_quat(), level=0.9, near=[]
         )
         assert found.cone is not None
         off = misorientations(space, torch.tensor([found.mean]), target)[0]
         held += math.degrees(float(off)) <= found.cone
-    # 180 are expected, with a deviation of 4.2
-    assert 160 <= held <= 195
+    # 54 are expected, with a deviation of 2.3
+    assert 47 <= held <= 59
 
 
 def test_rows_of_a_group_count_once_and_weights_as_repeats() -> None:
@@ -102,9 +103,9 @@ def test_shares_near_ideal_orientations() -> None:
         24 * (reach - math.sin(reach)) / math.pi, rel=0.15
     )
     assert len(found.mean) == 3
-    with pytest.raises(SettingError, match="near must be among cube"):
+    with refused("near", kind=SettingError):
         summarize_orientations(space, data, near=["ribbon"])
-    with pytest.raises(SettingError, match="near names orientations of cubic crystals"):
+    with refused("near", kind=SettingError):
         summarize_orientations(RotationSpace(symmetry="D6"), np.eye(4), near=["cube"])
-    with pytest.raises(OrbiflowError, match="weights must be 400 numbers"):
+    with refused("weights", "400"):
         summarize_orientations(space, data, weights=[1.0])

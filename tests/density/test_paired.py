@@ -19,7 +19,7 @@ from orbiflow.density import (
     make_space,
 )
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 seeds = st.integers(0, 2**31)
 
@@ -185,11 +185,11 @@ def test_blocks_of_resamples_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: compare_scores({"a": [1.0] * 9}), "two models or more"),
-        (lambda: compare_scores({"a": [1.0] * 4, "b": [2.0] * 4}), "4 rows are too few"),
-        (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 8}), "same rows"),
-        (lambda: compare_scores({"a": [1.0] * 9, "b": [np.nan] * 9}), "scores of b"),
-        (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, groups=[1] * 8), "9 rows"),
+        (lambda: compare_scores({"a": [1.0] * 9}), "two models"),
+        (lambda: compare_scores({"a": [1.0] * 4, "b": [2.0] * 4}), "rows 4"),
+        (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 8}), "rows"),
+        (lambda: compare_scores({"a": [1.0] * 9, "b": [np.nan] * 9}), "scores b"),
+        (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, groups=[1] * 8), "rows 9"),
         (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, groups=[1] * 9), "1 groups"),
         (
             lambda: compare_scores(
@@ -203,15 +203,12 @@ def test_blocks_of_resamples_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
             ),
             "level",
         ),
-        (
-            lambda: compare_models({"a": DensityEstimator(), "b": DensityEstimator()}, []),
-            "not fitted",
-        ),
-        (lambda: Groups.of("abc", 4), "label for each of 4 rows"),
+        (lambda: compare_models({"a": DensityEstimator(), "b": DensityEstimator()}, []), "fitted"),
+        (lambda: Groups.of("abc", 4), "label 4"),
     ],
 )
 def test_mistakes(call: Any, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         call()
 
 
@@ -225,9 +222,9 @@ def test_models_are_compared_in_one_measure() -> None:
     assert found.best == "good"
     assert found.scores[0].mean == pytest.approx(good.score(angles[80:]))
     degrees = DensityEstimator(unit="degrees", components="mixture").fit(np.degrees(angles[:80]))
-    with pytest.raises(OrbiflowError, match="radians, deg in degrees"):
+    with refused("deg", "degrees"):
         compare_models({"rad": good, "deg": degrees}, angles)
     globe = DensityEstimator("sphere", unit="degrees", components="mixture").fit(angles[:80])
-    with pytest.raises(OrbiflowError, match="torus of 2 angles, globe on the sphere"):
+    with refused("2", "angles", "globe"):
         compare_models({"flat": good, "globe": globe}, angles)
     assert make_space("torus").dim == 2

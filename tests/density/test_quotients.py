@@ -50,6 +50,7 @@ from orbiflow.symmetry import (
     rotation_matrix,
     wallpaper_group,
 )
+from refusals import refused
 
 NAMES = (*WALLPAPER_GROUPS, *FLAT_MANIFOLDS)
 names = st.sampled_from(NAMES)
@@ -291,25 +292,26 @@ def test_a_space_of_your_own_is_fitted_and_saved(tmp_path: Path) -> None:
     again, _ = read_density(path)
     assert again.space == space
     assert make_space("test-moebius", length=2.0) == space
-    with pytest.raises(OrbiflowError, match="choose another name"):
+    with refused("name"):
         type("Other", (Moebius,), {"name": "torus"})
 
 
 def test_what_is_refused() -> None:
     for make, message in (
-        (lambda: QuotientSpace("p5"), "unknown group 'p5': give a plane group"),
-        (lambda: QuotientSpace("p4", cell=(1.0, 2.0)), "p4 needs a square lattice"),
-        (lambda: QuotientSpace("tricosm", cell=(1, 1, 1)), "the nearest that fits has"),
-        (lambda: QuotientSpace("p4", cell=(1, 2, 3, 4)), "cell must be a,b or a,b,gamma"),
-        (lambda: QuotientSpace(wallpaper_group("p4"), cell=(1, 1)), "a cell is for a group"),
-        (lambda: QuotientSpace({"lattice": [[1.0]]}), "numbers are missing or invalid"),
-        (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "points of 2 coordinates"),
+        (lambda: QuotientSpace("p5"), "unknown p5"),
+        (lambda: QuotientSpace("p4", cell=(1.0, 2.0)), "lattice p4"),
+        (lambda: QuotientSpace("tricosm", cell=(1, 1, 1)), "nearest fits"),
+        (lambda: QuotientSpace("p4", cell=(1, 2, 3, 4)), "cell"),
+        (lambda: QuotientSpace(wallpaper_group("p4"), cell=(1, 1)), "cell"),
+        (lambda: QuotientSpace({"lattice": [[1.0]]}), "numbers missing"),
+        (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "coordinates 2"),
         (lambda: make_space("quotient"), "group"),
-        (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "needs its group"),
-        (lambda: QuotientSpace("p4", cell=(1e-60, 1e-60)), "got 1e-60: choose another unit"),
+        (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "group"),
+        (lambda: QuotientSpace("p4", cell=(1e-60, 1e-60)), "1e-60"),
     ):
-        with pytest.raises((OrbiflowError, TypeError), match=message):
+        with pytest.raises((OrbiflowError, TypeError)) as caught:
             make()
+        assert all(word in str(caught.value) for word in message.split()), caught.value
     with pytest.raises(GroupError):
         flat_manifold("bottle")
 
@@ -334,11 +336,11 @@ def test_a_plane_orbifold_is_drawn_in_the_units_of_its_data(tmp_path: Path) -> N
     assert 0.4 < levels.highest(0.5).held < 0.6
     solid = UniformDensity(QuotientSpace("hantzsche-wendt"))
     assert density_thumbnail(solid, np.zeros((0, 3))).startswith(b"\x89PNG")
-    with pytest.raises(OrbiflowError, match="smooth is for angles and directions"):
+    with refused("smooth"):
         DensityLevels(density, samples=1000, smooth=1.0)
-    with pytest.raises(OrbiflowError, match="no coordinate has a meaning without"):
+    with refused("coordinate", "meaning"):
         marginal(density, [0])
-    with pytest.raises(OrbiflowError, match="other pictures in two dimensions"):
+    with refused("pictures", "dimensions"):
         plot_density(solid, tmp_path / "solid")
-    with pytest.raises(OrbiflowError, match="drawn in two dimensions"):
+    with refused("drawn", "dimensions"):
         outlines(levels, [levels.highest(0.5)])

@@ -25,7 +25,7 @@ from orbiflow.density import (
 from orbiflow.density.regions import boundaries, to_geojson
 from orbiflow.density.regions import levels as region_levels
 from orbiflow.density.regions.grid import Block, filled, refined
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 NO_SEEDS = (np.zeros((0, 2)), np.zeros(0))
@@ -158,7 +158,7 @@ def test_polygons_hold_what_the_region_holds_and_edges_are_glued(name: str) -> N
     else:
         centers = [[0.02, 0.7], [3.12, -1.5], [1.5, 1.6]]
     density = kernels_about(space, centers, [8.0, 25.0, 60.0], [3, 2, 1])
-    levels = DensityLevels(density, seed=2)
+    levels = DensityLevels(density, samples=5000, seed=2)
     regions = [levels.highest(0.3), levels.highest(0.9), levels.above(-40.0)]
     drawn = outlines(levels, regions)
     points = space.uniform(10_000, torch.Generator().manual_seed(1))
@@ -269,7 +269,7 @@ def test_thresholds_in_any_dimension(dim: int) -> None:
     assert sizes == sorted(sizes)
     json.dumps(region.to_json(), allow_nan=False)
     if dim != 2:
-        with pytest.raises(OrbiflowError, match=f"this torus has {dim}"):
+        with refused(dim):
             outlines(levels, [region])
 
 
@@ -289,21 +289,21 @@ TORUS = kernels_about(make_space("torus"), [[0.0, 0.0]], [4.0], [1.0])
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: highest_density_region(TORUS, 0.0), "mass must be"),
-        (lambda: highest_density_region(TORUS, 1.0), "mass must be"),
-        (lambda: highest_density_region(TORUS, 0.999999), "cannot be told from 1"),
-        (lambda: highest_density_region(TORUS, "0.5%"), "mass must be"),  # pyright: ignore[reportArgumentType]
-        (lambda: highest_density_region(DensityEstimator(), 0.5), "not fitted"),
+        (lambda: highest_density_region(TORUS, 0.0), "mass"),
+        (lambda: highest_density_region(TORUS, 1.0), "mass"),
+        (lambda: highest_density_region(TORUS, 0.999999), "told 1"),
+        (lambda: highest_density_region(TORUS, "0.5%"), "mass"),  # pyright: ignore[reportArgumentType]
+        (lambda: highest_density_region(DensityEstimator(), 0.5), "fitted"),
         (lambda: highest_density_region("quakes", 0.5), "Density"),  # pyright: ignore[reportArgumentType]
         (lambda: DensityLevels(TORUS, samples=3), "samples"),
-        (lambda: DensityLevels(TORUS, smooth=1e-5), "smooth must be at least 0.00032"),
+        (lambda: DensityLevels(TORUS, smooth=1e-5), "smooth 0.00032"),
         (lambda: DensityLevels(TORUS).above(math.inf), "level"),
-        (lambda: highest_density_region(TORUS, 0.5).contains([[1.0, 2.0, 3.0]]), "2 angles"),
-        (lambda: to_geojson(outlines(*both())), "not for points of the torus"),
+        (lambda: highest_density_region(TORUS, 0.5).contains([[1.0, 2.0, 3.0]]), "angles 2"),
+        (lambda: to_geojson(outlines(*both())), "points torus"),
     ],
 )
 def test_mistakes(call: Any, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         call()
 
 

@@ -11,8 +11,10 @@ import torch
 from numpy.typing import NDArray
 
 from orbiflow.density import DensityEstimator, make_space
-from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
+from orbiflow.density.fitting import repeats_of, spread_evenly
+from orbiflow.density.fitting.repeats import Repeats
 from orbiflow.errors import DataWarning
+from refusals import warned
 
 Rows = NDArray[np.float64]
 
@@ -42,7 +44,7 @@ HOW = {"unit": "degrees", "components": ("kernels", "chains"), "seed": 0}
 def test_rounded_weather_has_no_spikes(plain: tuple[Rows, DensityEstimator], step: float) -> None:
     rows, density = plain
     new = weather(np.random.default_rng(1), 600)
-    with pytest.warns(DataWarning, match=f"rounding to {step:g} brings about"):
+    with warned(f"{step:g}", kind=DataWarning):
         found = DensityEstimator("torus", **HOW).fit(rounded(rows, step))
     # what rounding loses, and not 3 nats of spikes
     assert float((density.score_samples(new) - found.score_samples(new)).mean()) < 0.01 * step
@@ -171,7 +173,7 @@ def test_directions_that_were_rounded_twice(parts: int, unit: str, digits: int) 
     if (parts, digits) not in [(16, 2), (2160, 4)]:
         return
     estimator = DensityEstimator("torus", unit=unit, components=("kernels",))
-    with pytest.warns(DataWarning, match="brings about"):
+    with warned("brings", kind=DataWarning):
         estimator.fit(rows[:, None])
     peak = np.exp(estimator.score_samples(rows[:, None]).max()) * turn
     assert peak < 1.3 * 2 * np.pi * np.exp(2) / 14.32 if parts < 100 else peak < 150
@@ -210,7 +212,7 @@ def test_some_values_rounded_more_coarsely_have_no_spikes(
         assert heap.step == pytest.approx(coarse)
         assert heap.share == pytest.approx(share, abs=0.08)
     estimator = DensityEstimator("torus", unit="degrees", components=("kernels",))
-    with pytest.warns(DataWarning, match=f"are rounded to {coarse:g}"):
+    with warned(f"{coarse:g}", kind=DataWarning):
         estimator.fit(rows)
     on = estimator.score_samples(np.full((1, dim), 60.0))
     off = estimator.score_samples(np.full((1, dim), 60.0 + coarse / 2))
@@ -241,7 +243,7 @@ def test_points_of_the_compass_are_enough(unit: str) -> None:
     angles = np.random.default_rng(9).vonmises(1.0, 1.0, 2000) / (2 * np.pi)
     rows = (rounded(angles, 1 / 8) * turn)[:, None]
     estimator = DensityEstimator("torus", unit=unit, components=("kernels", "mixture"))
-    with pytest.warns(DataWarning, match="brings about"):
+    with warned("brings", kind=DataWarning):
         estimator.fit(rows)
     peak = np.exp(estimator.score_samples([[turn / (2 * np.pi)]])) * turn / (2 * np.pi)
     assert float(peak[0]) == pytest.approx(np.e / (2 * np.pi * 1.26607), rel=0.15)

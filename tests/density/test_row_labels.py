@@ -9,6 +9,7 @@ import pytest
 
 from orbiflow.density import (
     AngleRegressor,
+    ComparisonSettings,
     ConditionalEstimator,
     DensityEstimator,
     RotationSpace,
@@ -23,7 +24,7 @@ from orbiflow.density import (
     summarize_directions,
     summarize_orientations,
 )
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 pandas = pytest.importorskip("pandas")
 RNG = np.random.default_rng(0)
@@ -79,7 +80,8 @@ def sampled(weights: Any, groups: Any) -> Any:
     del weights
     other = pandas.Series([f"o{k}" for k in groups], groups.index)
     samples, labels = {"a": ANGLES[["phi"]], "b": ANGLES[["psi"]]}, {"a": groups, "b": other}
-    how: Any = {"unit": "degrees", "groups": labels}
+    quick = ComparisonSettings(permutations=99)
+    how: Any = {"unit": "degrees", "groups": labels, "settings": quick}
     return compare_samples(samples, **how), named_tests(samples, **how)
 
 
@@ -91,10 +93,10 @@ def test_labels_are_aligned_or_refused(call: Any) -> None:
     right = call(WEIGHTS, GROUPS)
     assert call(WEIGHTS.iloc[SHUFFLED], GROUPS.iloc[SHUFFLED]) == right
     others = GROUPS.set_axis([*NAMES[3:], "x", "y", "z"])
-    with pytest.raises(OrbiflowError, match=r"groups.* 6 "):
+    with refused("groups", "6"):
         call(WEIGHTS, others)
     twice = GROUPS.set_axis([*NAMES[1:], "r1"])
-    with pytest.raises(OrbiflowError, match=r"groups.*repeat"):
+    with refused("groups", "repeat"):
         call(WEIGHTS, twice)
 
 
@@ -103,7 +105,7 @@ def test_labels_are_aligned_or_refused(call: Any) -> None:
 def test_rows_without_a_group_are_refused(call: Any, gap: Any) -> None:
     groups = GROUPS.astype(object)
     groups.iloc[[4, 9]] = gap
-    with pytest.raises(OrbiflowError, match=r"groups.* 2 rows .*row 5"):
+    with refused("groups", "2", "5"):
         call(WEIGHTS, groups)
 
 
@@ -143,7 +145,7 @@ def test_covariates_have_labels() -> None:
     weighed = model.score(y, mixed, WEIGHTS.iloc[SHUFFLED])
     assert weighed == pytest.approx(np.average(right, weights=WEIGHTS))
     for call in (model.fit, model.score, model.score_samples):
-        with pytest.raises(OrbiflowError, match=r"given.* 2 "):
+        with refused("given", "2"):
             call(y, x.set_axis([*NAMES[1:], "new"]))
 
 
@@ -154,5 +156,5 @@ def test_targets_of_regressions_have_labels() -> None:
     assert np.array_equal(one.predict(x), other.predict(x))
     assert one.predict(x).shape == (ROWS,)
     assert one.score(x, y.iloc[SHUFFLED], WEIGHTS.iloc[SHUFFLED]) == one.score(x, y, WEIGHTS)
-    with pytest.raises(OrbiflowError, match=r"y.* 2 "):
+    with refused("y", "2"):
         one.score(x, y.set_axis([*NAMES[1:], "new"]))

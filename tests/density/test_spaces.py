@@ -19,7 +19,7 @@ from orbiflow.density import (
     to_vectors,
 )
 from orbiflow.density.spaces import clear_rotation
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
 SPACES = (
@@ -87,7 +87,7 @@ def test_densities_of_the_uniform_distribution(space) -> None:
     )
     assert torch.allclose(natural + factor["uniform"], torch.zeros(50).double(), atol=1e-12)
     assert torch.equal(factor["square"], torch.zeros(50).double())
-    with pytest.raises(OrbiflowError, match="measure must be natural, square or uniform"):
+    with refused("measure", "natural"):
         space.log_density_factor(points, "round")
 
 
@@ -139,37 +139,33 @@ def test_clear_rotation_moves_the_cone_points_away(kind) -> None:
 
 
 BAD = {
-    "latitude": (Sphere(), [[10, 0], [95, 0], [-91, 3]], r"row 2: latitude 95 .* \(2 such rows\)"),
-    "longitude": (Sphere(), [[0, 1000.0]], "row 1: longitude 1000 is beyond 360"),
-    "length": (ProjectivePlane(), [[1, 0, 0], [1, 1, 0]], "row 2: the vector .* has length 1.414"),
-    "columns": (
-        Torus(3),
-        [[1.0, 2.0]],
-        r"3 angles: expected an array \(N, 3\), got shape \(1, 2\)",
-    ),
-    "one row, flat": (Sphere(), [1.0, 2.0], r"got shape \(2,\)"),
-    "nan": (KleinBottle(), [[0, 0], [0, math.nan]], "row 2 has a missing or infinite value"),
-    "inf": (Torus(1), [[math.inf]], "row 1 has a missing or infinite value"),
-    "text": (Torus(2), [["a", "b"]], "expected numbers"),
-    "ragged": (Torus(2), [[1, 2], [3]], "expected numbers"),
+    "latitude": (Sphere(), [[10, 0], [95, 0], [-91, 3]], "latitude 2 95"),
+    "longitude": (Sphere(), [[0, 1000.0]], "1 1000 360"),
+    "length": (ProjectivePlane(), [[1, 0, 0], [1, 1, 0]], "2 1.414"),
+    "columns": (Torus(3), [[1.0, 2.0]], "angles 3 1 2"),
+    "one row, flat": (Sphere(), [1.0, 2.0], "shape 2"),
+    "nan": (KleinBottle(), [[0, 0], [0, math.nan]], "infinite 2"),
+    "inf": (Torus(1), [[math.inf]], "infinite 1"),
+    "text": (Torus(2), [["a", "b"]], "numbers"),
+    "ragged": (Torus(2), [[1, 2], [3]], "numbers"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_data_that_are_not_of_the_space(case: str) -> None:
     space, data, message = BAD[case]
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         space.to_chart(data)
 
 
 def test_options_that_are_none() -> None:
     for make, message in (
-        (lambda: Torus(0), "dim must be from 1 to 64"),
-        (lambda: Torus(2, unit="grad"), "unit must be radians, degrees or turns"),
-        (lambda: Sphere(form="utm"), "form must be latlon or vector"),
+        (lambda: Torus(0), "1 64"),
+        (lambda: Torus(2, unit="grad"), "unit"),
+        (lambda: Sphere(form="utm"), "form"),
         (lambda: Sphere(rotation=2 * np.eye(3)), "orthogonal"),
-        (lambda: make_space("moebius"), "unknown space 'moebius'; there are torus"),
-        (lambda: make_space("sphere", unit="degrees"), "the sphere has no option unit"),
+        (lambda: make_space("moebius"), "moebius"),
+        (lambda: make_space("sphere", unit="degrees"), "sphere unit"),
     ):
-        with pytest.raises(OrbiflowError, match=message):
+        with refused(*message.split()):
             make()

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from orbiflow.density import read_table
 from orbiflow.density.tables import append_columns, files, text, to_csv
 from orbiflow.errors import InputFileError, OrbiflowError
+from refusals import refused
 from table_files import PROPERTY, refuse, write
 
 
@@ -76,8 +77,8 @@ def test_choice(tmp_path: Path, wanted: list[str], values: list, names: tuple[st
 def test_repeated_names_can_be_told_apart_by_number(tmp_path: Path) -> None:
     path = write(tmp_path, "x,x,y\n1,2,3\n")
     assert read_table(path, columns=["2", "y"], width=2).values.tolist() == [[2, 3]]
-    refuse(path, "columns 1 and 2 are all called 'x'", ["x", "y"])
-    refuse(path, "columns 1 and 2 are all called 'x'", width=3)
+    refuse(path, "columns 1 2 x", ["x", "y"])
+    refuse(path, "columns 1 2 x", width=3)
 
 
 def test_a_name_wins_over_a_number(tmp_path: Path) -> None:
@@ -88,8 +89,8 @@ def test_a_name_wins_over_a_number(tmp_path: Path) -> None:
 def test_first_line_of_words_and_numbers(tmp_path: Path) -> None:
     path = write(tmp_path, "city,2019,2020\nParis,1,2\nRome,3,4\n")
     assert len(read_table(path, columns=["2019", "2020"], width=2).values) == 2
-    refuse(path, "line 1 may be a header or a row")
-    refuse(path, "line 1 may be a header or a row", ["2", "3"])
+    refuse(path, "header 1")
+    refuse(path, "header 1", ["2", "3"])
     below = write(tmp_path, "id,2019\n1,2\n3,4\n", "b.csv")
     assert read_table(below, columns=None, width=2).values.tolist() == [[1, 2], [3, 4]]
 
@@ -102,43 +103,37 @@ def test_single_column(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("", "the file is empty"),
-        ("\n \n", "only comments and blank lines"),
-        ("# a\n# b\n", "only comments and blank lines"),
-        ("\ufeff", "only comments and blank lines"),
-        ("# a\nlat,lon\n", "line 2 is a header and no row follows"),
-        ("lat,lon\n1,2\n3,x4\n", "line 3: column 'lon': 'x4' is not a number"),
-        ("1,2\n3,4\n\n5,1_000\n", "line 4: column 'column2': '1_000' is not"),
-        ("a,b\n" + "1,2\n" * 200 + "1," + "z" * 99, "line 202: column 'b': 'z{37}...'"),
-        (
-            "a;b\n0.5;2\n1,5;2\n",
-            "column 'a': '1,5' is not a number; write decimal points, not commas",
-        ),
-        ("a,b,c\n1,2,x\n1,2,3\n1,y,x", "line 4: column 'b': 'y' is not"),
-        ("a,b\n1,2\n,2\nNA,nan\n4,inf\n", "4 cells empty, NaN or infinite, .* line 3, column 'a'"),
-        ("1,2\n3,-1e999\n", "1 cell empty, NaN or infinite, .* line 2, column 'column2'"),
-        ("1,\n3,4\n", "1 cell empty, NaN or infinite, .* line 1,"),
-        ("a,b\n1,2\n3\n", "line 3 has 1 cell and line 1 has 2"),
-        ("a,b\n" + "1,2\n" * 200 + "1,2,3\n", "line 202 has 3 cells and line 1 has 2"),
-        ("a,b\n1,x\ny,2\n3,4\n", "line 2: column 'b': 'x' .* line 3: column 'a': 'y' is not"),
-        ("a,b\n1\n2\n" + "3,4\n" * 9, "line 2 has 1 cell .* line 3 has 1 cell"),
-        (
-            "a,b\n" + "1,2\n" * 200 + "1\n1,2\n" + "7\n" * 9,
-            "line 202 has 1 cell .*also, line 204 has 1 cell.* and 3 more",
-        ),
-        ('a,b\n1,"2\n', "line 2: .* quotation mark"),
-        ('a,b\n"1"x,2\n', "line 2: .* quotation mark"),
-        ("a,b,c\n1,2,3\n", r"2 columns .* it has 3 \(its columns: a, b, c\).* choose with columns"),
-        ("a,b\nx,y\n", "line 2: column 'a': 'x' is not"),
-        ("a,b,c\nx,y,z\n", "it has 0"),
-        (b"a,b\n1,2\n\xe9,4\n", "line 3: not UTF-8"),
-        (b"a,b\n" + b"1,2\n" * 9000 + b"\xe9,4\n", "line 9002: not UTF-8"),
+        ("", "file empty"),
+        ("\n \n", "comments blank"),
+        ("# a\n# b\n", "comments blank"),
+        ("\ufeff", "comments blank"),
+        ("# a\nlat,lon\n", "follows 2"),
+        ("lat,lon\n1,2\n3,x4\n", "3 lon x4"),
+        ("1,2\n3,4\n\n5,1_000\n", "4 column2 1_000"),
+        ("a,b\n" + "1,2\n" * 200 + "1," + "z" * 99, "202 b zzz"),
+        ("a;b\n0.5;2\n1,5;2\n", "1,5"),
+        ("a,b,c\n1,2,x\n1,2,3\n1,y,x", "column 4 b y"),
+        ("a,b\n1,2\n,2\nNA,nan\n4,inf\n", "4 NaN 3"),
+        ("1,2\n3,-1e999\n", "1 NaN 2 column2"),
+        ("1,\n3,4\n", "1 NaN"),
+        ("a,b\n1,2\n3\n", "line 3 1 2"),
+        ("a,b\n" + "1,2\n" * 200 + "1,2,3\n", "202 3 1 2"),
+        ("a,b\n1,x\ny,2\n3,4\n", "column 2 b x"),
+        ("a,b\n1\n2\n" + "3,4\n" * 9, "line 2 1 3"),
+        ("a,b\n" + "1,2\n" * 200 + "1\n1,2\n" + "7\n" * 9, "202 1 204 3"),
+        ('a,b\n1,"2\n', "quotation 2"),
+        ('a,b\n"1"x,2\n', "quotation 2"),
+        ("a,b,c\n1,2,3\n", "columns 2 3 b"),
+        ("a,b\nx,y\n", "column 2 x"),
+        ("a,b,c\nx,y,z\n", "0"),
+        (b"a,b\n1,2\n\xe9,4\n", "3 UTF-8"),
+        (b"a,b\n" + b"1,2\n" * 9000 + b"\xe9,4\n", "9002 UTF-8"),
         ("a,b\n1,2\n".encode("utf-16-le"), "binary data"),
-        ("a,b\n1,2\n".encode("utf-16")[:-1], "not UTF-16 text"),
+        ("a,b\n1,2\n".encode("utf-16")[:-1], "UTF-16"),
         (bytes(range(256)) * 9, "binary data"),
-        (b"\x1f\x8b\x08\xff", "line 1: not UTF-8"),
-        ("1" * 2**21, "line 1 is longer than"),
-        ("," * 10_001, "more than 10000 columns"),
+        (b"\x1f\x8b\x08\xff", "1 UTF-8"),
+        ("1" * 2**21, "longer 1"),
+        ("," * 10_001, "10000"),
     ],
 )
 def test_bad_text(tmp_path: Path, content: str | bytes, message: str) -> None:
@@ -148,16 +143,16 @@ def test_bad_text(tmp_path: Path, content: str | bytes, message: str) -> None:
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
-        (["lat", "alt"], r"no column 'alt'; it has lat, lon, city: .* from 1 to 3"),
-        (["lat", "4"], "no column '4'"),
-        (["lat", "0"], "no column '0'"),
-        (["lat", "9" * 5000], "no column '9{37}...'"),
-        (["lat", "²"], "no column"),
-        (["lat", ""], "no column ''"),
-        (["lat", "1"], "names a column twice"),
-        (["lat"], "2 columns of numbers must be taken and columns names 1"),
-        ([], "columns names 0"),
-        (["lat", "city"], "line 2: column 'city': 'Paris' is not"),
+        (["lat", "alt"], "alt lat 1 3"),
+        (["lat", "4"], "column 4"),
+        (["lat", "0"], "column 0"),
+        (["lat", "9" * 5000], "999"),
+        (["lat", "²"], "column"),
+        (["lat", ""], "column"),
+        (["lat", "1"], "names column"),
+        (["lat"], "columns 2 1"),
+        ([], "columns 0"),
+        (["lat", "city"], "2 city Paris"),
     ],
 )
 def test_bad_choice(tmp_path: Path, columns: list[str], message: str) -> None:
@@ -165,26 +160,26 @@ def test_bad_choice(tmp_path: Path, columns: list[str], message: str) -> None:
 
 
 def test_no_file(tmp_path: Path) -> None:
-    refuse(tmp_path / "a.csv", "no such file")
-    refuse(tmp_path, "is a folder")
-    refuse(tmp_path / "a\0.csv", "cannot be read")
-    refuse(write(tmp_path, "1,2") / "b.csv", "cannot be read")
+    refuse(tmp_path / "a.csv", "file")
+    refuse(tmp_path, "folder")
+    refuse(tmp_path / "a\0.csv", "read")
+    refuse(write(tmp_path, "1,2") / "b.csv", "read")
 
 
 def test_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path, "1,2\n3,4\n5,6\n")
-    with pytest.raises(InputFileError, match="more than 2 rows"):
+    with refused("rows", "2", kind=InputFileError):
         read_table(path, columns=None, width=2, max_rows=2)
     assert len(read_table(path, columns=None, width=2, max_rows=3).values) == 3
     monkeypatch.setattr(files, "MAX_BYTES", 5)
-    refuse(path, "at most .* are read")
+    refuse(path, "read")
 
 
 def test_size_is_checked_before_reading(tmp_path: Path) -> None:
     path = write(tmp_path, "1,2\n")
     with path.open("r+b") as file:
         file.truncate(2**31 + 1)  # sparse
-    refuse(path, "2.0 GiB, at most 2")
+    refuse(path, "2.0 GiB 2")
 
 
 def test_blocks_give_what_one_pass_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,17 +192,17 @@ def test_blocks_give_what_one_pass_gives(tmp_path: Path, monkeypatch: pytest.Mon
     np.testing.assert_array_equal(in_blocks.values, whole.values)
     np.testing.assert_array_equal(in_blocks.lines, np.arange(2, 1002))
     path.write_bytes(path.read_bytes() + b"1,2,x\n")
-    refuse(path, "line 1002: column 'c': 'x'", width=3)
+    refuse(path, "1002 c x", width=3)
 
 
 def test_memory_is_bounded(tmp_path: Path) -> None:
-    path = write(tmp_path, "lat,lon,note\n" + "12.3456,65.4321,a long text\n" * 100_000)
+    path = write(tmp_path, "lat,lon,note\n" + "12.3456,65.4321,a long text\n" * 40_000)
     tracemalloc.start()
     table = read_table(path, columns=["lat", "lon"], width=2)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert table.values.shape == (100_000, 2)
-    assert peak < table.values.nbytes + table.lines.nbytes + 24 * 2**20
+    assert table.values.shape == (40_000, 2)
+    assert peak < table.values.nbytes + table.lines.nbytes + 8 * 2**20
 
 
 @PROPERTY
@@ -261,10 +256,10 @@ def test_append_column(tmp_path: Path, content: str, expected: str) -> None:
 def test_append_column_to_a_changed_file(tmp_path: Path, changed: str) -> None:
     path = write(tmp_path, "x,y\n1,2\n3,4\n")
     table = read_table(path, columns=None, width=2)
-    with pytest.raises(ValueError, match=r"shape \(2,\)"):
+    with refused("shape", "2", kind=ValueError):
         append_columns(table, path, {"p": [1, 2, 3]})
     write(tmp_path, changed)
-    with pytest.raises(InputFileError, match="changed after it was read"):
+    with refused("changed", "after", kind=InputFileError):
         append_columns(table, path, {"p": [1, 2]})
 
 
@@ -272,5 +267,5 @@ def test_to_csv_quotes_names() -> None:
     names = ["a,b", 'c"d', "#e", "f\n g", "é"]
     header = to_csv(names, np.zeros((0, 5))).decode()
     assert header == '"a,b","c""d","#e",f g,é\n'
-    with pytest.raises(ValueError, match="shape"):
+    with refused("shape", kind=ValueError):
         to_csv(["a"], [[1, 2]])

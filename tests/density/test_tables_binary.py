@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from orbiflow.density import read_table
 from orbiflow.density.tables import append_columns
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError
+from refusals import refused
 from table_files import PROPERTY, refuse, write
 
 # npy
@@ -53,7 +54,7 @@ def test_npy(tmp_path: Path, array: np.ndarray, name: str) -> None:
 def test_npy_choice(tmp_path: Path) -> None:
     path = write(tmp_path, npy(np.array([[1, 2, 3]])), "a.npy")
     assert read_table(path, columns=["3", "column1"], width=2).values.tolist() == [[3, 1]]
-    refuse(path, "2 columns of numbers must be taken and it has 3")
+    refuse(path, "columns 2 3")
 
 
 def claim(shape: str, descr: str = "'<f8'") -> bytes:
@@ -67,28 +68,28 @@ def claim(shape: str, descr: str = "'<f8'") -> bytes:
     [
         (npy(np.array([[{}, 1]], dtype=object), allow_pickle=True), "Python objects"),
         (claim("(1,)", "[('a', '|O')]"), "Python objects"),
-        (npy(np.array([1.0, 2])), r"shape '\(2,\)'"),
+        (npy(np.array([1.0, 2])), "(2,)"),
         (npy(np.zeros((2, 2, 2))), "shape"),
         (npy(np.array(1.0)), "shape"),
-        (npy(np.zeros((0, 2))), "no rows"),
-        (npy(np.zeros((2, 0))), "it has 0"),
-        (npy(np.array([["a", "b"]])), "column 'column1' holds '<U1', not numbers"),
-        (npy(np.array([[1j, 2]])), "column 'column1' holds 'complex128'"),
-        (npy(np.array([[1j, 2, 3]])), "it has 0"),
-        (npy(np.array([[1, 2], [np.nan, np.inf]])), "2 cells empty, .* row 2, column 'column1'"),
-        (npy(np.zeros((9, 2)))[:-1], "promises 144 bytes of numbers and 143 follow"),
-        (claim("(10000000, 9000)"), "promises 720000000000 bytes"),
-        (claim("(4611686018427387904, 4)"), "promises 147573952589676412928 bytes"),
+        (npy(np.zeros((0, 2))), "rows"),
+        (npy(np.zeros((2, 0))), "0"),
+        (npy(np.array([["a", "b"]])), "column1 <U1"),
+        (npy(np.array([[1j, 2]])), "column1 complex128"),
+        (npy(np.array([[1j, 2, 3]])), "0"),
+        (npy(np.array([[1, 2], [np.nan, np.inf]])), "2 column1"),
+        (npy(np.zeros((9, 2)))[:-1], "144 143"),
+        (claim("(10000000, 9000)"), "720000000000"),
+        (claim("(4611686018427387904, 4)"), "147573952589676412928"),
         (claim("(1, 4611686018427387904)"), "promises"),
-        (claim("(20000001, 1)", "'|V0'"), "more than 20000000 rows"),
-        (claim("(0, 4611686018427387904)"), "more than 10000 columns"),
+        (claim("(20000001, 1)", "'|V0'"), "20000000"),
+        (claim("(0, 4611686018427387904)"), "10000"),
         (claim("(-1, 2)"), "shape"),
         (claim("(" * 900), "damaged"),
         (claim("(1, 2)" + " " * 20_000), "damaged"),
         (claim("(1, 2)", "'<q9'"), "damaged"),
         (b"\x93NUMPY\x09\x00" + bytes(99), "damaged"),
-        (b"\x93NUM", "does not begin as a .npy file"),
-        (b"1,2\n", "does not begin as a .npy file"),
+        (b"\x93NUM", "begin file"),
+        (b"1,2\n", "begin file"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:invalid escape")
@@ -98,7 +99,7 @@ def test_bad_npy(tmp_path: Path, content: bytes, message: str) -> None:
 
 def test_npy_column_that_is_text(tmp_path: Path) -> None:
     array = np.array([(1, b"a")], dtype=[("lat", "f4"), ("s", "S3")])
-    refuse(write(tmp_path, npy(array), "a.npy"), "column 's' holds", ["lat", "s"])
+    refuse(write(tmp_path, npy(array), "a.npy"), "column s", ["lat", "s"])
 
 
 # Parquet
@@ -106,9 +107,9 @@ def test_npy_column_that_is_text(tmp_path: Path) -> None:
 
 def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(OrbiflowError, match=r"needs pyarrow.*pip install 'orbiflow\[parquet\]'"):
+    with refused("orbiflow[parquet]"):
         read_table(write(tmp_path, "PAR1", "a.parquet"), columns=None, width=2)
-    refuse(write(tmp_path, "1,2", "a.parquet"), "does not begin as a .parquet file")
+    refuse(write(tmp_path, "1,2", "a.parquet"), "begin parquet")
 
 
 def parquet(tmp_path: Path, columns: dict[str, Any], names: list[str] | None = None) -> Path:
@@ -127,19 +128,17 @@ def test_parquet(tmp_path: Path) -> None:
     assert append_columns(table, path, {"p": [5, 6]}).startswith(
         b"lat,lon.x,p\n1,1.152921505e+18,5\n"
     )
-    refuse(path, "column 'city' holds 'string', not numbers", ["lat", "CITY"])
-    refuse(path, "no column 'x'", ["x"])
-    with pytest.raises(InputFileError, match="more than 1 rows"):
+    refuse(path, "city string", ["lat", "CITY"])
+    refuse(path, "column x", ["x"])
+    with refused("rows", "1", kind=InputFileError):
         read_table(path, columns=None, width=2, max_rows=1)
 
 
 def test_parquet_nulls_and_repeated_names(tmp_path: Path) -> None:
-    refuse(
-        parquet(tmp_path, {"a": [1, None, 2], "b": [1.0, None, float("nan")]}), "3 cells .* row 2"
-    )
-    refuse(parquet(tmp_path, {"a": np.zeros(0), "b": np.zeros(0)}), "no rows")
+    refuse(parquet(tmp_path, {"a": [1, None, 2], "b": [1.0, None, float("nan")]}), "cells 3 2")
+    refuse(parquet(tmp_path, {"a": np.zeros(0), "b": np.zeros(0)}), "rows")
     path = parquet(tmp_path, {"a": [1], "b": [2], "c": [3]}, ["a", "a", "c"])
-    refuse(path, "columns 1 and 2 are all called 'a'", ["1", "c"])
+    refuse(path, "columns 1 2", ["1", "c"])
 
 
 @PROPERTY

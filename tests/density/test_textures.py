@@ -23,7 +23,7 @@ from orbiflow.density import (
     UniformDensity,
 )
 from orbiflow.density.inference import fractions_near, misorientations, pole_density, texture_index
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 from strategies import seeds
 
 GROUPS = st.sampled_from(["C1", "C2y", "D2", "D3", "D3y", "C4", "D6", "T", "O"])
@@ -108,7 +108,7 @@ def test_the_texture_index_is_the_mean_square(crystal: str, specimen: str, seed:
     density = texture(crystal, specimen, seed, 5.0)
     found = texture_index(density)
     assert found.error == 0
-    count = 22
+    count = 18
     angles = 2 * np.pi * np.arange(count) / count
     nodes, weights = np.polynomial.legendre.leggauss(count)
     grid = np.stack(np.meshgrid(angles, np.arccos(nodes), angles, indexing="ij"), axis=-1)
@@ -172,7 +172,7 @@ def test_fractions_near_an_orientation() -> None:
 
 
 def test_what_is_no_texture_is_refused() -> None:
-    with pytest.raises(OrbiflowError, match="textures are densities of rotations"):
+    with refused("densities", "rotations"):
         texture_index(UniformDensity(Sphere()))
-    with pytest.raises(OrbiflowError, match="directions are vectors of three finite numbers"):
+    with refused("directions", "vectors"):
         pole_density(UniformDensity(RotationSpace()), [0, 0, 0], [[0, 0, 1]])

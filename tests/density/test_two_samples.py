@@ -14,7 +14,7 @@ from scipy.stats import binom, vonmises
 from orbiflow.density import ComparisonSettings, Sphere, compare_samples, make_space
 from orbiflow.density.comparing import RowSketch, mmd_test
 from orbiflow.density.comparing.resampling import Groups, chosen_rows
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 
@@ -123,12 +123,12 @@ def test_too_few_groups_are_refused(
         torch.rand(len(labels), 2, dtype=torch.float64) / 20 + 0.4 * torch.as_tensor(first)[:, None]
     )
     if not enough:
-        with pytest.raises(OrbiflowError, match=r"too few .* level 0.95, which takes [46] of each"):
+        with refused("0.95"):
             p_of("torus", points, first, labels, 0)
         return
     # far apart, and as clearly as so few can tell
     assert p_of("torus", points, first, labels, 0) <= 0.06
-    with pytest.raises(OrbiflowError, match="99 permutations are too few"):
+    with refused("99", "permutations"):
         mmd_test(
             make_space("torus"),
             points,
@@ -194,13 +194,13 @@ def test_data_far_apart_and_few_rows() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda a: compare_samples({"a": a}), "two data sets"),
-        (lambda a: compare_samples({"a": a, "b": a[:, :1]}), "2 and 1 columns"),
-        (lambda a: compare_samples({"a": a, "b": a[:0]}), "no rows"),
-        (lambda a: compare_samples({"a": a, "b": a[:2]}), "of their own"),
+        (lambda a: compare_samples({"a": a}), "data sets"),
+        (lambda a: compare_samples({"a": a, "b": a[:, :1]}), "columns 2 1"),
+        (lambda a: compare_samples({"a": a, "b": a[:0]}), "rows"),
+        (lambda a: compare_samples({"a": a, "b": a[:2]}), "their"),
         (lambda a: compare_samples({"a": a, "b": a}, "cube"), "unknown space"),
-        (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1]}), "by these names"),
-        (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1], "b": [2]}), "20 rows"),
+        (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1]}), "these names"),
+        (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1], "b": [2]}), "rows 20"),
         (
             lambda a: compare_samples(
                 {"a": a, "b": a}, settings=ComparisonSettings(permutations=3)
@@ -209,12 +209,12 @@ def test_data_far_apart_and_few_rows() -> None:
         ),
         (
             lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1] * 20, "b": [2] * 20}),
-            "2 groups are too few",
+            "2 groups",
         ),
     ],
 )
 def test_mistakes(call: Any, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         call(np.random.default_rng(0).vonmises(0, 1, (20, 2)))
 
 
@@ -241,7 +241,7 @@ def test_directions_are_known_in_another_form_and_frame() -> None:
     other = Sphere(form="vector", rotation=turn)
     vectors = Sphere(form="vector").from_chart(Sphere().to_chart(data))
     assert sketch.known(other, vectors)[0] >= 0.99 * 500
-    with pytest.raises(OrbiflowError, match="sketch"):
+    with refused("sketch"):
         RowSketch.from_json({"rows": 3, "whole": True, "hashes": [3, 2]})
-    with pytest.raises(OrbiflowError, match="sketch"):
+    with refused("sketch"):
         RowSketch.from_json([])

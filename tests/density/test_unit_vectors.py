@@ -34,12 +34,13 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
+from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.chains import concentration
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
-from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.spaces import UnitVectorSpace
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError
 from orbiflow.runtime import find, tensor_bytes
+from refusals import refused
 from strategies import seeds
 
 SPACES: tuple[UnitVectorSpace, ...] = (
@@ -262,10 +263,10 @@ def _other(space: Space) -> dict[str, object]:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"name": "hypersphere", "dim": 10**9}, "dim must be from 1 to 64"),
-        ({"name": "hypersphere", "dim": 4}, "do not fit a hypersphere"),
-        ({"name": "rotation-space", "form": "ZZZ"}, "form must be"),
-        ({"name": "rotation-space", "symmetry": "C999999"}, "symmetry must be"),
+        ({"name": "hypersphere", "dim": 10**9}, "dim 1 64"),
+        ({"name": "hypersphere", "dim": 4}, "hypersphere"),
+        ({"name": "rotation-space", "form": "ZZZ"}, "form"),
+        ({"name": "rotation-space", "symmetry": "C999999"}, "symmetry"),
     ],
 )
 def test_hostile_files_are_refused(
@@ -282,7 +283,7 @@ def test_hostile_files_are_refused(
     tensors = {"centers": torch.eye(4)[:1], "concentrations": one[:, None], "weights": one}
     path = tmp_path / "x.safetensors"
     path.write_bytes(tensor_bytes(header, {k: v.double() for k, v in tensors.items()}, "a density"))
-    with pytest.raises(InputFileError, match=message):
+    with refused(*message.split(), kind=InputFileError):
         read_density(path)
 
 
@@ -335,34 +336,30 @@ def test_gradients_are_slopes_along_the_sphere(space: UnitVectorSpace, seed: int
 
 space3, quarter = Hypersphere(3), [[0.0, 0.0, math.pi / 2]]
 REFUSED = {
-    r"row 2: the vector .* has length 2": lambda: space3.to_chart([[0, 0, 0, 1.0], [0, 0, 0, 2.0]]),
-    r"expected an array \(N, 4\)": lambda: space3.to_chart([[0.0, 0.0, 1.0]]),
-    "must be unit vectors": lambda: kernels(space3, 0).log_prob(torch.zeros(1, 4)),
-    "not 1: .*; latitude and longitude are for": lambda: Hypersphere(1).to_chart([[31.1, 35.5]]),
-    "row 1: .* is no rotation matrix": lambda: RotationSpace().to_chart([[1.0] * 9]),
-    "row 1: .* more than a turn in radians": lambda: RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
-    "more than a turn in degrees": lambda: CubicOrientations(form="ZXZ", unit="degrees").to_chart(
+    "row 2 length": lambda: space3.to_chart([[0, 0, 0, 1.0], [0, 0, 0, 2.0]]),
+    "array 4": lambda: space3.to_chart([[0.0, 0.0, 1.0]]),
+    "unit vectors": lambda: kernels(space3, 0).log_prob(torch.zeros(1, 4)),
+    "1 latitude longitude": lambda: Hypersphere(1).to_chart([[31.1, 35.5]]),
+    "row 1 matrix": lambda: RotationSpace().to_chart([[1.0] * 9]),
+    "row 1 turn radians": lambda: RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
+    "turn degrees": lambda: CubicOrientations(form="ZXZ", unit="degrees").to_chart(
         [[400.0, 0.0, 0.0]]
     ),
-    "gradients of rotations need unit quaternions": lambda: DensityEstimator.fitted(
+    "gradients quaternions": lambda: DensityEstimator.fitted(
         kernels(RotationSpace(), 0)
     ).score_gradient(quarter),
-    "a flow has 3 dimensions at most, this hypersphere has 3, but no": lambda: DensityEstimator(
-        space3, components=("flow", "kernels")
-    ).fit(space3.uniform(20, source(0))),
-    "max_frequency would have no effect on the hypersphere": lambda: DensityEstimator(
-        space3, max_frequency=3
-    ).fit(np.eye(4)),
-    "a picture needs two dimensions, this hypersphere has 2, but no": lambda: density_picture(
-        kernels(Hypersphere(2), 0)
+    "flow hypersphere 3": lambda: DensityEstimator(space3, components=("flow", "kernels")).fit(
+        space3.uniform(20, source(0))
     ),
-    "hypersphere has no option": lambda: make_space("hypersphere", unit="degrees"),
+    "max_frequency hypersphere": lambda: DensityEstimator(space3, max_frequency=3).fit(np.eye(4)),
+    "picture hypersphere": lambda: density_picture(kernels(Hypersphere(2), 0)),
+    "hypersphere option": lambda: make_space("hypersphere", unit="degrees"),
 }
 
 
 @pytest.mark.parametrize("message", REFUSED)
 def test_what_has_no_meaning_is_refused(message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         REFUSED[message]()
 
 
@@ -376,7 +373,7 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(tmp_path: P
         return dict(call.run().summary)
 
     where = {"space": "rotation-space", "data": table}
-    with pytest.raises(OrbiflowError, match="beyond 2 pi"):
+    with refused("2 pi"):
         run("fit", **where, out=folder)
     run("fit", **where, unit="degrees", out=folder, picture=True)
     assert (folder / "thumbnail.png").exists()
@@ -389,9 +386,9 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(tmp_path: P
     assert np.loadtxt(tmp_path / "drawn.csv", delimiter=",", skiprows=1).shape == (30, 3)
     found = run("region", model=folder, out=tmp_path / "regions.json", samples=1000)
     assert len(found["regions"]) == 2  # pyright: ignore[reportArgumentType]
-    with pytest.raises(OrbiflowError, match="angles on a torus"):
+    with refused("angles", "torus"):
         run("marginal", model=folder, out=tmp_path / "marginal", columns=("rx",))
-    with pytest.raises(OrbiflowError, match="axes and orientations; got 'hypersphere'"):
+    with refused("hypersphere"):
         run("summary", data=table, space="hypersphere")
-    with pytest.raises(OrbiflowError, match="GeoJSON is for places on a globe"):
+    with refused("GeoJSON"):
         run("region", model=folder, out=tmp_path / "regions.geojson")

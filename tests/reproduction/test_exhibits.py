@@ -41,8 +41,10 @@ TINY = Extent(
 
 @pytest.fixture(autouse=True)
 def _small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("reproduction.drawing.SHEET", Sheet.screen(600))
-    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 50)
+    monkeypatch.setattr("reproduction.drawing.SHEET", Sheet.screen(300))
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._RESOLUTION", 30)
+    monkeypatch.setattr("orbiflow.density.pictures.figures.few_colours", lambda png: png)
 
 
 def drawn_alone(name: str, folder: Path, extent: Extent = TINY) -> Findings:

@@ -31,8 +31,9 @@ from orbiflow.density import DensityEstimator
 from orbiflow.density.cross_validation import overview
 from orbiflow.density.cross_validation.settings import setting_of
 from orbiflow.density.fitting import COMPONENTS
-from orbiflow.errors import OrbiflowError, OutputError, SettingError
+from orbiflow.errors import OutputError, SettingError
 from orbiflow.runtime import Call, Cancel, Finished, ItemDone, Note, find
+from refusals import refused
 from runtime.searches import run
 from strategies import names_in
 
@@ -163,7 +164,7 @@ def test_nothing_is_done_twice(here: Here, tmp_path: Path) -> None:
     assert again(seed=1) == ALL
     assert again(folds=2) == [key for key in ALL if not key.endswith("3")]
     (out / "folds" / "mixture-1-02" / "scores.csv").unlink()
-    with pytest.raises(OrbiflowError, match=r"mixture-1-02.scores\.csv: no such file"):
+    with refused("mixture-1-02", "scores.csv"):
         again(folds=2)
     (out / "folds" / "mixture-1-02" / "report.json").unlink()
     (out / "folds" / "mixture-1-02").rmdir()
@@ -319,7 +320,7 @@ def test_what_was_written_by_another_is_not_believed(here: Here, tmp_path: Path)
     scores = call.flat["out"] / "folds" / "mixture-1-01" / "scores.csv"
     text = scores.read_text()
     scores.write_text("\n".join(text.splitlines()[:-1]) + "\n")
-    with pytest.raises(OrbiflowError, match="is not of the rows that were held out"):
+    with refused("rows", "held"):
         run_call(call)
     scores.write_text(text)
     run_call(call)
@@ -332,7 +333,7 @@ def test_a_table_that_changes_meanwhile(
     call, stamps = call_of(table_of(tmp_path)), iter(range(100))
     with monkeypatch.context() as patch:
         patch.setattr(overview, "_stamp", lambda _: next(stamps))
-        with pytest.raises(OrbiflowError, match="changed while it was cross-validated"):
+        with refused("changed", "cross-validated"):
             run_call(call)
     assert here.done == ALL
     run_call(call)
@@ -343,7 +344,7 @@ def test_a_folder_of_something_else_is_refused(here: Here, tmp_path: Path) -> No
     call = call_of(table_of(tmp_path))
     call.flat["out"].mkdir()
     (call.flat["out"] / "batch.jsonl").touch()
-    with pytest.raises(OutputError, match=r"holds batch\.jsonl, which is of no earlier cross-val"):
+    with refused("batch.jsonl", kind=OutputError):
         run_call(call)
     assert not here.done
 
@@ -383,19 +384,19 @@ def test_mistakes(fields: dict[str, Any], names: set[str]) -> None:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"folds": 49}, "49 folds need as many rows, there are 48: ask for fewer folds"),
-        ({"group": "protein"}, "3 folds need as many groups, there are 2"),
-        ({"group": "nothere"}, "no column 'nothere'"),
-        ({"columns": ["phi", "chi"]}, "no column 'chi'"),
-        ({"weights": "protein"}, "is not a number"),
-        ({"space": "sphere", "unit": None, "columns": ["phi"]}, "takes a latitude and a longitude"),
+        ({"folds": 49}, "49 folds 48"),
+        ({"group": "protein"}, "groups 3 2"),
+        ({"group": "nothere"}, "nothere"),
+        ({"columns": ["phi", "chi"]}, "chi"),
+        ({"weights": "protein"}, "number"),
+        ({"space": "sphere", "unit": None, "columns": ["phi"]}, "latitude longitude"),
     ],
 )
 def test_mistakes_that_the_table_shows(
     here: Here, tmp_path: Path, fields: dict[str, Any], message: str
 ) -> None:
     data = table_of(tmp_path, protein=["ab"[k % 2] for k in range(48)])
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         run_call(call_of(data, **fields))
     assert not here.done
     assert not (tmp_path / "out").exists()
@@ -409,10 +410,7 @@ def test_a_setting_has_one_name_in_whatever_order(parts: list[str]) -> None:
     assert own is None or set(own) == set(parts)
 
 
-@pytest.mark.parametrize(
-    ("fold", "message"),
-    [(9, r"none of its 40 rows are of fold 9 by 'column3'; give one of 0, 1, 2, 3")],
-)
+@pytest.mark.parametrize(("fold", "message"), [(9, "40 9 column3 0")])
 def test_no_such_fold(tmp_path: Path, fold: int, message: str) -> None:
     np.save(tmp_path / "rows.npy", np.column_stack([angles(40), np.arange(40) % 4]))
     call = fold_call(
@@ -424,5 +422,5 @@ def test_no_such_fold(tmp_path: Path, fold: int, message: str) -> None:
         unit="radians",
         out=tmp_path / "out",
     )
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         run(call)

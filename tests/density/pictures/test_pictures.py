@@ -39,9 +39,9 @@ from orbiflow.density.pictures.figures import few_colours
 from orbiflow.density.pictures.frames import angle_axis, axis_label, view_of
 from orbiflow.density.pictures.surfaces import boy_surface, mesh
 from orbiflow.drawing import Sheet
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
+from refusals import refused
 from strategies import random_orthogonal
 
 TURN = random_orthogonal(np.random.default_rng(2), 3)
@@ -99,6 +99,7 @@ def _coarse(monkeypatch):
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 24)
     monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 30)
     monkeypatch.setattr("orbiflow.density.pictures.surfaces._FINE_CELLS", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._RESOLUTION", 30)
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 24)
     monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
     monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 2)
@@ -124,7 +125,7 @@ def test_all_measures_are_drawn_and_another_is_refused():
     density = example(SPACES[2])
     for measure in ("natural", "square", "uniform"):
         assert density_png(density, measure=measure, width_px=200)
-    with pytest.raises(OrbiflowError, match="measure"):
+    with refused("measure"):
         density_png(density, measure="flat")
 
 
@@ -138,15 +139,15 @@ def test_single_precision_is_drawn():
 def test_other_dimensions_are_refused(dim):
     density = example(Torus(dim))
     for draw in (density_png, flow_png, density_page):
-        with pytest.raises(OrbiflowError, match="two dimensions"):
+        with refused("two", "dimensions"):
             draw(density)
-    with pytest.raises(OrbiflowError, match="two dimensions"):
+    with refused("two", "dimensions"):
         samples_png(density, torch.zeros(3, dim), torch.zeros(3, dim))
 
 
 def test_samples_of_another_shape_are_refused():
     for draw in (density_png, density_page):
-        with pytest.raises(OrbiflowError, match="chart points"):
+        with refused("chart", "points"):
             draw(example(SPACES[0]), samples=torch.zeros(4, 3))
 
 
@@ -216,10 +217,10 @@ def test_the_centre_moves_the_picture_but_not_its_colours(monkeypatch):
 
 @pytest.mark.parametrize("draw", [density_png, flow_png])
 def test_the_centre_is_checked(draw):
-    with pytest.raises(OrbiflowError, match="not to the klein-bottle"):
+    with refused("klein-bottle"):
         draw(example(SPACES[1]), center=(0, 0))
-    for center, message in (((0,), "2 angles"), ((0, np.nan), "must be a finite number")):
-        with pytest.raises(OrbiflowError, match=message):
+    for center, message in (((0,), "angles 2"), ((0, np.nan), "finite number")):
+        with refused(*message.split()):
             draw(example(SPACES[0]), center=center)
 
 
@@ -233,7 +234,7 @@ def test_axes_have_the_users_names():
     page = density_page(example(SPACES[0]), names, resolution=4)
     assert "φ (degrees) runs round the ring, psi&lt;b&gt; (degrees) round its tube" in page
     assert {"φ 90°", "φ −90°"} <= {label["text"] for label in page_data(page)["labels"]}
-    with pytest.raises(OrbiflowError, match="2 names"):
+    with refused("2", "names"):
         density_png(example(SPACES[0]), names=("a",))
 
 
@@ -290,7 +291,7 @@ def test_a_flow_in_few_colours_is_small(monkeypatch):
 
 
 def test_a_density_without_a_flow_has_no_picture_of_it():
-    with pytest.raises(OrbiflowError, match="no flow"):
+    with refused("flow"):
         flow_png(UniformDensity(SPACES[0]))
 
 
@@ -302,13 +303,13 @@ def test_pairs_of_angles(dim):
     both = corner_png(density, data, data[:9], names=names, width_px=400)
     assert picture(both).size == (400, 400)
     assert corner_png(density, None, data, center=[90] * dim, width_px=300)
-    with pytest.raises(OrbiflowError, match="chart points"):
+    with refused("chart", "points"):
         corner_png(density, data[:, :0], data)
 
 
 @pytest.mark.parametrize("space", [Torus(9), SPACES[2]], ids=["torus", "sphere"])
 def test_pairs_of_other_spaces_are_refused(space):
-    with pytest.raises(OrbiflowError, match="1 to 8 angles"):
+    with refused("angles", "1", "8"):
         corner_png(FlowDensity(space, example(SPACES[0]).flow), None, torch.zeros(3, 9))
 
 
@@ -343,7 +344,7 @@ def test_largest_page_is_below_three_megabytes():
 
 def test_too_large_a_page_is_refused():
     coast = np.random.default_rng(0).uniform(-60, 60, (200_000, 2))
-    with pytest.raises(OrbiflowError, match="MB"):
+    with refused("MB"):
         density_page(example(SPACES[2]), resolution=8, coastlines=[coast])
 
 

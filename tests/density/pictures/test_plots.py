@@ -29,6 +29,7 @@ from orbiflow.density.pictures.plots import refuse_foreign_files
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
+from refusals import refused
 
 DATA = np.random.default_rng(0).uniform(-3, 3, (40, 2))
 
@@ -41,7 +42,9 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 12)
     monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 20)
     monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 2)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._RESOLUTION", 30)
     monkeypatch.setattr("orbiflow.density.pictures.plots.SAMPLES", 50)
+    monkeypatch.setattr("orbiflow.density.pictures.figures.few_colours", lambda png: png)
 
 
 def example(space: Any = None) -> Density:
@@ -66,7 +69,7 @@ def test_a_folder_holds_the_pictures_of_one_plot(tmp_path: Path) -> None:
     assert names(out) == {"density.png", "flow.png", "surface.html"}
     assert names(out) < set(PICTURES)
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(OutputError, match=r"holds density\.png, which would be removed"):
+    with refused("density.png", kind=OutputError):
         plot_density(example(), out)
     assert names(out) == {"density.png", "flow.png", "surface.html", "notes.txt"}
 
@@ -93,7 +96,7 @@ def test_a_folder_may_be_called_like_a_pdf(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", ["png", "SVG", "html"])
 def test_one_picture_is_no_place_for_several(tmp_path: Path, ending: str) -> None:
-    with pytest.raises(OutputError, match=r"several pictures; give a folder, or a \.pdf"):
+    with refused("several", "pictures", kind=OutputError):
         plot_density(example(), tmp_path / f"plot.{ending}")
     assert not list(tmp_path.iterdir())
 
@@ -108,7 +111,7 @@ def test_inclinations_are_drawn_in_a_net(tmp_path: Path) -> None:
 
 def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None:
     estimator = DensityEstimator("torus", components="mixture")
-    with pytest.raises(OrbiflowError, match=r"call fit\(data\) first"):
+    with refused("call", "data"):
         plot_density(estimator, tmp_path / "a.pdf")
     plot_density(estimator.fit(DATA), tmp_path / "a.pdf")
     # the flow has no part in it
@@ -118,16 +121,16 @@ def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"format": "eps"}, "format must be png, pdf or svg"),
-        ({"width": "wide"}, "width: 'wide' is not a length"),
-        ({"measure": "flat"}, "measure must be natural, square or uniform"),
-        ({"scale": "square"}, "scale must be auto, linear or log"),
-        ({"projection": "globe"}, "projection must be auto, equal-earth"),
-        ({"samples": 0}, "samples must be from 1 to"),
+        ({"format": "eps"}, "format"),
+        ({"width": "wide"}, "width wide"),
+        ({"measure": "flat"}, "measure"),
+        ({"scale": "square"}, "scale"),
+        ({"projection": "globe"}, "projection"),
+        ({"samples": 0}, "samples 1"),
     ],
 )
 def test_settings_are_checked(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+    with refused(*message.split()):
         PlotSettings(**settings)
 
 
@@ -136,16 +139,16 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
 ) -> None:
     out = tmp_path / "plots"
     for space, settings, message in (
-        (Torus(2), PlotSettings(coastlines=Path("lines.csv")), "coastlines apply to the sphere"),
-        (Torus(9), PlotSettings(), "has 9 angles"),
-        (Torus(2), PlotSettings(names=("one",)), "2 names of columns"),
-        (Sphere(), PlotSettings(center=(0.0, 0.0, 0.0)), "a latitude and a longitude"),
-        (Torus(2), PlotSettings(projection="lambert"), "projection applies to maps"),
-        (Torus(2), PlotSettings(radius=20), "radius applies to maps"),
+        (Torus(2), PlotSettings(coastlines=Path("lines.csv")), "coastlines"),
+        (Torus(9), PlotSettings(), "angles 9"),
+        (Torus(2), PlotSettings(names=("one",)), "2 names"),
+        (Sphere(), PlotSettings(center=(0.0, 0.0, 0.0)), "latitude longitude"),
+        (Torus(2), PlotSettings(projection="lambert"), "projection"),
+        (Torus(2), PlotSettings(radius=20), "radius"),
     ):
         density = example() if space.dim == 2 and space.is_torus else None
         density = density or UniformDensity(space)
-        with pytest.raises(OrbiflowError, match=message):
+        with refused(*message.split()):
             plot_density(density, out, settings)
     with pytest.raises(OrbiflowError):
         plot_density(example(), out, data=DATA[:, :1])
@@ -155,9 +158,7 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
 def test_a_folder_of_ones_own_pictures_is_left_alone(tmp_path: Path) -> None:
     for name in ("density.pdf", "notes.txt"):
         (tmp_path / name).write_text("mine")
-    with pytest.raises(
-        OutputError, match=r"density\.pdf, which would be removed, beside notes\.txt"
-    ):
+    with refused("density.pdf", "notes.txt", kind=OutputError):
         refuse_foreign_files(tmp_path)
     (tmp_path / "notes.txt").unlink()
     refuse_foreign_files(tmp_path)  # as an earlier plot left it

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from itertools import pairwise
 from typing import Any
 
@@ -27,7 +26,7 @@ from orbiflow.density.pictures.projections import (
     chosen_map,
     refined,
 )
-from orbiflow.errors import OrbiflowError
+from refusals import refused
 
 NOTHING = torch.empty(0, 2)
 longitudes = st.floats(-180, 180)
@@ -215,18 +214,18 @@ def test_the_map_that_suits() -> None:
 @pytest.mark.parametrize(
     ("space", "asked", "message"),
     [
-        (Torus(2), {}, "maps are of the sphere"),
-        (Sphere(), {"projection": "mercator"}, "projection must be auto, equal-earth"),
-        (Sphere(), {"projection": "mollweide", "center": (40, 0)}, "centred on a meridian"),
-        (Sphere(), {"projection": "mollweide", "radius": 40}, "has no radius"),
-        (Sphere(), {"center": (95, 0)}, "latitude must be from -90 to 90"),
-        (Sphere(), {"center": (0, 0, 0)}, "a latitude and a longitude"),
-        (Sphere(), {"center": (math.nan,)}, "must be a finite number"),
-        (Sphere(), {"projection": "lambert", "radius": 120}, "radius must be"),
-        (ProjectivePlane(), {"projection": "mollweide"}, "one point of the projective plane"),
-        (ProjectivePlane(), {"projection": "schmidt", "center": (10, 20)}, "give no centre"),
+        (Torus(2), {}, "maps sphere"),
+        (Sphere(), {"projection": "mercator"}, "projection"),
+        (Sphere(), {"projection": "mollweide", "center": (40, 0)}, "meridian"),
+        (Sphere(), {"projection": "mollweide", "radius": 40}, "radius"),
+        (Sphere(), {"center": (95, 0)}, "latitude -90 90"),
+        (Sphere(), {"center": (0, 0, 0)}, "latitude longitude"),
+        (Sphere(), {"center": (math.nan,)}, "finite"),
+        (Sphere(), {"projection": "lambert", "radius": 120}, "radius"),
+        (ProjectivePlane(), {"projection": "mollweide"}, "projective plane"),
+        (ProjectivePlane(), {"projection": "schmidt", "center": (10, 20)}, "centre"),
     ],
 )
 def test_other_maps_are_refused(space: Any, asked: dict[str, Any], message: str) -> None:
-    with pytest.raises(OrbiflowError, match=re.escape(message)):
+    with refused(*message.split()):
         chosen_map(space, NOTHING, PlotSettings(**asked))

@@ -54,7 +54,9 @@ def data_doubts(
         is_place = space.base.name in DIRECTIONS and width - space.beside.dim == 2
         return _places(space.base, values[:, :2], called[:2], cure) if is_place else []
     unit = data_unit(space, width)
-    if unit is None or not values.size:
+    if not values.size:
+        return []
+    if unit is None:
         if values.ndim == 2:
             refuse_codes(space.name, values, called, "", cure)
         return []
