@@ -224,3 +224,22 @@ def test_unknown_names_are_refused(call: Any) -> None:
     with pytest.raises((OrbiflowError, TypeError)) as caught:
         call(colour=3)
     names(str(caught.value), "colour")
+
+
+def test_one_strange_value_does_not_make_a_cycle_a_plain_number() -> None:
+    hours = RNG.uniform(0, 24, ROWS)
+    for strange in (99.0, -1.0, 24.5):
+        hours[0] = strange
+        with refused("hour", 24, f"{strange:g}"):
+            ConditionalEstimator(**KIND).fit(ANGLES, pandas.DataFrame({"hour": hours}))
+    plain = ConditionalEstimator(**KIND, cycles={"hour": None})
+    assert plain.fit(ANGLES, {"hour": hours}).conditional_density_.covariates.columns[0].line
+
+
+def test_a_whole_number_is_the_same_word_as_a_float() -> None:
+    model = ConditionalEstimator(**KIND).fit(
+        ANGLES, {"site": pandas.Series(pandas.Categorical(LEVELS))}
+    )
+    assert model.at(site=2.0).mean() == pytest.approx(model.at(site="2").mean())
+    with refused("site", 5):
+        model.at(site=5.0)

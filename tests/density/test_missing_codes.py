@@ -133,3 +133,10 @@ def test_codes_are_refused_where_covariates_are_given() -> None:
     for values in ({"p": -9999, "tide": 3.0}, {"p": 1000, "tide": 99}):
         with refused("missing", kind=SettingError):
             model.at(values)
+
+
+def test_prices_are_no_codes() -> None:
+    prices = RNG.choice([9.99, 19.99, 99.99, 999.99], 120)
+    table = pandas.DataFrame({"phi": ANGLES[:120], "price": prices})
+    model = DensityEstimator("torus", unit="degrees", linear=["price"], components="kernels")
+    assert np.isfinite(model.fit(table).score(table))

@@ -158,3 +158,10 @@ def test_targets_of_regressions_have_labels() -> None:
     assert one.score(x, y.iloc[SHUFFLED], WEIGHTS.iloc[SHUFFLED]) == one.score(x, y, WEIGHTS)
     with refused("y", "2"):
         one.score(x, y.set_axis([*NAMES[1:], "new"]))
+
+
+def test_a_time_that_is_none_is_no_group() -> None:
+    days = pandas.Series(pandas.date_range("2020-01-01", periods=ROWS))
+    days[3] = pandas.NaT
+    with refused("groups", "row 4"):
+        DensityEstimator(**KIND).fit(RNG.uniform(0, 90, (ROWS, 1)), groups=days)

@@ -100,3 +100,9 @@ def test_a_cif_without_operators_says_its_origin(tmp_path: Path) -> None:
     ):
         path.write_text(cell + bare + more + "\n")
         assert group_from_cif(path) == space_group("227:2", (3, 3, 3))
+
+
+def test_there_is_no_third_origin() -> None:
+    for name in (227, 19):
+        with refused("origin", 3):
+            space_group(name, origin=3)  # pyright: ignore[reportArgumentType]

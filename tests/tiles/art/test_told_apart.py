@@ -12,7 +12,15 @@ from PIL import Image, ImageDraw
 from artworks import art_settings, flat, squirrel
 from orbiflow.drawing import PALETTES
 from orbiflow.studio.silhouette_file import read_input, silhouette_file
-from orbiflow.tiles import Over, ReadingSettings, are_told_apart, artwork
+from orbiflow.tiles import (
+    FileContent,
+    Over,
+    ReadingSettings,
+    Target,
+    are_told_apart,
+    artwork,
+    page_picture,
+)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 1.0])
@@ -53,3 +61,13 @@ def test_the_studio_begins_without_the_picture_of_a_black_icon(
     shown = json.loads(silhouette_file(tmp_path).read_text())["shown"]
     assert shown["told_apart"] == is_told
     assert shown["coloured"]
+
+
+def test_a_drawing_in_its_own_ink_is_shown_black() -> None:
+    drawing = FileContent(
+        b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9">'
+        b'<path d="M0 0h9v9H0z" fill="currentColor"/></svg>',
+        "ink.svg",
+    )
+    shown = page_picture(drawing, Target.from_bytes(drawing.data, drawing.name).covered, (9, 9))
+    assert shown.getpixel((4, 4)) == (0, 0, 0, 255)

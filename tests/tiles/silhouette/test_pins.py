@@ -4,12 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 from mask_files import SIZE, picture, save
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import Pins, Target
-from orbiflow.tiles.silhouette import triangulate
+from orbiflow.tiles.silhouette import outside, triangulate
 from outlines import animal, bar
 from refusals import refused
 
@@ -103,3 +106,10 @@ def test_mistakes_of_masks(tmp_path: Path) -> None:
         Pins.read([save(tmp_path, corner)], target)
     with refused("12;80", kind=InputFileError):
         Pins.read(["12;80"], target)
+
+
+@given(st.floats(-2000, 2000), st.floats(-2000, 2000))
+def test_the_place_that_a_refused_pin_is_told_lies_inside(x: float, y: float) -> None:
+    squirrel = shapely.Polygon(SQUIRREL.outline)
+    place = str(outside("the pin", x, y, squirrel)).split()[-1].split(",")
+    assert squirrel.contains(shapely.Point(*map(float, place)))
