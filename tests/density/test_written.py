@@ -97,7 +97,7 @@ def test_regions_are_written_as_the_data_and_geojson_as_its_standard_says(
     found: list[list[Any]] = []
     for from_zero in (False, True):
         space = kind(from_zero=from_zero)
-        centers = space.to_chart([[lat, lon], [lat, lon + 40]])
+        centers = space.to_chart([[lat, lon], [lat, (lon + 40) % 360]])
         kappa, weights = torch.tensor([[20.0], [30.0]]), torch.tensor([0.5, 0.5])
         density = AdaptiveKernels(space, centers, kappa.double(), weights.double())
         levels = DensityLevels(density, samples=4000)

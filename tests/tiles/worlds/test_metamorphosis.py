@@ -77,7 +77,7 @@ def test_stages_go_there_and_back() -> None:
         ArtSettings(stages=2)
 
 
-@settings(max_examples=1)
+@settings(max_examples=3)
 @given(st.sampled_from(["IH1", "IH4", "IH5", "IH7", "IH21", "IH28"]), st.data())
 def test_a_tile_becomes_another_of_its_class(name: str, data: Any) -> None:
     drawn = st.builds(swirled_tile, st.just(name), st.integers(0, 999), st.floats(0.05, 0.25))
