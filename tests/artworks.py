@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from orbiflow.tiles import ArtSettings, EscherTile, Frame, TileMap, as_map
-from orbiflow.tiles.motifs.carried import Picture
+from orbiflow.tiles.motifs import Picture
 from orbiflow.tiles.result_file import group_json
 from orbiflow.tiles.search.bent_map import map_of_bent
 from outlines import animal, bent_squirrel, flowless

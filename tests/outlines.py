@@ -28,9 +28,9 @@ from orbiflow.tiles import (
     signed_area,
 )
 from orbiflow.tiles.flowing.tile_model import extract_tile
+from orbiflow.tiles.search import Goal
 from orbiflow.tiles.search.bending import Bent, PlacedBent, bent_tiles, placed_best, prototile
 from orbiflow.tiles.search.co_deformation import Orientation
-from orbiflow.tiles.search.search_method import Goal
 
 FOLDER = Path(__file__).parent.parent / "examples" / "silhouettes"
 ANIMALS = ("squirrel.dat", "nagata/spider_120.dat", "nagata/octpus_94.dat", "nagata/camel_60.dat")

@@ -31,8 +31,7 @@ from orbiflow.density import (
     flow_picture,
     samples_picture,
 )
-from orbiflow.drawing import Picture, Sheet, field_picture, pdf_pages
-from orbiflow.drawing.sheet import NARROWEST
+from orbiflow.drawing import NARROWEST, Picture, Sheet, field_picture, pdf_pages
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from orbiflow.drawing import ShadedPart, View, draw_solids, solid_picture
+from orbiflow.drawing import ShadedPart, View, draw_solids, nearest_triangles, solid_picture
 from orbiflow.drawing.solid_pictures import crease_normals
-from orbiflow.drawing.solid_raster import nearest_triangles
 
 FROM_THE_TOP = View((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import Manifold
 
+from orbiflow.solids import Mesh
 from orbiflow.solids.bodies import as_mesh
-from orbiflow.solids.mesh import Mesh
 
 
 def of_volume_one(mesh: Mesh) -> Mesh:

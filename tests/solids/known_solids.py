@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
+from orbiflow.solids import Mesh
 from orbiflow.solids.closing import CellTile, Function, close_tile
 from orbiflow.solids.complexes import cell_complex
-from orbiflow.solids.mesh import Mesh
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, space_group
 
 CELLS = {

@@ -13,8 +13,9 @@ from manifold3d import Manifold
 from scipy.spatial import HalfspaceIntersection
 
 from orbiflow.arrays import Array
+from orbiflow.solids import Mesh
 from orbiflow.solids.bodies import as_mesh
-from orbiflow.solids.mesh import Mesh, joined
+from orbiflow.solids.mesh import joined
 from orbiflow.symmetry import CrystallographicGroup
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from orbiflow.arrays import Array
+from orbiflow.solids import Mesh
 from orbiflow.solids.assembly import Assembly, Pieces, greatest_overlap, sphere
 from orbiflow.solids.bodies import as_body, common_volume, moved_body, united
 from orbiflow.solids.contacts import contacts, free_cone
-from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.stacks import stack_of
 from orbiflow.symmetry import space_group
 from solids.hooked_tiles import hooked_tile

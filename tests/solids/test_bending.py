@@ -10,14 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError, SettingError
+from orbiflow.solids import FillSettings, GroupFamily
 from orbiflow.solids.bending import QUICK_STAGES, REACH, BentBody, bent, contacts
 from orbiflow.solids.body import Body
 from orbiflow.solids.distance import SignedDistance, points_inside
-from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
+from orbiflow.solids.families import USUAL_GROUPS
 from orbiflow.solids.likeness import measured, rigid_motion
 from orbiflow.solids.poses import FINENESS, Cover, Pose, best_poses, orbits_of_bins, polished
 from orbiflow.solids.search import coverage
-from orbiflow.solids.settings import FillSettings, Sphere
+from orbiflow.solids.settings import Sphere
 from orbiflow.symmetry import space_group
 from refusals import refused
 from solids.known_bodies import ball, creature

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.solids.certificate import certify_solid, face_partners
+from orbiflow.solids import Mesh, certify_solid
+from orbiflow.solids.certificate import face_partners
 from orbiflow.solids.crossings import crossing_pairs, orientation_signs
-from orbiflow.solids.mesh import Mesh, joined
+from orbiflow.solids.mesh import joined
 from orbiflow.solids.surfaces import tile_surface
 from solids.known_solids import CELLS, dirichlet_solid, group_named, random_tile, seeds
 

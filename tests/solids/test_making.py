@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
+from orbiflow.solids import Mesh
 from orbiflow.solids.bodies import as_body, as_mesh, common_volume
 from orbiflow.solids.making import Made, make_block, make_puzzle, make_stack, make_tile
-from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.offsets import offset_body
 from orbiflow.solids.print_advice import lying, overhang_share, print_advice
 from orbiflow.solids.sweeping import lifted

@@ -11,9 +11,9 @@ import pytest
 import trimesh
 
 from orbiflow.errors import InputFileError
+from orbiflow.solids import Mesh, read_mesh
 from orbiflow.solids.mending import MAX_FACES
-from orbiflow.solids.mesh import Mesh, joined
-from orbiflow.solids.reading import read_mesh
+from orbiflow.solids.mesh import joined
 from refusals import refused
 from solids.mesh_files import archive, ball, box, inside_out, obj, stl, stl_text, three_mf
 

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError, SettingError
-from orbiflow.solids import FillSettings, fill, separable
+from orbiflow.solids import FillSettings, certify_solid, fill, separable
 from orbiflow.solids.assembly import greatest_overlap
 from orbiflow.solids.bodies import as_body, united
-from orbiflow.solids.certificate import certify_solid
 from orbiflow.solids.distance import SignedDistance
 from orbiflow.solids.separable import (
     check_separable,

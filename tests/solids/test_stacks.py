@@ -15,11 +15,11 @@ import pytest
 from PIL import Image
 from scipy.ndimage import label
 
+from orbiflow.solids import Mesh, solid_gif, solid_sheet, stack_data, stack_page
 from orbiflow.solids.bodies import as_body, common_volume, moved_body
-from orbiflow.solids.mesh import Mesh
-from orbiflow.solids.pictures import figure_axes, solid_gif, solid_sheet
+from orbiflow.solids.pictures import figure_axes
 from orbiflow.solids.stacks import copy_colour, lighter, stack_of
-from orbiflow.solids.web_page import KINDS, stack_data, stack_page
+from orbiflow.solids.web_page import KINDS
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from solids.mesh_files import ball, box, bumpy_cell, cubic_group, space_tile
 from studio.browser import chromium

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from orbiflow.solids.certificate import certify_solid
+from orbiflow.solids import certify_solid
 from orbiflow.solids.surfaces import tile_surface
 from solids.known_solids import names, random_tile, seeds
 

@@ -13,8 +13,7 @@ import pytest
 
 from bent_tiles import bent_tile
 from orbiflow.errors import CertificationError, InputFileError
-from orbiflow.studio import open_project
-from orbiflow.studio.project_file import StudioProject
+from orbiflow.studio import StudioProject, open_project
 from orbiflow.studio.share_link import MAX_TEXT, MAX_UNPACKED, link_text, write_linked
 from orbiflow.tiles import CLASSES, EscherTile, save_tiles
 from small_pairs import pair_result

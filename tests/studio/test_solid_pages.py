@@ -16,8 +16,7 @@ import pytest
 from PIL import Image
 
 import orbiflow.solids
-from orbiflow.solids import EscherSolid, FillSettings, SolidLikeness, read_solid
-from orbiflow.solids.mesh import Mesh
+from orbiflow.solids import EscherSolid, FillSettings, Mesh, SolidLikeness, read_solid
 from orbiflow.solids.reading import READERS
 from orbiflow.studio.settings import Job
 from orbiflow.studio.solid_routes import FILES

@@ -23,7 +23,7 @@ from orbiflow.studio import Store, WorkQueue
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.store import Missing
 from orbiflow.studio.words import shown_project
-from orbiflow.tiles.silhouette.outlines import sampled
+from orbiflow.tiles.silhouette import sampled
 from studio.served import Bench, ByHand, InThread, join_tasks
 
 

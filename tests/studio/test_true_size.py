@@ -12,7 +12,7 @@ from bent_tiles import bent_tile
 from orbiflow.arrays import Array
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles import CLASSES
-from orbiflow.tiles.page.page import rectangle_sides
+from orbiflow.tiles.page import rectangle_sides
 from studio.test_pull_module import CLOSEUP, run_in_node
 
 SMALLEST = f"""

@@ -24,9 +24,8 @@ from artworks import (
 from orbiflow.drawing import palette
 from orbiflow.tiles import CLASSES, ArtSettings, Artwork, Over, artwork, render_artwork
 from orbiflow.tiles.make import art_scene
-from orbiflow.tiles.motifs import picture_paint
-from orbiflow.tiles.motifs.carried import carried_places
-from orbiflow.tiles.motifs.raster import NOWHERE, region_sides, runs
+from orbiflow.tiles.motifs import NOWHERE, carried_places, picture_paint, runs
+from orbiflow.tiles.motifs.raster import region_sides
 from orbiflow.tiles.silhouette import triangulate
 
 PAGE = art_settings(area="240x160px", tile_size="95px", outline=0.0, dpi=25.4)  # a pixel is 1 mm

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from exported import tile_of, tiles
 from orbiflow.tiles import CLASSES, Curve, Tile
-from orbiflow.tiles.page.outlines import CORNER, SHARP_CORNER, fitted, outline, turning
+from orbiflow.tiles.page import fitted, outline, turning
+from orbiflow.tiles.page.outlines import CORNER, SHARP_CORNER
 
 
 def polyline(seed: int, count: int, rough: float) -> np.ndarray:

@@ -13,8 +13,7 @@ from shapely.affinity import translate
 from artworks import squirrel
 from exported import dxf_lines, svg_lines, tile_of
 from orbiflow.errors import SettingError
-from orbiflow.tiles import ExportSettings, Scene, as_tile, scenes, sheet_content
-from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles import ExportSettings, Scene, as_tile, polygons_in, scenes, sheet_content
 from orbiflow.tiles.make.jigsaws import LEAST_SHARE
 from refusals import refused
 

@@ -12,7 +12,7 @@ from orbiflow.errors import SettingError
 from orbiflow.tiles import EscherTile, ExportSettings, Scene, as_tile, scenes, sheet_content
 from orbiflow.tiles.make.layout import layout
 from orbiflow.tiles.make.templates import numbered_edges
-from orbiflow.tiles.page.page import mark_corners
+from orbiflow.tiles.page import mark_corners
 from refusals import refused
 
 

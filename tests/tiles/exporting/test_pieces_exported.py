@@ -11,9 +11,9 @@ from scipy.spatial.distance import pdist
 
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
 from orbiflow.tiles import CLASSES, ExportSettings, Tile, as_tile, scenes, sheet_content
+from orbiflow.tiles.make import cut_ring
 from orbiflow.tiles.make.layout import layout
 from orbiflow.tiles.make.nesting import Arrangement, on_sheet
-from orbiflow.tiles.make.offsets import cut_ring
 from refusals import refused
 
 

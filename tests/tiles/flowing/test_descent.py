@@ -28,8 +28,7 @@ from orbiflow.tiles.flowing.descent import MAX_STEP_STEEPNESS, Descent
 from orbiflow.tiles.flowing.starts import template_starts
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.likeness import boundary_iou
-from orbiflow.tiles.search.candidates import silent
-from orbiflow.tiles.search.search_method import Goal
+from orbiflow.tiles.search import Goal, silent
 from outlines import searched
 from refusals import refused
 

@@ -14,15 +14,8 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.tiles import CLASSES, OverlapSearch, Target, Tile, TileModel, certify, resampled
 from orbiflow.tiles.flowing.starts import nearest_tiles, outline_starts, template_starts
-from orbiflow.tiles.search import template_symmetries
-from orbiflow.tiles.search.candidates import Prototiles
-from orbiflow.tiles.search.tile_space import (
-    Placements,
-    _compositions,
-    _count,
-    best_placements,
-    edge_lengths,
-)
+from orbiflow.tiles.search import Placements, Prototiles, best_placements, template_symmetries
+from orbiflow.tiles.search.tile_space import _compositions, _count, edge_lengths
 from strategies import divided_start
 
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])

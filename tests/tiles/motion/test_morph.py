@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from orbiflow.tiles import CLASSES, Tile, certify, isohedral_class
-from orbiflow.tiles.motion.morph import Morph, Orbits
-from orbiflow.tiles.motion.own_frame import OwnFrame
+from orbiflow.tiles.motion import Morph, OwnFrame
+from orbiflow.tiles.motion.morph import Orbits
 from orbiflow.tiles.silhouette import triangulate
 from refusals import refused
 from swirled_tiles import is_sound, swirled, swirled_tile

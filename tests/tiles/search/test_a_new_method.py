@@ -22,8 +22,7 @@ from orbiflow.tiles import (
     trainable,
 )
 from orbiflow.tiles.flowing.starts import template_starts
-from orbiflow.tiles.search import Goal, SearchMethod
-from orbiflow.tiles.search.candidates import OnProgress, StillTiles
+from orbiflow.tiles.search import Goal, OnProgress, SearchMethod, StillTiles
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import searched
 from refusals import refused

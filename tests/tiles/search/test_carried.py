@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, signed_area
-from orbiflow.tiles.search.bent_map import carried_anew, map_of_bent, onto_polygon
+from orbiflow.tiles.search import carried_anew
+from orbiflow.tiles.search.bent_map import map_of_bent, onto_polygon
 from orbiflow.tiles.silhouette import triangulate, unfolded
 from orbiflow.tiles.silhouette.bending import MAX_POINTS
 from outlines import BentTile, animal, bent_squirrel, disc

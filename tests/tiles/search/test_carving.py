@@ -13,7 +13,7 @@ import shapely
 from orbiflow.arrays import Array, Complex
 from orbiflow.tiles import CLASSES, Pins, complex_points, isohedral_class, plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, kept_of
-from orbiflow.tiles.search import bending, carving
+from orbiflow.tiles.search import Goal, TileSpace, bending, best_placements, carving
 from orbiflow.tiles.search.bending import Bent, bent_tiles
 from orbiflow.tiles.search.carving import (
     MAX_BEHIND,
@@ -26,8 +26,6 @@ from orbiflow.tiles.search.carving import (
     carved,
 )
 from orbiflow.tiles.search.co_deformation import BentTiles, held_on_tiles
-from orbiflow.tiles.search.search_method import Goal
-from orbiflow.tiles.search.tile_space import TileSpace, best_placements
 from outlines import SMALL, animal, squirrel_orientations
 
 PLAIN = replace(SMALL, carved=0)

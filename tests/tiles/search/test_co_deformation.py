@@ -22,10 +22,9 @@ from orbiflow.tiles import (
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.geometry import apart
 from orbiflow.tiles.likeness import Elastic
+from orbiflow.tiles.search import Goal, Placements, TileSpace, best_placements
 from orbiflow.tiles.search.bending import TWIN_DISTANCE, bent_tiles
 from orbiflow.tiles.search.co_deformation import BODIES, drawn_to_tiles, held_on_tiles
-from orbiflow.tiles.search.search_method import Goal
-from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import SMALL, animal, bent_squirrel, flowless, squirrel_orientations
 from strategies import seeds
 

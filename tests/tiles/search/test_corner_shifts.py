@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import CLASSES, complex_points, plane_points, resampled, signed_area
 from orbiflow.tiles.likeness import Elastic
-from orbiflow.tiles.search import co_deformation
+from orbiflow.tiles.search import Placements, TileSpace, best_placements, co_deformation
 from orbiflow.tiles.search.co_deformation import _moves, shifted
-from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import seeds
 

@@ -29,13 +29,17 @@ from orbiflow.tiles import (
     read_result,
     save_tiles,
     signed_area,
+    subdivided,
 )
 from orbiflow.tiles.finding import classes
-from orbiflow.tiles.flowing.overlap_search import OverlapSearch
-from orbiflow.tiles.geometry import subdivided
-from orbiflow.tiles.search.escherize_settings import EscherizeSettings
-from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
+from orbiflow.tiles.flowing import OverlapSearch
+from orbiflow.tiles.search import (
+    EscherizeSettings,
+    LikenessSearch,
+    Placements,
+    TileSpace,
+    best_placements,
+)
 from orbiflow.tiles.silhouette import outlines, sampled
 from outlines import animal
 from refusals import refused

@@ -13,17 +13,24 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.runtime import Cancel, Cancelled, Event, Progress
-from orbiflow.tiles import CLASSES, IsohedralClass, Tiling, certify, isohedral_class
-from orbiflow.tiles.geometry import complex_points, plane_points, resampled
+from orbiflow.tiles import (
+    CLASSES,
+    IsohedralClass,
+    Tiling,
+    certify,
+    complex_points,
+    isohedral_class,
+    plane_points,
+    resampled,
+)
 from orbiflow.tiles.likeness import Elastic
-from orbiflow.tiles.search import gluing
+from orbiflow.tiles.search import Goal, gluing
 from orbiflow.tiles.search.bending import unlike
 from orbiflow.tiles.search.gluing import Glued, _gains, _Tables, glues, placements, sums_along
 from orbiflow.tiles.search.pair_bending import BentPair, Figures, bent, finer, moved
 from orbiflow.tiles.search.pair_body import Glue, PairBody
 from orbiflow.tiles.search.pair_carving import CarvedPair, carved_pair
 from orbiflow.tiles.search.pair_search import PairSearch, search_pair
-from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.search.tile_space import _gains as every_gain
 from orbiflow.tiles.search.tile_space import edge_lengths
 from orbiflow.tiles.tilings import mixing

@@ -25,9 +25,8 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.likeness import mutual_iou
-from orbiflow.tiles.search.candidates import Fit
+from orbiflow.tiles.search import Fit, Goal
 from orbiflow.tiles.search.likeness_search import SKETCH
-from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import animal, searched
 from refusals import refused

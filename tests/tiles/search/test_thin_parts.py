@@ -28,14 +28,22 @@ from orbiflow.tiles import (
     fit_tile,
     index_page,
     iou,
+    polygons_in,
     read_result,
+    resampled,
     save_tiles,
 )
 from orbiflow.tiles.flowing.starts import template_starts
-from orbiflow.tiles.geometry import polygons_in, resampled
 from orbiflow.tiles.likeness import fidelity_to_original
-from orbiflow.tiles.search import Goal, SearchMethod, finished_tiles, rounded_for, why_poor
-from orbiflow.tiles.search.candidates import OnProgress, StillTiles
+from orbiflow.tiles.search import (
+    Goal,
+    OnProgress,
+    SearchMethod,
+    StillTiles,
+    finished_tiles,
+    rounded_for,
+    why_poor,
+)
 from orbiflow.tiles.search.likeness_search import ROUNDED_SHARES
 from orbiflow.tiles.search.search_method import Sketches
 from orbiflow.tiles.search.search_record import best_of

@@ -18,7 +18,7 @@ from orbiflow.tiles import (
     resampled,
     signed_area,
 )
-from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
+from orbiflow.tiles.search import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import angles, seeds
 

@@ -46,7 +46,7 @@ from orbiflow.tiles import (
     write_scene,
 )
 from orbiflow.tiles.likeness import mixing_factor
-from orbiflow.tiles.motifs.carried import Picture
+from orbiflow.tiles.motifs import Picture
 from orbiflow.tiles.motion.kinds import motion
 from orbiflow.tiles.result_file import part_file
 from orbiflow.tiles.tilings import mixing

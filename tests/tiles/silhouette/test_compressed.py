@@ -6,7 +6,7 @@ import pytest
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import FileContent, read_outline
-from orbiflow.tiles.silhouette.readers.svg_drawing import MAX_BYTES
+from orbiflow.tiles.silhouette.readers import MAX_BYTES
 
 SVG = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M1 1H8V5H1Z"/></svg>'
 

@@ -9,16 +9,10 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import LikenessSearch, Target, resampled, ring_length
+from orbiflow.tiles.search import Goal
 from orbiflow.tiles.search.co_deformation import BODIES
-from orbiflow.tiles.search.search_method import Goal
-from orbiflow.tiles.silhouette import sampled
-from orbiflow.tiles.silhouette.outlines import (
-    CORNER_DEPTH,
-    MAX_POINTS,
-    MIN_POINTS,
-    important_vertices,
-    with_corners,
-)
+from orbiflow.tiles.silhouette import CORNER_DEPTH, important_vertices, sampled, with_corners
+from orbiflow.tiles.silhouette.outlines import MAX_POINTS, MIN_POINTS
 from outlines import ANIMALS, SHAPES, animal, comb, disc, dumbbell, slit_square, unit
 from strategies import seeds
 

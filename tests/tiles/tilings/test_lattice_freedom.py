@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup, rotation_matrix
 from orbiflow.tiles import CLASSES
-from orbiflow.tiles.tilings.isohedral import commutant, stretch_matrix
+from orbiflow.tiles.tilings import commutant
+from orbiflow.tiles.tilings.isohedral import stretch_matrix
 from strategies import random_tensor, seeds, wallpaper_groups
 
 DIMENSION = {"p1": 2, "p2": 2, "pm": 1, "pg": 1, "cm": 1, "pmm": 1, "pmg": 1, "pgg": 1, "cmm": 1}

@@ -18,7 +18,7 @@ from orbiflow.tiles import (
     edges,
     skeleton,
 )
-from orbiflow.tiles.page.outlines import outline
+from orbiflow.tiles.page import outline
 from refusals import refused
 from some_tilings import NAMED, SQUARE, dirichlet_tilings, mirror_tiles, tilings
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.tiles import ArtSettings, art
-from orbiflow.tiles.result_file import read_result, read_tiles
+from orbiflow.tiles import ArtSettings, art, read_result
+from orbiflow.tiles.result_file import read_tiles
 from orbiflow.tiles.worlds import Unfolding, best_in_world, in_world, unfolded
 from orbiflow.tiles.worlds.choosing import Seen, flip_of
 from orbiflow.tiles.worlds.developing import Development

@@ -18,11 +18,18 @@ from scipy.spatial import KDTree
 from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import ArtSettings, EscherTile, art
-from orbiflow.tiles.geometry import orient, signed_area
+from orbiflow.tiles import ArtSettings, EscherTile, art, orient, signed_area
 from orbiflow.tiles.silhouette import triangulate
-from orbiflow.tiles.worlds import Unfolding, colours, copies, unfolded, world_of, world_scene
-from orbiflow.tiles.worlds.curved import disc_of, facing, form
+from orbiflow.tiles.worlds import (
+    Unfolding,
+    colours,
+    copies,
+    facing,
+    unfolded,
+    world_of,
+    world_scene,
+)
+from orbiflow.tiles.worlds.curved import disc_of, form
 from orbiflow.tiles.worlds.outlines import with_points
 from orbiflow.tiles.worlds.sheet import TOLERANCE
 from refusals import refused
