@@ -267,20 +267,20 @@ def _period_named(name: str, cells: Values, turn: float | None) -> float | None:
     """Return the period of a column of numbers that its name says, if its values suit."""
     if is_text(cells):
         return None
-    numbers = _numbers(name, cells)
-    found = cycle_named(name, float(numbers.min()), float(numbers.max()), turn)
-    if found is None:
-        suits = [cycle_named(name, value, value, turn) for value in numbers.tolist()]
-        others = numbers[[period is None for period in suits]]
-        if 0 < 2 * len(others) < len(numbers):
-            period = next(filter(None, suits))
-            raise OrbiflowError(
-                f"{name!r} is the name of a cycle of {period:g}, and the column has {others[0]:g} "
-                f"({len(others)} such rows): leave these rows out, or say what it is: "
-                f"cycles={{{name!r}: {period:g}}} or None there, {name}:{period:g} or {name}:real on "
-                "the command line"
-            )
-    return found
+    numbers, cycle = _numbers(name, cells), cycle_named(name, turn)
+    if cycle is None:
+        return None
+    others = numbers[(numbers < cycle.least) | (numbers > cycle.most)]
+    if not len(others):
+        return cycle.period
+    if 2 * len(others) < len(numbers):
+        raise OrbiflowError(
+            f"{name!r} is the name of a cycle of {cycle.period:g}, and the column has {others[0]:g} "
+            f"({len(others)} such rows): leave these rows out, or say what it is: "
+            f"cycles={{{name!r}: {cycle.period:g}}} or None there, {name}:{cycle.period:g} or "
+            f"{name}:real on the command line"
+        )
+    return None
 
 
 def _numbers(name: str, cells: Values) -> Array:

@@ -179,23 +179,27 @@ CYCLES = {
 """Periods of columns by their names, and the least and the largest value that they then have."""
 
 
-def cycle_named(name: str, least: float, most: float, turn: float | None) -> float | None:
-    """Return the period that a column has by its name, with such values; None if it says none.
+class Cycle(NamedTuple):
+    """The period that a column has by its name, and the least and the largest value it then has."""
+
+    period: float
+    least: float
+    most: float
+
+
+def cycle_named(name: str, turn: float | None) -> Cycle | None:
+    """Return the cycle that a column has by its name; None if it says none.
 
     `turn` is that of angles, if there are any.
 
-    >>> cycle_named("hour", 0, 23, None), cycle_named("psi", -170, 175, 360.0)
-    (24.0, 360.0)
-    >>> cycle_named("hours", 0, 500, None), cycle_named("temperature", 0, 20, 360.0)
-    (None, None)
+    >>> cycle_named("hour", None), cycle_named("temperature", 360.0)
+    (Cycle(period=24.0, least=0.0, most=24.0), None)
     """
     words = words_of(name)
-    if set(words) & ANGLES and turn is not None and max(abs(least), abs(most)) <= turn * 1.001:
-        return turn
-    found = CYCLES.get("".join(words)) or next(
-        (CYCLES[one] for one in words if one in CYCLES), None
-    )
-    return found[0] if found and found[1] <= least and most <= found[2] else None
+    if turn is not None and set(words) & ANGLES:
+        return Cycle(turn, -1.001 * turn, 1.001 * turn)
+    own = ("".join(words), *words)
+    return next((Cycle(*CYCLES[one]) for one in own if one in CYCLES), None)
 
 
 def is_other_quantity(name: str) -> bool:

@@ -61,7 +61,9 @@ async function show() {
   const mine = (turn += 1);
   const [pattern, load, step] = ROUTES.find(([known]) => known.test(path)) ?? [null];
   const [, id, tileId] = pattern ? path.match(pattern) : [];
-  if (id !== feed?.project.id) put(document.querySelector("#toasts"));
+  if (id !== feed?.project.id) {
+    document.querySelectorAll("#toasts .bad").forEach((one) => one.remove());
+  }
   const leave = close;
   close = () => {};
   await leave();

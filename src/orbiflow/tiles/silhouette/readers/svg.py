@@ -147,9 +147,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         if len(colours) > 1:
             notes.append(f"{all_but}; if that is a background, delete it")
         elif seen.area < (1 - MIN_HOLE_SHARE) * whole:
-            notes.append(
-                Advice(f"{all_but}; if the hole in it is the shape, try another {{invert}}")
-            )
+            notes.append(Advice(f"{all_but}; if the hole in it is the shape, change {{invert}}"))
     elif _is_badge(seen, shown):
         notes.append(
             "the silhouette is a disc with a drawing on it; if it is a background, delete it"
