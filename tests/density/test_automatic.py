@@ -40,7 +40,7 @@ def smooth(name: str, count: int = 300, seed: int = 0) -> torch.Tensor:
 
 
 @pytest.mark.usefixtures("whole_fits")
-@pytest.mark.parametrize("name", ["torus"])
+@pytest.mark.parametrize("name", ["torus", "projective-plane"])
 def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     space, said = make_space(name), []
     settings = DensitySettings(**QUICK)

@@ -67,14 +67,14 @@ def test_entropies_and_divergences_lie_within_their_errors(kappa: float) -> None
 
 
 def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> None:
-    drawn = pair.sample(10_000, random_state=0)
+    drawn = pair.sample(40_000, random_state=0)
     directions = np.angle(np.exp(1j * drawn).mean(axis=0))
-    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.04
+    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.02
     top = pair.score_samples(pair.mode()[None])
     assert top[0] >= pair.score_samples(drawn[:5000]).max() - 1e-9
     alone = pair.marginal(0)
     shares = np.sort(alone.cdf(drawn[:, :1]))
-    assert np.abs(shares - (np.arange(10_000) + 0.5) / 10_000).max() < 0.02
+    assert np.abs(shares - (np.arange(40_000) + 0.5) / 40_000).max() < 0.015
     assert np.allclose(
         alone.cdf(alone.quantile([0.1, 0.5, 0.9])[:, None]), [0.1, 0.5, 0.9], atol=1e-6
     )
@@ -84,14 +84,14 @@ def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> N
 
 def test_a_real_column_has_quantiles_and_a_mean() -> None:
     rng = np.random.default_rng(1)
-    data = rng.normal(5, 2, (400, 1))
+    data = rng.normal(5, 2, (2000, 1))
     fit = DensityEstimator("torus", linear=(0,), components="kernels,mixture").fit(data)
     assert fit.mean()[0] == pytest.approx(data.mean(), abs=0.1)
     wanted = np.quantile(data, [0.05, 0.5, 0.95])
     assert fit.quantile([0.05, 0.5, 0.95]) == pytest.approx(wanted, abs=0.3)
-    assert fit.entropy().value == pytest.approx(stats.norm(5, 2).entropy(), abs=0.12)
+    assert fit.entropy().value == pytest.approx(stats.norm(5, 2).entropy(), abs=0.06)
     other = DensityEstimator("torus", linear=(0,), components="mixture").fit(data + 1.0)
-    assert fit.kl_divergence(other).value == pytest.approx(1 / 8, abs=0.06)
+    assert fit.kl_divergence(other).value == pytest.approx(1 / 8, abs=0.04)
 
 
 def test_directions_have_a_mean_and_axes_have_none() -> None:

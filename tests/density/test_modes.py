@@ -91,7 +91,13 @@ def fitted_without_a_mode(name: str) -> DensityEstimator:
 
 
 @pytest.mark.parametrize(
-    ("name", "mode"), [("torus", "inference"), ("sphere", "no_grad"), ("klein-bottle", "plain")]
+    ("name", "mode"),
+    [
+        ("torus", "inference"),
+        ("sphere", "no_grad"),
+        ("klein-bottle", "plain"),
+        ("projective-plane", "inference"),
+    ],
 )
 def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: str) -> None:
     estimator = DensityEstimator(name, components=("flow",), **QUICK)
