@@ -17,11 +17,7 @@ def quick_fits(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{FITTING}.families.SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.families.MIXTURE_SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.held_out.USED", ())
-    patch.setattr(f"{FITTING}.held_out.TOLERANCE_NATS", 1e-3)
     patch.setattr(f"{COVARIATES}.fit.USED", ((10**9, 2),))
-    patch.setattr(f"{COVARIATES}.network.EPOCHS", 30)
-    patch.setattr(f"{COVARIATES}.network.HIDDEN", 16)
-    patch.setattr(f"{COVARIATES}.kernels.MOST_STEPS", 20)
     patch.setattr("orbiflow.density.models.figures.DRAWS", 2**13)
     patch.setattr("orbiflow.density.regions.boundaries.CHECKED", 20_000)
 

@@ -189,7 +189,7 @@ def test_concentration_is_in_its_interval_as_often_as_said(kappa: float, rows: i
 def test_intervals_cover_and_the_smooth_test_keeps_its_level(name: str) -> None:
     inside: list[bool] = []
     cones = small = 0
-    for seed in range(10):
+    for seed in range(14):
         space, points, truth = drawn(name, SPACES[name][0], 100, seed)
         found = found_by(space, points, name)
         shapes = found.parameters[-2:]
@@ -204,8 +204,8 @@ def test_intervals_cover_and_the_smooth_test_keeps_its_level(name: str) -> None:
         cones += apart <= (found.cones[label] or 90)
         small += p_of(found) < 0.05
     assert np.mean(inside) > 0.8
-    assert cones >= 8
-    assert small <= 2
+    assert cones >= 11
+    assert small <= 3
 
 
 def test_smooth_test_sees_what_is_not_of_the_family() -> None:
@@ -242,7 +242,7 @@ def test_beside_others_it_is_a_candidate() -> None:
     angles = rng.vonmises([0.5, 1.0], [2.0, 6.0], (400, 2))
     fit = DensityEstimator("torus", components=("kernels", "von-mises")).fit(angles)
     shares = {one.name: one.share for one in fit.report_.components}
-    assert shares["von-mises"] > 0.7
+    assert shares["von-mises"] > 0.8
     with refused("parametric", "family"):
         fit.parameters()
 
