@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the fits, figures and pictures of docs/examples again, in about eight minutes on two cores:
 #
-#     sh docs/examples/make.sh [NAME ...]      (ramachandran, wildfires, image-patches, poles, texture)
+#     sh docs/examples/make.sh [NAME ...]      (ramachandran, wildfires, image-patches, poles)
 #
 # Needs orbiflow on the path, and chromium for pictures of the surfaces (left out without it).
 # WORK: folder for fits and tables (out/examples).
@@ -256,22 +256,10 @@ CODE
     orbiflow density compare -d "$work/poles-turned.csv" --by polarity --space sphere --columns lat,lon
 }
 
-texture() {
-    awk '/^```python/ { inside = 1; next } /^```/ { inside = 0 } inside' docs/examples/texture.md >"$work/rolled.py"
-    (cd "$work" && python rolled.py)
-    sheet="--space rotation-space --crystal m-3m --specimen orthotropic --unit degrees"
-    # shellcheck disable=SC2086  # several options
-    fit texture "$work/rolled.csv" phi1,Phi,phi2 $sheet --components mixture
-    draw "poles inverse sections" --pole 001,110,111 --sections 0,45,65
-    # shellcheck disable=SC2086
-    orbiflow density summary "$work/rolled.csv" $sheet
-    orbiflow density texture --model "$work/texture"
-}
-
-for example in ${*:-ramachandran wildfires image-patches poles texture}; do
+for example in ${*:-ramachandran wildfires image-patches poles}; do
     case $example in
     image-patches) image_patches ;;
-    ramachandran | wildfires | poles | texture) $example ;;
+    ramachandran | wildfires | poles) $example ;;
     *) echo "no example $example" >&2 && exit 2 ;;
     esac
 done

@@ -59,7 +59,7 @@ TOPICS = {
     "Comparing densities, and data": (
         "compare_models compare_scores compare_samples named_tests ComparisonSettings cross_validate "
         "cross_validation_folds summarize_angles summarize_directions summarize_axes "
-        "summarize_orientations pole_density texture_index "
+        "summarize_orientations "
     ),
     "Figures": (
         "Sheet PlotSettings plot_density density_picture flow_picture samples_picture "

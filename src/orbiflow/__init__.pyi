@@ -13,8 +13,6 @@ from .density.cross_validation.operations import cross_validate as cross_validat
 from .density.estimator import DensityEstimator as DensityEstimator
 from .density.inference.partial import conditional as conditional
 from .density.inference.partial import marginal as marginal
-from .density.inference.textures import pole_density as pole_density
-from .density.inference.textures import texture_index as texture_index
 from .density.models.chains import VonMisesChains as VonMisesChains
 from .density.models.density import Density as Density
 from .density.models.evaluation import log_density_gradient as log_density_gradient

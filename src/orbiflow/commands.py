@@ -11,7 +11,6 @@ OPERATIONS = {
     "fill": "orbiflow.solids.operations:fill",
     "build": "orbiflow.solids.operations:build",
     "density summary": "orbiflow.density.operations.summary:summary",
-    "density texture": "orbiflow.density.operations.texture:texture",
     "density fit": "orbiflow.density.operations.fitting:fit",
     "density score": "orbiflow.density.operations.queries:score",
     "density sample": "orbiflow.density.operations.queries:sample",

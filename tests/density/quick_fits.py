@@ -31,9 +31,6 @@ def quick_pictures(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{pictures}.surfaces._RESOLUTION", 30)
     patch.setattr(f"{pictures}.maps._PIXELS", 2000)
     patch.setattr(f"{pictures}.colours._COARSE", 24)
-    patch.setattr(f"{pictures}.textures.ACROSS", 31)
-    patch.setattr(f"{pictures}.textures.INVERSE_ACROSS", 21)
-    patch.setattr(f"{pictures}.textures.SECTION_STEP", 6.0)
     patch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
     patch.setattr("orbiflow.drawing.canvas._STEPS", 4)
 

@@ -1,4 +1,4 @@
-"""Summaries of orientations: means modulo symmetry, their cones, shares near ideal ones."""
+"""Summaries of orientations: means modulo symmetry, and their cones."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from orbiflow.density import RotationSpace, summarize_orientations
-from orbiflow.density.inference import misorientations
-from orbiflow.errors import SettingError
 from refusals import refused
 from strategies import seeds
 
@@ -35,12 +33,12 @@ def test_the_mean_is_found_whatever_images_rows_are(crystal: str, specimen: str,
     lefts, rights = space.specimen_rotations, space.crystal_rotations
     moved = lefts[rng.integers(len(lefts), size=60)] * turns
     moved = moved * rights[rng.integers(len(rights), size=60)]
-    found, _ = summarize_orientations(space, moved.as_quat())
+    found = summarize_orientations(space, moved.as_quat())
     # SciPy's mean of rows that were not moved, unless an axis of symmetry folds them
     plain = torch.tensor(turns.mean().as_quat())
-    near = misorientations(space, torch.tensor(turns.as_quat()), plain).numpy()
+    near = space.misorientations(torch.tensor(turns.as_quat()), plain).numpy()
     folded = not np.allclose(near, (turns * turns.mean().inv()).magnitude(), atol=1e-9)
-    off = math.degrees(float(misorientations(space, torch.tensor([found.mean]), plain)[0]))
+    off = math.degrees(float(space.misorientations(torch.tensor([found.mean]), plain)[0]))
     assert off < (2 if folded else 1e-4)
     assert found.cone is not None
     assert 0 < found.cone < 1.5
@@ -53,11 +51,9 @@ def test_the_cone_holds_the_true_mean_as_often_as_it_says() -> None:
     truth, held = Rotation.from_euler("ZXZ", [20, 35, 10], degrees=True), 0
     target = torch.tensor(truth.as_quat())
     for seed in range(60):
-        found, _ = summarize_orientations(
-            space, about(truth, 4.0, 40, seed).as_quat(), level=0.9, near=[]
-        )
+        found = summarize_orientations(space, about(truth, 4.0, 40, seed).as_quat(), level=0.9)
         assert found.cone is not None
-        off = misorientations(space, torch.tensor([found.mean]), target)[0]
+        off = space.misorientations(torch.tensor([found.mean]), target)[0]
         held += math.degrees(float(off)) <= found.cone
     # 54 are expected, with a deviation of 2.3
     assert 47 <= held <= 59
@@ -69,43 +65,20 @@ def test_rows_of_a_group_count_once_and_weights_as_repeats() -> None:
         Rotation.from_euler("ZXZ", [20, 35, 10], degrees=True),
     )
     rows = about(truth, 4.0, 30, 0).as_quat()
-    single, shares = summarize_orientations(space, rows, near=["cube"])
+    single = summarize_orientations(space, rows)
     every = np.repeat(rows, 4, axis=0)
-    grouped, near = summarize_orientations(
-        space, every, groups=np.repeat(np.arange(30), 4), near=["cube"]
-    )
+    grouped = summarize_orientations(space, every, groups=np.repeat(np.arange(30), 4))
     assert grouped.mean == pytest.approx(single.mean, abs=1e-9)
     assert single.cone is not None
     assert grouped.cone is not None
     assert single.cone < grouped.cone < 1.3 * single.cone
-    assert near[0].high == pytest.approx(shares[0].high)
     weights = np.arange(30) % 3
-    weighed, _ = summarize_orientations(space, rows, weights=weights)
-    repeated, _ = summarize_orientations(space, np.repeat(rows, weights, axis=0))
+    weighed = summarize_orientations(space, rows, weights=weights)
+    repeated = summarize_orientations(space, np.repeat(rows, weights, axis=0))
     assert weighed.mean == pytest.approx(repeated.mean, abs=1e-9)
     assert weighed.spread == pytest.approx(repeated.spread)
 
 
-def test_shares_near_ideal_orientations() -> None:
-    space = RotationSpace(form="bunge", unit="degrees", symmetry="432")
-    goss = about(Rotation.from_euler("ZXZ", [0, 45, 0], degrees=True), 3.0, 300, 1)
-    brass = about(Rotation.from_euler("ZXZ", [-35.26, 45, 0], degrees=True), 3.0, 100, 2)
-    data = space.from_chart(torch.tensor(Rotation.concatenate([goss, brass]).as_quat()))
-    found, near = summarize_orientations(space, data)
-    shares = {one.name: one for one in near}
-    assert shares["goss"].share == pytest.approx(0.75, abs=0.01)
-    assert shares["brass"].share == pytest.approx(0.25, abs=0.01)
-    assert shares["cube"].share == 0
-    assert shares["goss"].low < 0.75 < shares["goss"].high
-    # a ball of 15 degrees has the measure (w - sin w) / pi, and 24 images
-    reach = math.radians(15)
-    assert shares["cube"].random == pytest.approx(
-        24 * (reach - math.sin(reach)) / math.pi, rel=0.15
-    )
-    assert len(found.mean) == 3
-    with refused("near", kind=SettingError):
-        summarize_orientations(space, data, near=["ribbon"])
-    with refused("near", kind=SettingError):
-        summarize_orientations(RotationSpace(symmetry="D6"), np.eye(4), near=["cube"])
-    with refused("weights", "400"):
-        summarize_orientations(space, data, weights=[1.0])
+def test_weights_that_do_not_fit_are_refused() -> None:
+    with refused("weights", "4"):
+        summarize_orientations(RotationSpace(), np.eye(4), weights=[1.0])

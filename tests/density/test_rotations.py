@@ -263,3 +263,22 @@ def test_families_without_the_symmetry_are_refused() -> None:
     for own in (RotationSpace(symmetry="D2"), RotationSpace(specimen="D2")):
         with refused("RotationSpace"):
             images_of(own)
+
+
+@settings(max_examples=12)
+@given(crystal=small, specimen=small, seed=seeds)
+def test_misorientations_are_the_smallest_angles_between_images(
+    crystal: str, specimen: str, seed: int
+) -> None:
+    space = RotationSpace(symmetry=crystal, specimen=specimen)
+    first, *others = Rotation.random(6, random_state=seed)
+    points = torch.tensor(Rotation.concatenate(others).as_quat())
+    found = space.misorientations(points, torch.tensor(first.as_quat()))
+    least = [
+        min(
+            (left * first * space.crystal_rotations * other.inv()).magnitude().min()
+            for left in space.specimen_rotations
+        )
+        for other in others
+    ]
+    assert found.numpy() == pytest.approx(np.array(least), abs=1e-7)

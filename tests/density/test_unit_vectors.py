@@ -253,7 +253,7 @@ def test_the_example_of_the_page_runs() -> None:
     (snippet,) = re.findall(r"```python\n([^`]*RotationSpace[^`]*)```", page)
     names: dict[str, Any] = {}
     exec(compile(snippet, "densities.md", "exec"), names)
-    assert names["texture"].space_.symmetry == "D2"
+    assert names["orientations"].space_.symmetry == "D2"
 
 
 def _other(space: Space) -> dict[str, object]:

@@ -31,8 +31,6 @@ from .fitting.settings import DensitySettings as DensitySettings
 from .fitting.settings import FlowSettings as FlowSettings
 from .inference.partial import conditional as conditional
 from .inference.partial import marginal as marginal
-from .inference.textures import pole_density as pole_density
-from .inference.textures import texture_index as texture_index
 from .models.chains import Factor as Factor
 from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
@@ -47,7 +45,6 @@ from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
 from .models.network import VonMisesNetwork as VonMisesNetwork
 from .models.sine import VonMisesSine as VonMisesSine
-from .orientations import NearSummary as NearSummary
 from .orientations import OrientationSummary as OrientationSummary
 from .orientations import summarize_orientations as summarize_orientations
 from .pictures.coastlines import read_coastlines as read_coastlines

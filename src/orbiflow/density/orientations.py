@@ -1,24 +1,20 @@
-"""Summaries of orientations: their mean modulo symmetry, its cone, and shares near named ones."""
+"""Summaries of orientations: their mean modulo symmetry, its cone, and how far rows are from it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
-from scipy import special
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number
+from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.density.data import alongside, as_data
-from orbiflow.density.inference import misorientations
-from orbiflow.density.spaces import ORIENTATIONS, RotationSpace, named_orientation, rotations_of
-from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
-from orbiflow.errors import SettingError
+from orbiflow.density.spaces import RotationSpace
+from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle
 
 STARTS, STEPS, MOST_LOOKED_AT = 16, 100, 2_000
 """Rows from which a mean is looked for, the most steps of each, and the most rows of a first look."""
@@ -43,20 +39,6 @@ class OrientationSummary:
     half: float
 
 
-@dataclass(frozen=True)
-class NearSummary:
-    """The share of rows within an angle of an ideal orientation, and its interval (Wilson, 1927).
-
-    - `random`: The share of a random texture there.
-    """
-
-    name: str
-    share: float
-    low: float
-    high: float
-    random: float
-
-
 def summarize_orientations(
     space: RotationSpace,
     data: ArrayLike,
@@ -64,9 +46,7 @@ def summarize_orientations(
     weights: ArrayLike | None = None,
     groups: ArrayLike | None = None,
     level: float = 0.95,
-    near: Sequence[str] | None = None,
-    within: float = 15.0,
-) -> tuple[OrientationSummary, list[NearSummary]]:
+) -> OrientationSummary:
     """Summarise orientations.
 
     Args:
@@ -75,17 +55,13 @@ def summarize_orientations(
         weights: How much each row counts (N,); only ratios matter.
         groups: What each row belongs to, (N,); rows of one group are not independent.
         level: Level of the intervals.
-        near: Names of ideal orientations (cube, goss, brass, copper, s) with all their variants in a
-            rolled sheet. Default: all of them for cubic crystals, else none.
-        within: The angle in degrees within which rows are counted as near.
 
     Raises:
-        OrbiflowError: If rows or weights do not fit, or names are unknown.
+        OrbiflowError: If rows or weights do not fit.
 
     >>> space = RotationSpace(form="bunge", unit="degrees", symmetry="432")
-    >>> found, shares = summarize_orientations(space, [[1, 0, 0], [89, 0, 0], [90, 1, 0], [0, 45, 0]])
-    >>> shares[0].name, shares[0].share
-    ('cube', 0.75)
+    >>> round(summarize_orientations(space, [[1, 0, 0], [89, 0, 0], [0, 3, 0]]).half, 6)
+    1.0
     """
     as_instance(space, RotationSpace, "space")
     data, weights, groups = alongside(data=data, weights=weights, groups=groups)
@@ -93,18 +69,17 @@ def summarize_orientations(
     kept, rows = chosen_rows(points.numpy(), weights, groups, level)
     points, shares = torch.tensor(kept), rows.weights
     mean, images = _mean(space, points, torch.tensor(shares))
-    angles = np.degrees(misorientations(space, points, mean).numpy())
+    angles = np.degrees(space.misorientations(points, mean).numpy())
     order = np.argsort(angles)
     half = float(angles[order][np.searchsorted(np.cumsum(shares[order]), 0.5 - 1e-12)])
     written = space.from_chart(mean[None])[0]
-    found = OrientationSummary(
+    return OrientationSummary(
         len(points),
         tuple(float(v) for v in written),
         _cone(images, rows),
         float(shares @ angles),
         half,
     )
-    return found, _near(space, points, rows, near, within)
 
 
 def _mean(space: RotationSpace, points: Tensor, shares: Tensor) -> tuple[Tensor, Array]:
@@ -156,51 +131,3 @@ def _cone(images: Array, rows: WeighedRows) -> float | None:
     angle = half_angle(errors, rows)
     # the angle of a rotation is twice that of quaternions
     return math.degrees(2 * angle) if angle is not None and angle < math.pi / 4 else None
-
-
-def _near(
-    space: RotationSpace,
-    points: Tensor,
-    rows: WeighedRows,
-    near: Sequence[str] | None,
-    within: float,
-) -> list[NearSummary]:
-    """Return the shares of rows near ideal orientations."""
-    reach = math.radians(as_number(within, "within", above=0, most=60))
-    names = near_names(space, near)
-    even = space.uniform(2**14 if names else 1, torch.Generator().manual_seed(0))
-    count, square = rows.effective, tail(special.chdtri, 1, 1 - rows.level)
-    found: list[NearSummary] = []
-    for name in names:
-        variants = ideal_variants(name)
-        share = float(rows.mean(nearest(space, points, variants) <= reach))
-        middle = (share + square / (2 * count)) / (1 + square / count)
-        half = math.sqrt(square) / (1 + square / count)
-        half *= math.sqrt(share * (1 - share) / count + square / (4 * count * count))
-        by_chance = float((nearest(space, even, variants) <= reach).mean())
-        low, high = max(0.0, middle - half), min(1.0, middle + half)
-        found.append(NearSummary(name, share, low, high, by_chance))
-    return found
-
-
-def near_names(space: RotationSpace, near: Sequence[str] | None) -> list[str]:
-    """Return the names of ideal orientations that are asked for, by default those of cubic crystals."""
-    if near is None:
-        return list(ORIENTATIONS) if space.symmetry in ("T", "O") else []
-    names = [name.strip().casefold() for name in near]
-    for name in names:
-        if name not in ORIENTATIONS:
-            raise SettingError(f"{{near}} must be among {', '.join(ORIENTATIONS)}, got {name}")
-    if space.symmetry not in ("T", "O"):
-        raise SettingError("{near} names orientations of cubic crystals")
-    return names
-
-
-def ideal_variants(name: str) -> Tensor:
-    """Return an ideal orientation and its images in a rolled sheet (4, 4), unit quaternions."""
-    return torch.tensor((rotations_of("D2") * named_orientation(name)).as_quat())
-
-
-def nearest(space: RotationSpace, points: Tensor, variants: Tensor) -> Array:
-    """Return the angles (N,) in radians from orientations (N, 4) to the nearest of several (V, 4)."""
-    return np.min([misorientations(space, points, one).numpy() for one in variants], axis=0)

@@ -49,12 +49,6 @@ class WeighedRows:
         return len(self.weights) if self.groups is None else int(self.groups.max()) + 1
 
     @property
-    def effective(self) -> float:
-        """The effective number of rows or groups (Kish), by the squares of their shares."""
-        shares = self.sums(np.ones((len(self.weights), 1)))[:, 0]
-        return 1 / float(shares @ shares)
-
-    @property
     def alike(self) -> bool:
         """Whether rows are independent and count the same."""
         return self.groups is None and self.even

@@ -15,11 +15,6 @@ from .fitted import FittedFigures as FittedFigures
 from .partial import conditional as conditional
 from .partial import marginal as marginal
 from .shortest import shortest_intervals as shortest_intervals
-from .textures import fractions_near as fractions_near
-from .textures import misorientations as misorientations
-from .textures import pole_density as pole_density
-from .textures import rotations_only as rotations_only
-from .textures import texture_index as texture_index
 from .trends import Trend as Trend
 from .trends import cell_masses as cell_masses
 from .trends import cells as cells

@@ -212,24 +212,6 @@ class Density(WithFigures):
         """Return how many weighed draws count, as a share, where samples are chosen among such."""
         return 1.0
 
-    # Rotations and orientations: see orbiflow.density.inference.textures.
-
-    def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor | None:
-        """Return means (N,) over the rotations that take directions of the crystal to others (N, 3).
-
-        They are in multiples of the uniform density. None if they have no closed form.
-        """
-        del crystal, specimen
-        return None
-
-    def mean_product(self, other: Density) -> float | None:
-        """Return the mean of the product with another density, both in multiples of the uniform one.
-
-        It is under the uniform distribution; None if it has no closed form.
-        """
-        del other
-        return None
-
     # Saving and loading: see orbiflow.density.models.files.
 
     stored: ClassVar[tuple[str, ...]] = ()

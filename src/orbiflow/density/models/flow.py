@@ -226,14 +226,6 @@ class UniformDensity(Density, kind="uniform"):
         points, axes = in_order(points, axes)
         return UniformDensity(self.space.of_axes(axes)).log_chart(points.double())
 
-    def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor:
-        del crystal
-        return torch.ones(len(specimen), dtype=torch.float64)
-
-    def mean_product(self, other: Density) -> float:
-        del other
-        return 1.0
-
     def restricted(self, split: Split, space: Space) -> Restriction:
         given = 0.0
         if split.given and self.space.parts:

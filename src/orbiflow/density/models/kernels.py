@@ -15,9 +15,8 @@ from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.concentrations import moments
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted, in_order
-from orbiflow.density.models.rotation_kernels import RotationKernels
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
-from orbiflow.density.spaces import CHART, RotationSpace, Space, by_sphere
+from orbiflow.density.spaces import CHART, Space, by_sphere
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import fft, special
 
@@ -72,7 +71,6 @@ class AdaptiveKernels(Density, kind="kernels"):
             t.double() for t in (centers, concentrations, weights)
         )
         images = space.features(self.centers, slice(space.kernel_images))
-        self._center_features = images[0]
         features = images.flatten(0, 1).mT.contiguous()
         self._terms = _terms(space, features, self.concentrations, self.weights)
 
@@ -178,24 +176,6 @@ class AdaptiveKernels(Density, kind="kernels"):
         logs = torch.stack([terms.each(own.mT) for own in images])
         logs = by_sphere(logs, len(kappa)).logsumexp(dim=(0, 2))
         return logs + space.log_kernel_factor(points, CHART)[:, None]
-
-    def fibre_means(self, crystal: Tensor, specimen: Tensor) -> Tensor | None:
-        own = self._on_rotations()
-        return None if own is None else own.fibre_means(crystal, specimen)
-
-    def mean_product(self, other: Density) -> float | None:
-        own = self._on_rotations()
-        if own is None or not isinstance(other, AdaptiveKernels):
-            return None if own is None else other.mean_product(self)
-        others = other._on_rotations()
-        return None if others is None else own.mean_product(others)
-
-    def _on_rotations(self) -> RotationKernels | None:
-        """Return the kernels of a space of rotations, None on other spaces."""
-        if not isinstance(self.space, RotationSpace):
-            return None
-        kappa = self.concentrations[:, 0]
-        return RotationKernels(self.space, self._center_features, kappa, self.weights)
 
     def header(self) -> dict[str, Any]:
         if len(self.centers) > MOST_KERNELS:

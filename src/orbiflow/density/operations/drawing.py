@@ -100,8 +100,6 @@ def plot(
 
 
 def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
-    if isinstance(space, spaces.RotationSpace):
-        return f"pole figures, inverse pole figures and sections are written to {out}"
     if isinstance(space, spaces.ProductSpace):
         return (
             f"pictures of the {space.base.name}, of the columns beside it, and of one along the other "

@@ -17,7 +17,7 @@ from orbiflow.density.data import ROTATIONS
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import CountedRowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError, literal
-from orbiflow.settings import DefaultText, Ending, Option, Range, Settings, Unit
+from orbiflow.settings import DefaultText, Ending, Option, Range, Settings
 
 if TYPE_CHECKING:
     from orbiflow.density.tables import TableRows
@@ -34,13 +34,6 @@ class SummarySettings(Settings, group="Summary"):
 
     level: Annotated[float, Range(0.5, 0.999)] = 0.95
     """Level of the intervals and cones."""
-
-    near: Annotated[tuple[str, ...] | None, DefaultText("all of them for cubic crystals")] = None
-    """Ideal orientations, of cube, goss, brass, copper and s, of which the shares of rows near them are
-    told."""
-
-    within: Annotated[float, Range(above=0, most=60), Unit("degrees")] = 15.0
-    """Angle within which a row is near an ideal orientation."""
 
 
 @runtime.operation("density summary")
@@ -132,9 +125,7 @@ def _summarised(
     }  # fmt: skip
     if space in ROTATIONS:
         own: Any = space_of(where, rows.table.columns, unit)
-        how |= {"near": settings.near, "within": settings.within}
-        whole, near = orientations.summarize_orientations(own, values, **how)
-        return {"orientations": [asdict(whole)], "near": [asdict(one) for one in near]}
+        return {"orientations": [asdict(orientations.summarize_orientations(own, values, **how))]}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
         if space == "torus":
@@ -173,13 +164,7 @@ def _tables(found: dict[str, Any], level: float) -> list[runtime.Table]:
         lines = tuple(
             (str(words.get(key, key)), _shown(key, value)) for key, value in entry.items()
         )
-        near = tuple(
-            (one["name"], *(f"{100 * one[key]:.2f}" for key in ("share", "low", "high", "random")))
-            for one in found.get("near", ())
-        )
-        heads = ("near", "% of rows", f"from ({sure})", "to", "% of a random texture")
-        made = [runtime.Table(name.capitalize(), ("figure", "value"), lines)]
-        return [*made, runtime.Table("Ideal orientations", heads, near)] if near else made
+        return [runtime.Table(name.capitalize(), ("figure", "value"), lines)]
     of = dict(zip(TABLES, (found["columns"], found["columns"], found["correlations"]), strict=True))
     return [
         runtime.Table(
@@ -228,7 +213,7 @@ def _notes(found: dict[str, Any], rows: TableRows) -> list[str]:
     if (half := entries[0].get("half", 0.0)) > WIDE_DEGREES:
         notes.append(
             f"half of the rows are {half:.0f} degrees and more from the mean, which says little: "
-            "`density fit` and `density texture` find several orientations"
+            "`density fit` finds several orientations"
         )
     undetermined = [entry["name"] for entry in entries if entry.get("half_width", 0) is None]
     if undetermined:

@@ -33,13 +33,7 @@ from orbiflow.density.pictures.roses import rose_picture
 from orbiflow.density.pictures.series import along_of, series_picture
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import density_page
-from orbiflow.density.pictures.textures import (
-    check_texture,
-    inverse_picture,
-    poles_picture,
-    sections_picture,
-)
-from orbiflow.density.spaces import ProductSpace, RotationSpace, Space, check_measure
+from orbiflow.density.spaces import ProductSpace, Space, check_measure
 from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
@@ -58,8 +52,7 @@ THUMBNAIL = "thumbnail.png"
 
 PAGE = "surface.html"
 NAMES = ("density", "latlon", "square", "flow", "samples", "rose", "series", "beside")
-TEXTURE_NAMES = ("poles", "inverse", "sections")
-PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES + TEXTURE_NAMES), PAGE)
+PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
 """The files that a plot may write into a folder, and that go when another one is written there."""
 
 SAMPLES = 3000
@@ -225,22 +218,13 @@ class _Shown:
         generator = torch.Generator().manual_seed(settings.seed)
         self.samples = self.density.sample((settings.samples or SAMPLES,), generator)
         self.points = self.samples if self.data is None else self.data
-        has_map = space.is_round and not isinstance(space, RotationSpace)
-        self.map = chosen_map(space, self.points, settings) if has_map else None
+        self.map = chosen_map(space, self.points, settings) if space.is_round else None
         self.regions = region_lines(self.density, settings)
         self.flows = figures.carried_part(density)[1].is_carried
 
     def makers(self) -> Mapping[str, Callable[[], Picture]]:
         """Return functions that draw the figures, by the names of their files without the ending."""
         density, settings, data, samples = self.density, self.settings, self.data, self.samples
-        if isinstance(self.space, RotationSpace):
-            points = self.points if settings.dots else None
-            drawn = {
-                "poles": poles_picture,
-                "inverse": inverse_picture,
-                "sections": sections_picture,
-            }
-            return {name: partial(draw, density, points, settings) for name, draw in drawn.items()}
         if self.space.dim != 2:
             made = {"samples": partial(corner_picture, density, data, samples, settings)}
             if self.space.dim == 1 and not real_spans(self.space):
@@ -272,18 +256,17 @@ class _Shown:
 
 def _check_space(space: Space, settings: PlotSettings) -> None:
     """Check that a space can be drawn, and that settings fit it."""
+    if not space.has_chart:
+        raise OrbiflowError(
+            f"pictures are of angles, directions and axes, not of the {space.name}: draw columns of "
+            "`orbiflow density sample`; MTEX and orix draw pole figures of sampled orientations"
+        )
     if space.dim > MAX_COLUMNS:
         raise OrbiflowError(
             f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
             "columns of `orbiflow density sample` beside those of the data"
         )
     check_measure(settings.measure, space)
-    if isinstance(space, RotationSpace):
-        check_texture(space, settings)
-        return
-    for name in ("pole", "inverse", "sections", "lattice"):
-        if getattr(settings, name) is not None:
-            raise SettingError(f"{{{name}}} is of orientations, not of the {space.name}")
     view_of(space, settings.names, settings.center)
     if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
         name = "radius" if settings.projection == "auto" else "projection"

@@ -25,7 +25,6 @@ MAX_REGIONS = 4
 """Number of styles of lines that can be told apart."""
 
 MAPS, POINTS = Group("Maps"), Group("Points and regions")
-TEXTURES = Group("Textures")
 
 
 def read_center(text: str) -> tuple[float, ...]:
@@ -110,20 +109,6 @@ class PlotSettings(Settings, group="Figures"):
         tuple[float, ...] | None, DefaultText("six: even ones of a period, else by equal masses")
     ] = None
     """Values of that column."""
-
-    pole: Annotated[tuple[str, ...] | None, TEXTURES, DefaultText("planes of low indices")] = None
-    """Lattice planes of orientations, by Miller indices such as 001,1-11, whose pole figures are drawn;
-    four indices, such as 10-10, are of hexagonal crystals."""
-
-    inverse: Annotated[tuple[str, ...] | None, TEXTURES, DefaultText("x,y,z")] = None
-    """Directions of the specimen whose inverse pole figures are drawn: x, y, z, RD, TD, ND or three
-    numbers such as 110."""
-
-    sections: Annotated[tuple[float, ...] | None, TEXTURES, DefaultText("0,45,65")] = None
-    """Angles phi2, in degrees, at which sections through the space of Bunge's angles are drawn."""
-
-    lattice: Annotated[tuple[float, ...] | None, TEXTURES, DefaultText("not known")] = None
-    """Lengths a,b,c of the crystal's axes, for planes inclined to axes of different lengths."""
 
     regions: Annotated[tuple[Mass, ...] | None, POINTS] = None
     """Masses such as 0.5,0.9: lines are drawn around the smallest regions that hold them."""

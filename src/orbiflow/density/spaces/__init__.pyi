@@ -1,11 +1,3 @@
-from .crystals import HEXAGONAL as HEXAGONAL
-from .crystals import ORIENTATIONS as ORIENTATIONS
-from .crystals import Sector as Sector
-from .crystals import fundamental_sector as fundamental_sector
-from .crystals import indices_of as indices_of
-from .crystals import named_orientation as named_orientation
-from .crystals import plane_normal as plane_normal
-from .crystals import specimen_direction as specimen_direction
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
@@ -14,7 +6,6 @@ from .mixed import Line as Line
 from .mixed import MixedTorus as MixedTorus
 from .mixed import turns_at as turns_at
 from .patches import to_klein as to_klein
-from .point_groups import international_name as international_name
 from .point_groups import rotation_group_name as rotation_group_name
 from .point_groups import rotations_of as rotations_of
 from .product import ProductSpace as ProductSpace

@@ -33,7 +33,6 @@ Axes of the highest order are along z, and those of order two of D2 to D6 along 
 another axis: C2x and C2y have theirs along x and y, D3y has one along y and none along x.
 """
 
-_FIRST = {name: words.split()[0] for name, words in NAMES.items()}
 _KNOWN = {word.casefold(): name for name, words in NAMES.items() for word in (name, *words.split())}
 _MONOCLINIC = frozenset({"2", "m", "2/m", "cs", "c2h", "monoclinic"})
 
@@ -66,15 +65,6 @@ def rotation_group_name(name: str, what: str = "symmetry") -> str:
             f"got {literal(repr(name))}"
         )
     return _KNOWN[word]
-
-
-def international_name(name: str) -> str:
-    """Return what crystallographers call a rotation group of `rotation_group_name`.
-
-    >>> international_name("O"), international_name("C2y")
-    ('432', '121')
-    """
-    return _FIRST[name]
 
 
 def rotations_of(name: str) -> Rotation:

@@ -20,6 +20,7 @@ from orbiflow.density.spaces.round import UNIT_TOLERANCE, refuse_rows, to_unit
 from orbiflow.density.spaces.space import checked_table
 from orbiflow.density.spaces.unit_vectors import UnitVectorSpace
 from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.typed_torch import linalg
 
 FORMS: dict[str, tuple[str, ...]] = {
     "quaternion": ("x", "y", "z", "w"),
@@ -179,6 +180,17 @@ class RotationSpace(UnitVectorSpace):
             raise OrbiflowError("gradients of rotations need unit quaternions: convert the rows")
         own = super().data_gradient(data, points, gradient)
         return np.roll(self._signed(own), self._first, axis=1)
+
+    def misorientations(self, points: Tensor, reference: Tensor) -> Tensor:
+        """Return the angles (N,) in radians between orientations (N, 4) and one (4,).
+
+        Of all rotations that take one of the images to the other, they are the smallest.
+        """
+        images, points = self.features(reference[None].double())[:, 0], points.double()
+        near = images[(images @ points.mT).argmax(dim=0)]
+        # half the chord is the sine of a quarter of the angle: an arc cosine would lose small ones
+        chord = linalg.vector_norm(points - near, dim=1)
+        return 4 * torch.asin((chord / 2).clamp_max(1))
 
     def step_angle(self, step: float) -> float:
         return 2 * math.pi * step / self.period
