@@ -170,7 +170,6 @@ def bring_files(folder: Path) -> None:
     for name, shape in (("bird", "seal"), ("dolphin", "shark")):
         shutil.copy(ROOT / f"docs/gallery/drawings/{shape}.svg", folder / f"{name}.svg")
     (folder / "coast.geojson").write_text(json.dumps(COAST))
-    np.save(folder / "patches.npy", np.random.default_rng(0).normal(size=(ROWS, 9)))
     for name, columns in COLUMNS.items():
         write_table(folder / f"{name}.csv", columns)
 

@@ -54,7 +54,7 @@ TOPICS = {
         "DensityEstimator ConditionalEstimator AngleRegressor read_density density_to_bytes "
         "Density Mixture FlowDensity AdaptiveKernels VonMisesChains VonMisesNetwork Space make_space "
         "QuotientSpace RotationSpace UnitVectorSpace conditional marginal log_density_gradient "
-        "highest_density_region DensityLevels outlines to_klein "
+        "highest_density_region DensityLevels outlines "
     ),
     "Comparing densities, and data": (
         "compare_models compare_scores compare_samples named_tests ComparisonSettings cross_validate "

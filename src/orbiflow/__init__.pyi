@@ -32,7 +32,6 @@ from .density.pictures.settings import PlotSettings as PlotSettings
 from .density.regions.boundaries import outlines as outlines
 from .density.regions.levels import DensityLevels as DensityLevels
 from .density.regions.levels import highest_density_region as highest_density_region
-from .density.spaces.patches import to_klein as to_klein
 from .density.spaces.quotient import QuotientSpace as QuotientSpace
 from .density.spaces.rotations import RotationSpace as RotationSpace
 from .density.spaces.space import Space as Space

@@ -21,7 +21,6 @@ OPERATIONS = {
     "density compare": "orbiflow.density.operations.comparison:compare",
     "density region": "orbiflow.density.operations.drawing:region",
     "density cv": "orbiflow.density.cross_validation.operations:cross_validate",
-    "density patches": "orbiflow.density.operations.drawing:patches",
     "density batch": "orbiflow.density.operations.fitting:batch",
     "studio": "orbiflow.studio.operations:studio",
 }

@@ -102,8 +102,6 @@ MISTAKES = {
     "density region -m X --samples 3": "--samples 1000",
     "density region -m X --mass 0.99999 --samples 20000": "--samples 1000000",
     "density region -m X -o r.txt": "--out .geojson .json .csv",
-    "density patches X --farthest -1": "--farthest 0",
-    "density patches X --unit degree": "--unit degrees",
 }
 
 

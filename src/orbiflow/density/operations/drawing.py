@@ -1,4 +1,4 @@
-"""Operations on a fitted density and on image patches: pictures, regions, angles of patches."""
+"""Operations on a fitted density: pictures and regions."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from orbiflow import runtime
 from orbiflow.density import pictures, regions, spaces, tables
-from orbiflow.density.data import Unit
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
 from orbiflow.density.run_folder import write_file
-from orbiflow.density.tables import TableSettings, check_table_name
-from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.settings import DefaultText, Option, Range
+from orbiflow.density.tables import TableSettings
+from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import DefaultText, Option
 
 if TYPE_CHECKING:
     from orbiflow.density.regions import DensityRegion, Outline
@@ -23,9 +22,6 @@ if TYPE_CHECKING:
 
 Model = Annotated[Path, Option("-m")]
 """The parameter of a fitted density."""
-
-PATCH_WIDTHS = (8, 9)
-"""Columns of image patches."""
 
 
 def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
@@ -239,54 +235,3 @@ def _percentage(share: float) -> str:
 
 def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
-
-
-@runtime.operation("density patches")
-def patches(
-    data: Path,
-    table: TableSettings = TableSettings(),
-    *,
-    out: Annotated[Path, Option("-o")] = Path("angles.csv"),
-    unit: Unit = "radians",
-    farthest: Annotated[float | None, Range(0), DefaultText("all are kept")] = None,
-    on_event: runtime.Sink = runtime.ignore,
-    cancel: runtime.Cancel = runtime.Cancel(),
-) -> runtime.Outcome:
-    """Turn image patches into theta,phi on the Klein bottle, for `fit --space klein-bottle`.
-
-    Distances are between patches of mean 0 and contrast 1.
-
-    Args:
-        data: Table of 9 pixel values a row, from the top left, or 8 DCT coordinates.
-        out: CSV of theta, phi and distance.
-        unit: Unit of theta and phi.
-        farthest: Largest distance from the Klein bottle, 0 to 1.41, of the patches that are kept.
-    """
-    import numpy as np
-
-    check_table_name(out)
-    runtime.check_output_file(out, data)
-    found = tables.read_rows(data, table, on_event).table
-    width = len(found.columns)
-    if width not in PATCH_WIDTHS:
-        raise SettingError(
-            f"{literal(str(data))}: a patch has 9 pixel values or 8 DCT coordinates, and there "
-            f"{'is' if width == 1 else 'are'} {_counted(width, 'column')} "
-            f"({literal(tables.listing(found.columns))}): choose with {{columns}}"
-        )
-    with runtime.one_thread():
-        angles, distances = spaces.to_klein(found.values, unit=unit)
-    near = distances <= (np.inf if farthest is None else farthest)
-    if not near.any():  # a table has a row at least
-        raise OrbiflowError(
-            f"none of {len(near)} patches is within {farthest:g} of the Klein bottle; the nearest is "
-            f"{distances.min():.3f} away"
-        )
-    kept = np.column_stack([angles, distances])[near]
-    cancel.check()
-    left_out = int((~near).sum())
-    left = f", {left_out} farther ones left out" if left_out else ""
-    half = f"half of them within {np.median(kept[:, 2]):.3f} of the Klein bottle{left}"
-    content = tables.to_csv(("theta", "phi", "distance"), kept)
-    write_file(out, content, on_event, f"{len(kept)} patches, {half}; written to {out}")
-    return runtime.Outcome({"file": str(out), "rows": len(kept), "left_out": left_out})

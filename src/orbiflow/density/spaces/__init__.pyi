@@ -5,7 +5,6 @@ from .frame import Frame as Frame
 from .mixed import Line as Line
 from .mixed import MixedTorus as MixedTorus
 from .mixed import turns_at as turns_at
-from .patches import to_klein as to_klein
 from .point_groups import rotation_group_name as rotation_group_name
 from .point_groups import rotations_of as rotations_of
 from .product import ProductSpace as ProductSpace

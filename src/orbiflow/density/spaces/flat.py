@@ -154,7 +154,8 @@ class KleinBottle(_AngleSpace):
 
     These are the coordinates of 3 x 3 image patches cos(phi) l(theta) + sin(phi) q(theta), with l a
     linear and q a quadratic gradient across direction theta (Carlsson, Ishkhanov, de Silva and
-    Zomorodian, On the local behavior of spaces of natural images, 2008; see `patches`).
+    Zomorodian, On the local behavior of spaces of natural images, 2008;
+    `docs/examples/image-patches.md` finds them).
 
     In the chart x = (phi + pi/2) / 2 pi and y = theta / pi, so (x, y) ~ (1 - x, y + 1).
 
