@@ -13,7 +13,6 @@ likelihood, for each angle by itself. Of simulated rows the truth is known.
 from __future__ import annotations
 
 import argparse
-import copy
 import csv
 import math
 import time
@@ -25,6 +24,7 @@ import numpy as np
 import torch
 from common import DATA, needed
 from density_data import Data, dequantised, residues, rna, rna_structures, sidechains
+from rivals import trained
 from scipy import optimize, special, stats
 
 from orbiflow.density import ConditionalEstimator
@@ -192,36 +192,7 @@ def linear_circular(angles: Data, x: Data, unseen: Data, at: Data) -> Data:
     return total
 
 
-EPOCHS, PATIENCE, BATCH, RATE = 400, 40, 512, 1e-3
-HIDDEN, TRANSFORMS = (128, 128), 3
-
-
-def spline_flow(train: Data, held: Data, contexts: tuple[Data, Data], device: str) -> Any:
-    """A neural circular spline flow, trained until `held` grows no likelier."""
-    import zuko  # pyright: ignore[reportMissingImports]
-
-    torch.manual_seed(0)
-    how: dict[str, Any] = {"transforms": TRANSFORMS, "hidden_features": HIDDEN}
-    flow: Any = zuko.flows.NCSF(train.shape[1], context=contexts[0].shape[1], **how).to(device)
-    rows, seen, at, at_held = (
-        torch.tensor(own, dtype=torch.float32, device=device) for own in (train, held, *contexts)
-    )
-    optimizer = torch.optim.Adam(flow.parameters(), RATE)
-    best, kept, waited = math.inf, copy.deepcopy(flow.state_dict()), 0
-    for _ in range(EPOCHS):
-        for batch in torch.split(torch.randperm(len(rows), device=device), BATCH):
-            loss = -flow(at[batch]).log_prob(rows[batch]).mean()
-            optimizer.zero_grad()
-            loss.backward()
-            optimizer.step()
-        with torch.no_grad():
-            now = float(-flow(at_held).log_prob(seen).mean())
-        if now < best - 1e-4:
-            best, kept, waited = now, copy.deepcopy(flow.state_dict()), 0
-        elif (waited := waited + 1) >= PATIENCE:
-            break
-    flow.load_state_dict(kept)
-    return flow
+HIDDEN = (128, 128)
 
 
 def rival(rows: Rows, train: Any, x: Data, test: Any, device: str) -> Data:
@@ -230,11 +201,18 @@ def rival(rows: Rows, train: Any, x: Data, test: Any, device: str) -> Data:
     held = np.random.default_rng(1).permutation(len(train)) % 9 == 0
     if rows.group is not None:
         held = _apart(rows.group[train], 1 / 9)
-    fit, apart = train[~held], train[held]
-    flow = spline_flow(turned[fit], turned[apart], (x[fit], x[apart]), device)
-    with torch.no_grad():
-        own, at = (torch.tensor(a[test], dtype=torch.float32, device=device) for a in (turned, x))
-        return flow(at).log_prob(own).double().cpu().numpy()
+    import zuko  # pyright: ignore[reportMissingImports]
+
+    torch.manual_seed(0)
+    flow: Any = zuko.flows.NCSF(turned.shape[1], context=x.shape[1], hidden_features=HIDDEN)
+    # a row has its angles first, then what is known
+    both, width = np.column_stack([turned, x]), turned.shape[1]
+    log = trained(
+        flow,
+        lambda own: flow(own[:, width:]).log_prob(own[:, :width]),
+        *(both[train[~held]], both[train[held]], device),
+    )
+    return log(both[test])
 
 
 def compare(names: list[str], device: str) -> None:

@@ -181,15 +181,6 @@ def backbone_windows(dim: int) -> Drawn:
     return Drawn(dequantised(np.array(rows)), "torus", group=np.array(group))
 
 
-def poles() -> Data:
-    """Virtual geomagnetic poles (N, 2), lat and lon in degrees: of both polarities, so axes."""
-    lines = _file("rp2/dsdp522_sites_with_vgps.txt", "the magnetic poles").read_text().splitlines()
-    header = lines[1].split("\t")
-    at = [header.index("vgp_lat"), header.index("vgp_lon")]
-    rows = [line.split("\t") for line in lines[2:]]
-    return np.array([[float(row[i]) for i in at] for row in rows if all(row[i] for i in at)])
-
-
 def splits(data: Data, count: int = 5, *, grouped: bool = False) -> list[tuple[Data, Data, Data]]:
     """Random 80/10/10 splits; `grouped` keeps equal rows together."""
     found = []

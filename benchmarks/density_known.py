@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from common import ROOT
 from density_data import Data, Drawn
+from scipy.spatial.transform import Rotation
 from scipy.special import ive, logsumexp
 
 from orbiflow.density import to_latlon, to_vectors
@@ -19,9 +19,6 @@ BUNDLED = ROOT / "examples" / "density"
 
 COUNT = 10_000
 """Points of a synthetic set."""
-
-KLEIN = ("patches", "three-circles")
-AXES = ("poles", "three-axes")
 
 CIRCLES = np.array(
     [  # weight, mean and standard deviation of theta, of phi; inf: uniform
@@ -166,21 +163,36 @@ def hidden_markov_chain(dim: int) -> Drawn:
     return Drawn(data, "torus", log_density)
 
 
-def surface(name: str, space: str) -> Drawn:
-    """A set of the benchmark on unoriented surfaces."""
-    truth = known(name)
-    return Drawn(unoriented(name)[:5_000], space, truth.log_density if truth else None)
+def turned(components: int, count: int) -> Drawn:
+    """Rotations (unit quaternions), and their log density in multiples of the uniform one.
+
+    Wrapped normal distributions whose means are uniform and whose precisions are Gamma(100), as in De
+    Bortoli et al., Riemannian score-based generative modelling (2022).
+    """
+    rng = np.random.default_rng(components)
+    means = Rotation.random(components, rng=rng)
+    deviations = rng.gamma(100, 1, components) ** -0.5
+    chosen = rng.integers(components, size=count)
+    steps = rng.normal(size=(count, 3)) * deviations[chosen, None]
+
+    def log_density(rows: Data) -> Data:
+        terms = []
+        for mean, deviation in zip(means, deviations, strict=True):
+            angle = (mean.inv() * Rotation.from_quat(rows)).magnitude()
+            # a step of a whole turn more is 60 deviations long
+            own = -((angle / deviation) ** 2) / 2 - 3 * np.log(deviation * np.sqrt(2 * np.pi))
+            # the volume of steps over that of rotations, 8 pi^2 in all
+            terms.append(own + np.log(8 * np.pi**2) - 2 * np.log(np.sinc(angle / 2 / np.pi)))
+        return np.asarray(logsumexp(terms, axis=0)) - np.log(components)
+
+    rows = (means[chosen] * Rotation.from_rotvec(steps)).as_quat()
+    return Drawn(rows, "rotation-space", log_density)
 
 
-class Known(NamedTuple):
-    """A density that is known: its entropy in nats, and how to evaluate it."""
-
-    entropy: float
-    name: str
-
-    def log_density(self, data: Data) -> Data:
-        """Log densities (N,), per radian^2 of theta, phi or per steradian."""
-        return _log_circles(data) if self.name == "three-circles" else _log_axes(data)
+def surface(name: str, space: str, count: int = 5_000) -> Drawn:
+    """A set of the benchmark on unoriented surfaces, and its log density where that is known."""
+    truth = {"three-circles": _log_circles, "three-axes": _log_axes}.get(name)
+    return Drawn(unoriented(name)[:count], space, truth)
 
 
 def unoriented(name: str) -> Data:
@@ -193,25 +205,6 @@ def unoriented(name: str) -> Data:
             return _draw_circles()
         case _:
             return _draw_axes()
-
-
-def known(name: str) -> Known | None:
-    """The true density of a synthetic set, with its entropy by quadrature."""
-    if name == "three-circles":
-        t = (np.arange(800) + 0.5) * math.pi / 800
-        grid = np.stack(np.meshgrid(t, 2 * t, indexing="ij"), axis=-1).reshape(-1, 2)
-        log, area = _log_circles(grid), np.full(len(grid), 2 * (math.pi / 800) ** 2)
-    elif name == "three-axes":
-        nodes, weights = np.polynomial.legendre.leggauss(800)
-        lon = np.arange(800) * 0.225  # half the sphere is all axes
-        lat = np.degrees(np.arcsin(nodes))
-        grid = np.stack(np.meshgrid(lat, lon, indexing="ij"), axis=-1).reshape(-1, 2)
-        log, area = _log_axes(grid.astype(np.float64)), np.repeat(weights, 800) * math.pi / 800
-    else:
-        return None
-    mass = float((np.exp(log) * area).sum())
-    assert abs(mass - 1) < 1e-6, (name, mass)
-    return Known(-float((np.exp(log) * log * area).sum()), name)
 
 
 def _draw_circles() -> Data:

@@ -6,9 +6,8 @@ table: ours on each data set, random 90/10 splits and grouped ones (equal locati
 RNA structures), with the integral of every density by quadrature (density_integral.py), and the
 published figures. narrow: test NLL of a tuned kernel estimate with ever narrower kernels added, on
 both kinds of split. entropy: what an estimate by nearest neighbours says of the data's entropy, and
-of that of as many draws from our density, whose entropy is known. scheme: the published evaluation
-of kinetic diffusions on a density that is known (density_limits.py). Needs the tables of
-docs/benchmarks.md, scheme nothing.
+of that of as many draws from our density, whose entropy is known. Needs the tables of
+docs/benchmarks.md.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from common import published
 from density_data import EARTH, TORI, Data, Drawn, backbone_and_chains, earth, rna_angles
 from density_default import halves
 from density_integral import Integral, integral
-from density_limits import excess, mass, neighbour_entropy, with_narrow
+from density_limits import neighbour_entropy, with_narrow
 from numpy.typing import NDArray
 
 from orbiflow.density import DensityEstimator, Mixture
@@ -159,23 +158,7 @@ def entropy(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> 
             print(f"{name:9}{len(drawn.data):8}{cells}", flush=True)
 
 
-def scheme(_count: int, _pool: ProcessPoolExecutor, _names: tuple[str, ...]) -> None:
-    """Print how far the published evaluation is off, by the width of the density and its steps."""
-    degrees = (1, 2, 4, 8, 16, 40)
-    print("estimated less true NLL of one angle, wrapped normal, exact score; mass of the estimate")
-    print(f"{'T':>4}{'t0':>8}{'steps':>7}" + "".join(f"{d:>11} deg" for d in degrees))
-    for end, start in ((15.0, 1e-2), (2.0, 1e-4)):
-        for steps in (100, 300, 1000):
-            cells = []
-            for d in degrees:
-                width = math.radians(d)
-                off = excess(width, steps, rows=4_000, end=end, start=start)
-                cells.append(f"{off:+8.3f} {mass(width, steps, end=end, start=start):6.3f}")
-            print(f"{end:4g}{start:8g}{steps:7}" + "".join(f"{c:>15}" for c in cells), flush=True)
-
-
 PARTS: dict[str, Callable[[int, ProcessPoolExecutor, tuple[str, ...]], None]] = {
-    "scheme": scheme,
     "narrow": narrow,
     "entropy": entropy,
     "table": table,
@@ -195,6 +178,8 @@ def main() -> None:
         parser.error(f"no such part: {', '.join(sorted(unknown))}")
     names = ("proline",) if options.quick else tuple(options.data)
     parts = options.parts or (["narrow", "table"] if options.quick else list(PARTS))
+    for name in names:
+        load(name)  # what is missing is said here, once
     with ProcessPoolExecutor(options.workers) as pool:
         for part in parts:
             PARTS[part](1 if options.quick else options.splits, pool, names)

@@ -3,32 +3,21 @@
     python benchmarks/density_speed.py [--rows N ...] [--points N] [--quick] [SPACE ...]
 
 Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time, and by the clock on
-all cores that `taskset` leaves. Then evaluations a second of processor time, side by side in one run
-(exact ones also in seconds by the clock, all points together):
+all cores that `taskset` leaves. Then evaluations a second of processor time, side by side in one run:
 of `log_prob`; of its gradient in the points; and of all kernels for all points. Off: the largest
 difference in nats of the exact one to that of all kernels, which knows the narrowest ones to 1e-9.
---components: of the density, such as kernels. --search: `GridSearchCV` over five settings of 2,000
-points in five folds. --commands: instead of the table, what a user types, `orbiflow density fit`, for
-10,000 rows of two angles and a length and for a million places on the sphere, start included: seconds
-by the clock, of processor time, and the most memory.
+--components: of the density, such as kernels.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-import os
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
-from density_mixed import SETS
 from numpy.typing import NDArray
 
 from orbiflow.density import AdaptiveKernels, DensityEstimator, Mixture, log_density_gradient
@@ -38,17 +27,6 @@ from orbiflow.density.models.sums import BLOCK_ENTRIES
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane", "three angles")
 DENSE = 2_000
 """Points at which all kernels are summed."""
-
-
-class Speed(NamedTuple):
-    """Of one evaluation: processor seconds, the points, and seconds by the clock."""
-
-    seconds: float
-    points: int
-    wall: float
-
-    def __str__(self) -> str:
-        return f"{self.points / self.seconds:12,.0f}"
 
 
 def clustered(space: str, rows: int, seed: int = 0) -> NDArray[np.float64]:
@@ -65,11 +43,11 @@ def clustered(space: str, rows: int, seed: int = 0) -> NDArray[np.float64]:
     return data / np.linalg.norm(data, axis=1, keepdims=True) if round_ else data
 
 
-def timed(function: Callable[[], torch.Tensor], points: int) -> tuple[torch.Tensor, Speed]:
-    """What it returns and how long it takes."""
-    begin, wall = time.process_time(), time.perf_counter()
+def timed(function: Callable[[], torch.Tensor], points: int) -> tuple[torch.Tensor, float]:
+    """What it returns, and the points a second of processor time."""
+    begin = time.process_time()
     found = function()
-    return found, Speed(time.process_time() - begin, points, time.perf_counter() - wall)
+    return found, points / (time.process_time() - begin)
 
 
 def dense(density: Mixture, points: torch.Tensor) -> torch.Tensor:
@@ -115,68 +93,9 @@ def line(space: str, rows: int, points: int, parts: str) -> str:
     chart = density.space.from_chart(drawn[:few])
     _, of_slope = timed(lambda: torch.tensor(log_density_gradient(density, chart)[0]), few)
     return (
-        f"{space:18}{rows:8,}{fit:9.1f}{wall:9.1f}{kernel_count(density):10,}{of_exact}"
-        f"{of_exact.wall:9.1f}{of_slope}"
-        f"{of_dense}{off:10.1e}"
+        f"{space:18}{rows:8,}{fit:9.1f}{wall:9.1f}{kernel_count(density):10,}"
+        f"{of_exact:12,.0f}{of_slope:12,.0f}{of_dense:12,.0f}{off:10.1e}"
     )
-
-
-def search() -> str:
-    """A search over five settings."""
-    from sklearn.model_selection import GridSearchCV
-
-    begin, wall = time.process_time(), time.perf_counter()
-    settings = ["auto", "kernels", "mixture", "kernels,mixture", "flow,kernels"]
-    found = GridSearchCV(DensityEstimator("torus", unit="radians"), {"components": settings}, cv=5)
-    found.fit(clustered("torus", 2_000))
-    return (
-        f"GridSearchCV, 5 settings of 2,000 points, 26 fits on one core: "
-        f"{time.process_time() - begin:.0f} s of processor time, {time.perf_counter() - wall:.0f} s"
-    )
-
-
-def arcs(rows: int) -> NDArray[np.float64]:
-    """Unit vectors (N, 3) along sixty arcs, within a quarter of a degree or a degree: like faults."""
-    rng = np.random.default_rng(1)
-    ends = np.linalg.qr(rng.normal(size=(60, 3, 2)))[0]
-    which, along = rng.integers(60, size=rows), rng.uniform(0, 1.2, rows)
-    middles = (
-        ends[which, :, 0] * np.cos(along)[:, None] + ends[which, :, 1] * np.sin(along)[:, None]
-    )
-    data = middles + rng.choice([0.004, 0.02], rows)[:, None] * rng.normal(size=(rows, 3))
-    return data / np.linalg.norm(data, axis=1, keepdims=True)
-
-
-def commands(scale: float) -> None:
-    """Print what the command takes for tables of so many rows, in the sizes that the docs promise."""
-    mixed, many = int(10_000 * scale), int(1_000_000 * scale)
-    rng = np.random.default_rng(0)
-    tables = (
-        (
-            "phi,psi,length",
-            SETS["backbone"].draw(mixed, rng),
-            "torus --unit radians --linear length",
-        ),
-        ("x,y,z", clustered("sphere", many), "sphere"),
-        ("x,y,z", arcs(many), "sphere"),
-    )
-    print(f"{'columns':18}{'rows':>10}{'wall, s':>10}{'processor, s':>14}{'memory, GB':>12}")
-    with tempfile.TemporaryDirectory() as folder:
-        for columns, rows, options in tables:
-            table = Path(folder, "table.csv")
-            np.savetxt(table, rows, "%.6f", ",", header=columns, comments="")
-            call = [sys.executable, "-m", "orbiflow", "density", "fit", str(table), "--space"]
-            call += [*options.split(), "--columns", columns, "--out", str(Path(folder, "fit"))]
-            begin = time.perf_counter()
-            process = subprocess.Popen(call, stdout=subprocess.DEVNULL)
-            _, status, used = os.wait4(process.pid, 0)  # with its workers, once they have ended
-            wall, seconds = time.perf_counter() - begin, used.ru_utime + used.ru_stime
-            if status:
-                raise SystemExit(f"{' '.join(call)} ended with {os.waitstatus_to_exitcode(status)}")
-            memory = used.ru_maxrss * 1024 / 1e9
-            print(
-                f"{columns:18}{len(rows):10,}{wall:10.1f}{seconds:14.1f}{memory:12.2f}", flush=True
-            )
 
 
 def main() -> None:
@@ -186,26 +105,19 @@ def main() -> None:
     parser.add_argument("--rows", type=int, nargs="+", default=[1_000, 10_000])
     parser.add_argument("--points", type=int, default=1_000_000, help="evaluated")
     parser.add_argument("--components", default="auto")
-    parser.add_argument("--search", action="store_true", help="a grid search, too")
-    parser.add_argument("--commands", action="store_true", help="what a user types, instead")
     parser.add_argument("--quick", action="store_true", help="one small fit")
     options = parser.parse_args()
-    if options.commands:
-        commands(0.03 if options.quick else 1)
-        return
     torch.set_num_threads(1)
     rows = [300] if options.quick else options.rows
     spaces = ["torus"] if options.quick else options.spaces or SPACES
     points = 5_000 if options.quick else options.points
     print(
         f"{'space':18}{'rows':>8}{'fit, s':>9}{'wall, s':>9}{'kernels':>10}{'exact, 1/s':>12}"
-        f"{'wall, s':>9}{'slope, 1/s':>12}{'dense, 1/s':>12}{'off':>10}"
+        f"{'slope, 1/s':>12}{'dense, 1/s':>12}{'off':>10}"
     )
     for count in rows:
         for space in spaces:
             print(line(space, count, points, options.components), flush=True)
-    if options.search:
-        print(search())
 
 
 if __name__ == "__main__":

@@ -42,9 +42,6 @@ TRIES = 8
 
 CELL, HEAD, BLUE = 300, 36, "#1f5fbf"  # pixels
 
-BARS = {"arap": 2 / 3, "trial": 2 / 3, "est": 3 / 4, "overlap": 3 / 4, BEFORE: 3 / 5}
-"""Shares of rows in which likeness is meant to be preferred."""
-
 INSTRUCTIONS = """\
 # What you are asked
 
@@ -235,20 +232,16 @@ def score(options: argparse.Namespace) -> None:
         print(f"{method:14}" + "".join(_share(rows, method, other) for other in methods))
     print()
     if "likeness" in methods:
-        _print_bars(named)
+        _print_likeness(named)
 
 
-def _print_bars(named: list[tuple[str, dict[str, float]]]) -> None:
+def _print_likeness(named: list[tuple[str, dict[str, float]]]) -> None:
     """Print in how many rows likeness is preferred, and to ARAP, EST or one of them by silhouettes."""
     rows = [row for _, row in named]
-    for other, bar in BARS.items():
+    for other in COLUMNS:
         wins, count = preferred(rows, "likeness", other)
-        if count:
-            met = "met" if wins >= bar * count - 1e-9 else "not met"
-            print(
-                f"likeness preferred to {other:8}{wins:5g} of {count}"
-                f"  ({wins / count:4.0%}; bar {bar:.0%}: {met})"
-            )
+        if count and other != "likeness":
+            print(f"likeness preferred to {other:8}{wins:5g} of {count}  ({wins / count:4.0%})")
     parts = {name: shape["part"] for name, shape in silhouettes().items()}
     groups = {"all": lambda _: True, "the nine goals": GOALS.__contains__}
     groups |= {"others": lambda name: name not in GOALS}

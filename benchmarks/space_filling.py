@@ -5,7 +5,7 @@
 
 A row of a search is of the first solid: how much it looks like the figure, how many of a million points
 of a grid are in no copy or in several, and whether a copy with the gap of a print
-leaves a stack by a straight move. Memory is the peak of all processes, in MB. With --out
+leaves a stack by a straight move. With --out
 the sheet of each first solid is written into a folder, and solids.png, the solids alone, for people to
 name.
 
@@ -22,7 +22,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from memory import peak_memory
 from PIL import Image, ImageDraw
 
 from orbiflow.drawing import ShadedPart, View, draw_solids, font
@@ -96,13 +95,11 @@ def _cost(goal: Goal, body: Body, family: GroupFamily) -> float:
 def _searches(files: list[Path], settings: FillSettings, out: Path | None) -> None:
     print(
         "solid       group      score overlap shadows kept smooth bent  missed  leaves  found  seconds"
-        "  memory"
     )
     best = list[EscherSolid]()
     for file in files:
         begin = time.perf_counter()
-        with peak_memory() as peak:
-            found = fill(read_mesh(file).mesh, settings.replace(up=usual_up(file)), name=file.stem)
+        found = fill(read_mesh(file).mesh, settings.replace(up=usual_up(file)), name=file.stem)
         seconds = time.perf_counter() - begin
         if not found:
             print(f"{file.stem[:11]:11} nothing found {seconds:60.0f}", flush=True)
@@ -113,7 +110,7 @@ def _searches(files: list[Path], settings: FillSettings, out: Path | None) -> No
         pieces = pieces_with_gap(found[0].group, found[0].tile)
         leaves = pieces.leaving_stack(found[0].group.linear_parts if settings.separable else None)
         free = "yes" if leaves.is_free else f"{100 * leaves.blocked:.1f} %"
-        row += f"  {missed(found[0]):6} {free:>7} {len(found):6} {seconds:8.0f} {peak[0]:7.0f}"
+        row += f"  {missed(found[0]):6} {free:>7} {len(found):6} {seconds:8.0f}"
         print(row, flush=True)
         best.append(found[0])
     if out is not None:

@@ -83,34 +83,6 @@ def test_entropy_by_neighbours(module) -> None:
     assert found == pytest.approx(2 * math.log(2 * math.pi), abs=0.05)
 
 
-def test_the_score_of_the_kinetic_diffusion(module) -> None:
-    momentum = module("density_limits")
-    rng = np.random.default_rng(3)
-    angle, velocity = rng.uniform(-3, 3, 50), rng.normal(size=50)
-
-    def log_density(xi: np.ndarray) -> np.ndarray:  # two dimensions, by their covariance
-        left = 1 - math.exp(-0.7)
-        covariance = np.array([[0.04 + 2 * (0.7 - left), left], [left, 1.0]])
-        lifted = np.stack(np.broadcast_arrays(angle + momentum.TURNS, xi[None]), axis=-1)
-        form = np.einsum("kni,ij,knj->kn", lifted, np.linalg.inv(covariance), lifted)
-        return np.logaddexp.reduce(-form / 2, axis=0)
-
-    mean, slope = momentum.score(0.7, angle, velocity, 0.2)
-    h = 1e-4
-    below, at, above = (log_density(velocity + k * h) for k in (-1, 0, 1))
-    assert mean == pytest.approx((above - below) / (2 * h), abs=1e-5)
-    assert slope == pytest.approx((above - 2 * at + below) / h**2, abs=1e-4)
-
-
-def test_the_published_evaluation_is_off_and_less_so_with_steps(module) -> None:
-    momentum = module("density_limits")
-    time = {"end": 15.0, "start": 1e-2}
-    few, many = (momentum.excess(0.1, n, rows=1_000, **time) for n in (100, 1_000))
-    assert few < -0.2
-    assert few < many < -0.01
-    assert momentum.mass(0.1, 100, draws=20, **time) > 1.2
-
-
 @pytest.mark.parametrize("dim", [2, 4])
 def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
     quick_fits(monkeypatch)

@@ -14,7 +14,7 @@ from orbiflow.tiles import signed_area
 ROOT = Path(__file__).parents[2]
 BENCHMARKS = ROOT / "benchmarks"
 WANTING = {
-    "density_nll.py": "the Top500 backbones",
+    "density_record.py": "the Top500 backbones",
     "escherization.py": "the paper's distorted PNGs",
 }
 
@@ -58,7 +58,7 @@ def test_the_best_similarity_undoes_one(common) -> None:
 def test_what_is_missing_is_said_in_one_line(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--distorted"] if name == "escherization.py" else []
+    arguments = ["--distorted"] if name == "escherization.py" else ["narrow", "--data", "proline"]
     monkeypatch.setenv("ORBIFLOW_DATA", str(tmp_path))
     monkeypatch.setattr(sys, "argv", [str(BENCHMARKS / name), *arguments])
     monkeypatch.syspath_prepend(str(BENCHMARKS))
@@ -79,6 +79,6 @@ def test_what_is_missing_is_said_in_one_line(
 def test_the_page_names_every_benchmark() -> None:
     page = (ROOT / "docs" / "benchmarks.md").read_text()
     helpers = {"common", "density_data", "density_integral", "density_kde", "density_known"}
-    helpers |= {"density_limits", "memory", "rivals"}
+    helpers |= {"density_limits", "rivals"}
     for path in BENCHMARKS.glob("*.py"):
         assert path.stem in helpers or f"benchmarks/{path.name}" in page
