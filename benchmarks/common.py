@@ -116,14 +116,7 @@ def aligned(tile: Ring, goal: Ring, tries: int = 3) -> Ring:
 
 
 def cell(ring: Ring, size: int, unit: float, colour: str = "black") -> Image.Image:
-    """A filled ring (M, 2), y up, in the middle of a white square of `size` pixels.
-
-    Args:
-        ring: in units of which one is `unit` pixels long.
-        size: of the picture's sides.
-        unit: pixels.
-        colour: of the filling.
-    """
+    """A filled ring (M, 2), y up, in a white square of `size` pixels; its unit is `unit` pixels."""
     middle = (ring.min(axis=0) + ring.max(axis=0)) / 2
     pixels = ((ring - middle) * (1, -1) * unit + size / 2) * SMOOTH
     picture = Image.new("RGB", (size * SMOOTH, size * SMOOTH), "white")

@@ -16,10 +16,12 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 
 import torch
+from common import ROOT
 
 from orbiflow.density import (
     SPACES,
@@ -32,6 +34,8 @@ from orbiflow.density import (
     make_space,
 )
 from orbiflow.density.models import kl_by_quadrature, midpoints
+
+sys.path.append(str(ROOT))  # which has the paper's targets
 from reproduction.densities import FIT_SETTINGS, KL, TargetMeasure, drawn, weighted
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}

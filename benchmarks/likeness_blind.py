@@ -34,9 +34,6 @@ BEFORE = "before"
 """An earlier search for likeness: its first tiles lie in the folder of tiles as NAME-before.json."""
 
 METHODS = (*SEARCHES, *RIVALS, BEFORE)
-COLUMNS = (*METHODS, "trial")
-"""What `score` knows: the trial that the search for likeness grew from is in the answers of seed 97."""
-
 TRIES = 8
 """Turns from which the best similarity is sought: three have missed it for a spider."""
 
@@ -219,7 +216,7 @@ def score(options: argparse.Namespace) -> None:
         except (ValueError, KeyError, TypeError) as error:
             raise SystemExit(f"{path}: {type(error).__name__}: {error}") from error
     rows = [row for _, row in named]
-    methods = [method for method in COLUMNS if any(method in row for row in rows)]
+    methods = [method for method in METHODS if any(method in row for row in rows)]
     print(f"{len(rows)} rows from {len(options.answers)} files\n\nmean rank\n{'':18}", end="")
     print("".join(f"{method:>10}" for method in methods))
     for name in dict.fromkeys(name for name, _ in named):
@@ -238,7 +235,7 @@ def score(options: argparse.Namespace) -> None:
 def _print_likeness(named: list[tuple[str, dict[str, float]]]) -> None:
     """Print in how many rows likeness is preferred, and to ARAP, EST or one of them by silhouettes."""
     rows = [row for _, row in named]
-    for other in COLUMNS:
+    for other in METHODS:
         wins, count = preferred(rows, "likeness", other)
         if count and other != "likeness":
             print(f"likeness preferred to {other:8}{wins:5g} of {count}  ({wins / count:4.0%})")
