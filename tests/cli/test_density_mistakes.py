@@ -87,18 +87,6 @@ def test_rows_that_lack_a_value_can_be_left_out_of_pictures(
     assert done.status == 0, done.err
 
 
-def test_patches_without_a_header_and_with_gaps(tmp_path: Path, orbiflow) -> None:
-    patches = np.random.default_rng(0).normal(size=(20, 9))
-    patches[3, 4] = np.nan
-    data, out = tmp_path / "patches.csv", tmp_path / "angles.csv"
-    np.savetxt(data, patches, delimiter=",")
-    turn = ("density", "patches", data, "--out", out)
-    assert "leave their rows out with --drop-missing\n" in orbiflow(*turn).err
-    done = orbiflow(*turn, "--drop-missing", "--no-header")
-    assert done.status == 0, done.err
-    assert len(out.read_text().splitlines()) == 20
-
-
 def test_a_flow_that_was_meant_and_not_tried_is_said(
     tmp_path: Path, folder: Path, orbiflow
 ) -> None:

@@ -130,7 +130,7 @@ def test_cells_in_another_unit_than_the_model(folder: Path, tmp_path: Path, orbi
 
 
 @pytest.mark.parametrize(("out", "about"), [("empty", "empty"), ("none/x.csv", "none")])
-@pytest.mark.parametrize("command", ["score", "sample", "patches"])
+@pytest.mark.parametrize("command", ["score", "sample"])
 def test_where_a_table_goes_is_looked_at_first(
     command: str, out: str, about: str, folder: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,7 +139,6 @@ def test_where_a_table_goes_is_looked_at_first(
     options = {
         "score": (folder / "torus.csv", "-m", folder / "torus"),
         "sample": ("-m", folder / "torus"),
-        "patches": (folder / "torus.csv",),
     }[command]
     before = sorted(folder.rglob("*"))
     done = orbiflow("density", command, *options, "--out", folder / out)

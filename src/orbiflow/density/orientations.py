@@ -60,7 +60,7 @@ def summarize_orientations(
         OrbiflowError: If rows or weights do not fit.
 
     >>> space = RotationSpace(form="bunge", unit="degrees", symmetry="432")
-    >>> round(summarize_orientations(space, [[1, 0, 0], [89, 0, 0], [0, 3, 0]]).half, 6)
+    >>> round(summarize_orientations(space, [[1, 0, 0], [89, 0, 0], [0, 0, 0]]).half, 6)
     1.0
     """
     as_instance(space, RotationSpace, "space")
