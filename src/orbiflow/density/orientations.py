@@ -10,11 +10,11 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.density.data import alongside, as_data
 from orbiflow.density.spaces import RotationSpace
 from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle
+from orbiflow.settings import as_instance
 
 STARTS, STEPS, MOST_LOOKED_AT = 16, 100, 2_000
 """Rows from which a mean is looked for, the most steps of each, and the most rows of a first look."""
