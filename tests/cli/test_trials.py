@@ -77,7 +77,7 @@ def test_drawings(name: str, shape: shapely.Polygon) -> None:
     [
         ("grey16-trns.png", "the opaque part"),
         ("white16.png", "the opaque part"),
-        ("label-mask.png", "label mask: took the pixels of 1 for the shape"),
+        ("label-mask.png", "took 1 for white"),
         ("empty-first-frame.png", "took frame 2, the first that shows anything, of 2"),
     ],
 )

@@ -15,9 +15,7 @@ from PIL import Image
 from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
-from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE, without_card, without_frame
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
-from orbiflow.tiles.silhouette.readers.label_masks import label_mask
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
 from orbiflow.tiles.silhouette.readers.tracing import Level, middle_of_line, trace
@@ -57,18 +55,11 @@ def read_image(
     image, notes = found.image, [*found.notes]
     if _is_hardly_cut_out(image):
         image, notes = _on_white(image), [*notes, "took the few transparent pixels for white"]
-    elif threshold is None and invert is None and (drawn := without_card(image)) is not None:
-        image, notes = drawn, [*notes, CARD_NOTE]
     band, name, band_notes = _channel(path, image)
     picture = None
-    if threshold is None and name == "luminance":
-        numbers, are_labels = found.numbers, found.are_labels
-        if numbers is not None and (labels := label_mask(numbers, are_labels=are_labels)):
-            mask, note = labels
-            picture = _drawing(Image.fromarray(mask), "mask", notes, [note])
-        elif invert is None:
-            colours = band if band_notes or band.mode == "F" else image.convert("RGB")
-            picture = _photograph(path, colours, (*notes, *band_notes))
+    if threshold is None and invert is None and name == "luminance":
+        colours = band if band_notes or band.mode == "F" else image.convert("RGB")
+        picture = _photograph(path, colours, (*notes, *band_notes))
     picture = picture or _drawing(band, name, notes, band_notes)
     picture = replace(picture, size=found.size, reduced=picture.reduced * found.shrunk)
     return _traced(path, picture, threshold, invert)
@@ -169,10 +160,6 @@ def choose_shape(
     cut = _cut(path, picture) if threshold is None else threshold
     given = "" if threshold is None else ", as given"
     above = channel > cut
-    framing: list[str] = []
-    if picture.name == "luminance" and invert is None:
-        channel, framing = without_frame(channel, above)
-        above = channel > cut
     if above.all() or not above.any():
         side = "above" if above.any() else "below"
         raise InputFileError(
@@ -194,8 +181,8 @@ def choose_shape(
     else:
         take_high, notes = _polarity(above, invert, f"threshold {cut:.2f}{given}")
     if take_high:
-        return Level(channel, cut, float(high)), [*framing, *notes]
-    return Level(1 - channel, 1 - cut, 1 - float(low)), [*framing, *notes]
+        return Level(channel, cut, float(high)), notes
+    return Level(1 - channel, 1 - cut, 1 - float(low)), notes
 
 
 def _cut(path: Source, picture: Picture) -> float:
@@ -209,8 +196,8 @@ def _cut(path: Source, picture: Picture) -> float:
         raise InputFileError(
             Advice(
                 literal(f"{path}: the image is all but blank")
-                + f", its luminance is {low:.2f} to {high:.2f}; raise the contrast or try another "
-                "{threshold}"
+                + f", its luminance is {low:.2f} to {high:.2f}; raise the contrast, save the shape as "
+                "a mask, white on black, or try another {threshold}"
             )
         )
     return (low + high) / 2
@@ -242,9 +229,8 @@ def read_mask_array(
     """Return the outline of the shape in an array (H, W), in pixels with y down.
 
     Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it
-    is not. So do labels, of which the largest is the shape (see `label_mask`). Other integers of 8 or
-    16 bits are gray levels of that full scale, floats of full scale 1: `threshold` and `invert` mean
-    what they do for images (see `read_image`).
+    is not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale 1:
+    `threshold` and `invert` mean what they do for images (see `read_image`).
 
     Raises:
         OrbiflowError: for another shape or type, levels out of range, or a setting that does not fit.
@@ -253,8 +239,7 @@ def read_mask_array(
     source = FileContent(b"", name)
     array = _array(values, name)
     check_size(source, array.shape[::-1], MAX_PIXELS)
-    labels = label_mask(array) if array.dtype.kind in "iu" and array.max(initial=0) > 1 else None
-    levels, is_mask = _levels(array if labels is None else labels[0] > 0, name)
+    levels, is_mask = _levels(array, name)
     if is_mask and threshold is not None:
         raise OrbiflowError(
             f"{name}: threshold parts gray levels, and this is a mask; leave it out"
@@ -262,8 +247,7 @@ def read_mask_array(
     band = Image.fromarray(levels)
     by_colour = not is_mask and threshold is None and invert is None
     picture = _photograph(source, band, ()) if by_colour else None
-    more = () if labels is None else (labels[1],)
-    picture = picture or _drawing(band, "mask" if is_mask else "luminance", more=more)
+    picture = picture or _drawing(band, "mask" if is_mask else "luminance")
     return _traced(source, picture, threshold, invert)
 
 
