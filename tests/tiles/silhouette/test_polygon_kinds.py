@@ -136,7 +136,7 @@ def test_points_without_a_header(name: str, is_clockwise: bool) -> None:
         ("0 0\n1 0\n1 1\n\n5 5\n6 5\n6 6\n", "line 5 begins another run of points"),
         ("x,y\n0,0\n1\n1,1\n", r"line 3: '1' has no two numbers under 'x' and 'y', of 2"),
         ("x,y,x\n0,0,1\n", "names several columns"),
-        ("x,y\n", "no line below the header|is not a number of vertices"),
+        ("x,y\n", "no line below the header|is not a vertex"),
         ("x,y\n0,0\n1,0\nnan,1\n", "line 4: 'nan,1' has no two numbers"),
         ("hello there\n", "line 1: 'hello there' is not"),
         (">\n0 0\n1 0\n0 1\n>\n3 3\n", "line 5: '>' is not a vertex"),

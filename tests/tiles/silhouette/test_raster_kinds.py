@@ -20,7 +20,7 @@ from refusals import refused
 SHAPE = np.array([[20, 10], [40, 10], [40, 70], [80, 70], [80, 90], [20, 90]], dtype=float)
 INSIDE = np.zeros((100, 100), bool)
 INSIDE[10:90, 20:40] = INSIDE[70:90, 20:80] = True
-OPAQUE = "shape taken: the opaque part (alpha threshold 0.50)"
+OPAQUE = "the shape is what is not transparent (edge at 0.50)"
 
 
 def read(data: bytes, name: str = "a.png") -> Reading:

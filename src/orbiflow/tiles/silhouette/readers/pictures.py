@@ -26,7 +26,10 @@ MIN_SIDE_OF_PHOTOGRAPH = 16
 MIN_TRANSPARENT = 0.005  # of the picture: less, such as rounded corners, cuts nothing out
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
 # channels that say by themselves where the shape is: their high part and their low part
-_PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
+_PARTS = {
+    "alpha": ("what is not transparent", "what is transparent"),
+    "mask": ("what is marked", "what is not marked"),
+}
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[
     """Return levels 0 to 1 with at most so many pixels a side, how many became one, and a note."""
     reduced = -(-max(band.size) // most)
     full_scale = 1.0 if band.mode == "F" else 255.0
-    note = f"averaged {reduced} x {reduced} pixels into one before tracing"
+    note = f"made the picture smaller to read it: {reduced} x {reduced} pixels became one"
     levels = np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale
     return levels, reduced, [note] * (reduced > 1)
 
@@ -154,8 +157,8 @@ def choose_shape(
     channel = picture.channel
     if channel.min() == channel.max():
         raise InputFileError(
-            f"{path}: the image is blank, every pixel has {picture.name} {channel.min():.2f}; "
-            "there is no shape in it"
+            f"{path}: the picture is empty, it is the same all over, so there is no shape in it; give "
+            "another one"
         )
     cut = _cut(path, picture) if threshold is None else threshold
     given = "" if threshold is None else ", as given"
@@ -177,9 +180,9 @@ def choose_shape(
     elif picture.name in _PARTS:
         take_high = not invert
         part = _PARTS[picture.name][not take_high]
-        notes = [f"shape taken: the {part} part ({picture.name} threshold {cut:.2f}{given})"]
+        notes = [f"the shape is {part} (edge at {cut:.2f}{given})"]
     else:
-        take_high, notes = _polarity(above, invert, f"threshold {cut:.2f}{given}")
+        take_high, notes = _polarity(above, invert, f"edge at {cut:.2f}{given}")
     if take_high:
         return Level(channel, cut, float(high)), notes
     return Level(1 - channel, 1 - cut, 1 - float(low)), notes
@@ -203,16 +206,14 @@ def _cut(path: Source, picture: Picture) -> float:
     return (low + high) / 2
 
 
-def _polarity(
-    above: NDArray[np.bool_], invert: bool | None, threshold: str
-) -> tuple[bool, list[str]]:
+def _polarity(above: NDArray[np.bool_], invert: bool | None, edge: str) -> tuple[bool, list[str]]:
     """Return whether the shape is the light part."""
     border = np.concatenate([above[0], above[-1], above[1:-1, 0], above[1:-1, -1]])
     light = float(border.mean())
     shape_is_light = light < 0.5 if invert is None else invert
     kind = "light on dark" if shape_is_light else "dark on light"
     how = "detected" if invert is None else "as set"
-    notes = [f"shape {how}: {kind} ({threshold})"]
+    notes = [f"shape {how}: {kind} ({edge})"]
     if invert is None and 0.3 < light < 0.7:
         notes.append(
             Advice(
