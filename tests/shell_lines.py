@@ -19,8 +19,8 @@ from pathlib import Path
 import pytest
 
 from orbiflow.cli import app
-from orbiflow.commands import OPERATIONS
 from orbiflow.runtime import Call, Outcome, find
+from orbiflow.settings import OPERATIONS
 
 ROOT = Path(__file__).parents[1]
 

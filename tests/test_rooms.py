@@ -47,7 +47,7 @@ DENSITY += [
 ]
 DENSITY += ["cross_validation"]
 ROOMS = [
-    *("runtime", "symmetry", "fields", "flows", "drawing", "batch"),
+    *("settings", "runtime", "symmetry", "fields", "flows", "drawing", "batch"),
     *(f"tiles.{room}" for room in TILES),
     *(f"density.{room}" for room in DENSITY),
     *("tiles", "density", "solids", "loading", "studio", "cli"),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orbiflow.extras import EXTRAS
+from orbiflow.settings.extras import EXTRAS
 from refusals import names
 
 HERE = Path(__file__).parent
@@ -118,7 +118,7 @@ MISSING = """
 import sys
 import orbiflow
 from orbiflow.cli.app import run
-from orbiflow.extras import MissingExtraError
+from orbiflow.settings import MissingExtraError
 from orbiflow.symmetry import space_group
 
 for words in sys.argv[1:]:

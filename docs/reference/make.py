@@ -7,10 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import orbiflow
-from orbiflow.commands import OPERATIONS
 from orbiflow.errors import SettingError
 from orbiflow.runtime import Operation, find
-from orbiflow.settings import Field, Hidden
+from orbiflow.settings import OPERATIONS, Field, Hidden
 
 PAGE, NAMES = (Path(__file__).with_name(name) for name in ("settings.md", "names.md"))
 

@@ -9,7 +9,7 @@ up when it is first used.
 'p2'
 """
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __version__ = "0.1.0"
 

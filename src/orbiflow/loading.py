@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from orbiflow.arguments import as_path
 from orbiflow.density import (
     CONDITIONAL,
     MODEL,
@@ -23,6 +22,7 @@ from orbiflow.density import (
 )
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, read_json, write_atomic, write_json
+from orbiflow.settings import as_path
 from orbiflow.solids import SOLID, SOLIDS, EscherSolid, read_run, read_solid
 from orbiflow.tiles import (
     RESULT,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orbiflow.commands import OPERATIONS
+from orbiflow.settings import OPERATIONS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "comparing.md").read_text(encoding="utf-8")
 

@@ -10,8 +10,8 @@ import pytest
 
 from orbiflow.cli import app
 from orbiflow.cli.app import summary
-from orbiflow.commands import OPERATIONS
 from orbiflow.runtime import Call, Operation, Outcome, find
+from orbiflow.settings import OPERATIONS
 from refusals import names, refused
 
 

@@ -13,8 +13,7 @@ import jsonschema
 import pytest
 
 from docs.reference.make import reference
-from orbiflow.commands import OPERATIONS
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Cancel,
     Cancelled,
@@ -31,7 +30,7 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.settings import Needs, Range, SettingError, Settings
+from orbiflow.settings import OPERATIONS, Needs, Range, Settings
 from refusals import refused
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "settings.md"
@@ -167,7 +166,7 @@ def test_the_reference_page_is_up_to_date() -> None:
 
 def test_operations_are_known_without_numerical_libraries() -> None:
     code = (
-        "import sys; from orbiflow.commands import OPERATIONS\n"
+        "import sys; from orbiflow.settings import OPERATIONS\n"
         "from orbiflow.runtime import call_from_json, find\n"
         "[find(name).schema for name in OPERATIONS]\n"
         "call_from_json({'schema_version': 2, 'operation': 'export', 'result': 'x'})\n"

@@ -13,37 +13,40 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.commands import OPERATIONS
 from orbiflow.drawing import PALETTES
-from orbiflow.kinds import (
-    ChoiceKind,
-    FlagKind,
-    Kind,
-    ListKind,
-    NumberKind,
-    OptionalKind,
-    ParsedKind,
-    PathKind,
-    Refused,
-    TupleKind,
-)
+from orbiflow.errors import SettingError
 from orbiflow.runtime import find
 from orbiflow.settings import (
+    OPERATIONS,
+    Colour,
     DefaultText,
     Field,
+    FlagKind,
     Group,
+    Length,
+    LengthOrZero,
+    ListKind,
     Needs,
     NotWith,
     OnlyWith,
     Option,
+    PageSize,
+    PathKind,
     Range,
     Repeated,
-    SettingError,
     Settings,
     Unit,
     fields_of,
 )
-from orbiflow.units import Colour, Length, LengthOrZero, PageSize
+from orbiflow.settings.kinds import (
+    ChoiceKind,
+    Kind,
+    NumberKind,
+    OptionalKind,
+    ParsedKind,
+    Refused,
+    TupleKind,
+)
 from refusals import refused
 from strategies import names_in
 

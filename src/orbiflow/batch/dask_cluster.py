@@ -21,8 +21,8 @@ from typing import Any, Self, TypeAlias
 from orbiflow import __version__
 from orbiflow.batch.parcels import Answer, Executor, Parcel, carry_out
 from orbiflow.errors import OrbiflowError
-from orbiflow.extras import naming_extras
 from orbiflow.runtime import Cancel, Note, Polled, Sink, one_thread
+from orbiflow.settings import naming_extras
 
 Client: TypeAlias = Any
 Future: TypeAlias = Any

@@ -19,12 +19,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from orbiflow import __version__
-from orbiflow.arguments import meant
-from orbiflow.commands import OPERATIONS
 from orbiflow.errors import Advice, OrbiflowError, SettingError, advice_of, literal
-from orbiflow.kinds import FlagKind, ListKind, PathKind
 from orbiflow.runtime import Cancelled, Operation, Polled, find, use_one_thread
-from orbiflow.settings import Field, Hidden
+from orbiflow.settings import OPERATIONS, Field, FlagKind, Hidden, ListKind, PathKind, meant
 
 HELP = "Turn a silhouette into a tile that looks like it and provably tiles the plane."
 START = (

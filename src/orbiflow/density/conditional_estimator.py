@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_whole, described, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.covariates import (
     ConditionalDensity,
@@ -27,6 +26,7 @@ from orbiflow.density.fitting import Progress, mean_of, weighed
 from orbiflow.density.inference import Trend, axes_named, trend_of
 from orbiflow.density.spaces import MixedTorus, Space, Torus, check_measure
 from orbiflow.errors import DataWarning, OrbiflowError
+from orbiflow.settings import as_whole, described, is_a
 
 
 def _signature() -> inspect.Signature:

@@ -9,7 +9,6 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from orbiflow.arguments import as_number, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
@@ -36,6 +35,7 @@ from orbiflow.density.spaces import (
     space_for,
 )
 from orbiflow.errors import DataWarning, SettingError, literal
+from orbiflow.settings import as_number, is_a
 
 
 class DataInSpace(NamedTuple):

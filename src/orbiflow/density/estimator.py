@@ -13,7 +13,6 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_choice, as_instance, as_whole, refusal
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
@@ -54,7 +53,7 @@ from orbiflow.density.inference import (
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
 from orbiflow.density.spaces import Space, check_measure
 from orbiflow.errors import DataWarning, OrbiflowError
-from orbiflow.settings import check_names, fields_of
+from orbiflow.settings import as_choice, as_instance, as_whole, check_names, fields_of, refusal
 
 RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
 """As scikit-learn has it, and NumPy's newer generators."""

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from scipy import special
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number
 from orbiflow.arrays import Array
 from orbiflow.density.data import alongside, as_data
 from orbiflow.density.inference import misorientations
 from orbiflow.density.spaces import ORIENTATIONS, RotationSpace, named_orientation, rotations_of
 from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
 from orbiflow.errors import SettingError
+from orbiflow.settings import as_instance, as_number
 
 STARTS, STEPS, MOST_LOOKED_AT = 16, 100, 2_000
 """Rows from which a mean is looked for, the most steps of each, and the most rows of a first look."""

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
 from orbiflow.density.data import alongside, as_data, data_of, unit_of, written_from_zero
 from orbiflow.density.fitting import SAME, concentration
 from orbiflow.density.spaces import to_latlon, to_vectors, whole_turn
 from orbiflow.density.uniformity import bingham_p, kuiper_p, rao_p, rayleigh_p, watson_p
 from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
+from orbiflow.settings import as_array
 
 MIN_ROWS = 25
 """Rows or groups below which an interval is rough (Fisher, 1993, section 4.4.4)."""

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.density.data import as_numbers, group_numbers
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_number
 
 
 @dataclass(frozen=True, eq=False)

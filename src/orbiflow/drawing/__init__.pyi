@@ -10,6 +10,7 @@ from .canvas import fill_rings as fill_rings
 from .canvas import mark_symmetry as mark_symmetry
 from .canvas import outline_cell as outline_cell
 from .canvas import plane_axes as plane_axes
+from .contours import level_curves as level_curves
 from .palettes import DEFAULT_PALETTE as DEFAULT_PALETTE
 from .palettes import PALETTES as PALETTES
 from .palettes import Palette as Palette

@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Annotated, NamedTuple
 
-from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
-from orbiflow.kinds import Parsed
+from orbiflow.settings import Parsed, is_a
 
 
 class Palette(NamedTuple):

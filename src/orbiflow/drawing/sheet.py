@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from orbiflow.arguments import as_choice, as_number
 from orbiflow.errors import OrbiflowError
-from orbiflow.units import COLUMNS, length
+from orbiflow.settings import COLUMNS, as_choice, as_number, length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -182,7 +181,7 @@ def _plain_texts() -> Generator[None]:
 
 
 def column_width(text: str) -> float:
-    """Return the width in mm of a printed figure, from a word of `orbiflow.units.COLUMNS` or a length.
+    """Return the width in mm of a printed figure, from a word of `COLUMNS` or a length.
 
     >>> column_width("double"), column_width("8.5cm")
     (180.0, 85.0)

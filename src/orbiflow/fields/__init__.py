@@ -1,5 +1,5 @@
 """Vector fields with symmetry: Fourier fields, and the symmetrization of any field."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

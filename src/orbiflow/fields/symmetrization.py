@@ -17,9 +17,9 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.arguments import as_tensor, as_whole, described, is_tensor, refusal
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.protocol import VectorField, lipschitz_bound, prepared_with_divergence
+from orbiflow.settings import as_tensor, as_whole, described, is_tensor, refusal
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,

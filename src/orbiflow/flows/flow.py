@@ -9,7 +9,6 @@ from typing import Any, Self
 import torch
 from torch import Tensor, nn
 
-from orbiflow.arguments import as_number, as_whole, is_a
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import (
     VectorField,
@@ -21,6 +20,7 @@ from orbiflow.fields import (
 from orbiflow.flows.integrators import RungeKutta, StepCheck
 from orbiflow.flows.integrators import method as runge_kutta
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_number, as_whole, is_a
 from orbiflow.typed_torch import linalg
 
 State = tuple[Tensor, ...]

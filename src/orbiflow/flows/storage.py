@@ -7,11 +7,11 @@ from typing import Any, cast
 import torch
 from torch import Tensor, nn
 
-from orbiflow.arguments import as_instance, as_number, as_path, as_whole
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import FourierField, InvariantField, PeriodicFeatures, SplineField, Symmetrized
 from orbiflow.flows.flow import Flow
 from orbiflow.runtime import is_list, read_tensors, tensor_bytes, write_atomic
+from orbiflow.settings import as_instance, as_number, as_path, as_whole
 from orbiflow.symmetry import CrystallographicGroup, group_from_header, group_header
 
 # functions that create a user's own fields, by the name or the place of the field

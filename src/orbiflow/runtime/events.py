@@ -22,10 +22,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from orbiflow.arguments import described
 from orbiflow.errors import Advice, SettingError, literal
 from orbiflow.runtime.files import is_object
-from orbiflow.settings import Field, check_names
+from orbiflow.settings import Field, check_names, described
 
 
 class Event:

@@ -13,8 +13,8 @@ from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeGuard
 
-from orbiflow.arguments import described
 from orbiflow.errors import InputFileError, OutputError, system_errors
+from orbiflow.settings import described
 
 
 def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
@@ -279,7 +279,7 @@ def check_output_folder(out: Path, *reads: Path | None, what: str = "file") -> N
 
 def check_inputs_kept(out: Path, *reads: Path | None) -> None:
     """Check that a file that will be written is none that is read, by whatever name or link."""
-    from orbiflow.commands import RUN_FOLDERS
+    from orbiflow.settings import RUN_FOLDERS
 
     for read in filter(None, reads):
         files = [read / name for name in RUN_FOLDERS] if read.is_dir() else [read]
@@ -325,7 +325,7 @@ def _run_around(read: Path) -> tuple[Path, set[str]]:
 
 def _files_of_run(folder: Path) -> set[str]:
     """Return the files of earlier runs in a folder; the file that is read, alone, is a copy."""
-    from orbiflow.commands import RUN_FOLDERS
+    from orbiflow.settings import RUN_FOLDERS
 
     found: set[str] = set()
     for read, place in RUN_FOLDERS.items():

@@ -1,7 +1,7 @@
 """Operations: public functions from which a command line, a JSON form and a reference are derived.
 
 **To add an operation**, write a function in a light module (heavy libraries are imported inside it)
-and name it in `orbiflow.commands`::
+and name it in `orbiflow.settings.commands`::
 
     @operation("export")
     def export(
@@ -40,9 +40,7 @@ from functools import cache, cached_property, wraps
 from importlib import import_module
 from typing import Any, Literal, ParamSpec, TypeVar, cast
 
-from orbiflow.arguments import as_instance, described, meant
 from orbiflow.errors import OrbiflowError, SettingError, advice_of, literal
-from orbiflow.extras import naming_extras
 from orbiflow.runtime.events import (
     Cancel,
     Cancelled,
@@ -53,7 +51,18 @@ from orbiflow.runtime.events import (
     Progress,
     Started,
 )
-from orbiflow.settings import Field, Positional, Settings, check_names, check_rules, fields_of
+from orbiflow.settings import (
+    Field,
+    Positional,
+    Settings,
+    as_instance,
+    check_names,
+    check_rules,
+    described,
+    fields_of,
+    meant,
+    naming_extras,
+)
 
 SCHEMA_VERSION = 2
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
@@ -276,7 +285,7 @@ def operation(
     """Make a function an operation: its arguments are checked and its events sent.
 
     Args:
-        name: The name by which `orbiflow.commands` knows it.
+        name: The name by which `orbiflow.settings.commands` knows it.
         keeps_partial: Whether it can be stopped and keeps what it has.
         starts_processes: Whether it forks, so that no thread may run beside it.
     """
@@ -336,11 +345,11 @@ def as_part(send: Sink, begin: float = 0.0, end: float = 1.0) -> Sink:
 
 @cache
 def find(name: str) -> Operation:
-    """Return the operation that `orbiflow.commands` has under a name, importing its module.
+    """Return the operation that `orbiflow.settings.commands` has under a name, importing its module.
 
     Raises `SettingError` if there is none.
     """
-    from orbiflow.commands import OPERATIONS, WORK
+    from orbiflow.settings import OPERATIONS, WORK
 
     place = {**OPERATIONS, **WORK}.get(name)
     if place is None:

@@ -15,10 +15,10 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.runtime.files import is_object
+from orbiflow.settings import as_path
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -19,7 +19,7 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.drawing import STL_TRIANGLE
 from orbiflow.errors import InputFileError, OrbiflowError, system_errors
-from orbiflow.extras import naming_extras
+from orbiflow.settings import naming_extras
 from orbiflow.solids.bounded import read_bounded
 from orbiflow.solids.mending import mended
 from orbiflow.solids.mesh import Mesh

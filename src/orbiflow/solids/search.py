@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.extras import naming_extras
 from orbiflow.runtime import NEVER, Cancel, Cancelled, Sink, Team, cores, ignore
+from orbiflow.settings import naming_extras
 from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
 from orbiflow.solids.body import Body, Weight
 from orbiflow.solids.closing import Function, ball_of_cells, box_around

@@ -11,6 +11,8 @@ from orbiflow.settings import (
     Count,
     DefaultText,
     FileSettings,
+    Length,
+    LengthOrZero,
     OnlyWith,
     Parsed,
     Range,
@@ -18,7 +20,6 @@ from orbiflow.settings import (
     Seed,
     Settings,
 )
-from orbiflow.units import Length, LengthOrZero
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array

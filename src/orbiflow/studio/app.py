@@ -23,8 +23,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from orbiflow import __version__
 from orbiflow.drawing import PALETTES, Palette
 from orbiflow.errors import OrbiflowError, advice_of
-from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
+from orbiflow.settings import MissingExtraError
 from orbiflow.studio import (
     density_routes,
     mask_routes,

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.kinds import PathKind
 from orbiflow.runtime import Call, Operation, find
-from orbiflow.settings import Field, Hidden, NotWith, OnlyWith
+from orbiflow.settings import Field, Hidden, NotWith, OnlyWith, PathKind
 from orbiflow.studio.words import LABELS, plain_letters
 
 SERVER_SET = ("project", "task", "force", "workers", "tile", "picture")
@@ -25,7 +24,7 @@ SERVER_SET = ("project", "task", "force", "workers", "tile", "picture")
 class Kind:
     """A kind of task.
 
-    - `work`: The operation that does it, in `orbiflow.commands.WORK`, of a `Job`.
+    - `work`: The operation that does it, in `orbiflow.settings.commands.WORK`, of a `Job`.
     - `lane`: "quick" for what somebody waits for; it waits for no search.
     - `makes`: Of a take-away, the operation that writes it.
     """

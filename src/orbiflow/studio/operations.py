@@ -12,8 +12,8 @@ from importlib import import_module
 from pathlib import Path
 
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.extras import naming_extras
 from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, make_folder, operation
+from orbiflow.settings import naming_extras
 from orbiflow.studio.settings import StudioSettings
 
 PACKAGES = ("starlette", "uvicorn", "platformdirs")

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.runtime import is_object
+from orbiflow.settings import as_path
 from orbiflow.studio.tile_files import PLACES, best_stage, tile_folder
 from orbiflow.studio.words import MASKS, OF_PICTURE
 

@@ -17,8 +17,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.extras import naming_extras
 from orbiflow.runtime import is_object
+from orbiflow.settings import naming_extras
 from orbiflow.studio.guard import PAGE, SANDBOX, Refused
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project

@@ -11,9 +11,9 @@ import numpy as np
 import shapely
 from scipy.spatial import KDTree
 
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.settings import as_array
 from orbiflow.studio.share_link import NO_PICTURE
 from orbiflow.tiles import (
     Bending,

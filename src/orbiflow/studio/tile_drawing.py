@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
 from orbiflow.drawing import draw_line, png_bytes, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object, write_atomic
+from orbiflow.settings import as_array, as_number
 from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, open_image, orient, triangulate
 
 MAX_STROKES, MAX_POINTS, MAX_EYES = 2000, 100_000, 60

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, refusal
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError, NotAnIsometryError
+from orbiflow.settings import as_array, refusal
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.isometry import Isometry, Line, rotation, transflection
 from orbiflow.symmetry.triplets import cell_lattice, group_from_operators

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import is_a, is_tensor, refusal
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
+from orbiflow.settings import is_a, is_tensor, refusal
 from orbiflow.symmetry.group import CrystallographicGroup
 from orbiflow.symmetry.isometry import TOLERANCE, Isometry, Line, Points, cast_like
 

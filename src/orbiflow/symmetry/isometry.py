@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError, NotAnIsometryError
+from orbiflow.settings import is_a, is_tensor
 
 if TYPE_CHECKING:
     import torch

@@ -12,7 +12,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_path, described
 from orbiflow.arrays import Array
 from orbiflow.errors import (
     DataWarning,
@@ -21,7 +20,7 @@ from orbiflow.errors import (
     LatticeMismatchError,
     system_errors,
 )
-from orbiflow.extras import naming_extras
+from orbiflow.settings import as_path, described, naming_extras
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.group_symbols import (
     find_hall,

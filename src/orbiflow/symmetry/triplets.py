@@ -9,7 +9,6 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, refusal
 from orbiflow.arrays import Array
 from orbiflow.errors import (
     GroupError,
@@ -17,6 +16,7 @@ from orbiflow.errors import (
     NotAnIsometryError,
     RoundedOperatorsWarning,
 )
+from orbiflow.settings import as_array, refusal
 from orbiflow.symmetry.group import MAX_ORDER, CrystallographicGroup, checked_lattice, generated
 from orbiflow.symmetry.isometry import Isometry, translation
 

@@ -18,8 +18,9 @@ from orbiflow.batch import (
     WorkSettings,
     run_files,
 )
+from orbiflow.errors import SettingError
 from orbiflow.runtime import NEVER, Call, Cancel, Outcome, Sink, find, ignore, operation
-from orbiflow.settings import Option, SettingError
+from orbiflow.settings import Option
 from orbiflow.tiles.search import SearchSettings
 from orbiflow.tiles.silhouette import ReadingSettings
 

@@ -4,7 +4,7 @@ A ring is a float64 array (..., N, 2) whose last vertex does not repeat the firs
 a stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arrays import Array, Complex, Integers
+from orbiflow.arrays import Array, Complex, Integers, Window
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array
 
 if TYPE_CHECKING:
     import torch
@@ -234,3 +235,19 @@ def polygons_in(geometry: BaseGeometry) -> list[Polygon]:
         return [] if geometry.is_empty else [geometry]
     parts: Iterable[BaseGeometry] = getattr(geometry, "geoms", ())
     return [polygon for part in parts for polygon in polygons_in(part)]
+
+
+def checked_window(window: Sequence[float]) -> Window:
+    """Return `window` as four numbers xmin < xmax and ymin < ymax.
+
+    Raises `OrbiflowError` for anything else.
+    """
+    try:
+        values = as_array(window, "window", (4,)).tolist()
+    except OrbiflowError:
+        values = [0.0] * 4
+    if not (values[0] < values[2] and values[1] < values[3]):
+        raise OrbiflowError(
+            f"a window is (xmin, ymin, xmax, ymax) with xmin < xmax and ymin < ymax, got {window!r}"
+        )
+    return values[0], values[1], values[2], values[3]

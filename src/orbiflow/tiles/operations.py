@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from orbiflow.errors import SettingError
 from orbiflow.runtime import (
     NEVER,
     Cancel,
@@ -20,7 +21,7 @@ from orbiflow.runtime import (
     operation,
     write_atomic,
 )
-from orbiflow.settings import DefaultText, Ending, InMemory, Option, SettingError
+from orbiflow.settings import DefaultText, Ending, InMemory, Option
 from orbiflow.tiles.make import CURVED, ArtSettings, ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.solids import BALLS, SolidSettings

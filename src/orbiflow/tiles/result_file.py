@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import as_instance, as_path, described
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError
 from orbiflow.runtime import (
@@ -23,6 +22,7 @@ from orbiflow.runtime import (
     write_atomic,
     write_json,
 )
+from orbiflow.settings import as_instance, as_path, described
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
 from orbiflow.tiles.geometry import Place
 from orbiflow.tiles.likeness import (

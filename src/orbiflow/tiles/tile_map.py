@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import array_bytes, read_arrays
+from orbiflow.settings import as_path
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tilings import Tile
 

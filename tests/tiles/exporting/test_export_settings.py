@@ -9,8 +9,8 @@ import pytest
 
 from exported import tile_of
 from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import PAGES
 from orbiflow.tiles import ExportSettings, scenes
-from orbiflow.units import PAGES
 from refusals import refused
 
 

@@ -9,18 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.kinds import Refused, kind_of
-from orbiflow.units import (
-    MILLIMETRES,
-    Length,
-    LengthOrZero,
-    PageSize,
-    length,
-    length_or_none,
-    page_size,
-    signed_length,
-    size,
-)
+from orbiflow.settings import MILLIMETRES, Length, LengthOrZero, PageSize, length
+from orbiflow.settings.kinds import Refused, kind_of
+from orbiflow.settings.units import length_or_none, page_size, signed_length, size
 from refusals import refused
 
 

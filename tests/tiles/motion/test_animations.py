@@ -18,8 +18,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageSequence
 
 from orbiflow.drawing import palette
-from orbiflow.errors import CertificationError
-from orbiflow.settings import SettingError
+from orbiflow.errors import CertificationError, SettingError
 from orbiflow.tiles import (
     AnimationSettings,
     EscherTile,

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from awkward import NOT_SIMPLE, STRANGE
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
+from orbiflow.settings import as_array
 from orbiflow.tiles import orient, resampled, signed_area
 from orbiflow.tiles.silhouette import Mesh, triangulate
 from outlines import ANIMALS, SHAPES, animal, comb, disc, dumbbell, slit_square, star, unit

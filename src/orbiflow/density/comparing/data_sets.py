@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 from torch import Tensor
 
-from orbiflow.arguments import as_array, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
@@ -22,6 +21,7 @@ from orbiflow.density.data import alongside, cells_of, data_of, group_numbers, u
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import DataWarning, OrbiflowError
+from orbiflow.settings import as_array, is_a
 
 T = TypeVar("T")
 

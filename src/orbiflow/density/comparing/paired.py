@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, as_instance, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
@@ -20,6 +19,7 @@ from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array, as_instance, is_a
 
 BLOCK_ROWS = 65_536
 """Rows scored between two looks at whether to stop."""

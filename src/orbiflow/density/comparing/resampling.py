@@ -10,13 +10,13 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.data import group_numbers
 from orbiflow.density.fitting import lightest_folds, lone_groups_note
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_whole
 from orbiflow.typed_torch import listed
 
 MIN_GROUPS = 5

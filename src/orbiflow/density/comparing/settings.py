@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from orbiflow.kinds import Parsed
-from orbiflow.settings import DefaultText, Range, Settings
+from orbiflow.settings import DefaultText, Parsed, Range, Settings
 
 TestName = Literal[
     "watson-williams", "common-mean", "common-median", "common-concentration",

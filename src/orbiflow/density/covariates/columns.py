@@ -12,7 +12,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     as_numbers,
@@ -24,6 +23,7 @@ from orbiflow.density.data import (
 )
 from orbiflow.density.spaces import Line
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_number
 
 Values = NDArray[Any]
 """The cells (N,) of a column: numbers, or words."""

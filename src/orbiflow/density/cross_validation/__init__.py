@@ -1,5 +1,5 @@
 """Cross-validation: how well a density predicts rows that its fit has not seen."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

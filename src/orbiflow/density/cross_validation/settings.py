@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from orbiflow.arguments import as_whole
 from orbiflow.density import operations
 from orbiflow.density.fitting import COMPONENTS, KNOWN, ComponentSettings, DensitySettings
 from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
 from orbiflow.errors import SettingError, literal
-from orbiflow.settings import DefaultText, Range, Repeated, Settings
+from orbiflow.settings import DefaultText, Range, Repeated, Settings, as_whole
 
 SCORES, REPORT = "scores.csv", "report.json"
 """Files of one fit."""

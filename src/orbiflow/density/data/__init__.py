@@ -1,5 +1,5 @@
 """Data as people have them: arrays and frames of any library, names of columns, units of values."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

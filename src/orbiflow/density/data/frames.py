@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.arguments import described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.data.draws import columns_of_draws, has_draws, posterior_of
 from orbiflow.density.data.row_labels import cells_of, is_missing
 from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.settings import described, is_a, is_tensor
 
 
 class Data(NamedTuple):

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.arguments import described, is_a, is_tensor
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import described, is_a, is_tensor
 
 CATEGORIES = ("category", "categorical", "enum", "dictionary")
 """What the types of columns of categories begin with in pandas, polars and pyarrow."""

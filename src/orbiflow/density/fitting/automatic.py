@@ -12,7 +12,6 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
 from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting.evidence import (
     Candidates,
@@ -80,6 +79,7 @@ from orbiflow.density.models import MOST_BESIDE, MOST_DIM, Density, Mixture, flo
 from orbiflow.density.spaces import ProductSpace, Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.runtime import SideBySide
+from orbiflow.settings import as_instance
 
 LEAST_FLOW_ROWS = 300
 """With fewer, a flow is not tried: on no data has one gained anything."""

@@ -12,7 +12,6 @@ import torch
 from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
 from orbiflow.density.data import alongside
 from orbiflow.density.fitting.likelihood import (
     Budget,
@@ -42,6 +41,7 @@ from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.fields import FourierField, InvariantField, SplineField, has_even_grid
 from orbiflow.flows import Flow
+from orbiflow.settings import as_instance
 
 DTYPE = torch.float32
 """The dtype in which a flow is trained, about twice as fast; the result is float64."""

@@ -10,7 +10,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.held_out import LEAST_PLACES
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.parameters import ParametricFit, parametric_fit_from
@@ -21,6 +20,7 @@ from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_instance, as_points
 
 MASS_TOLERANCE = 1e-3
 """Of the integral over the square, and of the log-likelihood at doubled steps."""

@@ -10,12 +10,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_instance, is_tensor
 from orbiflow.density.data import as_numbers, cells_of
 from orbiflow.density.inference import check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_choice, as_instance, is_tensor
 from orbiflow.typed_torch import listed, unique
 
 

@@ -4,17 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, get_args
 
-from orbiflow.kinds import Parsed
-from orbiflow.settings import (
-    DefaultText,
-    Group,
-    Hidden,
-    Range,
-    SettingError,
-    Settings,
-    Unit,
-    fields_of,
-)
+from orbiflow.errors import SettingError
+from orbiflow.settings import DefaultText, Group, Hidden, Parsed, Range, Settings, Unit, fields_of
 
 Component = Literal[
     "flow", "kernels", "mixture", "chains", "network", "von-mises", "von-mises-sine",

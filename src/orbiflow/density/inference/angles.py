@@ -12,11 +12,11 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number, as_tensor, as_whole, is_a
 from orbiflow.density.models import Density, UniformDensity
 from orbiflow.density.spaces import CHART, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_instance, as_number, as_tensor, as_whole, is_a
 from orbiflow.typed_torch import listed, unique
 
 

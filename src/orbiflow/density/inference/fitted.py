@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.inference.angles import axes_named
 from orbiflow.density.inference.shortest import shortest_intervals
 from orbiflow.density.inference.trends import Trend, pair_alone, trend
 from orbiflow.density.models import Density, Estimate
 from orbiflow.density.spaces import Space
+from orbiflow.settings import as_instance, as_tensor
 
 
 class FittedFigures:

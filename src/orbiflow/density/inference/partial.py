@@ -11,7 +11,6 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number
 from orbiflow.density.inference.angles import given_axes, kept_axes
 from orbiflow.density.models import (
     LEVELS,
@@ -26,6 +25,7 @@ from orbiflow.density.models import (
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_instance, as_number
 from orbiflow.typed_torch import listed
 
 ACCURACY = 0.01

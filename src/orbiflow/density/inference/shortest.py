@@ -10,11 +10,11 @@ import torch
 from scipy.optimize import brentq
 from torch import Tensor
 
-from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.density.inference.angles import check_torus
 from orbiflow.density.models import Density
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_number
 from orbiflow.typed_torch import unique
 
 PIECES = 2048

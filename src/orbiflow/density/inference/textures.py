@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, Estimate
 from orbiflow.density.spaces import RotationSpace
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_instance, as_number
 from orbiflow.typed_torch import linalg
 
 FIRST_NODES, MOST_NODES = 64, 4096

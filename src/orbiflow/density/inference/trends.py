@@ -10,7 +10,6 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
 from orbiflow.density.inference.angles import at_observed, check_torus, chosen_columns
 from orbiflow.density.inference.partial import marginal
@@ -18,6 +17,7 @@ from orbiflow.density.models import Density
 from orbiflow.density.spaces import Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_array, as_number
 
 CELLS = 720
 """Cells of the circle of the column whose mean is found: half a degree each."""

@@ -13,7 +13,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_tensor
 from orbiflow.density.models.chain_integrals import (
     MAX_NODES,
     MAX_NODES_ALONE,
@@ -28,6 +27,7 @@ from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_tensor
 from orbiflow.typed_torch import listed, special, unique
 
 PILOT_DRAWS, SHARE_BY_WEIGHT = 64, 1e-3

@@ -13,12 +13,12 @@ import torch
 from torch import Tensor
 from torch.distributions import constraints
 
-from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.models.figures import WithFigures
 from orbiflow.density.models.tensors import destination, moved, shape_of, source_of
 from orbiflow.density.spaces import CHART, Space, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import SideBySide, Tell, one_thread
+from orbiflow.settings import as_instance, as_points
 
 LEVELS = 4
 """Levels of accuracy of kernels that stand for a density; each has a quarter of the error or less."""

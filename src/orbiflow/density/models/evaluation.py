@@ -9,12 +9,12 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_instance, as_tensor
 
 GRADIENT_BLOCK = 16_384
 """Points evaluated at a time, as a flow keeps all its steps for the gradient."""

@@ -10,9 +10,9 @@ import torch
 from torch import Tensor
 from torch.distributions import Distribution, kl
 
-from orbiflow.arguments import as_tensor, as_whole
 from orbiflow.density.spaces import CHART, MixedTorus, Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_tensor, as_whole
 from orbiflow.typed_torch import linalg
 
 DRAWS = 2**16

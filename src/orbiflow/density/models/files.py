@@ -11,11 +11,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number
 from orbiflow.density.models.density import KINDS, Density
 from orbiflow.density.spaces import Space, make_space
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import read_tensors, tensor_bytes
+from orbiflow.settings import as_instance, as_number
 from orbiflow.symmetry import CrystallographicGroup, group_header
 
 FORMAT = "orbiflow-density/6"

@@ -13,11 +13,11 @@ import torch
 from scipy.optimize import brentq, minimize_scalar
 from torch import Tensor
 
-from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_tensor
 from orbiflow.typed_torch import linalg
 
 NODES = 200

@@ -10,7 +10,6 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
 from orbiflow.density.models.density import Density, Restriction, Split, in_order
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.files import density_from, density_parts, within
@@ -19,6 +18,7 @@ from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow, flow_from, flow_parts
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_instance
 from orbiflow.typed_torch import linalg
 
 MOST_DIM = 3

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.concentrations import moments
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted, in_order
@@ -19,6 +18,7 @@ from orbiflow.density.models.rotation_kernels import RotationKernels
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
 from orbiflow.density.spaces import CHART, RotationSpace, Space, by_sphere
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_tensor
 from orbiflow.typed_torch import fft, special
 
 MOST_KERNELS = 1_000_000

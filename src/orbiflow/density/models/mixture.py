@@ -10,13 +10,13 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
 from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import MixedTorus, ProductSpace, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
+from orbiflow.settings import as_instance, as_tensor
 from orbiflow.typed_torch import listed
 
 MOST_COMPONENTS = 4096

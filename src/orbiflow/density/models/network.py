@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
 from orbiflow.density.models.chain_integrals import quantiles
 from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
@@ -24,6 +23,7 @@ from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object
+from orbiflow.settings import as_instance
 from orbiflow.typed_torch import broadcast, listed, special, unique
 
 DRAWS = 4096

@@ -10,7 +10,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_tensor
 from orbiflow.density.models.chains import waves
 from orbiflow.density.models.density import Density, Restriction, Split, in_order
 from orbiflow.density.models.kernels import AdaptiveKernels, drawn_about, kernel_peaks
@@ -18,6 +17,7 @@ from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import CHART, ProductSpace, Space, by_sphere
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_tensor
 from orbiflow.typed_torch import linalg, listed, special
 
 MOST_BESIDE = 3

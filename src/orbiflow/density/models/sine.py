@@ -8,12 +8,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import MixedTorus, Space, Torus
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_tensor
 from orbiflow.typed_torch import special
 
 FEWEST_NODES, NODES_PER_DEVIATION = 64, 24

@@ -17,8 +17,8 @@ from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
-from orbiflow.errors import DataWarning
-from orbiflow.settings import DefaultText, Hidden, Option, SettingError
+from orbiflow.errors import DataWarning, SettingError
+from orbiflow.settings import DefaultText, Hidden, Option
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array

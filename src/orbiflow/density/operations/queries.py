@@ -12,8 +12,8 @@ from orbiflow.density import comparing, fitting, models, regions, spaces, tables
 from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
-from orbiflow.errors import Advice, literal
-from orbiflow.settings import DefaultText, Needs, Option, Range, SettingError, Settings
+from orbiflow.errors import Advice, SettingError, literal
+from orbiflow.settings import DefaultText, Needs, Option, Range, Settings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
-from orbiflow.arguments import is_a
 from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.data import ROTATIONS
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import CountedRowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError, literal
-from orbiflow.settings import DefaultText, Ending, Option, Range, Settings, Unit
+from orbiflow.settings import DefaultText, Ending, Option, Range, Settings, Unit, is_a
 
 if TYPE_CHECKING:
     from orbiflow.density.tables import TableRows

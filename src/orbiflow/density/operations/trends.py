@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from orbiflow import runtime
-from orbiflow.arguments import is_a
 from orbiflow.batch import csv_bytes
 from orbiflow.density import models
 from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import check_table_name
-from orbiflow.errors import literal
-from orbiflow.settings import DefaultText, Option, Range, SettingError, Settings
+from orbiflow.errors import SettingError, literal
+from orbiflow.settings import DefaultText, Option, Range, Settings, is_a
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -1,5 +1,5 @@
 """Pictures of densities: on squares, on maps, and on surfaces to turn."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import described
 from orbiflow.arrays import Array
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import Space
 from orbiflow.density.tables import read_table
 from orbiflow.errors import InputFileError, SettingError, system_errors
 from orbiflow.runtime import is_list, is_object
+from orbiflow.settings import described
 
 MAX_BYTES = 32_000_000
 MAX_POINTS = 1_000_000

@@ -14,7 +14,6 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
@@ -43,6 +42,7 @@ from orbiflow.density.spaces import ProductSpace, RotationSpace, Space, check_me
 from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
+from orbiflow.settings import as_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

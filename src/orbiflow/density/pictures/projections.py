@@ -14,11 +14,11 @@ from typing import ClassVar, TypeAlias, cast
 import numpy as np
 from torch import Tensor
 
-from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
 from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import as_number
 
 FINEST = 1.0
 """Degrees between points of lines that are drawn, at most, so that curves look smooth."""

@@ -17,7 +17,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import colours, frames
@@ -26,6 +25,7 @@ from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, Torus, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_whole
 
 RING_RADIUS, TUBE_RADIUS = 1.0, 0.45
 """Radii of the torus: of its centre line, and of its tube."""

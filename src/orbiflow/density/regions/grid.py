@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.contours import level_curves
+from orbiflow.drawing import level_curves
 
 Function = Callable[[Array], Array]
 """A function from points (N, 2) to values (N,)."""

@@ -11,7 +11,6 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_number, as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of, scores_of
 from orbiflow.density.estimator import DensityEstimator
@@ -20,6 +19,7 @@ from orbiflow.density.regions.settings import MAX_SAMPLES, MIN_SAMPLES, SAMPLES,
 from orbiflow.density.spaces import MixedTorus, whole_turn
 from orbiflow.errors import SettingError
 from orbiflow.runtime import one_thread
+from orbiflow.settings import as_number, as_whole
 
 SAMPLES_PER_EVEN_POINT = 4
 """Ratio of samples to points drawn evenly, which tell the sizes of regions of hardly any mass, too."""

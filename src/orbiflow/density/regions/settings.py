@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterable
 from typing import Annotated
 
-from orbiflow.arguments import as_number, as_whole, placeholder
 from orbiflow.errors import SettingError
-from orbiflow.settings import DefaultText, Range, Settings
+from orbiflow.settings import DefaultText, Range, Settings, as_number, as_whole, placeholder
 
 SAMPLES = 20_000
 """Default number of samples: the mass of a region of half of it is right within 0.35 %."""

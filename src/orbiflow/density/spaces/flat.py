@@ -12,10 +12,10 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.data import written_from_zero
 from orbiflow.density.spaces.space import Space, checked_table, named_group
+from orbiflow.settings import as_choice, as_whole
 from orbiflow.symmetry import CrystallographicGroup
 
 TURN: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}

@@ -11,12 +11,12 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
 from orbiflow.density.data import written_from_zero
 from orbiflow.density.spaces.flat import Torus, whole_turn
 from orbiflow.density.spaces.space import checked_table
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array, as_number
 
 SCALES = 2.5
 """The scale of a line, in deviations of its data: what is normal is then nearly von Mises."""

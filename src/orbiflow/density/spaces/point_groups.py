@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from orbiflow.arguments import is_a
 from orbiflow.errors import SettingError, literal
+from orbiflow.settings import is_a
 
 NAMES: dict[str, str] = {
     "C1": "1 -1 Ci triclinic",

@@ -10,12 +10,12 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.mixed import Axis, MixedTorus
 from orbiflow.density.spaces.space import CHART, Space, by_sphere, checked_table, make_space
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_instance
 from orbiflow.symmetry import CrystallographicGroup
 
 T = TypeVar("T", Tensor, Array)

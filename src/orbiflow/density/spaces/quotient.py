@@ -12,12 +12,12 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
 from orbiflow.density.data import fraction_doubts
 from orbiflow.density.spaces.frame import frame_of
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import DataWarning, OrbiflowError
+from orbiflow.settings import as_array
 from orbiflow.symmetry import (
     CrystallographicGroup,
     cell_lattice,

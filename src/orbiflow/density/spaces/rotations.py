@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from orbiflow.arguments import as_choice
 from orbiflow.arrays import Array
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.point_groups import rotation_group_name, rotations_of
@@ -20,6 +19,7 @@ from orbiflow.density.spaces.round import UNIT_TOLERANCE, refuse_rows, to_unit
 from orbiflow.density.spaces.space import checked_table
 from orbiflow.density.spaces.unit_vectors import UnitVectorSpace
 from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import as_choice
 
 FORMS: dict[str, tuple[str, ...]] = {
     "quaternion": ("x", "y", "z", "w"),

@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import elliprf
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_instance
 from orbiflow.arrays import Array
 from orbiflow.density.data import CODES, written_from_zero
 from orbiflow.density.spaces.space import Space, checked_table, named_group, row_count
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_choice, as_instance
 from orbiflow.typed_torch import linalg
 
 K = 1.854074677301371918433850347195

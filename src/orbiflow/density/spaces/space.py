@@ -15,11 +15,11 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_tensor, as_whole, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.data import as_data
 from orbiflow.density.spaces.frame import Frame, frame_of
 from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import as_choice, as_tensor, as_whole, is_a
 from orbiflow.symmetry import (
     CrystallographicGroup,
     DirichletDomain,

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from scipy.special import gammaln
 from torch import Tensor
 
-from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.spaces.flat import MAX_DIM
 from orbiflow.density.spaces.round import UNIT_TOLERANCE, to_unit
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_whole
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.typed_torch import linalg
 

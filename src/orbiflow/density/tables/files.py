@@ -29,7 +29,7 @@ from orbiflow.density.tables.table import (
     quote,
 )
 from orbiflow.errors import InputFileError
-from orbiflow.extras import naming_extras
+from orbiflow.settings import naming_extras
 
 MAX_BYTES = 2 * 2**30
 _MAGIC = {"npy": b"\x93NUMPY", "parquet": b"PAR1"}

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 from orbiflow.density.data import ROTATIONS, Unit, check_unit, rotation_form
-from orbiflow.errors import literal
-from orbiflow.settings import DefaultText, Needs, SettingError, Settings
+from orbiflow.errors import SettingError, literal
+from orbiflow.settings import DefaultText, Needs, Settings
 
 if TYPE_CHECKING:
     from orbiflow.symmetry import CrystallographicGroup

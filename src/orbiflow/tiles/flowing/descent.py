@@ -21,11 +21,11 @@ import shapely
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.fields import FourierField, group_factor, steepness
 from orbiflow.flows import METHODS, Flow
 from orbiflow.runtime import NEVER, Cancel, one_thread
+from orbiflow.settings import as_instance
 from orbiflow.tiles.flowing.soft_target import SoftTarget
 from orbiflow.tiles.flowing.starts import Starts, outline_starts, template_starts
 from orbiflow.tiles.flowing.tile_model import TileModel

@@ -14,8 +14,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_whole
 from orbiflow.runtime import NEVER, Cancel
+from orbiflow.settings import as_instance, as_whole
 from orbiflow.tiles.flowing.descent import between
 from orbiflow.tiles.flowing.soft_target import signed_distance
 from orbiflow.tiles.flowing.starts import initial_poses

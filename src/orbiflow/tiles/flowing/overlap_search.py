@@ -8,11 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from orbiflow.arguments import refusal
 from orbiflow.errors import CertificationError
 from orbiflow.flows import method
 from orbiflow.runtime import NEVER, Cancel, one_thread
-from orbiflow.settings import Count, Range, Seed, Settings
+from orbiflow.settings import Count, Range, Seed, Settings, refusal
 from orbiflow.tiles.flowing.descent import fit_descent, shared_soft_target
 from orbiflow.tiles.flowing.occupancy import fit_occupancy
 from orbiflow.tiles.flowing.starts import initial_poses, outline_starts

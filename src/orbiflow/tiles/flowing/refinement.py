@@ -12,10 +12,10 @@ import shapely
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_number, as_whole, described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel, one_blas_thread, one_thread
+from orbiflow.settings import as_number, as_whole, described, is_tensor
 from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.likeness import Likeness, narrowest_neck
 from orbiflow.tiles.result_file import as_tile

@@ -9,8 +9,8 @@ import torch.nn.functional as F
 from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number, as_whole
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_instance, as_number, as_whole
 from orbiflow.tiles.silhouette import Emphasis, Target
 
 MARGIN = 0.5  # around the target's bounding box, in square roots of its area

@@ -15,11 +15,11 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.arguments import as_array, as_instance, as_number, as_whole, is_a
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
+from orbiflow.settings import as_array, as_instance, as_number, as_whole, is_a
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.search import Candidates, Prototiles, StillTiles, simplest_tile
 from orbiflow.tiles.silhouette import Bending, Frame

@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex
+from orbiflow.settings import as_array
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.bending_onto import bent_onto
 from orbiflow.tiles.likeness.elastic import Elastic

@@ -15,9 +15,9 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry import MultiPolygon, Polygon, box
 
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex, Integers, Window
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array
 from orbiflow.tiles.geometry import complex_points, plane_points, polygons_in, signed_area
 
 # the number of vertices beyond which a region of area 1 is simplified, and the tolerance

@@ -19,9 +19,9 @@ import shapely
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
-from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array, as_number
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
 from orbiflow.tiles.silhouette import DISC_OVERREACH, opened
 

@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, as_number, as_whole
 from orbiflow.arrays import Array
+from orbiflow.settings import as_array, as_number, as_whole
 from orbiflow.tiles.geometry import centroid, complex_points, orient, signed_area
 from orbiflow.tiles.likeness.metrics import Overlap, best_overlay
 

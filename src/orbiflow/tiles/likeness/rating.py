@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from orbiflow.arguments import as_number
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_number
 from orbiflow.tiles.likeness.faithful import GOOD_MARK, STEEPNESS
 
 STAR_WORDS = {4.5: "excellent", 3.5: "good", 2.5: "fair", 1.0: "poor"}

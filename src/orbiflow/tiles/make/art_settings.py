@@ -6,21 +6,22 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 from orbiflow.drawing import PaletteName
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import (
     DefaultText,
     Hidden,
+    LineWidth,
     NotWith,
     OnlyWith,
     Option,
+    PageArea,
+    PageLength,
     Parsed,
     Range,
-    SettingError,
     Unit,
 )
 from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import PageSettings
-from orbiflow.units import LineWidth, PageArea, PageLength
 
 MOST_ORDER, MOST_ARMS = 12, 60  # of a centre of rotation, and steps along a lattice vector
 LONGEST_BAND = 12  # heights: beyond 15 places can no longer be told apart

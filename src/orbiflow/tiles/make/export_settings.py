@@ -5,29 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
+from orbiflow.errors import SettingError
 from orbiflow.settings import (
+    COLUMNS,
+    PAGES,
+    Colour,
     DefaultText,
     Group,
     Hidden,
+    Length,
+    LengthOrZero,
     OnlyWith,
     Option,
+    PageLength,
+    PageSize,
     Range,
-    SettingError,
+    SignedLength,
     Unit,
 )
 from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import MARKS_EDGE, ColourRule, PageSettings, usual_tolerance
 from orbiflow.tiles.write import SceneFormat
-from orbiflow.units import (
-    COLUMNS,
-    PAGES,
-    Colour,
-    Length,
-    LengthOrZero,
-    PageLength,
-    PageSize,
-    SignedLength,
-)
 
 PIECES = Group("Pieces")
 FINE = 0.01  # in mm: a step of a machine

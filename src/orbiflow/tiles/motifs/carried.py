@@ -16,10 +16,10 @@ from PIL import Image
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arguments import as_path
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, png_bytes
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError
+from orbiflow.settings import as_path
 from orbiflow.tiles import search
 from orbiflow.tiles.geometry import polygons_in, triangle_sides
 from orbiflow.tiles.motifs.engraving import engraved, eye

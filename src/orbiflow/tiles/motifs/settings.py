@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from orbiflow.errors import OrbiflowError
-from orbiflow.settings import Group, Option, Parsed, Range, Repeated, SettingError, Settings
+from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import Group, Option, Parsed, Range, Repeated, Settings
 
 Strokes: TypeAlias = Literal["hatch", "echoes", "feathers"]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import polar
 
-from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_instance
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.tilings import (
     EdgeClass,

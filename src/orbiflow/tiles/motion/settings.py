@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from orbiflow.settings import DefaultText, Hidden, OnlyWith, Option, Range, SettingError, Unit
+from orbiflow.errors import SettingError
+from orbiflow.settings import (
+    DefaultText,
+    Hidden,
+    OnlyWith,
+    Option,
+    PageArea,
+    PageLength,
+    Range,
+    Unit,
+)
 from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import PageSettings
-from orbiflow.units import PageArea, PageLength
 
 MOST_FRAMES = 2400  # the largest number of pictures of a GIF or video
 SIDES = 64, 8000  # the least and the largest side of a picture in pixels

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import shapely
 
-from orbiflow.arrays import Array, Integers, Window, checked_window
+from orbiflow.arrays import Array, Integers, Window
 from orbiflow.drawing import Palette
 from orbiflow.symmetry import Isometry, rotation_matrix
-from orbiflow.tiles.geometry import Place, polygons_in
+from orbiflow.tiles.geometry import Place, checked_window, polygons_in
 from orbiflow.tiles.page.flattening import GROUND_INSET, boundary, ground_of
 from orbiflow.tiles.page.scene import (
     Box,

@@ -5,8 +5,17 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 from orbiflow.drawing import DEFAULT_PALETTE, PaletteName
-from orbiflow.settings import DefaultText, FileSettings, Option, Range, Unit
-from orbiflow.units import MILLIMETRES, LineWidth, PageArea, PageLength
+from orbiflow.settings import (
+    MILLIMETRES,
+    DefaultText,
+    FileSettings,
+    LineWidth,
+    Option,
+    PageArea,
+    PageLength,
+    Range,
+    Unit,
+)
 
 USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
 MARKS_EDGE = 10.0  # distance in mm of registration marks from the page's edge

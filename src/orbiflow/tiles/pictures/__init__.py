@@ -1,5 +1,5 @@
 """Pictures of tiles: tilings, overlays, the nine classes, a choice between two aims."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

@@ -10,10 +10,10 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
 from orbiflow.drawing import Sheet, rgb
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array
 from orbiflow.tiles.pictures.sketch import ScenePicture, Sketch
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile

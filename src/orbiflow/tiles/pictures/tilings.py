@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 from PIL import Image, ImageDraw
 
-from orbiflow.arguments import as_whole
 from orbiflow.arrays import Window
 from orbiflow.drawing import DEFAULT_PALETTE, Sheet, font, palette, palette_png
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_whole
 from orbiflow.tiles.page import Layer, Page, Style, symbol_of
 from orbiflow.tiles.pictures.sketch import LEAST_LINE, ScenePicture
 from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, default_window

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path, PurePath
 
-from orbiflow.arguments import as_instance, as_path
 from orbiflow.drawing import Sheet
 from orbiflow.runtime import (
     Note,
@@ -22,6 +21,7 @@ from orbiflow.runtime import (
     write_atomic,
     write_json,
 )
+from orbiflow.settings import as_instance, as_path
 from orbiflow.tiles.pictures import ScenePicture, comparison, tile_picture, tiling_picture
 from orbiflow.tiles.result_file import RESULT, folder_names, part_file
 from orbiflow.tiles.run_folder.files import (

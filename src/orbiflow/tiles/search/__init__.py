@@ -1,5 +1,5 @@
 """The search for tiles: what all methods share, and the search for likeness."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

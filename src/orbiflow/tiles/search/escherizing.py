@@ -16,7 +16,6 @@ import scipy
 import shapely
 
 from orbiflow import __version__
-from orbiflow.arguments import as_instance, described, is_a
 from orbiflow.errors import CertificationError, OrbiflowError, SettingError
 from orbiflow.runtime import (
     NEVER,
@@ -30,6 +29,7 @@ from orbiflow.runtime import (
     process_context,
     work,
 )
+from orbiflow.settings import as_instance, described, is_a
 from orbiflow.tiles.likeness import NearSymmetry, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent

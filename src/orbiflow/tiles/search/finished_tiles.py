@@ -9,10 +9,10 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import Advice, CertificationError, OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread
+from orbiflow.settings import as_instance
 from orbiflow.tiles.likeness import (
     Likeness,
     Pinned,

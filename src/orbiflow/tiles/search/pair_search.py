@@ -11,10 +11,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import shapely
 
-from orbiflow.arguments import as_choice
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import NEVER, Cancel, Sink, Team, ignore
-from orbiflow.settings import Count, Range, Seed, Settings
+from orbiflow.settings import Count, Range, Seed, Settings, as_choice
 from orbiflow.tiles.geometry import plane_points
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.bending import unlike

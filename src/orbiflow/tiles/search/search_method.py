@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from orbiflow.arguments import as_choice, as_instance
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
+from orbiflow.settings import as_choice, as_instance
 from orbiflow.tiles.search.candidates import Fit, OnProgress
 from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile

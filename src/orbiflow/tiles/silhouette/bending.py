@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import as_array, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array, is_tensor
 from orbiflow.tiles.geometry import best_similarity, complex_points, doubled_areas, triangle_sides
 from orbiflow.tiles.silhouette.mesh import Mesh, harmonic
 

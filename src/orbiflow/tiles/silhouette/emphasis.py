@@ -9,9 +9,9 @@ import scipy
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import as_array, as_instance, as_number
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.settings import as_array, as_instance, as_number
 from orbiflow.tiles.silhouette.outlines import percent
 from orbiflow.tiles.silhouette.readers import read_mask
 from orbiflow.tiles.silhouette.target import Covered, Target

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import as_array
 from orbiflow.tiles.geometry import (
     arc_lengths,
     kept_vertices,

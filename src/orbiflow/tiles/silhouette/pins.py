@@ -14,9 +14,9 @@ import scipy.sparse.csgraph
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import as_array, as_instance, as_number
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.settings import as_array, as_instance, as_number
 from orbiflow.tiles.geometry import resampled
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.outlines import outside, percent

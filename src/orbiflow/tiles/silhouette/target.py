@@ -14,9 +14,9 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 
-from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
+from orbiflow.settings import as_array, described, is_a, is_tensor
 from orbiflow.tiles.geometry import centroid, orient, polygons_in, signed_area
 from orbiflow.tiles.silhouette import readers  # read when a file is
 from orbiflow.tiles.silhouette.outlines import (

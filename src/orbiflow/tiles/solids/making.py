@@ -10,11 +10,11 @@ import numpy as np
 from manifold3d import Manifold
 
 from orbiflow import __version__
-from orbiflow.arguments import as_choice
 from orbiflow.arrays import Array
 from orbiflow.drawing import write_3mf, write_stl
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import Outcome
+from orbiflow.settings import as_choice
 from orbiflow.tiles.likeness import narrowest_slit
 from orbiflow.tiles.make import ExportSettings, dark_parts, fit_words, laid_out, place_on
 from orbiflow.tiles.page import Motif

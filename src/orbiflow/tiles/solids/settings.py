@@ -6,10 +6,21 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from orbiflow.settings import DefaultText, FileSettings, Needs, OnlyWith, Range, SettingError, Unit
+from orbiflow.errors import SettingError
+from orbiflow.settings import (
+    LONGEST_SIDE,
+    DefaultText,
+    FileSettings,
+    Length,
+    LengthOrZero,
+    Needs,
+    OnlyWith,
+    PageSize,
+    Range,
+    Unit,
+)
 from orbiflow.tiles.make import Orders
 from orbiflow.tiles.motifs import MotifSettings
-from orbiflow.units import LONGEST_SIDE, Length, LengthOrZero, PageSize
 
 WITH_DRAWING = ("tile", "stamp", "mould", "puzzle")
 FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break

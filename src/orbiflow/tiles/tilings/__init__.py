@@ -1,5 +1,5 @@
 """Tilings by one or several prototiles: isohedral classes, certificates, patches, colourings."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

@@ -12,9 +12,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.settings import as_number
 from orbiflow.tiles.tilings.prototile import Prototile
 from orbiflow.tiles.tilings.surroundings import (
     SegmentMatch,

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple, TypeVar, cast, overload
 
 import numpy as np
 
-from orbiflow.arguments import as_array, described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array, described, is_tensor
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,

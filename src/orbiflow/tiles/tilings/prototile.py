@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from orbiflow.arguments import as_array, as_whole
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array, as_whole
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.tiles.geometry import signed_area
 

@@ -13,10 +13,11 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from orbiflow.arguments import as_whole
-from orbiflow.arrays import Array, Integers, checked_window
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_whole
 from orbiflow.symmetry import Isometry, symmetry_elements
+from orbiflow.tiles.geometry import checked_window
 from orbiflow.tiles.tilings.tile_copies import (
     Copies,
     Placed,

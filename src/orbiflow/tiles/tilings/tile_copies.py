@@ -12,9 +12,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.arrays import Array, Integers, Window, checked_window
+from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
+from orbiflow.tiles.geometry import checked_window
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 

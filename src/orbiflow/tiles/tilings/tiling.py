@@ -13,9 +13,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, as_instance, described, is_a
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import as_array, as_instance, described, is_a
 from orbiflow.symmetry import CrystallographicGroup, Isometry, reduced_basis
 from orbiflow.tiles.tilings.prototile import Prototile, Stabiliser, stabiliser
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated
 
-from orbiflow.arguments import as_choice
-from orbiflow.settings import OneOf
+from orbiflow.settings import OneOf, as_choice
 
 if TYPE_CHECKING:
     from orbiflow.tiles.page import Scene

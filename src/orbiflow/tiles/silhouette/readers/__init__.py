@@ -1,5 +1,5 @@
 """Readers of silhouettes: pictures, drawings, polygons and masks."""
 
-from orbiflow.extras import door
+from orbiflow.settings import door
 
 __getattr__, __dir__, __all__ = door(__name__, __file__)

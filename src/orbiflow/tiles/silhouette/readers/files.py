@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from orbiflow.arguments import as_path
 from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
+from orbiflow.settings import as_path
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import (
     LEFT_OUT,

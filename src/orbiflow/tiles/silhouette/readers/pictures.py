@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
+from orbiflow.settings import described, is_tensor
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source

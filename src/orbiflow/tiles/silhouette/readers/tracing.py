@@ -16,7 +16,7 @@ from shapely.geometry import MultiPoint, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array, Integers
-from orbiflow.contours import level_curves
+from orbiflow.drawing import level_curves
 from orbiflow.errors import Advice, InputFileError, literal
 from orbiflow.tiles.geometry import polygons_in, signed_area
 from orbiflow.tiles.silhouette.outlines import MIN_PART_SHARE, left_out, outer_ring, thinned

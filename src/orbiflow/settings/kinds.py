@@ -17,8 +17,16 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Literal, Union, cast
 
-from orbiflow.arguments import ANY, Range, described, meant, number_wanted, one_of, path_text
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings.arguments import (
+    ANY,
+    Range,
+    described,
+    meant,
+    number_wanted,
+    one_of,
+    path_text,
+)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 from typing import Annotated
 
-from orbiflow.arguments import Range
 from orbiflow.errors import OrbiflowError
-from orbiflow.kinds import Parsed, Unit
+from orbiflow.settings.arguments import Range
+from orbiflow.settings.kinds import Parsed, Unit
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72}
 """Millimetres in each unit."""

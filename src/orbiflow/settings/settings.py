@@ -11,7 +11,7 @@ sentence, in a string under it::
         \"\"\"Width that the tool burns away.\"\"\"
 
 The class becomes a frozen dataclass whose fields are keywords. A field without default is required.
-Types are those of `orbiflow.kinds` and `orbiflow.units`: `bool`, `int`, `float`, `str`, `Path`,
+Types are those of `kinds.py` and `units.py`: `bool`, `int`, `float`, `str`, `Path`,
 `Literal`, tuples, unions with None, `Length`, `PageSize`, ...; `Annotated` adds:
 
 - `Range(1, 100)`, `Range(above=0)`, `Unit("s")`: which numbers, in which unit.
@@ -23,7 +23,7 @@ Types are those of `orbiflow.kinds` and `orbiflow.units`: `bool`, `int`, `float`
   apply to fields that were given (`settings.fields_given`), so a default never offends.
   `because=...` adds a reason to the message, with names of fields in braces.
 - `Ending(".png", ".svg")`: what the name of a file must end in.
-- `Parsed(function, "a length such as 40mm")`: text is read by a function; see `orbiflow.kinds`.
+- `Parsed(function, "a length such as 40mm")`: text is read by a function; see `kinds.py`.
 
 What rules cannot say goes into a method `check`, which raises a `SettingError` with the names of
 fields in braces. A default that depends on other fields goes into a method `defaults`, which returns
@@ -48,15 +48,9 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform
 
-from orbiflow.arguments import Range as Range
-from orbiflow.arguments import described, meant, one_of, placeholder, refusal
 from orbiflow.errors import SettingError, literal
-from orbiflow.kinds import FlagKind, Kind, OptionalKind, Refused, kind_of
-from orbiflow.kinds import InMemory as InMemory
-from orbiflow.kinds import OneOf as OneOf
-from orbiflow.kinds import Parsed as Parsed
-from orbiflow.kinds import Repeated as Repeated
-from orbiflow.kinds import Unit as Unit
+from orbiflow.settings.arguments import Range, described, meant, one_of, placeholder, refusal
+from orbiflow.settings.kinds import FlagKind, Kind, OptionalKind, Refused, kind_of
 
 Count = Annotated[int, Range(1)]
 """A whole number of things."""
