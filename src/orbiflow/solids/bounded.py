@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import subprocess
 import sys
 from contextlib import suppress
@@ -79,11 +80,12 @@ def _bound(memory: int, seconds: int) -> None:
 
     limits = {"RLIMIT_AS": memory, "RLIMIT_CPU": seconds, "RLIMIT_CORE": 0}
     for name, most in limits.items():
-        with suppress(OSError, ValueError):
+        with suppress(OSError, ValueError, OverflowError):  # a lower bound than this stays
             resource.setrlimit(getattr(resource, name), (most, most))
 
 
 def _main() -> int:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints
     path, memory, seconds = sys.argv[1:]
