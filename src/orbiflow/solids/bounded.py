@@ -33,7 +33,9 @@ MAX_WAIT = 1200
 REFUSED = 3
 """The status of a process that says why it has refused a file."""
 
-TOO_MUCH = "is broken, or takes more memory or time than a mesh needs; export it again"
+TOO_MUCH = (
+    "is broken, or takes more memory or time than a mesh needs; simplify it, or export it again"
+)
 
 
 def read_bounded(path: Path, *, memory: int = MAX_MEMORY, seconds: int = MAX_SECONDS) -> Soup:
