@@ -99,8 +99,7 @@ WORKS: dict[str, Call] = {
     "occupancy of float64": lambda: SOFT.occupancy(torch.zeros(3, 2, dtype=torch.float64), 0.1),
     "window in an array": lambda: patch(TILE, np.array([0, 0, 1, 1])),
     "frame of integers": lambda: TARGET.frame.to_input(torch.tensor([[1, 2]])),
-    "labels in an array": lambda: tiles.Target.from_mask(np.pad(np.full((30, 20), 7), 9)),
-    "labels of 16 bits": lambda: tiles.Target.from_mask(np.pad(np.full((9, 9), 1, "u2"), 2) + 1),
+    "mask of 16 bits": lambda: tiles.Target.from_mask(np.pad(np.full((9, 9), 1, "u2"), 2)),
     "plane group with blanks": lambda: wallpaper_group("p 4 m m"),
     "mask in a list": lambda: Emphasis([[1, 0]], (0, 0, 1, 1)),
 }

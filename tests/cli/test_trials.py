@@ -75,9 +75,9 @@ def test_drawings(name: str, shape: shapely.Polygon) -> None:
 @pytest.mark.parametrize(
     ("name", "note"),
     [
-        ("grey16-trns.png", "the opaque part"),
-        ("white16.png", "the opaque part"),
-        ("label-mask.png", "label mask: took the pixels of 1 for the shape"),
+        ("grey16-trns.png", "what is not transparent"),
+        ("white16.png", "what is not transparent"),
+        ("label-mask.png", "took 1 for white"),
         ("empty-first-frame.png", "took frame 2, the first that shows anything, of 2"),
     ],
 )

@@ -1,17 +1,16 @@
 """Reading meshes from files: STL, OBJ, PLY, 3MF, glTF and GLB, as one closed body each.
 
-Files may come from anybody. Their size, and the numbers of points and faces that they announce, are
-bounded before anything is decoded. Nothing is run, fetched from a network, or read from another
-folder; materials and textures are left aside, colours of points are kept. PLY and glTF are read by
-trimesh.
+Files may come from anybody. Their size, and the numbers of points and faces that STL, OBJ and PLY
+announce, are bounded before anything is decoded; 3MF and glTF are read in a process of bounded memory
+and time. Nothing is run, fetched from a network, or read from another folder; materials and textures
+are left aside, colours of points are kept. PLY and glTF are read by trimesh.
 """
 
 from __future__ import annotations
 
 import importlib
-import io
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -21,12 +20,12 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import STL_TRIANGLE
 from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.settings import naming_extras
-from orbiflow.solids.gltf_files import COLOURS, checked_gltf, from_metres, with_raw_colours
+from orbiflow.solids.bounded import read_bounded
 from orbiflow.solids.mending import mended
 from orbiflow.solids.mesh import Mesh
-from orbiflow.solids.package_files import read_3mf
 from orbiflow.solids.painting import Painting
 from orbiflow.solids.soup import MAX_BYTES, MAX_FACES_READ, Soup, check_counts
+from orbiflow.solids.trimesh_files import by_trimesh
 
 MAX_LINE = 2**16
 """Bytes of a line of an OBJ file at most: a polygon of some thousand corners."""
@@ -85,6 +84,7 @@ def read_mesh(path: str | Path) -> ReadMesh:
         data = path.read_bytes()
     try:
         soup, notes = reader(data, path), list[str]()
+        check_counts(len(soup.points), len(soup.faces))
         mesh = mended(soup, notes)
         painting = Painting.of(soup, mesh)
     except InputFileError:
@@ -174,53 +174,25 @@ def _read_ply(data: bytes, path: Path) -> Soup:
     check_counts(points, faces)
     if sum(int(n) for n in counts.values()) > len(data):
         raise OrbiflowError("is cut off: its header announces more than it holds; copy it again")
-    return _by_trimesh("ply", data, path, None)
-
-
-def _read_gltf(data: bytes, path: Path) -> Soup:
-    """Read a glTF or GLB by trimesh, once it is known to be within the bounds."""
-    files = checked_gltf(data, path)
-    data = with_raw_colours(data)
-    return from_metres(_by_trimesh(path.suffix.lower()[1:], data, path, files))
-
-
-def _by_trimesh(kind: str, data: bytes, path: Path, files: Mapping[str, bytes] | None) -> Soup:
     with naming_extras(f"reading {path.name}"):
-        trimesh = importlib.import_module("trimesh")
-    try:
-        scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind, resolver=files, skip_materials=True, process=False
-        )
-        parts = [own for own in scene.dump(concatenate=False) if hasattr(own, "faces")]
-        soups = [_coloured(own) for own in parts]
-    # what a broken file does to a reader is of any kind
-    except Exception as error:
-        raise OrbiflowError(f"is broken, or of a kind that is not read: {error}") from error
-    check_counts(sum(len(own.points) for own in soups), sum(len(own.faces) for own in soups))
-    return Soup.joined(soups)
+        return by_trimesh("ply", data)
 
 
-def _coloured(part: Any) -> Soup:
-    """Return a mesh of trimesh, with the colours of its points or faces."""
-    points = np.asarray(part.vertices, float).reshape(-1, 3)
-    soup = Soup(points, np.asarray(part.faces, np.int64).reshape(-1, 3))
-    found = np.asarray(part.vertex_attributes.get(COLOURS, ()))
-    if found.shape in ((len(points), 3), (len(points), 4)):
-        most = np.iinfo(found.dtype).max if found.dtype.kind in "iu" else 1
-        return soup._replace(colours=found[:, :3] / most)
-    if part.visual.kind == "vertex":
-        return soup._replace(colours=part.visual.vertex_colors[:, :3] / 255)
-    if part.visual.kind == "face":
-        colours = part.visual.face_colors[:, None, :3].repeat(3, axis=1) / 255
-        return soup.with_corner_colours(colours)
-    return soup
+def _read_3mf(_: bytes, path: Path) -> Soup:
+    return read_bounded(path)
+
+
+def _read_gltf(_: bytes, path: Path) -> Soup:
+    with naming_extras(f"reading {path.name}"):
+        importlib.import_module("trimesh")
+    return read_bounded(path)
 
 
 READERS: dict[str, Callable[[bytes, Path], Soup]] = {
     ".stl": _read_stl,
     ".obj": _read_obj,
     ".ply": _read_ply,
-    ".3mf": lambda data, _: read_3mf(data),
+    ".3mf": _read_3mf,
     ".gltf": _read_gltf,
     ".glb": _read_gltf,
 }

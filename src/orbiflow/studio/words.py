@@ -29,54 +29,19 @@ LABELS = {
     "invert": "side (The animal is)",
     "smooth": "smoothing",
     "thicken": "Thin parts",
-    "unit": "the way angles are counted",
+    "unit": "“How angles are counted”",
 }
 """What the pages call settings whose names say too little."""
 
-ON_THE_PAGE = {
-    "(alpha threshold ": "(opacity from ",
-    "(threshold ": "(edge at ",
-    "with smoothing 0.01": "with a little smoothing",
-    "say so with missing codes, and leave their rows out with drop missing; or make": "make",
-    "give the way angles are counted": "choose under “How angles are counted”:",
-}
-"""What messages say of options and levels, once these are named, and what the page has for them."""
-
-
-IN_PLAIN_WORDS = {
-    r"line 1: .* is not a number of vertices, a vertex .*": (
-        "this is a text, not a picture or a polygon; choose a PNG, JPEG, WebP or SVG picture"
-    ),
-    r"the image is blank, every pixel .*": (
-        "the picture is empty, it has one colour all over; choose another one"
-    ),
-    r"the light \(or opaque\) part of the mask does not touch the silhouette, or is only a speck; .*": (
-        "it is only a speck, or beside the animal; paint more of it on the animal, or undo it"
-    ),
-    r"the pins hold (.*) of the outline, so that nothing is left to bend; .*": (
-        r"what keeps its shape is \1 of the outline, so that nothing is left to bend; undo some of it"
-    ),
-    r"averaged \d+ x \d+ pixels into one before tracing": "the picture was made smaller to read it",
-    r"shape taken: the opaque part \(.*?\)": "the shape is what is not transparent",
-    r" \([01][.]\d\d of 1\)": "",
-}
-"""What messages say in the words of image processing, as patterns, and what the page says instead."""
-
 
 def page_words(text: str) -> str:
-    """Return a message in the page's own words.
+    """Return a message with settings called what the page calls them.
 
-    >>> page_words("cat.png: the image is blank, every pixel has luminance 1.00; there is no shape")
-    'cat.png: the picture is empty, it has one colour all over; choose another one'
     >>> page_words(Advice("raise the contrast or try another {threshold}"))
     'raise the contrast or try another edge (Where it ends)'
     """
     if isinstance(text, Advice):
-        text = text.named(lambda name: LABELS.get(name, name.replace("_", " ")))
-    for words, meant in ON_THE_PAGE.items():
-        text = text.replace(words, meant)
-    for pattern, meant in IN_PLAIN_WORDS.items():
-        text = re.sub(pattern, meant, text)
+        return text.named(lambda name: LABELS.get(name, name.replace("_", " ")))
     return text
 
 

@@ -118,19 +118,6 @@ def test_three_columns_that_nothing_names_are_refused() -> None:
         ({"points": SHAPE}, False),
         ({"vertices": SHAPE, "y_down": True}, True),
         ({"outline": [{"x": x, "y": y} for x, y in SHAPE], "y_down": True}, True),
-        ({"annotations": [{"segmentation": [FLAT], "bbox": [0, 0, 1, 1]}]}, True),
-        ({"annotations": [{"segmentation": {"counts": "x"}}, {"segmentation": [FLAT]}]}, True),
-        ({"version": "5", "shapes": [{"label": "a", "points": SHAPE}]}, True),
-        (
-            {
-                "shapes": [
-                    {"label": "box", "points": [[0, 0], [99, 99]], "shape_type": "rectangle"},
-                    {"label": "a", "points": SHAPE, "shape_type": "polygon"},
-                    {"label": "b", "points": OTHER, "shape_type": "polygon"},
-                ]
-            },
-            True,
-        ),
     ],
 )
 def test_json_of_other_programs(content: Any, y_down: bool) -> None:
@@ -139,30 +126,15 @@ def test_json_of_other_programs(content: Any, y_down: bool) -> None:
     assert target.y_down is y_down
 
 
-def test_of_annotations_the_largest_object_is_taken_alone() -> None:
-    beside = [4.5, 0.25, 6, 0.25, 6, 2, 4.5, 2]  # touches it, and is another object
-    content = {
-        "annotations": [
-            {"category_id": 1, "segmentation": [FLAT]},
-            {"category_id": 2, "segmentation": [beside]},
-        ],
-        "categories": [{"id": 1, "name": "bird"}, {"id": 2, "name": "branch"}],
-    }
-    target = read(content)
-    assert iou(target.outline, SHAPE) == pytest.approx(1)
-    assert target.notes == ("took the largest of 2 annotated objects, 'bird'",)
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"annotations": [{"segmentation": {"counts": "x"}}]}, "none of its 1 annotations"),
-        ({"shapes": []}, "none of its 0 annotations"),
+        ({"annotations": [{"segmentation": [FLAT]}], "categories": []}, "'annotations'.*mask"),
+        ({"version": "5", "shapes": [{"label": "a", "points": SHAPE}]}, "'shapes'.*mask"),
         ({"x": [1, 2], "y": [1]}, '"x" and "y" must be lists'),
         ([SHAPE, None], "no list of pairs"),
         ([[[[SHAPE]]]], "not a pair of numbers"),
         ([{"x": 1, "y": 2}, {"x": 1}, {"x": 2, "y": 3}], "vertex 1 "),
-        ({"annotations": [{"segmentation": [[*FLAT, 1]]}]}, "vertex 4 "),
         (FLAT, "vertex 0 "),
     ],
 )

@@ -110,7 +110,7 @@ def test_dat(tmp_path: Path, newline: str) -> None:
         ("3\n0 0\n1 0\n0 x\n", "line 4: '0 x' is not a vertex"),
         ("3\n0 0\n1 0 5\n0 1\n", "line 3: '1 0 5' is not a vertex"),
         ("3\n0 0\n1 0\nnan 1\n", "line 4: 'nan 1': every coordinate must be a finite"),
-        ("two\n0 0\n", "line 1: 'two' is not a number of vertices"),
+        ("two\n0 0\n", "line 1: 'two' is not a vertex"),
         ("2\n0 0\n1 0\n", "line 1: 2 vertices; from 3"),
         ("999999999\n0 0\n", "line 1: 999999999 vertices; from 3 to 100000"),
         ("4\n0 0\n1 1\n1 0\n0 1\n", r"near \(0\.5, 0\.5\)"),

@@ -66,7 +66,7 @@ def test_palette_with_transparent_colour(tmp_path: Path) -> None:
     image = draw("P", 1, 0)
     image.putpalette([255, 255, 255, 255, 255, 255])
     reading = read_outline(save(tmp_path, image, transparency=0))
-    assert reading.notes[0] == "shape taken: the opaque part (alpha threshold 0.50)"
+    assert reading.notes[0] == "the shape is what is not transparent (edge at 0.50)"
     assert iou(reading.outline, SHAPE) > 0.995
 
 
@@ -80,7 +80,7 @@ def test_rounded_corners_cut_nothing_out(tmp_path: Path) -> None:
     assert "took the few transparent pixels for white" in reading.notes
     plain = Image.new("RGBA", (100, 100), (9, 9, 9, 255))
     plain.putpixel((0, 0), (0, 0, 0, 0))  # nothing else to be seen
-    assert "alpha" in read_outline(save(tmp_path, plain)).notes[0]
+    assert "transparent" in read_outline(save(tmp_path, plain)).notes[0]
 
 
 @pytest.mark.parametrize(
@@ -110,8 +110,8 @@ def test_anti_aliased_edges_are_found_between_pixels(tmp_path: Path) -> None:
 def test_polarity_is_detected_and_said(tmp_path: Path) -> None:
     dark = read_outline(save(tmp_path, draw()))
     light = read_outline(save(tmp_path, draw("L", 255, 0)))
-    assert dark.notes == ("shape detected: dark on light (threshold 0.50)",)
-    assert light.notes == ("shape detected: light on dark (threshold 0.50)",)
+    assert dark.notes == ("shape detected: dark on light (edge at 0.50)",)
+    assert light.notes == ("shape detected: light on dark (edge at 0.50)",)
     assert iou(dark.outline, light.outline) > 0.999
 
 
@@ -120,7 +120,7 @@ def test_threshold_and_invert_override(tmp_path: Path) -> None:
     ImageDraw.Draw(image).rectangle((20, 10, 39, 49), fill=20)
     path = save(tmp_path, image)
     reading = read_outline(path, threshold=0.2, invert=False)
-    assert reading.notes == ("shape as set: dark on light (threshold 0.20, as given)",)
+    assert reading.notes == ("shape as set: dark on light (edge at 0.20, as given)",)
     # Interpolated towards a light ground, a low threshold draws the edge inwards.
     assert iou(reading.outline, [[20, 10], [40, 10], [40, 50], [20, 50]]) > 0.9
     with refused("shape.png", "100 x 100 pixels", "invert", kind=InputFileError):
@@ -195,7 +195,7 @@ def test_shape_on_the_border_is_closed_along_it(tmp_path: Path) -> None:
 def test_large_images_are_averaged_down_in_original_pixels(tmp_path: Path) -> None:
     reading = read_outline(save(tmp_path, draw(scale=20)))
     assert reading.size == (2000, 2000)
-    assert "averaged 2 x 2 pixels into one before tracing" in reading.notes
+    assert any("2 x 2 pixels became one" in note for note in reading.notes)
     assert iou(reading.outline, SHAPE * 20) > 0.995
 
 
@@ -228,7 +228,7 @@ def test_outline_is_simple_where_pixels_meet_at_corners(tmp_path: Path) -> None:
     ("make", "message"),
     [
         (lambda: Image.new("L", (1, 1)), "1 x 1 pixels cannot hold"),
-        (lambda: Image.new("L", (50, 50), 77), r"blank, every pixel has luminance 0\.30"),
+        (lambda: Image.new("L", (50, 50), 77), "empty"),
         (lambda: Image.new("RGBA", (50, 50)), "wholly transparent"),
         (lambda: draw("L", 250, 255), "all but blank"),
         (lambda: draw().resize((8, 8)), "covers only .* pixels"),

@@ -144,7 +144,7 @@ def test_nagata(name: str) -> None:
 def test_distorted_images(name: str) -> None:
     target = Target.read(DATA / "nagata_distorted_png" / f"{name}.png")
     assert target.size == (1024, 1024)
-    assert target.notes[0] == "shape detected: dark on light (threshold 0.50)"
+    assert target.notes[0] == "shape detected: dark on light (edge at 0.50)"
     assert len(target.outline) < 1000
 
 

@@ -206,7 +206,7 @@ def _symmetry_note(near: NearSymmetry, names: Sequence[str]) -> str:
     own = [name for name in SYMMETRIC_CLASSES[near.stabiliser] if name in names]
     searched = f"{', '.join(own)} with exactly symmetric tiles" if own else "no class of such tiles"
     return (
-        f"the silhouette is much like {what} ({max(near):.2f} of 1): {searched} "
+        f"the silhouette is much like {what} (likeness {max(near):.2f}): {searched} "
         f"{'are' if len(own) > 1 else 'is'} searched"
     )
 

@@ -22,6 +22,8 @@ MAX_LEFT_OUT_SHARE = 0.02  # of what was seen
 MIN_HOLE_SHARE, MAX_HOLE_SHARE = 0.02, 0.3
 MIN_CONVEX_SHARE = 0.95  # of its convex hull: what a frame fills
 MAX_CUT_OUT_SHARE = 0.7  # of a card: what the line of a drawing encloses is larger
+MIN_CARD_COVERAGE = 0.94  # of its box: what a card fills, round corners apart
+MIN_CARD_SHARE = 0.85  # of the page's sides: a card's
 MAX_INSIDE_SHARE = 0.1  # of the silhouette: more that lies in a hole is a shape of its own
 MIN_LENGTH_PIXELS = 40
 THIN_PIXELS = 3.0  # pixels
@@ -73,7 +75,8 @@ def _lost_parts(target: Target) -> list[str]:
             f"them to it in the drawing, or by a larger {{smooth}}{level * is_image}"
         )
     share = sum(hole.area for hole in holes) / target.area
-    if _is_card(target, holes):
+    is_cut_out = _is_card(target, holes)
+    if is_cut_out:
         found.append(
             f"the silhouette is a card, of whose area a hole takes {percent(share)}: if the hole is "
             "the shape, change {invert}"
@@ -89,6 +92,11 @@ def _lost_parts(target: Target) -> list[str]:
         found.append(
             f"another shape, of {percent(share)} of the silhouette, lies inside the hole that was "
             "filled: if it is the one meant, remove the frame or lines around it"
+        )
+    elif not is_cut_out and _fills_page(target):
+        found.append(
+            "the silhouette is a rectangle almost as large as the page: if it is the card that the "
+            "shape lies on, remove it from the picture"
         )
     return found
 
@@ -108,6 +116,15 @@ def _is_card(target: Target, holes: list[Polygon]) -> bool:
     share = hole.area / target.area
     is_cut_out = MIN_HOLE_SHARE < share < MAX_CUT_OUT_SHARE and not _is_convex(hole)
     return is_cut_out and _is_convex(Polygon(target.outline))
+
+
+def _fills_page(target: Target) -> bool:
+    """Return whether a silhouette is a rectangle that all but fills the picture or the page."""
+    sides = np.ptp(target.outline, axis=0)
+    if target.size is None or target.kind not in ("image", "svg"):
+        return False
+    is_large = (sides >= MIN_CARD_SHARE * np.array(target.size)).all()
+    return bool(is_large and target.area >= MIN_CARD_COVERAGE * sides.prod())
 
 
 def _is_convex(shape: Polygon) -> bool:

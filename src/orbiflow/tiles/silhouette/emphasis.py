@@ -157,8 +157,8 @@ def _share_of(emphasis: Emphasis, target: Target) -> float:
     on_outline = emphasis.level(ring)
     if max(levels.max(initial=0), on_outline.max()) < MIN_TOUCHING_LEVEL:
         raise InputFileError(
-            f"{emphasis.source}: the light (or opaque) part of the mask does not touch the "
-            "silhouette, or is only a speck; paint it over the silhouette, in the same picture"
+            f"{emphasis.source}: what is painted, light or opaque, is only a speck or does not touch "
+            "the silhouette; paint more of it on the silhouette, in the same picture"
         )
     return float(levels.mean()) if levels.size else float(on_outline.mean())
 

@@ -156,8 +156,8 @@ def _warnings(pins: Pins, target: Target) -> list[str]:
     share = float(pins.holds(resampled(target.normal, 720)).mean())
     if share >= MAX_PINNED_SHARE:
         raise OrbiflowError(
-            f"the pins hold {percent(share)} of the outline, so that nothing is left to bend; pin "
-            "only a head or a hand"
+            f"what keeps its shape is {percent(share)} of the outline, so that nothing is left to "
+            "bend; pin less, such as a head or a hand"
         )
     if share > MUCH_PINNED_SHARE:
         return [f"the pins hold {percent(share)} of the outline: little is left to bend"]

@@ -7,24 +7,18 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.label_masks import (
-    MAX_INDISTINCT_LEVEL,
-    is_of_labels,
-    may_be_labels,
-)
 from orbiflow.tiles.silhouette.readers.reading import Source, check_file, read_bytes, read_head
 
 MAX_BYTES = 64 * 2**20
 MAX_PIXELS = 40_000_000  # that are kept: of a larger image, several become one
 MAX_PIXELS_READ = 128_000_000  # before they are shrunk: telephones have 48 or 108 million
 MAX_FRAMES = 100  # of an animation, in which one that shows anything is sought
-FULL_SCALES = (255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of 8, 10, 12, 14 and 16 bits
+FULL_SCALES = (1.0, 255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of masks, and of 8 to 16 bits
 STRIP_ROWS = 256  # rows of the shrunk image that are made at once
-MIN_COLOURS = 10  # of 255: a palette whose colours differ less shows nothing
+MASK_NOTE = "took 1 for white: the levels are 0 and 1 alone"
 _STARTS = {
     **{b"\x89PNG\r\n\x1a\n": "PNG", b"\xff\xd8\xff": "JPEG", b"BM": "BMP"},
     **{b"GIF87a": "GIF", b"GIF89a": "GIF", b"II*\0": "TIFF", b"MM\0*": "big-endian TIFF"},
@@ -47,7 +41,6 @@ _TURNS = {
     7: Image.Transpose.TRANSVERSE,
     8: Image.Transpose.ROTATE_90,
 }
-Numbers = NDArray[np.integer[Any]]
 
 
 def image_kind(head: bytes) -> str:
@@ -64,18 +57,13 @@ class DecodedImage:
     - `image`: Of mode "L", "RGB", "RGBA" (not premultiplied), or "F" (0 to 1, of more than 8 bits).
     - `size`: The width and height of the image in the file, turned, in pixels.
     - `shrunk`: How many of those pixels are one of `image`'s wide.
-    - `numbers`: The whole number (H, W) that stands in the file for each pixel, if that may be a label:
-      of grey images, and of palettes without colours or of label masks. Not of shrunk images.
-    - `are_labels`: Whether the palette says that they are.
     - `notes`: What was decided for the user.
     """
 
     image: Image.Image
     size: tuple[int, int]
     shrunk: int
-    numbers: Numbers | None
     notes: tuple[str, ...]
-    are_labels: bool = False
 
 
 def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
@@ -191,14 +179,10 @@ def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> Dec
     factor = max(1, round(shrunk * file.width / width))
     image = raw.shown(levels) if factor == 1 else _shrunk(raw, factor, levels)
     image = image if turn is None else image.transpose(turn)
-    if shrunk > 1:
-        return DecodedImage(image, size, shrunk, None, tuple(notes))
-    palette = None
-    raw = raw if turn is None else raw._replace(image=raw.image.transpose(turn))
-    if raw.image.mode == "P" and image.mode == "RGB":  # without transparent colours
-        palette = np.array(raw.image.getpalette() or [0, 0, 0], dtype=np.int64).reshape(-1, 3)
-    are_labels = palette is not None and is_of_labels(palette)
-    return DecodedImage(image, size, 1, _numbers(raw, image, palette), tuple(notes), are_labels)
+    if image.mode == "L" and image.getextrema() == (0, 1):
+        image = image.point([0, *[255] * 255])
+        notes.append(MASK_NOTE)
+    return DecodedImage(image, size, shrunk, tuple(notes))
 
 
 class _Raw(NamedTuple):
@@ -269,7 +253,9 @@ def _levels(path: Source, image: Image.Image, notes: list[str]) -> tuple[float, 
     if image.mode == "F" or low < 0 or high > FULL_SCALES[-1]:
         return low, max(high, low + float(np.finfo(np.float32).tiny))
     white = next(scale for scale in FULL_SCALES if high <= scale)
-    if MAX_INDISTINCT_LEVEL < high <= FULL_SCALES[-2]:
+    if high <= 1:
+        notes.append(MASK_NOTE)
+    elif high <= FULL_SCALES[-2]:
         notes.append(
             f"took {white:.0f} for white: the levels, of 16 bits or more, go up to {high:.0f}"
         )
@@ -294,21 +280,3 @@ def _shrunk(raw: _Raw, factor: int, levels: tuple[float, float] | None) -> Image
     for top, strip in strips:
         whole.paste(strip, (0, top))
     return whole
-
-
-def _numbers(raw: _Raw, shown: Image.Image, palette: NDArray[np.int64] | None) -> Numbers | None:
-    """Return the numbers of the pixels that may be labels: see `DecodedImage`."""
-    mode, values = raw.image.mode, np.asarray(raw.image)
-    if raw.opaque is not None:
-        return None
-    if mode == "F":  # as ImageJ saves labels
-        is_label = (
-            np.isfinite(values).all() and abs(values).max() <= 65535 and not (values % 1).any()
-        )
-        return values.astype(np.int32) if is_label else None
-    is_grey = mode == "L" or mode.startswith("I")
-    if palette is not None:
-        extrema: Any = shown.getextrema()
-        is_grey = all(high - low < MIN_COLOURS for low, high in extrema)
-        is_grey |= is_of_labels(palette) or may_be_labels(values, palette)
-    return values if is_grey else None

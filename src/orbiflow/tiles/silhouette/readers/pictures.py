@@ -15,9 +15,7 @@ from PIL import Image
 from orbiflow.arrays import Array
 from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
 from orbiflow.settings import described, is_tensor
-from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE, without_card, without_frame
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
-from orbiflow.tiles.silhouette.readers.label_masks import label_mask
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
 from orbiflow.tiles.silhouette.readers.tracing import Level, middle_of_line, trace
@@ -28,7 +26,10 @@ MIN_SIDE_OF_PHOTOGRAPH = 16
 MIN_TRANSPARENT = 0.005  # of the picture: less, such as rounded corners, cuts nothing out
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
 # channels that say by themselves where the shape is: their high part and their low part
-_PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
+_PARTS = {
+    "alpha": ("what is not transparent", "what is transparent"),
+    "mask": ("what is marked", "what is not marked"),
+}
 
 
 @dataclass(frozen=True)
@@ -57,18 +58,11 @@ def read_image(
     image, notes = found.image, [*found.notes]
     if _is_hardly_cut_out(image):
         image, notes = _on_white(image), [*notes, "took the few transparent pixels for white"]
-    elif threshold is None and invert is None and (drawn := without_card(image)) is not None:
-        image, notes = drawn, [*notes, CARD_NOTE]
     band, name, band_notes = _channel(path, image)
     picture = None
-    if threshold is None and name == "luminance":
-        numbers, are_labels = found.numbers, found.are_labels
-        if numbers is not None and (labels := label_mask(numbers, are_labels=are_labels)):
-            mask, note = labels
-            picture = _drawing(Image.fromarray(mask), "mask", notes, [note])
-        elif invert is None:
-            colours = band if band_notes or band.mode == "F" else image.convert("RGB")
-            picture = _photograph(path, colours, (*notes, *band_notes))
+    if threshold is None and invert is None and name == "luminance":
+        colours = band if band_notes or band.mode == "F" else image.convert("RGB")
+        picture = _photograph(path, colours, (*notes, *band_notes))
     picture = picture or _drawing(band, name, notes, band_notes)
     picture = replace(picture, size=found.size, reduced=picture.reduced * found.shrunk)
     return _traced(path, picture, threshold, invert)
@@ -95,7 +89,7 @@ def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[
     """Return levels 0 to 1 with at most so many pixels a side, how many became one, and a note."""
     reduced = -(-max(band.size) // most)
     full_scale = 1.0 if band.mode == "F" else 255.0
-    note = f"averaged {reduced} x {reduced} pixels into one before tracing"
+    note = f"made the picture smaller to read it: {reduced} x {reduced} pixels became one"
     levels = np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale
     return levels, reduced, [note] * (reduced > 1)
 
@@ -163,16 +157,12 @@ def choose_shape(
     channel = picture.channel
     if channel.min() == channel.max():
         raise InputFileError(
-            f"{path}: the image is blank, every pixel has {picture.name} {channel.min():.2f}; "
-            "there is no shape in it"
+            f"{path}: the picture is empty, it is the same all over, so there is no shape in it; give "
+            "another one"
         )
     cut = _cut(path, picture) if threshold is None else threshold
     given = "" if threshold is None else ", as given"
     above = channel > cut
-    framing: list[str] = []
-    if picture.name == "luminance" and invert is None:
-        channel, framing = without_frame(channel, above)
-        above = channel > cut
     if above.all() or not above.any():
         side = "above" if above.any() else "below"
         raise InputFileError(
@@ -190,12 +180,12 @@ def choose_shape(
     elif picture.name in _PARTS:
         take_high = not invert
         part = _PARTS[picture.name][not take_high]
-        notes = [f"shape taken: the {part} part ({picture.name} threshold {cut:.2f}{given})"]
+        notes = [f"the shape is {part} (edge at {cut:.2f}{given})"]
     else:
-        take_high, notes = _polarity(above, invert, f"threshold {cut:.2f}{given}")
+        take_high, notes = _polarity(above, invert, f"edge at {cut:.2f}{given}")
     if take_high:
-        return Level(channel, cut, float(high)), [*framing, *notes]
-    return Level(1 - channel, 1 - cut, 1 - float(low)), [*framing, *notes]
+        return Level(channel, cut, float(high)), notes
+    return Level(1 - channel, 1 - cut, 1 - float(low)), notes
 
 
 def _cut(path: Source, picture: Picture) -> float:
@@ -209,23 +199,21 @@ def _cut(path: Source, picture: Picture) -> float:
         raise InputFileError(
             Advice(
                 literal(f"{path}: the image is all but blank")
-                + f", its luminance is {low:.2f} to {high:.2f}; raise the contrast or try another "
-                "{threshold}"
+                + f", its luminance is {low:.2f} to {high:.2f}; raise the contrast, save the shape as "
+                "a mask, white on black, or try another {threshold}"
             )
         )
     return (low + high) / 2
 
 
-def _polarity(
-    above: NDArray[np.bool_], invert: bool | None, threshold: str
-) -> tuple[bool, list[str]]:
+def _polarity(above: NDArray[np.bool_], invert: bool | None, edge: str) -> tuple[bool, list[str]]:
     """Return whether the shape is the light part."""
     border = np.concatenate([above[0], above[-1], above[1:-1, 0], above[1:-1, -1]])
     light = float(border.mean())
     shape_is_light = light < 0.5 if invert is None else invert
     kind = "light on dark" if shape_is_light else "dark on light"
     how = "detected" if invert is None else "as set"
-    notes = [f"shape {how}: {kind} ({threshold})"]
+    notes = [f"shape {how}: {kind} ({edge})"]
     if invert is None and 0.3 < light < 0.7:
         notes.append(
             Advice(
@@ -242,9 +230,8 @@ def read_mask_array(
     """Return the outline of the shape in an array (H, W), in pixels with y down.
 
     Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it
-    is not. So do labels, of which the largest is the shape (see `label_mask`). Other integers of 8 or
-    16 bits are gray levels of that full scale, floats of full scale 1: `threshold` and `invert` mean
-    what they do for images (see `read_image`).
+    is not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale 1:
+    `threshold` and `invert` mean what they do for images (see `read_image`).
 
     Raises:
         OrbiflowError: for another shape or type, levels out of range, or a setting that does not fit.
@@ -253,8 +240,7 @@ def read_mask_array(
     source = FileContent(b"", name)
     array = _array(values, name)
     check_size(source, array.shape[::-1], MAX_PIXELS)
-    labels = label_mask(array) if array.dtype.kind in "iu" and array.max(initial=0) > 1 else None
-    levels, is_mask = _levels(array if labels is None else labels[0] > 0, name)
+    levels, is_mask = _levels(array, name)
     if is_mask and threshold is not None:
         raise OrbiflowError(
             f"{name}: threshold parts gray levels, and this is a mask; leave it out"
@@ -262,8 +248,7 @@ def read_mask_array(
     band = Image.fromarray(levels)
     by_colour = not is_mask and threshold is None and invert is None
     picture = _photograph(source, band, ()) if by_colour else None
-    more = () if labels is None else (labels[1],)
-    picture = picture or _drawing(band, "mask" if is_mask else "luminance", more=more)
+    picture = picture or _drawing(band, "mask" if is_mask else "luminance")
     return _traced(source, picture, threshold, invert)
 
 

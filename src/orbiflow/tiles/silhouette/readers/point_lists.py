@@ -114,8 +114,8 @@ def read_points(path: Source) -> Reading:
         return _numbered(path, lines)
     raise first.refused(
         path,
-        "is not a number of vertices, a vertex (two numbers, `x y`) or a title of lines that are; save "
-        "the polygon as one of these",
+        "is not a vertex (two numbers, `x y`), a number of vertices, or a title above vertices: this "
+        "text is not a polygon; give one, or a picture (PNG, JPEG, WebP or SVG)",
     )
 
 

@@ -1,8 +1,7 @@
-"""Polygons in JSON, GeoJSON, annotations of COCO and labelme, and WKT."""
+"""Polygons in JSON, GeoJSON and WKT."""
 
 import json
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import shapely
@@ -23,8 +22,6 @@ UP = 'took y to point up; if it points down, write {"outline": [...], "y_down": 
 _KEYS = ", ".join(f'"{key}"' for key in POLYGON_KEYS)
 _AXES = frozenset(("x", "y"))
 _CURVES = re.compile(r"CURVE|CIRCULARSTRING|MULTISURFACE", re.IGNORECASE)
-_TOPOJSON = "is TopoJSON, which is not read; convert it to GeoJSON (mapshaper.org does)"
-_ESRI = 'is JSON of Esri ("rings"), which is not read; export GeoJSON'
 _BELOW = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 
 
@@ -33,15 +30,14 @@ def read_json(path: Source) -> Reading:
 
     Taken are: a list of [x, y] pairs, of objects with x and y, or of such lists; an object with lists
     "x" and "y", or with any of these under a word of `POLYGON_KEYS`, and optionally `"y_down": true`;
-    GeoJSON; annotations of COCO and labelme, with y down. Of several polygons the largest is kept.
+    GeoJSON. Of several polygons the largest is kept.
     """
     content = _content(path)
-    if is_object(content) and not content.keys() & {*POLYGON_KEYS}:
-        for key, annotated in (("annotations", _coco), ("shapes", _labelme)):
-            if is_list(marked := content.get(key)):
-                return _annotated(path, len(marked), list(annotated(content, marked)))
-        if "type" in content and not content.keys() >= _AXES:
-            return _geojson(path, content)
+    has_points = is_object(content) and (
+        content.keys() & {*POLYGON_KEYS} or content.keys() >= _AXES
+    )
+    if is_object(content) and "type" in content and not has_points:
+        return _geojson(path, content)
     points, y_down, notes = _find_polygon(path, content)
     found = _read_pairs(path, _rings(path, points), bool(y_down), notes)
     return found if y_down is not None else found.with_notes(UP)
@@ -81,12 +77,10 @@ def _find_polygon(path: Source, content: object) -> tuple[Any, bool | None, list
     if not keys and content.keys() >= _AXES:
         return content, y_down, []
     if not keys:
-        if content.keys() & {"rings", "geometryType"} or is_object(content.get("geometry")):
-            raise InputFileError(f"{path}: {_ESRI}")
         found = ", ".join(quoted(str(key)) for key in list(content)[:8]) or "nothing"
         raise InputFileError(
-            f"{path}: none of {_KEYS} is in it (it has {found}); put the list of vertices under one "
-            "of them"
+            f"{path}: none of {_KEYS} is in it (it has {found}); put the vertices of one polygon under "
+            "one of them, or export that polygon as GeoJSON or its shape as a mask (PNG)"
         )
     points = content[keys[0]]
     if not is_list(points) and not is_object(points):
@@ -128,52 +122,6 @@ def _check_pairs(path: Source, points: Any) -> None:
             )
 
 
-_Annotation = tuple[list[Any], str]
-"""One object that was outlined in a picture, as rings of pairs, and its name."""
-
-
-def _coco(content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotation]:
-    listed = content.get("categories")
-    known = [kind for kind in listed if is_object(kind)] if is_list(listed) else []
-    names = {json.dumps(kind.get("id")): str(kind.get("name")) for kind in known}
-    for one in marked:
-        flat = one.get("segmentation") if is_object(one) else None
-        parts = flat if is_list(flat) else []
-        parts = [parts] if parts and not is_list(parts[0]) else parts
-        rings = [
-            # pairs, or x, y, x, y and so on; what is left over stands alone, to be refused
-            part if is_list(part[0]) else [part[i : i + 2] for i in range(0, len(part), 2)]
-            for part in parts
-            if is_list(part) and len(part) >= 6
-        ]
-        yield rings, names.get(json.dumps(one.get("category_id")), "") if rings else ""
-
-
-def _labelme(_content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotation]:
-    for one in marked:
-        points = one.get("points") if is_object(one) else None
-        is_polygon = is_object(one) and one.get("shape_type") in (None, "polygon")
-        rings = [points] if is_polygon and is_list(points) and len(points) > 2 else []
-        yield rings, str(one.get("label") or "") if rings else ""
-
-
-def _annotated(path: Source, count: int, every: list[_Annotation]) -> Reading:
-    """Return the object whose outline encloses most."""
-    found = [(rings, name) for rings, name in every if rings]
-    if not found:
-        raise InputFileError(
-            f"{path}: none of its {count} annotations is a polygon (they may be masks, boxes, circles, "
-            "lines or points); give the mask as PNG, or outline the shape by a polygon"
-        )
-    for ring in (ring for rings, _ in found for ring in rings):
-        _check_pairs(path, ring)
-    best, name = max(found, key=lambda one: sum(map(_area, one[0])))
-    left, name = count - len(found), f", {quoted(name)}" if name else ""
-    notes = [f"took the largest of {len(found)} annotated objects{name}"] * (len(found) > 1)
-    notes += [f"left {left} annotation{'s' * (left > 1)} that are no polygons unread"] * (left > 0)
-    return _read_pairs(path, best, True, notes)
-
-
 def _area(ring: list[Any]) -> float:
     """Return the area of a ring, 0 for what has none or is too large to be computed."""
     is_finite = all(abs(n) < 1e300 for pair in ring for n in pair)
@@ -181,8 +129,6 @@ def _area(ring: list[Any]) -> float:
 
 
 def _geojson(path: Source, content: dict[str, Any]) -> Reading:
-    if content["type"] == "Topology":
-        raise InputFileError(f"{path}: {_TOPOJSON}")
     polygons, others = _polygons(path, content)
     if not polygons:
         kinds = ", ".join(quoted(kind) for kind in dict.fromkeys(others)) or "nothing"

@@ -22,12 +22,6 @@ from orbiflow.tiles.silhouette.outlines import (
     percent,
     thinned,
 )
-from orbiflow.tiles.silhouette.readers.frames import (
-    CARD_NOTE,
-    MIN_CARD_COVERAGE,
-    MIN_CARD_SHARE,
-    MIN_DRAWN_SHARE,
-)
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_overlays import (
@@ -37,7 +31,6 @@ from orbiflow.tiles.silhouette.readers.svg_overlays import (
     alike,
     overlay,
     solid,
-    without_axes,
     without_grid,
 )
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
@@ -53,6 +46,7 @@ WHOLE_SHARE, PAVED_SHARE = (
     0.95,
 )  # shares of the page that a background covers: one shape, several
 DISC_AREA_TOLERANCE = 0.01  # of its box: how nearly a disc has the area of one
+MIN_DRAWN_SHARE = 0.25  # of a disc's sides: what is drawn on it
 MIN_BADGE_SHARE = 0.5  # of a disc's width or height: more than an eye or a spot on it has
 MIN_HOLE_SHARE = 0.1  # of what fills the page: what is cut out of it is larger
 MAX_STRIPS = 500  # rectangles that a background is made of, as strips or a chequerboard
@@ -127,19 +121,15 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         notes = ["nothing is painted: took the closed paths as filled"]
     layers = [own for own in layers if own]
     paper, grounds = _background(layers, drawing)
-    n, card = len(grounds), _card(layers, grounds, drawing)
-    if card is not None:
-        paper, grounds = layers[card][0].brush.colour, grounds | {card}
+    n = len(grounds)
     shown = [layer for k, own in enumerate(layers) if k not in grounds for layer in own]
     if not shown:
         raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
-    notes += [CARD_NOTE] * (card is not None)
     shown, ruled = without_grid(shown, paper or PAPER_COLOUR)
     seen, decided = overlay(shown, paper)
-    seen, framed = without_axes(seen)
-    decided = [*ruled, *framed, *decided]
+    decided = [*ruled, *decided]
     colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= MIN_VISIBLE_OPACITY}
     whole = solid(seen)
     if whole >= PAVED_SHARE * _page(layers, drawing).area:
@@ -220,28 +210,6 @@ def _shown_on(colour: str, layers: Iterable[Layer]) -> list[Layer]:
     return [layer for layer in visible if not alike(layer.brush.colour, colour)]
 
 
-def _card(layers: list[list[Layer]], grounds: set[int], drawing: Drawing) -> int | None:
-    """Return which shape is a card: a rectangle that all but fills the page, with a drawing on it."""
-    rest = [k for k in range(len(layers)) if k not in grounds]
-    if len(rest) < 2 or drawing.box is None:
-        return None
-    card, page = layers[rest[0]][0], shapely.box(*drawing.box)
-    on_it = _shown_on(card.brush.colour, chain(*(layers[k] for k in rest[1:])))
-    region = _without_holes(card.region)
-    drawn = shapely.union_all([layer.region for layer in on_it])
-    is_card = (
-        card.brush.opacity >= MIN_VISIBLE_OPACITY
-        and _is_rectangle(region)
-        and (_sides(region) >= MIN_CARD_SHARE * _sides(page)).all()
-        and drawn.difference(region).area <= MIN_NOTED_SHARE * drawn.area
-    )
-    if not is_card or drawn.is_empty:
-        return None
-    largest = outer_outline(drawn)[0]
-    is_drawing = (_sides(largest) > MIN_DRAWN_SHARE * _sides(region)).all()
-    return rest[0] if is_drawing and not _is_rectangle(largest) else None
-
-
 def _is_badge(seen: BaseGeometry, layers: list[Layer]) -> bool:
     """Return whether what is seen is a disc in one colour with a drawing of another on it."""
     whole = outer_outline(seen)[0]
@@ -255,10 +223,6 @@ def _is_badge(seen: BaseGeometry, layers: list[Layer]) -> bool:
         return False
     shares = _sides(outer_outline(shapely.union_all(on_it))[0]) / _sides(whole)
     return bool(shares.min() > MIN_DRAWN_SHARE and shares.max() > MIN_BADGE_SHARE)
-
-
-def _is_rectangle(region: BaseGeometry) -> bool:
-    return region.area >= MIN_CARD_COVERAGE * region.envelope.area
 
 
 def _sides(region: BaseGeometry) -> Array:

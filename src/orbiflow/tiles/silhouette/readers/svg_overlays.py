@@ -1,4 +1,4 @@
-"""Layers of paint laid over one another: what is seen of them on a paper, without grids and axes."""
+"""Layers of paint laid over one another: what is seen of them on a paper, without grids."""
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
@@ -13,13 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.drawing import rgb
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import filled, outer_outline, percent
-from orbiflow.tiles.silhouette.readers.frames import (
-    AXES_NOTE,
-    MAX_LINE_SHARE,
-    MAX_MARK_SHARE,
-    MIN_DRAWN_SHARE,
-)
+from orbiflow.tiles.silhouette.outlines import outer_outline, percent
 from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, Layer, painted
 from orbiflow.tiles.silhouette.readers.svg_values import Brush
 
@@ -32,7 +26,6 @@ MIN_SHOWN_SHARE, MIN_NOTED_SHARE, MIN_OVERLAP_SHARE = 0.5, 0.001, 0.1  # shares 
 MAX_FAINT_LAYERS = 200  # laid over one another; of more, each is judged by itself
 MAX_GRID_LINE_SHARE = 0.01  # of all that is painted: a line that is no wider may belong to a grid
 MIN_SPAN_SHARE = 0.98  # of the shape's width or height: what a line of a grid spans
-MIN_FRAME_COVERAGE = 0.97  # of its box: what a frame encloses, marks that point inwards apart
 BLACK = Brush("#000000", 1.0)
 _Shades = dict[tuple[float, float], BaseGeometry]
 """Regions by how much of the shapes' paint is seen there, and how much of the ground is covered."""
@@ -213,30 +206,3 @@ def _is_across(region: BaseGeometry, whole: Polygon) -> bool:
     bounds = shapely.bounds(polygons_in(region))
     common = np.minimum(bounds[:, 2:], high) - np.maximum(bounds[:, :2], low)
     return bool((common >= MIN_SPAN_SHARE * (high - low)).any(axis=1).all())
-
-
-def without_axes(seen: BaseGeometry) -> tuple[BaseGeometry, list[str]]:
-    """Return what lies in a thin rectangular frame, such as the axes of a chart, and a note.
-
-    The frame goes, with what lies outside of it, if what is inside is no speck.
-    """
-    parts = polygons_in(seen)
-    frame = max(parts, key=lambda part: filled(part).area, default=Polygon())
-    if not frame.interiors or len(parts) == 1:
-        return seen, []
-    hole = max((Polygon(ring) for ring in frame.interiors), key=lambda own: own.area)
-    xmin, ymin, xmax, ymax = hole.bounds
-    width, height = xmax - xmin, ymax - ymin
-    most, reach = MAX_LINE_SHARE * min(width, height), MAX_MARK_SHARE * min(width, height)
-    is_frame = (
-        hole.area >= MIN_FRAME_COVERAGE * width * height
-        and shapely.box(xmin - reach, ymin - reach, xmax + reach, ymax + reach).covers(frame)
-        and frame.area <= most * hole.length
-    )
-    inside = [part for part in parts if part is not frame and hole.covers(part)]
-    if not is_frame or not inside:
-        return seen, []
-    drawn = outer_outline(shapely.union_all(inside))[0].bounds
-    if min((drawn[2] - drawn[0]) / width, (drawn[3] - drawn[1]) / height) <= MIN_DRAWN_SHARE:
-        return seen, []
-    return shapely.union_all(inside), [AXES_NOTE]
