@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.fields.fourier import differentiate, evaluate, evaluate_plainly, trigonometric_table
+from orbiflow.fields.fourier import differentiate, evaluate, evaluate_plainly
 from strategies import central_difference, largest, random_tensor, seeds
 
 orders = st.lists(st.integers(0, 4), min_size=1, max_size=3)
@@ -109,16 +109,6 @@ def test_differentiated_weights_give_the_derivative(seed, orders, data):
     slopes = central_difference(lambda p: evaluate(weights, p.mT[None])[0].mT, u[0].mT)
     derived = evaluate(differentiate(weights, axis, dim), u)[0]
     torch.testing.assert_close(derived, slopes[..., axis].mT, rtol=1e-9, atol=1e-7)
-
-
-@given(seeds, st.integers(0, 6))
-def test_the_table_holds_harmonics_row_by_row(seed, order):
-    u = random_tensor(seed, 2, 3)
-    table = trigonometric_table(u, order, u.new_empty(2, 2 * order + 1, 3))
-    assert table.shape == (2, 2 * order + 1, 3)
-    for s, row, n in itertools.product(range(2), range(2 * order + 1), range(3)):
-        expected = harmonic(row, order, u[s, n].item())
-        assert table[s, row, n].item() == pytest.approx(expected, abs=1e-13)
 
 
 @pytest.mark.parametrize(("dtype", "away"), [(torch.float64, 2.0**24), (torch.float32, 2.0**10)])

@@ -158,11 +158,6 @@ def test_other_groups_are_refused(group: CrystallographicGroup) -> None:
         SplineField(group, 2)
 
 
-def test_points_of_another_dimension_are_refused() -> None:
-    with refused("points", "(3, 3)"):
-        SplineField(identification_group("torus"), 2)(torch.zeros(3, 3, dtype=torch.float64))
-
-
 @given(names, seeds)
 @settings(max_examples=10, deadline=None)
 def test_no_sampled_slope_exceeds_its_lipschitz_bound(name: str, seed: int) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError
-from orbiflow.symmetry import WALLPAPER_GROUPS, group_by_name, space_group, wallpaper_group
+from orbiflow.symmetry import space_group
 from orbiflow.symmetry.group_symbols import USUAL, find_hall, find_setting, plain
 from refusals import refused
 
@@ -61,16 +61,12 @@ def test_every_setting_in_every_way_to_write_it(typesetting: str, blanks: str) -
 @pytest.mark.parametrize("change", [str.lower, str.upper, str.swapcase])
 def test_large_and_small_letters(change) -> None:
     for row in TABLE[:USUAL]:
+        short = find_setting(gemmi, row.short_name())
+        assert short is not None
+        assert short.number == row.number
         found = find_setting(gemmi, change(row.xhm().replace(" ", "")))
         assert found is not None
         assert found.xhm() == row.xhm()
-
-
-def test_every_short_symbol_is_of_its_number() -> None:
-    for row in TABLE[:USUAL]:
-        found = find_setting(gemmi, row.short_name())
-        assert found is not None
-        assert found.number == row.number
 
 
 FULL = (
@@ -154,6 +150,24 @@ KNOWN = {
     r"$F\,4_1/d\,\bar{3}\,2/m$:2": "F d -3 m:2",
     "F 41/d -3 2/m :2": "F d -3 m:2",
     "R -3 2/c:R": "R -3 c:R",
+    "227:2": "F d -3 m:2",
+    "227:1": "F d -3 m:1",
+    "62:cab": "P b n m",
+    "14:b1": "P 1 21/c 1",
+    "166:R": "R -3 m:R",
+    "No. 225": "F m -3 m",
+    "#225": "F m -3 m",
+    "P 4 / m m m": "P 4/m m m",
+    "I41/amdZ": "I 41/a m d:2",
+    "P4/nmmS": "P 4/n m m:1",
+    "Pbar1": "P -1",
+    "Fdbar3m:1": "F d -3 m:1",
+    "Pm3barm": "P m -3 m",
+    "F 4d 2 3 -1d": "F d -3 m:1",
+    "P 2c -2ac": "P c a 21",
+    "-P 2ac 2ab": "P b c a",
+    "-P 6c 2c": "P 63/m m c",
+    "-F 4vw 2vw 3": "F d -3 m:2",
 }
 
 
@@ -207,6 +221,7 @@ def test_names_that_people_write(name: str, setting: str) -> None:
             "hall: x",
             "P 2 ybc zz",
         ),
+        *("14:3", "225:2", "300", "#0", "0:1", "P 31 2", "I 4 2 3", "-R 3"),
         *("14 15", "231", "P 21/c 14", "Fd-3m (origin 3)", "<sub>", "$$", "\\bar", "P\u0305"),
     ],
 )
@@ -249,57 +264,6 @@ def test_the_symbols_of_hall() -> None:
         assert gemmi.find_spacegroup_by_ops(gemmi.GroupOps(found)).number == row.number
     assert space_group("hall: P 2").name == "P 1 1 2"
     assert space_group("HALL:P 2 (0 0 1)").order == 2
-
-
-def test_groups_of_spaces_by_typeset_names() -> None:
-    assert group_by_name("P2_1/c").name == "P 1 21/c 1"
-    with pytest.raises(GroupError):
-        group_by_name("C2_1")
-
-
-@pytest.mark.parametrize("name", WALLPAPER_GROUPS)
-def test_plane_groups_are_read_with_blanks_or_refused(name: str) -> None:
-    for written in (" ".join(name), f" {name} ", f"${name}$"):
-        assert wallpaper_group(written).name == name
-        assert group_by_name(written).name == name
-    for capital in (name.capitalize(), name.upper()):
-        assert wallpaper_group(capital).name == name
-    for wrong in (f"{name}x", f"{name[0]}_{name[1:]}"):
-        with refused("wallpaper group", kind=GroupError):
-            wallpaper_group(wrong)
-
-
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [
-        ("227:2", "F d -3 m:2"),
-        ("227:1", "F d -3 m:1"),
-        ("62:cab", "P b n m"),
-        ("14:b1", "P 1 21/c 1"),
-        ("166:R", "R -3 m:R"),
-        ("No. 225", "F m -3 m"),
-        ("#225", "F m -3 m"),
-        ("P 4 / m m m", "P 4/m m m"),
-        ("I41/amdZ", "I 41/a m d:2"),
-        ("P4/nmmS", "P 4/n m m:1"),
-        ("Pbar1", "P -1"),
-        ("Fdbar3m:1", "F d -3 m:1"),
-        ("Pm3barm", "P m -3 m"),
-        ("F 4d 2 3 -1d", "F d -3 m:1"),
-        ("P 2c -2ac", "P c a 21"),
-        ("-P 2ac 2ab", "P b c a"),
-        ("-P 6c 2c", "P 63/m m c"),
-        ("-F 4vw 2vw 3", "F d -3 m:2"),
-    ],
-)
-def test_numbers_with_settings_and_symbols_of_hall(name: str, meant: str) -> None:
-    assert space_group(name).name == meant
-
-
-@pytest.mark.parametrize("name", ["14:3", "225:2", "300", "#0", "0:1", "P 31 2", "I 4 2 3", "-R 3"])
-def test_what_has_no_sure_meaning_is_refused(name: str) -> None:
-    with refused("space group", kind=GroupError):
-        space_group(name)
 
 
 def test_no_symbol_of_hall_is_taken_for_another_group() -> None:
