@@ -7,10 +7,9 @@ import pytest
 import shapely
 import torch
 
-from orbiflow.runtime import NEVER, Cancel, Event, Progress
+from orbiflow.runtime import Cancel, Event, Progress
 from orbiflow.tiles import (
     CLASSES,
-    OccupancySearch,
     OverlapSearch,
     SoftTarget,
     Target,
@@ -28,7 +27,7 @@ from orbiflow.tiles.flowing.descent import MAX_STEP_STEEPNESS, Descent
 from orbiflow.tiles.flowing.starts import template_starts
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.likeness import boundary_iou
-from orbiflow.tiles.search import Goal, silent
+from orbiflow.tiles.search import Goal
 from outlines import searched
 from refusals import refused
 
@@ -132,16 +131,6 @@ def test_a_fit_certifies_and_survives_storage(name: str) -> None:
     assert np.allclose(again.polygon, tile.polygon, atol=1e-12)
 
 
-def test_the_inverse_of_the_flow_takes_the_tile_back() -> None:
-    model = (
-        trainable(fit_descent(TARGET, isohedral_class("IH6"), QUICK).candidates).take([0]).double()
-    )
-    model.flow = model.flow.with_steps(4, method="rk4")
-    with torch.no_grad():
-        points = model.prototile()[0]
-        assert (model.inverse(model(points)) - points).abs().max() < 1e-6
-
-
 def test_broken_prototiles_are_refused() -> None:
     saved = as_map(
         trainable(fit_descent(TARGET, isohedral_class("IH4"), QUICK).candidates).take([0])
@@ -198,12 +187,6 @@ def test_a_preview_is_certified() -> None:
         assert tile.certificate.valid
 
 
-def test_methods_have_names() -> None:
-    assert QUICK.method_name == "descent"
-    assert OccupancySearch().method_name == "occupancy"
-    assert QUICK.fit(Goal(TARGET), isohedral_class("IH1"), 2, silent, NEVER).enough == 4
-
-
 def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:
     rng = np.random.default_rng(0)
     region = shapely.Polygon(TARGET.normal)
@@ -218,30 +201,7 @@ def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:
     assert np.allclose(soft.weighted_iou(rings).numpy(), exact, atol=5e-3)
 
 
-@pytest.mark.parametrize("effort", OverlapSearch.efforts)
-def test_efforts_are_valid_settings(effort: str) -> None:
-    settings = OverlapSearch.for_effort(effort, seed=7)
-    assert settings.seed == 7
-
-
-@pytest.mark.parametrize(
-    ("changes", "name"),
-    [
-        ({"max_frequency": -1}, "max_frequency"),
-        ({"max_frequency": 61}, "max_frequency"),
-        ({"candidates": 0}, "candidates"),
-        ({"starts": "random"}, "starts"),
-        ({"boundary": 100}, "boundary"),
-        ({"resolutions": (50,)}, "resolutions"),
-        ({"stages": ()}, "stages"),
-        ({"stages": ((3000, 1),)}, "stages"),
-        ({"polish": -1}, "polish"),
-        ({"seed": -1}, "seed"),
-    ],
-)
-def test_settings_are_checked(changes: dict[str, object], name: str) -> None:
-    with refused(name):
-        OverlapSearch(**changes)  # type: ignore[arg-type]
+def test_efforts_are_checked() -> None:
     with refused("effort", "heroic"):
         OverlapSearch.for_effort("heroic")
     with refused("magic"):

@@ -52,13 +52,6 @@ def test_agrees_with_shapely(seed: int, corners: int, clockwise: bool) -> None:
     assert np.abs(phi.numpy() - np.where(inside, distance, -distance)).max() < 1e-12
 
 
-def test_the_polygons_are_of_both_kinds() -> None:
-    polygons = [shapely.Polygon(star_polygon(seed).numpy()) for seed in range(100)]
-    assert all(p.is_valid for p in polygons)
-    convex = sum(p.convex_hull.area - p.area < 1e-12 for p in polygons)
-    assert 5 <= convex <= 95
-
-
 @given(seeds)
 def test_stacks_broadcast(seed: int) -> None:
     vertices = torch.stack([star_polygon(seed + i) for i in range(3)])

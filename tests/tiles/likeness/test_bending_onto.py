@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from orbiflow.tiles import arc_lengths, plane_points, resampled
-from orbiflow.tiles.likeness import Elastic, Pinned, bent_onto, mutual_iou
+from orbiflow.tiles.likeness import Elastic, bent_onto, mutual_iou
 from orbiflow.tiles.likeness.bending_onto import _separated, corresponding
 from outlines import animal
 
@@ -55,12 +55,6 @@ def test_it_costs_no_more_than_the_known_way_and_less_for_less() -> None:
         costs.append(float(BODY.forgiving_energy(laid)[0]))
         assert costs[-1] < 1.05 * BODY.forgiving_energy(known)[0]
     assert costs == sorted(costs)
-
-
-def test_a_pinned_body_can_be_laid() -> None:
-    part = np.flatnonzero(abs(BODY.rest - BODY.rest[3]) < 0.3)
-    z = bent_onto(Pinned(RING, [part]), waved(0.05))
-    assert np.isfinite(z).all()
 
 
 def test_places_moved_apart_keep_their_order_and_stay_where_they_are_if_they_can() -> None:

@@ -126,12 +126,3 @@ def test_a_score_is_a_probability_that_the_stars_know(kept: Fidelity) -> None:
         middle = Rating.of_likeness(0.5)
         assert (kept.score > 0.5) == (kept.mark > GOOD_MARK)
         assert (Rating.of_likeness(kept.score).stars >= middle.stars) or kept.score < 0.5
-
-
-def test_what_is_lost_is_named_the_worst_first() -> None:
-    kept = Fidelity((0.4, 0.05), 0.01, 0.9, 5.0, 0.001, 0.01, 0.2, 6.0)
-    assert kept.lost == [
-        "small parts such as ears and feet have lost their shapes",
-        "limbs or body have become thinner or thicker",
-    ]
-    assert replace(kept, thickness=0.1).lost == kept.lost[:1]

@@ -62,17 +62,6 @@ def test_hausdorff_is_that_of_the_curves(a: np.ndarray, b: np.ndarray) -> None:
     assert sampled - 4e-6 <= value <= sampled + 5e-4
 
 
-def test_hausdorff_inside_an_edge() -> None:
-    # A triangle over the base of a wide roof: every vertex of one is near the other, the farthest
-    # point of the base is in the middle of the edge.
-    base = [[0, 0], [4, 0], [4, -1], [0, -1]]
-    notched = [[0, 0], [2, -0.9], [4, 0], [4, -1], [0, -1]]
-    slope = np.hypot(2, 0.9)
-    # The middle (2, 0) of the edge is 2 * 0.9 / slope from either side of the notch.
-    exact = max(2 * 0.9 / slope, 0.1)
-    assert hausdorff(base, notched) == pytest.approx(exact, abs=1e-5)
-
-
 def test_pixel_accuracy_depends_on_its_window() -> None:
     half = SQUARE * [1, 0.5]
     assert default_window(SQUARE).bounds == pytest.approx((-0.4, -0.4, 4.4, 4.4))

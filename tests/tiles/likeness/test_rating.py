@@ -16,16 +16,7 @@ from scipy.stats import spearmanr
 
 from orbiflow.arrays import Array
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import (
-    EscherTile,
-    Fidelity,
-    Likeness,
-    Rating,
-    SearchResult,
-    Target,
-    Tile,
-    rank_score,
-)
+from orbiflow.tiles import EscherTile, Fidelity, Likeness, Rating, Target, Tile
 from orbiflow.tiles.likeness.rating import STAR_WORDS
 from orbiflow.tiles.search.finished_tiles import rated
 from refusals import refused
@@ -59,17 +50,6 @@ def test_scores_span_the_stars() -> None:
     assert Rating.of_likeness(0).stars == 1
     assert Rating.of_likeness(1).stars == 5
     words = [Rating.of_likeness(score).word for score in (0.95, 0.6, 0.2, 0.02)]
-    assert words == ["excellent", "good", "fair", "poor"]
-
-
-def test_a_blob_for_a_spider_is_poor() -> None:
-    target = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
-    scores = (0.99, 0.9, 0.8, rank_score(0.64, 0.36))
-    tiles = [
-        EscherTile(Tile(target.outline, wallpaper_group("p1")), likeness=Likeness(known_score=s))
-        for s in scores
-    ]
-    words = [tile.rating and tile.rating.word for tile in SearchResult(target, tiles).tiles]
     assert words == ["excellent", "good", "fair", "poor"]
 
 

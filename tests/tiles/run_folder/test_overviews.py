@@ -180,29 +180,6 @@ def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> No
     assert "Not certified: it <overlaps> itself." in page.words
 
 
-def test_figures_are_those_that_were_taken(
-    target: Target, bent: EscherTile, flowed: EscherTile
-) -> None:
-    of_bent, of_flowed = (
-        Page(
-            index_page(
-                [tile.changed(likeness=replace(tile.likeness, pinned=pinned))], [target], ["IH4"]
-            )
-        ).words
-        for tile, pinned in ((bent, 0.0042), (flowed, None))
-    )
-    for figure in ("Deformation", f"{bent.likeness.deformation:.3f}", "Pinned parts", "0.0042"):
-        assert figure in of_bent
-        assert figure not in of_flowed
-    for figure in (
-        "Score",
-        f"{flowed.score:.3g}",
-        f"{flowed.likeness.metrics.iou:.3f}",
-        "Thinnest neck",
-    ):
-        assert figure in of_flowed
-
-
 @pytest.mark.parametrize(("count", "size"), [(1, 1320), (2, 1920), (3, 1920), (7, 1920)])
 def test_an_overview_of_any_number(
     target: Target, bent: EscherTile, flowed: EscherTile, count: int, size: int

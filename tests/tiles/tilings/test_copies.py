@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from exported import tile_of, tiles
-from orbiflow.tiles import CLASSES, Tile, colouring, copies_inside, copies_meeting, edges, patch
+from exported import tile_of
+from orbiflow.tiles import CLASSES, Tile, colouring, copies_inside, copies_meeting, edges
 from orbiflow.tiles.tilings.tiling import coset_and_cell
 from refusals import refused
 
@@ -17,40 +15,6 @@ def window_of(tile: Tile, shift: tuple[float, float], size: tuple[float, float])
     middle = tile.center + tile.radius * np.array(shift)
     half = tile.radius * np.array(size)
     return (*(middle - half), *(middle + half))
-
-
-shifts = st.tuples(st.floats(-5, 5), st.floats(-5, 5))
-sizes = st.tuples(st.floats(0.05, 4), st.floats(0.05, 4))
-
-
-@settings(max_examples=20, deadline=None)
-@given(tiles, shifts, sizes)
-def test_those_that_meet_a_window_are_its_patch(tile, shift, size) -> None:
-    window = window_of(tile, shift, size)
-    found = copies_meeting(tile, window)
-    ours = set(zip(found.cosets.tolist(), map(tuple, found.cells.tolist()), strict=True))
-    assert ours == {coset_and_cell(tile.group, g) for g in patch(tile, window)}
-    assert len(ours) == len(found)
-
-
-@settings(max_examples=20, deadline=None)
-@given(tiles, shifts, sizes)
-def test_those_inside_are_those_of_the_patch_that_are_whole(tile, shift, size) -> None:
-    window = window_of(tile, shift, size)
-    found = copies_inside(tile, window)
-    rings = [g(tile.polygon) for g in patch(tile, window)]
-    low, high = np.array(window).reshape(2, 2)
-    rounding = 1e-9 * (tile.radius + float(np.abs(window).max()))
-    # those that only touch the window's border are inside or not, as rounding has it
-    surely, perhaps = (
-        sum(bool((r >= low + by).all() and (r <= high - by).all()) for r in rings)
-        for by in (rounding, -rounding)
-    )
-    assert surely <= len(found) <= perhaps
-    for k, ring in enumerate(found.images(tile.polygon)):
-        np.testing.assert_allclose(ring, found.isometry(k)(tile.polygon), atol=1e-9 * tile.radius)
-        assert (ring >= low - rounding).all()
-        assert (ring <= high + rounding).all()
 
 
 @pytest.mark.parametrize("name", CLASSES)

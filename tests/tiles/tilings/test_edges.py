@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exported import tile_of
-from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import CLASSES, IsohedralClass, Tile, edges
-from refusals import refused
+from orbiflow.tiles import IsohedralClass, Tile, edges
 
 
 def test_the_templates(kind: IsohedralClass) -> None:
@@ -34,20 +31,3 @@ def test_bent_tiles(kind: IsohedralClass, make_tile, turned: bool) -> None:
         image = image[::-1] if pair.reversed else image
         np.testing.assert_allclose(image, own.points(pair.second), atol=1e-9)
         assert own.across[pair.second].is_close(pair.isometry)
-
-
-def test_partners_are_partners_of_each_other() -> None:
-    for name in CLASSES:
-        own = edges(tile_of(name))
-        for edge, partner in enumerate(own.partners):
-            assert own.partners[partner] == edge
-            there = own.across[edge] @ own.across[partner]
-            assert there.is_close(own.across[edge] @ own.across[edge].inverse(), 1e-6)
-
-
-def test_bricks_in_half_bond_have_sides_that_no_neighbour_has() -> None:
-    brick = Tile(
-        np.array([[0, 0], [2, 0], [2, 1], [0, 1]]), wallpaper_group("p1", [[2, 1], [0, 1]])
-    )
-    with refused(2, 4, "edge_to_edge"):
-        edges(brick)
