@@ -1,6 +1,5 @@
 """Placements, nearest tiles and start tiles."""
 
-import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -15,7 +14,6 @@ from orbiflow.arrays import Array
 from orbiflow.tiles import CLASSES, OverlapSearch, Target, Tile, TileModel, certify, resampled
 from orbiflow.tiles.flowing.starts import nearest_tiles, outline_starts, template_starts
 from orbiflow.tiles.search import Placements, Prototiles, best_placements, template_symmetries
-from orbiflow.tiles.search.tile_space import _compositions, _count, edge_lengths
 from strategies import divided_start
 
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])
@@ -43,27 +41,6 @@ def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
         turn = float(model.angle) if kind.stretch_dim == 1 else 0.0
     lengths = np.full((1, len(kind.template())), pieces)
     return ring, Placements(lengths, np.zeros(1, int), np.array([turn]), np.ones(1))
-
-
-@pytest.mark.parametrize("multiplicities", [(2, 2, 2), (1, 2, 1, 1, 1), (2, 2, 1, 1), (2, 1)])
-def test_compositions_are_all_there(multiplicities: tuple[int, ...]) -> None:
-    for total in (4, 9, 12):
-        brute = {
-            row
-            for row in itertools.product(range(1, total), repeat=len(multiplicities))
-            if np.dot(row, multiplicities) == total
-        }
-        found = _compositions(multiplicities, total)
-        assert {tuple(row) for row in found.tolist()} == brute
-        assert len(found) == len(brute) == _count(multiplicities, total)
-
-
-@pytest.mark.parametrize("name", CLASSES)
-def test_lengths_fit_the_class(name: str) -> None:
-    lengths = edge_lengths(CLASSES[name], 24)
-    assert (lengths.sum(axis=1) == 24).all()
-    for pair in CLASSES[name].identified_edges:
-        assert (lengths[:, pair.first] == lengths[:, pair.second]).all()
 
 
 @pytest.mark.parametrize("name", CLASSES)

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import MultiPolygon, Polygon, box
 
-from orbiflow.tiles import compare, dice, hausdorff, iou, pixel_accuracy
-from orbiflow.tiles.likeness.metrics import default_window
+from orbiflow.tiles import Overlap, compare, dice, hausdorff, iou, pixel_accuracy, prepared_region
+from orbiflow.tiles.likeness.metrics import MAX_REGION_VERTICES, default_window
 from refusals import refused
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
@@ -117,3 +117,14 @@ def test_compare_names_its_own_arguments() -> None:
         compare(BOWTIE, SQUARE)
     with refused("target", "[1 1]"):
         compare(SQUARE, BOWTIE)
+
+
+def test_regions_of_many_vertices_are_simplified_for_choosing() -> None:
+    t = np.linspace(0, 2 * np.pi, 2 * MAX_REGION_VERTICES, endpoint=False)
+    radius = 0.56 + 0.002 * np.random.default_rng(0).normal(size=len(t))
+    ring = np.stack([radius * np.cos(t), radius * np.sin(t)], axis=-1)
+    simple = prepared_region(ring)
+    assert len(simple.exterior.coords) < MAX_REGION_VERTICES
+    assert abs(simple.area - shapely.Polygon(ring).area) < 0.01
+    assert len(prepared_region(ring[::4]).exterior.coords) == len(ring[::4]) + 1
+    assert Overlap(ring[::4]).region.area == shapely.Polygon(ring[::4]).area

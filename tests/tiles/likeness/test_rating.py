@@ -15,10 +15,8 @@ from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
 from orbiflow.arrays import Array
-from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import EscherTile, Fidelity, Likeness, Rating, Target, Tile
+from orbiflow.tiles import Fidelity, Rating
 from orbiflow.tiles.likeness.rating import STAR_WORDS
-from orbiflow.tiles.search.finished_tiles import rated
 from refusals import refused
 
 DATA = Path(__file__).parents[3] / "benchmarks" / "data"
@@ -125,10 +123,3 @@ def test_words_agree_with_marks_as_the_docs_say(shown: list[Marked]) -> None:
     apart = abs(np.diff(np.array(pairs), axis=1))
     assert np.mean(apart == 0) > 0.45
     assert np.mean(apart < 2) > 0.95
-
-
-def test_a_line_never_has_stars() -> None:
-    line = Target.from_polygon([[0, 0], [100, 0], [100, 2], [0, 2]])
-    tile = EscherTile(Tile(line.outline, wallpaper_group("p1")), likeness=Likeness(known_score=0.9))
-    (own,) = rated([tile], line)
-    assert own.rating == Rating(1)
