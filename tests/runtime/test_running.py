@@ -35,8 +35,7 @@ def files(folder: Path) -> set[str]:
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_search(workers: int, tmp_path: Path) -> None:
+def test_a_search(tmp_path: Path) -> None:
     events: list[Event] = []
     threads: set[int] = set()
 
@@ -44,7 +43,7 @@ def test_a_search(workers: int, tmp_path: Path) -> None:
         events.append(event)
         threads.add(threading.get_ident())
 
-    finished = run(boot_call(tmp_path, "IH4", "ih6", workers=workers), sink)
+    finished = run(boot_call(tmp_path, "IH4", "ih6"), sink)
     assert finished is events[-1]
     assert finished.state == "done"
     assert threads == {threading.get_ident()}
