@@ -37,7 +37,8 @@ def test_a_closed_form_is_used_where_there_is_one():
     assert torch.equal(jacobian(field, points), field.jacobian(points))
 
 
-def test_a_constant_but_trainable_field_has_no_divergence():
+def test_a_constant_field_has_no_divergence_trainable_or_not():
+    assert not divergence(torch.ones_like, random_tensor(0, 5, 2)).any()
     drift = torch.ones(2, dtype=torch.float64, requires_grad=True)
     found = divergence(lambda p: drift.expand_as(p), random_tensor(0, 5, 2))
     assert found.tolist() == [0.0] * 5

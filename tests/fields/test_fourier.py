@@ -84,17 +84,6 @@ def test_equivariance_holds_to_rounding_in_space(group, seed):
     assert equivariance_error(field, group, random_tensor(seed, 6, 3)) < 1e-11
 
 
-@pytest.mark.parametrize(
-    ("name", "size"), [("p1", 2), ("pm", 1), ("pg", 1), ("p2", 0), ("p3", 0), ("p6m", 0)]
-)
-def test_frequency_zero_leaves_the_invariant_translations(name, size):
-    field = random_field(wallpaper_group(name), 0, 0)
-    points = random_tensor(0, 5, 2)
-    assert field.size == size
-    torch.testing.assert_close(field(points), field(points[:1]).expand(5, 2), rtol=0, atol=0)
-    assert float(field.lipschitz_bound()) == 0.0
-
-
 @settings(max_examples=20)
 @given(groups, st.integers(0, 3))
 def test_the_number_of_parameters_is_the_trace_of_the_projector(group, max_frequency):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from torch import Tensor, nn
 
-from orbiflow.fields import FourierField, symmetrize
+from orbiflow.fields import FourierField
 from orbiflow.flows import METHODS, Flow
 from orbiflow.symmetry import wallpaper_group
 from refusals import refused
@@ -21,7 +21,6 @@ from strategies import (
     gentle_field,
     groups,
     largest,
-    neural_field,
     plane_groups,
     random_field,
     random_tensor,
@@ -156,25 +155,6 @@ def test_a_closed_form_and_autograd_give_the_same_log_determinant():
     closed = Flow(field, steps=4).log_abs_det_jacobian(points)
     by_autograd = Flow(lambda p: field(p), steps=4).log_abs_det_jacobian(points)
     torch.testing.assert_close(by_autograd, closed, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "field",
-    [
-        lambda p: torch.tanh(p) * p.flip(-1),
-        neural_field(wallpaper_group("p4"), hidden=(4,)),
-        symmetrize(torch.tanh, wallpaper_group("p2")),
-        nn.Linear(2, 2).double(),
-    ],
-    ids=["function", "network", "symmetrized", "module"],
-)
-def test_any_callable_serves_as_a_field(field):
-    flow = Flow(field, steps=24, method="rk5")
-    points = random_tensor(0, 4, 2)
-    moved, there = flow.forward_and_log_det(points)
-    back, home = flow.inverse_and_log_det(moved)
-    torch.testing.assert_close(back, points, rtol=0, atol=1e-8)
-    torch.testing.assert_close(there, -home, rtol=0, atol=1e-8)
 
 
 def test_a_module_list_is_taken_as_its_members():

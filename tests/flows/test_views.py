@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import threading
-
 import pytest
 import torch
-from torch import Tensor
 
 from orbiflow.flows import Flow
 from orbiflow.symmetry import wallpaper_group
 from refusals import refused
-from strategies import error_estimate, gentle_field, random_tensor, several
+from strategies import random_tensor, several
 
 
 def test_a_view_integrates_in_its_own_steps():
@@ -41,32 +38,6 @@ def test_a_flow_cannot_be_changed_under_others(name):
     flow = Flow(torch.sin, steps=4)
     with pytest.raises(AttributeError):
         setattr(flow, name, getattr(flow, name))
-
-
-def test_another_thread_sees_its_own_steps():
-    field = gentle_field(wallpaper_group("pgg"), 2, 0)
-    inside, leave = threading.Event(), threading.Event()
-
-    calls = 0
-
-    def pausing(points: Tensor) -> Tensor:
-        nonlocal calls
-        if threading.current_thread() is other:
-            calls += 1
-            if calls == 20:  # 16 evaluations take 4 steps: it is at work with 8
-                inside.set()
-                leave.wait(60)
-        return field(points)
-
-    flow, points = Flow(pausing, steps=4), random_tensor(0, 5, 2)
-    other = threading.Thread(target=lambda: error_estimate(flow, points))
-    expected = flow(points)
-    other.start()
-    assert inside.wait(60)
-    differed = sum(not torch.equal(flow(points), expected) for _ in range(60))
-    leave.set()
-    other.join()
-    assert differed == 0
 
 
 def test_views_are_checked_like_flows():

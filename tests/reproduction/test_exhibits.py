@@ -18,7 +18,6 @@ from orbiflow.tiles import CLASSES, EscherTile, OccupancySearch, Target, as_mode
 from reproduction.animal import Pulled, animal, animal_tile
 from reproduction.classes import (
     GROUPS,
-    center_orbits,
     constrained_angles,
     drawn_elements,
     identification_error,
@@ -100,17 +99,6 @@ def test_marks_of_symmetry_belong_to_the_group(name: str) -> None:
     assert all(group.contains(g) for g in elements)
     kinds = {"p1": 0, "pg": 1, "p2": 1, "p3": 1, "p4": 1, "p6": 1, "pgg": 2}
     assert len({g.determinant for g in elements}) == kinds[GROUPS[name]]
-
-
-def test_orbits_of_centres() -> None:
-    orders = {
-        name: [c.order for c in center_orbits(kind.group())] for name, kind in CLASSES.items()
-    }
-    assert orders["IH4"] == [2, 2, 2, 2]
-    assert orders["IH7"] == [3, 3, 3]
-    assert orders["IH21"] == [6, 3, 2]
-    assert orders["IH28"] == [4, 4, 2]
-    assert orders["IH2"] == []
 
 
 def test_spaces_are_what_they_are_called() -> None:

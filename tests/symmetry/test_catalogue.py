@@ -23,23 +23,12 @@ from strategies import lattices
 # counted by hand from the diagrams of the International Tables: largest rotation, then whether the
 # point group holds a reflection, and whether some mirror line exists (pg and pgg only glide)
 POINT_GROUPS = {
-    "p1": (1, False, False),
-    "p2": (2, False, False),
-    "pm": (1, True, True),
-    "pg": (1, True, False),
-    "cm": (1, True, True),
-    "pmm": (2, True, True),
-    "pmg": (2, True, True),
-    "pgg": (2, True, False),
-    "cmm": (2, True, True),
-    "p4": (4, False, False),
-    "p4m": (4, True, True),
-    "p4g": (4, True, True),
-    "p3": (3, False, False),
-    "p3m1": (3, True, True),
-    "p31m": (3, True, True),
-    "p6": (6, False, False),
-    "p6m": (6, True, True),
+    **{"p1": (1, False, False), "p2": (2, False, False), "pm": (1, True, True)},
+    **{"pg": (1, True, False), "cm": (1, True, True), "pmm": (2, True, True)},
+    **{"pmg": (2, True, True), "pgg": (2, True, False), "cmm": (2, True, True)},
+    **{"p4": (4, False, False), "p4m": (4, True, True), "p4g": (4, True, True)},
+    **{"p3": (3, False, False), "p3m1": (3, True, True), "p31m": (3, True, True)},
+    **{"p6": (6, False, False), "p6m": (6, True, True)},
 }
 
 

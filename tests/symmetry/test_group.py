@@ -200,6 +200,12 @@ def test_an_irrational_glide_is_refused_by_number(number):
         CrystallographicGroup.generate(np.eye(2), generators, max_order=500)
 
 
+def test_two_centres_at_an_irrational_distance_are_refused():
+    centres = [(0.0, 0.0), (np.sqrt(2) / 3, 0.0)]
+    with refused("generator 1,", kind=NotDiscreteError):
+        CrystallographicGroup.generate(np.eye(2), [rotation(c, 2) for c in centres], max_order=100)
+
+
 @given(st.integers(2, 12))
 def test_a_glide_by_a_fraction_of_the_lattice_multiplies_the_order(parts):
     glide = transflection(Line((0.0, 0.3), (1.0, 0.0)), 1.0 / parts)
