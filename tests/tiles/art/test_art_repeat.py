@@ -10,7 +10,7 @@ import pytest
 
 from artworks import art_settings, checkerboard, squirrel
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import CLASSES, Over, Page, artwork, render_artwork
+from orbiflow.tiles import Over, Page, artwork, render_artwork
 from orbiflow.tiles.make.repeats import rectangle
 from orbiflow.tiles.page import Box
 from refusals import refused
@@ -23,7 +23,7 @@ def two_by_two(page: Page) -> Page:
 
 
 @pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     tile = squirrel(name)
     settings = art_settings(repeat="basic", tile_size="60px", colour=how, stretch=0.05)

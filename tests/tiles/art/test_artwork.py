@@ -49,7 +49,7 @@ def rgb(colour: str) -> np.ndarray:
     return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_a_flat_picture_covers_the_plane(name: str) -> None:
     tile = squirrel(name)
     made = render_artwork(artwork(tile, PAGE, Over(flat(tile, "#c02040"))))
@@ -57,7 +57,7 @@ def test_a_flat_picture_covers_the_plane(name: str) -> None:
     assert (made == rgb("#c02040")).all()
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_each_sample_is_in_one_copy(name: str) -> None:
     art = artwork(squirrel(name), settings(samples=1))
     made = render_artwork(art)
@@ -68,7 +68,7 @@ def test_each_sample_is_in_one_copy(name: str) -> None:
     assert (made == expected).all(axis=2).mean() > 0.9999
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_a_checkerboard_is_carried(name: str) -> None:
     tile = squirrel(name)
     board = checkerboard(tile, 6)

@@ -7,7 +7,6 @@ import pytest
 import shapely
 import torch
 
-from orbiflow.runtime import Cancel, Event, Progress
 from orbiflow.tiles import (
     CLASSES,
     OverlapSearch,
@@ -117,7 +116,7 @@ def test_keep_selects_everything_alike(soft: SoftTarget) -> None:
     assert all(len(fields) == 2 for fields in state.record)
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH4", "IH5", "IH21"])
 def test_a_fit_certifies_and_survives_storage(name: str) -> None:
     found = fit_descent(TARGET, isohedral_class(name), QUICK)
     tile, fine = extract_tile(trainable(found.candidates).take([0]))
@@ -164,19 +163,6 @@ def test_several_tiles_of_a_class_are_not_twins() -> None:
         assert 1 <= len(own) <= 3
         for i, first in enumerate(own):
             assert all(iou(first, second) <= 0.97 for second in own[i + 1 :])
-
-
-def test_a_first_tile_comes_at_once_and_survives_an_interrupt() -> None:
-    cancel = Cancel()
-
-    def interrupt(event: Event) -> None:
-        if isinstance(event, Progress) and event.class_name:
-            cancel.cancel()
-
-    results, failures = searched(TARGET, ["IH4", "IH6"], QUICK, on_event=interrupt, cancel=cancel)
-    assert [r.name for r in results] == ["IH6"]
-    assert results[0].certificate.valid
-    assert [f.name for f in failures] == ["IH4"]
 
 
 def test_a_preview_is_certified() -> None:

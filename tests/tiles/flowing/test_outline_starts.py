@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
-from orbiflow.tiles import CLASSES, OverlapSearch, Target, Tile, TileModel, certify, resampled
+from orbiflow.tiles import CLASSES, OverlapSearch, Target, TileModel, resampled
 from orbiflow.tiles.flowing.starts import nearest_tiles, outline_starts, template_starts
 from orbiflow.tiles.search import Placements, Prototiles, best_placements, template_symmetries
 from strategies import divided_start
@@ -64,39 +64,6 @@ def test_gains_do_not_depend_on_the_pose(name: str, turn: float, scale: float, r
     one, two = (placements(name, 60).take(np.arange(5)), best_placements(CLASSES[name], moved, 5))
     if name != "IH4":  # starts run in steps of two points there
         assert np.allclose(one.gains, two.gains, atol=1e-9)
-
-
-@pytest.mark.parametrize("name", CLASSES)
-def test_nearest_tiles_tile(name: str) -> None:
-    kind = CLASSES[name]
-    found = placements(name, 60)
-    tiles = nearest_tiles(kind, OUTLINE, found)
-    checked = 0
-    for i, vertices in enumerate(tiles.vertices):
-        polygon = np.stack([vertices.real, vertices.imag], axis=-1)
-        start = np.roll(OUTLINE, -found.starts[i])
-        assert tiles.distance[i] == pytest.approx((abs(vertices - start) ** 2).sum(), rel=1e-6)
-        if np.linalg.det(tiles.linear[i]) <= 0 or not shapely.Polygon(polygon).is_valid:
-            continue
-        group = kind.group().conjugate(tiles.linear[i], tiles.offset[i])
-        tile = Tile(polygon, group, name, tuple(tiles.corners[i].tolist()))
-        assert certify(tile).valid
-        checked += 1
-    assert checked > 5
-
-
-@settings(max_examples=7, deadline=None)
-@given(st.sampled_from(list(CLASSES)), st.integers(0, 10**6))
-def test_no_tile_of_the_placement_is_nearer(name: str, seed: int) -> None:
-    kind = CLASSES[name]
-    rng = np.random.default_rng(seed)
-    found = placements(name, 60).take(np.arange(3))
-    tiles = nearest_tiles(kind, OUTLINE, found)
-    noise = 0.05 * (rng.standard_normal(60) + 1j * rng.standard_normal(60))
-    others = nearest_tiles(kind, OUTLINE + noise, found)
-    for i in range(len(found.starts)):
-        distance = (abs(others.vertices[i] - np.roll(OUTLINE, -found.starts[i])) ** 2).sum()
-        assert distance >= tiles.distance[i] - 1e-9
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

@@ -165,23 +165,3 @@ def test_what_does_not_tile_is_refused() -> None:
     )
     with refused("tile", kind=CertificationError):
         refine(square, perimeter)
-
-
-def test_touching_is_blamed_only_where_it_ends_the_descent(monkeypatch) -> None:
-    """Near a minimum the longest step may touch, and shorter ones not lower the loss."""
-    from orbiflow.tiles.flowing import refinement
-
-    def steep(polygon: Tensor) -> Tensor:
-        first.append(polygon.detach().clone())
-        away = polygon - first[0]
-        return 1 + away[:, 1].sum() + 1e12 * away.square().sum()
-
-    def notes(widths: list[float]) -> str:
-        found = iter([1.0, *widths])
-        monkeypatch.setattr(refinement, "_clearance", lambda _: next(found, widths[-1]))
-        first.clear()
-        return refine(template("IH4"), steep, points=24, steps=3).notes[0]
-
-    first: list[Tensor] = []
-    assert "touched" not in notes([0.0, 0.0, 1.0])
-    assert "touched" in notes([0.0])

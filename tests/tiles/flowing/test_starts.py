@@ -14,15 +14,8 @@ from orbiflow.tiles.search import template_symmetries
 
 # class: order of the rotations, whether there is a reflection
 SYMMETRIES = {
-    "IH1": (6, True),
-    "IH2": (2, True),
-    "IH3": (2, True),
-    "IH4": (2, True),
-    "IH5": (1, True),
-    "IH6": (1, True),
-    "IH7": (3, True),
-    "IH21": (1, False),
-    "IH28": (1, True),
+    **{"IH1": (6, True), "IH2": (2, True), "IH3": (2, True), "IH4": (2, True), "IH5": (1, True)},
+    **{"IH6": (1, True), "IH7": (3, True), "IH21": (1, False), "IH28": (1, True)},
 }
 
 

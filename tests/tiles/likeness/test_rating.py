@@ -103,23 +103,3 @@ def test_a_score_is_the_share_of_marks_that_are_good(shown: list[Marked]) -> Non
     good = np.concatenate([(one.marks >= 6.5).mean(axis=1) for one in shown])
     for tenth in np.array_split(np.argsort(scores), 10):
         assert good[tenth].mean() == pytest.approx(scores[tenth].mean(), abs=0.08)
-
-
-def test_a_score_means_the_same_for_long_outlines(shown: list[Marked]) -> None:
-    # before, tiles with legs had scores of nearly 0 whatever they looked like
-    for third in np.array_split(np.argsort([one.length for one in shown]), 3):
-        scores = np.concatenate([shown[k].scores for k in third])
-        good = np.concatenate([(shown[k].marks >= 6.5).mean(axis=1) for k in third])
-        assert good.mean() == pytest.approx(scores.mean(), abs=0.07)
-
-
-def test_words_agree_with_marks_as_the_docs_say(shown: list[Marked]) -> None:
-    place = list(STAR_WORDS.values()).index
-    pairs = [
-        (place(Rating.of_likeness(score).word), place(Rating.of_mark(mark).word))
-        for one in shown
-        for score, mark in zip(one.scores, one.marks.mean(axis=1), strict=True)
-    ]
-    apart = abs(np.diff(np.array(pairs), axis=1))
-    assert np.mean(apart == 0) > 0.45
-    assert np.mean(apart < 2) > 0.95

@@ -70,16 +70,6 @@ def test_similarities_of_both_change_nothing(
     assert moved.as_dict() == pytest.approx(expected.as_dict(), abs=1e-6)
 
 
-@given(star_shapes(), star_shapes(), st.integers(0, 19), st.floats(0.01, 0.5))
-@settings(max_examples=20, deadline=None)
-def test_the_list_of_vertices_does_not_matter(a: Ring, b: Ring, by: int, step: float) -> None:
-    def other(ring: Ring) -> Polygon:
-        return shapely.segmentize(Polygon(np.roll(ring, by, axis=0)[::-1]), step)
-
-    same = recognisability(other(a), other(b)).as_dict()
-    assert same == pytest.approx(recognisability(a, b).as_dict(), abs=1e-6)
-
-
 @given(st.sampled_from(sorted(LIMBS)), st.floats(0.12, 0.24))
 @settings(max_examples=6, deadline=None)
 def test_cutting_a_limb_costs_more_and_more(angle: float, width: float) -> None:

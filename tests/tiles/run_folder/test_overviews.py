@@ -164,14 +164,6 @@ def test_small_tilings_are_those_of_the_tile(target: Target, bent: EscherTile) -
     assert shapely.union_all(pieces).area > 0.99 * window.area
 
 
-def test_what_was_read_is_shown_if_it_is_there(target: Target, bent: EscherTile) -> None:
-    read, bare = (Page(index_page([bent], [target], ["IH4"], read=own)) for own in (True, False))
-    assert "read.png" in [picture["src"] for picture in read.all("img")]
-    assert "left out, a hole, filled." in " ".join(read.words.split())
-    assert "What was read" not in bare.words
-    assert len(read.all("svg")) == len(bare.all("svg")) - 1  # one picture of it is enough
-
-
 def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> None:
     bad = replace(flowed.certificate, reasons=("it <overlaps> itself",))
     uncertified = replace(flowed)
@@ -202,18 +194,6 @@ def test_the_page_is_one_of_the_files_of_a_run(tmp_path: Path) -> None:
     known = written_files(tmp_path)
     assert {"index.html", "overview.png", "IH4/field.png", "IH4/tiling.png"} <= known
     assert folder_names(["IH4", "IH4"]) == ["IH4", "IH4-2"]
-
-
-def test_what_was_decided_and_what_failed_is_on_the_sheets(
-    target: Target, bent: EscherTile
-) -> None:
-    noted = replace(target, notes=("filled 3 holes <of> it",))
-    page = Page(index_page([bent], [noted], ["IH4"]))
-    assert "filled 3 holes <of> it" in page.words
-    assert not [item for item in Page(index_page([bent], [target], ["IH4"])).all("ul")
-                if item.get("class") == "notes"]  # fmt: skip
-    plain = overview_png([bent], [target])
-    assert overview_png([bent], [target], failures=[ClassFailure("IH7", "no tile")]) != plain
 
 
 def test_a_sheet_shows_stars_and_how_tiles_lie(target: Target, bent: EscherTile) -> None:

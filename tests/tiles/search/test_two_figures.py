@@ -26,7 +26,6 @@ from orbiflow.tiles import (
     ExportSettings,
     LikenessSearch,
     Over,
-    Page,
     SolidSettings,
     artwork,
     colouring,
@@ -115,19 +114,6 @@ def test_maps_keep_what_the_marks_say(number: int) -> None:
     way = 1 if signed_area(rest) > 0 else -1
     kept = fidelity(complex_points(rest)[::way], complex_points(moved)[::way], known.cost)
     assert kept.mark == pytest.approx(known.mark, abs=0.1)
-
-
-def test_a_window_is_covered_once() -> None:
-    tiling = pair().tiling
-    (left, low), (right, high) = tiling.box
-    window = shapely.box(left, low, right, high)
-    copies = [shapely.Polygon(ring) for ring in copies_meeting(tiling, window.bounds).rings()]
-    assert sum(own.intersection(window).area for own in copies) == pytest.approx(
-        window.area, rel=1e-9
-    )
-    assert shapely.union_all(copies).intersection(window).area == pytest.approx(
-        window.area, rel=1e-9
-    )
 
 
 def test_a_saved_pair_is_the_same(tmp_path: Path) -> None:
@@ -267,12 +253,6 @@ def test_every_frame_of_a_morph_is_a_tiling(kind: str) -> None:
         assert shapely.union_all(rings).intersection(window).area == pytest.approx(
             window.area, rel=1e-4
         )
-
-
-def test_a_page_has_the_colours_of_figures() -> None:
-    page = Page.of_window(pair().tiling, (*pair().tiling.box[0], *pair().tiling.box[1]), 200.0)
-    kinds = page.copies.prototiles
-    assert not set(page.colours[kinds == 0].tolist()) & set(page.colours[kinds == 1].tolist())
 
 
 def test_a_search_that_is_stopped_keeps_its_first_look() -> None:
