@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import shutil
 from pathlib import Path
@@ -11,8 +12,8 @@ import numpy as np
 import pytest
 
 from batch.small_batches import QUICK, Here, rows, run_call, write_boot
+from orbiflow.batch import dask_cluster, work
 from orbiflow.batch import folder as folder_module
-from orbiflow.batch import work
 from orbiflow.errors import OutputError, SettingError
 from orbiflow.runtime import Call, Cancel, Finished, ItemDone, Note, find
 from refusals import refused
@@ -209,6 +210,13 @@ def test_mistakes(given: dict[str, Any], names: set[str]) -> None:
 def test_what_belongs_to_one_silhouette_is_no_setting_of_a_batch(name: str) -> None:
     with refused("batch", repr(name), kind=SettingError):
         find("batch").call({"folder": "in", name: "a.png"})
+
+
+def test_no_scheduler_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = functools.partial(dask_cluster.DaskCluster, timeout=0.2)
+    monkeypatch.setattr(dask_cluster, "DaskCluster", quick)
+    with refused("tcp://127.0.0.1:1"):
+        run_call(changed(call, scheduler="tcp://127.0.0.1:1"))
 
 
 @pytest.mark.usefixtures("here")

@@ -145,10 +145,7 @@ def test_what_kills_processes_fails_alone(monkeypatch: pytest.MonkeyPatch) -> No
     events: list[Event] = []
     found = answers(LocalProcesses(2), parcels_of(b"a", b"deadly", b"b", b"c"), events)
     assert {key: state_of(answer) for key, answer in found.items()} == {
-        "0": "done",
-        "1": "died",
-        "2": "done",
-        "3": "done",
+        **{"0": "done", "1": "died", "2": "done", "3": "done"}
     }
     end = found["1"].end
     assert isinstance(end, Failed)
@@ -165,11 +162,7 @@ def test_what_kills_workers_fails_alone(monkeypatch: pytest.MonkeyPatch, cluster
     sent = parcels_of(b"a", b"deadly", b"b", b"c", b"d")
     found = answers(DaskCluster(cluster.scheduler_address), sent, events)
     assert {key: state_of(answer) for key, answer in found.items()} == {
-        "0": "done",
-        "1": "died",
-        "2": "done",
-        "3": "done",
-        "4": "done",
+        **{"0": "done", "1": "died", "2": "done", "3": "done", "4": "done"}
     }
     assert any(isinstance(event, Note) for event in events)
     assert found["0"].files == {"file": b"a"}
