@@ -15,35 +15,15 @@ HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile_map", "tile"]
 TILES += [
-    "result_file",
-    "search",
-    "flowing",
-    "page",
-    "write",
-    "pictures",
-    "motifs",
-    "make",
-    "motion",
-    "worlds",
-    "solids",
+    *("result_file", "search", "flowing", "page", "write", "pictures", "motifs", "make"),
+    *("motion", "worlds", "solids"),
 ]
 TILES += ["run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
-    "data_space",
-    "estimator",
-    "covariates",
-    "conditional_estimator",
-    "comparing",
-    "regions",
-    "weighed_rows",
-    "uniformity",
-    "summaries",
-    "orientations",
-    "tables",
-    "pictures",
-    "run_folder",
-    "operations",
+    *("data_space", "estimator", "covariates", "conditional_estimator", "comparing", "regions"),
+    *("weighed_rows", "uniformity", "summaries", "orientations", "tables", "pictures"),
+    *("run_folder", "operations"),
 ]
 DENSITY += ["cross_validation"]
 ROOMS = [
@@ -186,6 +166,7 @@ def door_or_module(source: str, name: str) -> str:
 ALL = [found for path in MODULES.values() for found in imports(path)]
 
 
+@cache
 def room(module: str) -> str:
     """The longest room that holds a module; "" for a file at the top, which all share."""
     inside = module.removeprefix("orbiflow").lstrip(".")
