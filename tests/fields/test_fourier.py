@@ -171,16 +171,6 @@ def test_smoothness_does_not_depend_on_the_unit_of_length(group, unit):
     np.testing.assert_allclose(scaled, weights, rtol=1e-10)
 
 
-@given(wallpaper_groups(), st.integers(0, 6))
-def test_magnitudes_are_lengths_of_dual_vectors(group, max_frequency):
-    field = FourierField(group, max_frequency)
-    lengths = np.linalg.norm(field.basis.frequencies @ group.inverse_lattice, axis=1)
-    mode = field.basis.rows // 4
-    np.testing.assert_allclose(
-        lengths[mode], field.basis.magnitude[field.basis.columns], rtol=1e-9, atol=1e-12
-    )
-
-
 @pytest.mark.parametrize("name", WALLPAPER_GROUPS)
 def test_the_frequency_set_holds_the_box(name):
     found = {tuple(k) for k in frequency_set(wallpaper_group(name), 3).tolist()}

@@ -33,14 +33,6 @@ def test_a_new_field_is_zero():
     assert largest(field(random_tensor(0, 10, 2))) == 0.0
 
 
-def test_the_global_random_state_is_left_alone():
-    torch.manual_seed(11)
-    expected = torch.rand(3)
-    torch.manual_seed(11)
-    neural_field(wallpaper_group("p2"), seed=5)
-    assert torch.equal(torch.rand(3), expected)
-
-
 @pytest.mark.parametrize(
     ("dim", "max_frequency", "size"), [(1, 3, 6), (2, 1, 8), (2, 2, 24), (3, 1, 26), (4, 2, 16)]
 )

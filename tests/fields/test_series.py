@@ -82,14 +82,6 @@ def test_second_derivatives_pass_gradgradcheck(orders):
     assert torch.autograd.gradgradcheck(evaluate, inputs, atol=1e-6, rtol=1e-5)
 
 
-@pytest.mark.parametrize("which", [0, 1])
-def test_derivatives_pass_when_only_one_argument_wants_them(which):
-    inputs = list(weights_and_points(5, [2, 2]))
-    inputs[which].requires_grad_()
-    assert torch.autograd.gradcheck(evaluate, inputs, atol=1e-7, rtol=1e-6)
-    assert torch.autograd.gradgradcheck(evaluate, inputs, atol=1e-5, rtol=1e-5)
-
-
 def test_a_gradient_is_the_same_whether_or_not_it_is_to_be_differentiated_again():
     # points that depend on the weights, as they do inside an integrator
     weights, u = weights_and_points(6, [2, 2])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.fields import FourierField, SplineField, jacobian
-from orbiflow.fields.spline_field import cubic_weights, padded, spline_sum
+from orbiflow.fields.spline_field import padded, spline_sum
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
 from refusals import refused
 
@@ -92,28 +92,6 @@ def test_second_derivatives_of_the_sum_against_numerical_ones(dim: int) -> None:
     check = partial(torch.autograd.gradgradcheck, inputs=(table, u), fast_mode=dim == 3)
     assert check(lambda t, x: spline_sum(padded(t), x)[0])
     assert check(lambda t, x: spline_sum(padded(t), x, rates))
-
-
-@given(names, seeds)
-@settings(max_examples=5, deadline=None)
-def test_a_jacobian_can_be_penalised(name: str, seed: int) -> None:
-    spline, _, points = pair(name, seed)
-    slopes = jacobian(spline, points)
-    assert slopes.requires_grad
-    (found,) = torch.autograd.grad(slopes.square().sum(), spline.parameters_)
-    # linear in the parameters, so the square's gradient points at them: Euler
-    expected = 2 * slopes.square().sum()
-    torch.testing.assert_close(found @ spline.parameters_, expected, rtol=1e-9, atol=1e-9)
-    assert float(found.norm()) > 0
-
-
-@given(seeds)
-@settings(max_examples=10, deadline=None)
-def test_weights_are_a_partition_of_unity(seed: int) -> None:
-    torch.manual_seed(seed)
-    weights = cubic_weights(torch.rand(2, 50, dtype=torch.float64), 3).sum(dim=2)
-    assert torch.allclose(weights[:, 0], torch.ones_like(weights[:, 0]))
-    assert torch.allclose(weights[:, 1:], torch.zeros_like(weights[:, 1:]), atol=1e-12)
 
 
 def test_a_field_made_double_is_as_symmetric_as_one_born_so() -> None:

@@ -8,8 +8,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from torch import Tensor, nn
-from torch.autograd import forward_ad
-from torch.func import functional_call, jacfwd, jacrev, jvp, vjp, vmap
+from torch.func import functional_call, jacfwd, jacrev, vmap
 
 from orbiflow.fields import SplineField, divergence, jacobian, symmetrize
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
@@ -76,22 +75,6 @@ def test_values_and_divergence_are_mapped(kind, seed):
     torch.testing.assert_close(vmap(vmap(field))(points), field(points), rtol=1e-12, atol=1e-12)
     mapped = vmap(lambda p: divergence(field, p))(points)
     torch.testing.assert_close(mapped, divergence(field, points), rtol=1e-10, atol=1e-10)
-
-
-@every_kind
-def test_products_forward_and_backward_agree_with_the_jacobian(kind):
-    field, points = PLANE[kind](1), random_tensor(1, 6, 2)
-    along, against = random_tensor(2, 6, 2), random_tensor(3, 6, 2)
-    exact = jacobian(field, points).detach()
-    pushed = jvp(field, (points,), (along,))[1].detach()
-    torch.testing.assert_close(pushed, torch.einsum("nij,nj->ni", exact, along))
-    (pulled,) = vjp(field, points)[1](against)
-    torch.testing.assert_close(pulled.detach(), torch.einsum("nij,ni->nj", exact, against))
-    with forward_ad.dual_level():
-        dual = field(forward_ad.make_dual(points, along))
-        tangent = forward_ad.unpack_dual(dual).tangent
-        assert tangent is not None
-        torch.testing.assert_close(tangent.detach(), pushed)
 
 
 def test_many_fields_at_once_by_their_parameters():

@@ -1,7 +1,8 @@
-"""The flow of vector fields: map, inverse, log-determinant, shapes, errors."""
+"""The flow of vector fields: map, inverse, log-determinant, symmetry, views, threads, errors."""
 
 import copy
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from torch import Tensor, nn
 
 from orbiflow.fields import FourierField
 from orbiflow.flows import METHODS, Flow
+from orbiflow.flows.flow import MULTITHREADED_COORDINATES
 from orbiflow.symmetry import wallpaper_group
 from refusals import refused
 from strategies import (
@@ -21,6 +23,7 @@ from strategies import (
     gentle_field,
     groups,
     largest,
+    map_equivariance_error,
     plane_groups,
     random_field,
     random_tensor,
@@ -74,14 +77,6 @@ def test_segments_follow_one_another():
     for field in reversed(fields):
         backwards = Flow(field, steps=8).inverse(backwards)
     assert torch.equal(Flow(fields, steps=8).inverse(points), backwards)
-
-
-def test_twice_the_duration_is_the_flow_twice():
-    field = gentle_field(wallpaper_group("p2"), 2, 0)
-    points = random_tensor(0, 10, 2)
-    long = Flow(field, steps=20, duration=2.0)(points)
-    once = Flow(field, steps=10)
-    torch.testing.assert_close(long, once(once(points)), rtol=0, atol=1e-13)
 
 
 def test_a_negative_duration_is_the_inverse():
@@ -246,3 +241,79 @@ def test_numbers_are_finite(value: Any) -> None:
         Flow(lambda p: p, duration=value)
     with refused("steps"):
         Flow(lambda p: p, steps=value)
+
+
+def test_a_view_integrates_in_its_own_steps():
+    fields = several(wallpaper_group("p4"), 0)
+    flow, points = Flow(fields, steps=4), random_tensor(0, 5, 2)
+    view = flow.with_steps(9, method="midpoint")
+    assert (view.steps, view.method, flow.steps, flow.method) == (9, "midpoint", 4, "rk4")
+    assert flow.with_steps(9).method == "rk4"
+    assert torch.equal(view(points), Flow(fields, steps=9, method="midpoint")(points))
+    assert torch.equal(flow(points), Flow(fields, steps=4)(points))
+
+
+def test_a_view_shares_its_parameters():
+    flow = Flow(several(wallpaper_group("p4"), 0), steps=4)
+    view = flow.with_steps(8)
+    assert [id(p) for p in view.parameters()] == [id(p) for p in flow.parameters()]
+    assert list(view.state_dict()) == list(flow.state_dict())
+    with torch.no_grad():
+        for parameter in view.parameters():
+            parameter.zero_()
+    points = random_tensor(0, 5, 2)
+    assert torch.equal(flow(points), points)
+
+
+@pytest.mark.parametrize("name", ["steps", "method", "duration"])
+def test_a_flow_cannot_be_changed_under_others(name):
+    flow = Flow(torch.sin, steps=4)
+    with pytest.raises(AttributeError):
+        setattr(flow, name, getattr(flow, name))
+
+
+def test_views_are_checked_like_flows():
+    flow = Flow(torch.sin)
+    with refused("steps", 0):
+        flow.with_steps(0)
+    with refused("heun"):
+        flow.with_steps(4, method="heun")
+
+
+@pytest.fixture
+def seen() -> Iterator[list[int]]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    yield []
+    assert torch.get_num_threads() == 3
+    torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize(("count", "threads"), [(5, 1), (MULTITHREADED_COORDINATES, 3)])
+@pytest.mark.parametrize("apply", ["forward", "inverse", "forward_and_log_det"])
+def test_how_many_threads_carry(seen: list[int], count: int, threads: int, apply: str) -> None:
+    def field(points: Tensor) -> Tensor:
+        seen.append(torch.get_num_threads())
+        return 0 * points
+
+    flow = Flow(field, steps=1, method="euler", warn=False)
+    getattr(flow, apply)(torch.zeros(count, 1))
+    assert set(seen) == {threads}
+
+
+@settings(max_examples=10)
+@given(groups, seeds, st.sampled_from(sorted(METHODS)), st.integers(1, 4))
+def test_equivariance_holds_to_rounding_for_any_group(group, seed, method, steps):
+    flow = Flow(random_field(group, 1, seed), method=method, steps=steps, duration=0.1, warn=False)
+    assert map_equivariance_error(flow, group, random_tensor(seed, 8, group.dim)) < 1e-11
+
+
+def test_the_log_determinant_is_invariant():
+    group = wallpaper_group("p4g")
+    flow = Flow(gentle_field(group, 3, 0), steps=2)
+    points = random_tensor(0, 20, 2)
+    with torch.no_grad():
+        expected = flow.log_abs_det_jacobian(points)
+        for g in group.cosets:
+            found = flow.log_abs_det_jacobian(g(points))
+            torch.testing.assert_close(found, expected, rtol=0, atol=1e-12)

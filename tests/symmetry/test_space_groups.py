@@ -47,15 +47,6 @@ def test_every_setting_is_the_group_of_the_tables_on_its_primitive_lattice(name)
     assert space_group(f"Hall: {SETTINGS[name].hall}") == group
 
 
-@pytest.mark.parametrize(
-    ("symbol", "centring"), [("P 2 3", 1), ("C 2 2 2", 2), ("I 2 3", 2), ("R 3", 3), ("F 2 3", 4)]
-)
-def test_centred_cells_become_primitive(symbol, centring):
-    cell = (2, 2, 2, 90, 90, 120 if symbol == "R 3" else 90)
-    whole = abs(np.linalg.det(cell_lattice(cell)))
-    assert space_group(symbol, cell).cell_volume == pytest.approx(whole / centring, rel=1e-12)
-
-
 def test_the_hall_symbol_is_meant_only_if_it_is_said():
     cell = (1, 2, 3)
     assert space_group("P 2", cell) == space_group("P 1 2 1", cell)

@@ -103,19 +103,6 @@ def test_the_lattice_can_be_held(soft: SoftTarget) -> None:
         assert torch.equal(state.model.stretch.detach(), before) != lattice
 
 
-def test_keep_selects_everything_alike(soft: SoftTarget) -> None:
-    state = descent("IH6")
-    for _ in range(3):
-        state.step(soft)
-    boundaries = state.placed()
-    state.keep([4, 1], np.full(state.model.size, 0.8))
-    assert state.model.size == 2
-    assert np.allclose(state.placed(), boundaries[[4, 1]], atol=1e-6)
-    assert torch.allclose(state.threshold, torch.tensor(0.8 / 1.8))
-    state.step(soft)
-    assert all(len(fields) == 2 for fields in state.record)
-
-
 @pytest.mark.parametrize("name", ["IH1", "IH4", "IH5", "IH21"])
 def test_a_fit_certifies_and_survives_storage(name: str) -> None:
     found = fit_descent(TARGET, isohedral_class(name), QUICK)
@@ -128,6 +115,12 @@ def test_a_fit_certifies_and_survives_storage(name: str) -> None:
     saved = as_map(fine)
     again = extract_tile(as_model(saved))[0]
     assert np.allclose(again.polygon, tile.polygon, atol=1e-12)
+
+
+def test_templates_may_be_the_only_starts() -> None:
+    few = dataclasses.replace(QUICK, starts="template")
+    found = fit_descent(TARGET, isohedral_class("IH4"), few)
+    assert certify(extract_tile(trainable(found.candidates).take([0]))[0]).valid
 
 
 def test_broken_prototiles_are_refused() -> None:

@@ -63,14 +63,6 @@ def test_samples_know_what_is_inside(seed: int, y_down: bool) -> None:
     assert all(rows[tuple(p)] == o for p, o in zip(points.tolist(), occupied.tolist(), strict=True))
 
 
-def test_samples_depend_on_the_seed_alone() -> None:
-    target = Target.from_polygon(BOOT)
-    a, b, c = (OccupancySamples(target, 600, seed=seed) for seed in (4, 4, 5))
-    assert torch.equal(a.points, b.points)
-    assert torch.equal(a.draw(50)[0], b.draw(50)[0])
-    assert not torch.equal(a.points, c.points)
-
-
 @pytest.mark.parametrize("name", CLASSES)
 def test_the_matching_pose_has_the_least_loss(name: str) -> None:
     kind = CLASSES[name]

@@ -53,18 +53,6 @@ def test_agrees_with_shapely(seed: int, corners: int, clockwise: bool) -> None:
 
 
 @given(seeds)
-def test_stacks_broadcast(seed: int) -> None:
-    vertices = torch.stack([star_polygon(seed + i) for i in range(3)])
-    points = random_tensor(seed, 3, 7, 2)
-    each = [signed_distance(p, v) for p, v in zip(points, vertices, strict=True)]
-    assert torch.equal(signed_distance(points, vertices), torch.stack(each))
-    shared = [signed_distance(points[0], v) for v in vertices]
-    assert torch.equal(signed_distance(points[0], vertices), torch.stack(shared))
-    one = [signed_distance(p, vertices[0]) for p in points]
-    assert torch.equal(signed_distance(points, vertices[0]), torch.stack(one))
-
-
-@given(seeds)
 def test_derivatives_match_differences(seed: int) -> None:
     vertices = star_polygon(seed)
     points = smooth_points(seed, shapely.Polygon(vertices.numpy()))[:12]

@@ -27,15 +27,6 @@ def test_an_outline_corresponds_to_itself(shift: int) -> None:
     assert abs(apart).max() < 0.03 * size
 
 
-@pytest.mark.parametrize("weights", [(0.15, 0.5), (0.8, 2.0)])
-def test_places_are_in_order(weights: tuple[float, float]) -> None:
-    other = resampled(waved(0.1), 77)
-    at = corresponding(RING, other, *weights)
-    size = arc_lengths(other)[-1]
-    gaps = np.diff(np.append(at, at[0] + size))
-    assert (gaps > 0).all()
-
-
 def test_points_lie_on_the_ring_in_order() -> None:
     ring = resampled(waved(0.1), 90)
     z = bent_onto(BODY, ring)

@@ -172,16 +172,6 @@ def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> No
     assert "Not certified: it <overlaps> itself." in page.words
 
 
-@pytest.mark.parametrize(("count", "size"), [(1, 1320), (2, 1920), (3, 1920), (7, 1920)])
-def test_an_overview_of_any_number(
-    target: Target, bent: EscherTile, flowed: EscherTile, count: int, size: int
-) -> None:
-    picture = Image.open(io.BytesIO(overview_png(([bent, flowed] * 4)[:count], [target])))
-    assert picture.width == size
-    assert 600 < picture.height < 2100
-    assert len(picture.getcolors(2**24) or []) > 50
-
-
 @pytest.mark.parametrize("wide", [1.0, 90.0, 1 / 90])
 def test_an_overview_of_a_long_silhouette(flowed: EscherTile, wide: float) -> None:
     ring = np.array(BOOT) * (wide**0.5, wide**-0.5)

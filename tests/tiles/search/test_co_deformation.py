@@ -62,15 +62,6 @@ def test_the_energy_never_grows(name: str) -> None:
     assert tiles.offset.shape == (10, 2)
 
 
-@pytest.mark.parametrize("name", CLASSES)
-def test_several_rounds_are_the_same_as_one_by_one(name: str) -> None:
-    z, space = drawn_to_tiles(BODY, CLASSES[name], placements(name, 3))
-    single = z
-    for _ in range(4):
-        single = held_on_tiles(BODY, space, single, 1).points
-    assert held_on_tiles(BODY, space, z, 4).points == pytest.approx(single, abs=1e-9)
-
-
 @pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 @settings(max_examples=4)
 @given(seed=seeds)

@@ -64,14 +64,6 @@ def test_no_certified_finalist() -> None:
     assert str(caught.value).count("crosses itself") == 1  # the same reason is given once
 
 
-def test_force_keeps_the_uncertified_and_says_so() -> None:
-    target = Target.from_polygon(KIND.template())
-    result = best_tile(target, finalists(2.0), starts=1, seconds=0.0, force=True)
-    assert not result.certificate.valid
-    assert "not simple" in result.certificate.reasons[0]
-    assert 0 < result.likeness.metrics.iou < 1
-
-
 def test_force_prefers_the_certified() -> None:
     # the crossing tile covers the target better than the certified one, which is moved away
     target = Target.from_polygon(KIND.template())

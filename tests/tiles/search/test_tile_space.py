@@ -128,25 +128,6 @@ def test_the_nearest_tiles_match_and_certify(name: str) -> None:
     assert certified == 3
 
 
-@given(seeds)
-def test_in_order_undoes_the_placements(seed: int) -> None:
-    own = space("IH4")
-    values = outlines(own, seed)
-    ordered = np.take_along_axis(values, own.order, axis=1)
-    assert np.array_equal(own.in_order(ordered), values)
-
-
-@pytest.mark.parametrize("name", TURNING)
-@settings(max_examples=5)
-@given(seed=seeds, turn=angles)
-def test_best_turns_go_with_the_outline(name: str, seed: int, turn: float) -> None:
-    own = space(name)
-    goals = outlines(own, seed)
-    still, turned = own.best_turns(goals), own.best_turns(goals * np.exp(1j * turn))
-    apart = np.exp(2j * (turned - still - turn))  # an axis, not an arrow
-    assert abs(apart - 1).max() < 1e-6
-
-
 @pytest.mark.parametrize("name", TURNING)
 @given(seed=seeds, error=st.floats(0.2, 1.4))
 def test_best_turns_suit_a_tile_turned_away(name: str, seed: int, error: float) -> None:

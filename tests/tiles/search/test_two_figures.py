@@ -78,15 +78,6 @@ def test_both_figures_are_measured_and_the_worse_one_ranks() -> None:
             assert part.figure.rating is not None
 
 
-def test_the_first_figure_lies_on_its_silhouette() -> None:
-    first, second = pair().parts
-    np.testing.assert_allclose(first.place.linear, np.eye(2), atol=1e-12)
-    own = shapely.Polygon(first.place(first.figure.tile.polygon))
-    goal = shapely.Polygon(pair_result().target.outline)
-    assert own.intersection(goal).area > 0.5 * goal.area
-    assert second.place.scale > 0
-
-
 @given(seeds, st.integers(0, 1))
 def test_maps_of_both_figures_have_inverses(seed: int, number: int) -> None:
     figure = pair().parts[number].figure

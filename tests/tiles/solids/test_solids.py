@@ -21,7 +21,6 @@ from orbiflow.tiles import SolidSettings, Tile, as_tile, make_solid, polygons_in
 from orbiflow.tiles.make import ExportSettings, dark_parts, laid_out
 from orbiflow.tiles.page import Curve, Motif, Part, Style, longer_side
 from orbiflow.tiles.solids.plates import plates_of
-from orbiflow.tiles.solids.sections import Level, stacked
 from orbiflow.tiles.solids.shapes import Plan
 from refusals import refused
 from solids_read import read_3mf, read_stl, section
@@ -78,16 +77,6 @@ def test_the_volume_of_a_tile(tile: Tile) -> None:
     assert bevelled.volume() == pytest.approx(4 * area + slope, rel=1e-3)
     inset = section(plain.parts["tile"], 1).buffer(-1, quad_segs=32)
     assert top == pytest.approx(inset.area, rel=2e-3)
-
-
-def test_a_slope_is_exact() -> None:
-    square = shapely.box(0, 0, 10, 10)
-    body = stacked(
-        Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre"))
-    )
-    assert body.volume() == pytest.approx(3 / 3 * (100 + 36 + 60))
-    cone = stacked(Level(1, square.buffer(-4)), Level(2, square))
-    assert cone.status().name == "NoError"
 
 
 @pytest.mark.parametrize("kind", ["cutter", "stamp", "mould"])

@@ -157,14 +157,3 @@ def test_solutions_are_those_of_the_equation(drawn: Any, orders: Any, a: float, 
     reach = np.abs(pattern.to_centres(np.array([pattern.middle]))).min()
     expected = found.start @ np.stack([solved([1 + 0j, 0]), solved([0j, 1 / reach])])
     assert np.abs(found.reached(end) - expected).max() < 1e-8 * np.abs(expected).max()
-
-
-@pytest.mark.parametrize("orders", [(5, 5, 5, 5), (3, 4, 3, 4)])
-def test_a_square_of_half_turns_is_a_part_of_a_pattern_of_quarters(orders: Any) -> None:
-    group = CrystallographicGroup.generate(
-        np.eye(2), [Isometry(-np.eye(2), np.zeros(2))], name="p2"
-    )
-    found = Development.of(Pattern.near(group, np.array([0.2, 0.2])), orders)
-    # the square's diagonals are mirrors: sides of equal length
-    sides = np.arccosh(-(found.corners * form(-1) * np.roll(found.corners, -1, axis=0)).sum(axis=1))
-    assert np.ptp(sides) < 1e-9
