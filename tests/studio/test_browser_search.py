@@ -135,9 +135,7 @@ def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
 def test_tiles_of_an_outline_since_changed_are_marked_and_searched_anew(
     page, studio: RunningStudio
 ) -> None:
-    own = studio.with_picture()
-    studio.search(own, "IH4")
-    studio.found(own)
+    own = studio.with_tiles()
     small_searches(page, "IH4")
     page.goto(f"/#/p/{own}")
     page.wait_for_selector(CARD)
@@ -146,15 +144,14 @@ def test_tiles_of_an_outline_since_changed_are_marked_and_searched_anew(
     studio.client.put(f"projects/{own}/reading", json={"smooth": 0.05})
     page.locator("summary", has_text="changed the picture").wait_for()
     assert (new.count(), old.count()) == (0, 1)
-    page.get_by_role("button", name="Search again").click()
+    page.get_by_role("button", name=re.compile("^Search")).click()
     page.wait_for_selector("ul:not(details ul) > .card[data-stage=final]")
     assert (new.count(), old.count()) == (1, 1)
 
 
 def test_pulled_versions_of_a_tile_are_on_its_card(page, studio: RunningStudio) -> None:
-    own = studio.with_picture()
-    studio.search(own, "IH4")
-    (first,) = (tile["id"] for tile in studio.found(own))
+    own = studio.with_tiles()
+    (first,) = (tile["id"] for tile in studio.project(own)["tiles"])
 
     def pull(tile: int) -> int:
         start = studio.client.get(f"projects/{own}/tiles/{tile}/space").json()["start"]
@@ -180,9 +177,7 @@ def test_pulled_versions_of_a_tile_are_on_its_card(page, studio: RunningStudio) 
 
 
 def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio) -> None:
-    searched = studio.with_picture()
-    studio.search(searched, "IH4")
-    studio.found(searched)
+    searched = studio.with_tiles()
     small_searches(page, "IH4")
     page.goto(f"/#/p/{searched}")
     page.wait_for_selector(CARD)
