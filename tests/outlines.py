@@ -119,16 +119,10 @@ def unit(ring: Array) -> Array:
 
 
 SHAPES: dict[str, Array] = {
-    "triangle": disc(3),
-    "square": disc(4),
-    "disc": disc(64),
-    "star": star(5, 0.4),
-    "sharp star": star(9, 0.25),
-    "bar": unit(bar(12.0, 1.0)),
-    "comb": unit(comb(5, 0.2, 0.15, 2.0)),
-    "dumbbell": unit(dumbbell(0.05, 1.0)),
-    "slit": slit_square(0.004, 0.8),
-    "crescent": crescent(),
+    **{"triangle": disc(3), "square": disc(4), "disc": disc(64), "star": star(5, 0.4)},
+    **{"sharp star": star(9, 0.25), "bar": unit(bar(12.0, 1.0))},
+    **{"comb": unit(comb(5, 0.2, 0.15, 2.0)), "dumbbell": unit(dumbbell(0.05, 1.0))},
+    **{"slit": slit_square(0.004, 0.8), "crescent": crescent()},
     "vertices on sides": unit(np.insert(bar(3.0, 1.0), 1, [[0.5, 0.0], [0.7, 0.0]], axis=0)),
 }
 """Simple outlines of area about 1, counter-clockwise."""

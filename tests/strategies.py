@@ -220,7 +220,6 @@ def random_field(
 
 
 small_fields = st.builds(random_field, groups, st.integers(1, 2), seeds)
-plane_fields = st.builds(random_field, plane_groups, st.integers(1, 5), seeds)
 
 
 def gentle_field(

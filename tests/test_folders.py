@@ -131,15 +131,6 @@ def test_a_move_that_fails_is_taken_back(tmp_path: Path, monkeypatch: pytest.Mon
     assert files(made[0]) == {"result.json": "new"}
 
 
-def test_two_runs_at_once_end_with_the_last(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    fill(out, *OURS, text="old")
-    with folder_at(out).replaced() as later:
-        run(out)
-        fill(later, "IH6/tile.svg", text="later")
-    assert files(tmp_path) == {"out/IH6/tile.svg": "later"}
-
-
 def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
     fill(tmp_path / "real", *OURS, text="old")
     (tmp_path / "out").symlink_to(tmp_path / "real")

@@ -11,22 +11,17 @@ import numpy as np
 import pytest
 
 import orbiflow
-from artworks import art_settings
 from orbiflow.density import DensityEstimator
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.loading import LoadedRun
 from orbiflow.runtime import find
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
-    AnimationSettings,
     EscherTile,
     ExportSettings,
     Tile,
     TileMap,
-    animate,
-    art,
     export,
-    load_model,
     read_document,
     read_result,
 )
@@ -74,13 +69,7 @@ def test_a_density(folders: Path) -> None:
 def test_flipped_bits_of_a_result_never_give_another_tile(tmp_path: Path) -> None:
     """What decides, polygon and group, is certified anew: a result.json may be edited by hand."""
     ring = [
-        [0, 0],
-        [0.6, 0.13],
-        [1.37, 0],
-        [1.5, 0.7],
-        [1.37, 1.21],
-        [0.6, 1.34],
-        [0, 1.21],
+        *([0, 0], [0.6, 0.13], [1.37, 0], [1.5, 0.7], [1.37, 1.21], [0.6, 1.34], [0, 1.21]),
         [0.13, 0.7],
     ]
     tile = Tile(np.array(ring), wallpaper_group("p1", np.diag([1.37, 1.21])))
@@ -196,19 +185,6 @@ def test_a_tile_that_is_saved_is_loaded_the_same(folders: Path, tmp_path: Path) 
     assert np.isnan(read_result(tmp_path / "plain").likeness.metrics.iou)
     with refused("turtle", kind=OutputError):
         orbiflow.save(found, folders / "turtle")
-
-
-def test_what_is_loaded_is_taken(folders: Path, tmp_path: Path) -> None:
-    tile = orbiflow.load(folders / "turtle" / "IH6")
-    assert isinstance(tile, EscherTile)
-    assert export(tile, tmp_path / "a.svg").files == (tmp_path / "a.svg",)
-    assert art(tile, tmp_path / "a.png", art_settings(area="90x60px")).width == 90
-    assert (tmp_path / "a.png").is_file()
-    small = AnimationSettings(**{"seconds": 0.5, "fps": 4, "area": "96x64px"})
-    animate(tile, tmp_path / "a.gif", small)
-    assert (tmp_path / "a.gif").is_file()
-    with refused("model.safetensors"):
-        load_model(folders / "turtle" / "IH6" / "model.safetensors")
 
 
 def test_a_tile_that_does_not_tile(folders: Path, tmp_path: Path) -> None:

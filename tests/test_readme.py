@@ -45,17 +45,6 @@ def test_the_first_snippet_draws_a_certified_tile(tmp_path, monkeypatch, capsys,
     assert (tmp_path / "turtles.png").stat().st_size > 1000
 
 
-def test_a_maker_is_soon_at_a_first_tile() -> None:
-    assert README.index("![") < README.index("make demo")
-    assert len(README.splitlines()) <= 180
-    assert len(README[: README.index("orbiflow escherize")].splitlines()) < 35
-    headings = re.findall(r"^## (.*)$", README, flags=re.MULTILINE)
-    anchors = {re.sub(r"[^\w -]", "", name).lower().replace(" ", "-") for name in headings}
-    doors = re.findall(r"\]\(#([\w-]+)\)", README)
-    assert len(doors) == 3
-    assert anchors >= set(doors)
-
-
 def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
     (snippet,) = [s for s in SNIPPETS if "tile.forward" in s]
     target = Target.read(README_PATH.parent / "examples" / "silhouettes" / "turtle.png")

@@ -15,35 +15,15 @@ HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile_map", "tile"]
 TILES += [
-    "result_file",
-    "search",
-    "flowing",
-    "page",
-    "write",
-    "pictures",
-    "motifs",
-    "make",
-    "motion",
-    "worlds",
-    "solids",
+    *("result_file", "search", "flowing", "page", "write", "pictures", "motifs", "make"),
+    *("motion", "worlds", "solids"),
 ]
 TILES += ["run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
-    "data_space",
-    "estimator",
-    "covariates",
-    "conditional_estimator",
-    "comparing",
-    "regions",
-    "weighed_rows",
-    "uniformity",
-    "summaries",
-    "orientations",
-    "tables",
-    "pictures",
-    "run_folder",
-    "operations",
+    *("data_space", "estimator", "covariates", "conditional_estimator", "comparing", "regions"),
+    *("weighed_rows", "uniformity", "summaries", "orientations", "tables", "pictures"),
+    *("run_folder", "operations"),
 ]
 DENSITY += ["cross_validation"]
 ROOMS = [
@@ -56,6 +36,72 @@ ROOMS = [
 
 EXCEPTIONS: dict[str, str] = {}
 """Imports that may go past a door, `file: module`, each with its reason."""
+
+TESTS = Path(__file__).parent
+TESTED = {
+    "tiles/art": ("tiles.make", "tiles.motifs"),
+    "tiles/exporting": ("tiles.make", "tiles.page"),
+    "tiles/flowing": ("tiles.search",),
+    "tiles/search": ("tiles.flowing",),
+}
+"""Rooms whose insides a folder of tests is about beside the room of its own name."""
+PAST_DOORS = {
+    **dict.fromkeys(
+        (
+            "artworks.py: tiles.search.bent_map",
+            "studio/test_pulled_tiles.py: tiles.search.bent_map",
+        ),
+        "a tile with the map that a search would give it, without the search",
+    ),
+    **dict.fromkeys(
+        ("artworks.py: tiles.result_file", "exported.py: tiles.result_file"),
+        "a run's document without a run",
+    ),
+    "test_loading.py: tiles.result_file": "what is saved is compared entry by entry",
+    **dict.fromkeys(
+        (
+            "cli/test_batch.py: tiles.run_folder.files",
+            "cli/test_escherize.py: tiles.run_folder.files",
+            "runtime/test_running.py: tiles.run_folder.files",
+        ),
+        "the one list of a run's files",
+    ),
+    "cli/test_escherize.py: tiles.search.finished_tiles": "a forced tile without a search",
+    **dict.fromkeys(
+        (
+            "outlines.py: tiles.flowing.tile_model",
+            "outlines.py: tiles.search.bending",
+            "outlines.py: tiles.search.co_deformation",
+        ),
+        "one bent silhouette for all tests, step by step",
+    ),
+    **dict.fromkeys(
+        (
+            "small_pairs.py: tiles.search.pair_search",
+            "small_searches.py: tiles.search.likeness_search",
+            "test_page_commands.py: tiles.search.pair_search",
+        ),
+        "makes searches small",
+    ),
+    "sealed.py: runtime.tensor_files": "seals files that tests have damaged",
+    "settings/test_commands.py: cli.app": "the command line has no door: nobody imports it",
+    "studio/test_browser_solid.py: solids.bodies": "a mesh to upload",
+    "studio/test_solid_pages.py: solids.reading": "the studio takes what is read",
+    **dict.fromkeys(
+        (
+            "test_awkward_calls.py: tiles.flowing.starts",
+            "test_awkward_calls.py: tiles.flowing.tile_model",
+        ),
+        "methods of one's own call them: see tiles/search/test_a_new_method.py",
+    ),
+    "tiles/search/test_carried.py: tiles.silhouette.bending": "the most points of a map",
+    "tiles/search/test_two_figures.py: tiles.motion.kinds": "every frame, not the file",
+    "tiles/silhouette/test_sampling.py: tiles.search.co_deformation": "bodies sampled for it",
+    "cli/test_density_patches.py: density.spaces.patches": "what the command's rows are made of",
+    "density/cross_validation/test_cross_validation.py: batch.parcels": "a worker's part, here",
+    "density/pictures/test_plots.py: density.operations.drawing": "the operation that draws",
+}
+"""Imports past a door in tests, `file: module`, each with its reason."""
 
 
 class Import(NamedTuple):
@@ -78,6 +124,7 @@ def dotted(path: Path) -> str:
 
 
 MODULES = {dotted(path): path for path in sorted(HOME.rglob("*.py"))}
+FILES = {name for name, path in MODULES.items() if path.name != "__init__.py"}
 PACKAGES = {name for name, path in MODULES.items() if path.name == "__init__.py"}
 
 
@@ -119,6 +166,7 @@ def door_or_module(source: str, name: str) -> str:
 ALL = [found for path in MODULES.values() for found in imports(path)]
 
 
+@cache
 def room(module: str) -> str:
     """The longest room that holds a module; "" for a file at the top, which all share."""
     inside = module.removeprefix("orbiflow").lstrip(".")
@@ -175,6 +223,32 @@ def test_imports_go_through_doors() -> None:
         if common < len(own) and len(parts) > common + 1 and str(found) not in EXCEPTIONS:
             past.append(str(found))
     assert not past
+
+
+def past_doors(path: Path) -> Iterator[str]:
+    """Names that a test takes from the inside of a room that is not its own.
+
+    A module that is imported whole is there to be changed for a test; a folder's tests, too, may use
+    the files beside its room, such as `tiles.tile_map` for those of `tiles.flowing`.
+    """
+    folder = path.parent.relative_to(TESTS).as_posix()
+    rooms = () if folder == "." else (folder.replace("/", "."), *TESTED.get(folder, ()))
+    text = path.read_text("utf-8")
+    for node in ast.walk(ast.parse(text)) if "from orbiflow." in text else ():
+        if not isinstance(node, ast.ImportFrom) or node.module not in FILES:
+            continue
+        module = node.module.removeprefix("orbiflow.")
+        package, _, file = module.rpartition(".")
+        own = any(f"{package}.".startswith(f"{room}.") for room in rooms)
+        beside = any(room.startswith(f"{package}.") for room in rooms)
+        whole = all(f"{node.module}.{alias.name}" in MODULES for alias in node.names)
+        if package and file and not (own or beside or whole):
+            yield f"{path.relative_to(TESTS).as_posix()}: {module}"
+
+
+def test_tests_go_through_doors() -> None:
+    past = {found for path in TESTS.rglob("*.py") for found in past_doors(path)}
+    assert past == PAST_DOORS.keys()
 
 
 def iter_common(one: list[str], other: list[str]) -> Iterator[str]:

@@ -55,11 +55,6 @@ def test_restored_after_an_exception():
     assert torch.get_num_threads() == THREADS
 
 
-def test_decorates_a_function():
-    assert one_thread()(torch.get_num_threads)() == 1
-    assert torch.get_num_threads() == THREADS
-
-
 def test_a_thread_started_meanwhile_is_not_limited():
     with one_thread():
         assert in_new_threads(torch.get_num_threads) == [THREADS]

@@ -28,7 +28,8 @@ def bare_fixture(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         if name not in BASE_HAS:
             text = f'raise ModuleNotFoundError("No module named {name!r}", name="{name}")\n'
             (absent / f"{name}.py").write_text(text)
-    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(absent), str(HERE)])}
+    paths = [str(absent), str(HERE), os.environ.get("PYTHONPATH", "")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
 def run(words: list[str], bare: dict[str, str], folder: Path) -> subprocess.CompletedProcess[str]:

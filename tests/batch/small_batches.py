@@ -20,10 +20,7 @@ from runtime.searches import BOOT, run
 on_cluster, locally = dask_cluster._serve, executors._serve
 
 QUICK: dict[str, Any] = {
-    "classes": ["IH4"],
-    "method": "occupancy",
-    "turns": 1,
-    "iterations": 2,
+    **{"classes": ["IH4"], "method": "occupancy", "turns": 1, "iterations": 2},
     "max_frequency": 1,
 }
 
@@ -37,12 +34,8 @@ def write_boot(path: Path, height: float = 145) -> None:
 def boot_parcels(count: int) -> list[Parcel]:
     """Searches of less than a second, with `small_searches`; they import no torch."""
     given = {
-        "classes": ["IH4"],
-        "effort": "fast",
-        "image": "boot.json",
-        "workers": 1,
-        "called": "boot",
-        "shown_out": "out",
+        **{"classes": ["IH4"], "effort": "fast", "image": "boot.json", "workers": 1},
+        **{"called": "boot", "shown_out": "out"},
     }
     call = find("escherize").call(given)
     data = json.dumps(BOOT).encode()

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from batch.small_batches import QUICK, Here, rows, run_call, small_locally, write_boot
-from orbiflow.batch import dask_cluster, executors, work
+from batch.small_batches import QUICK, Here, rows, run_call, write_boot
+from orbiflow.batch import dask_cluster, work
 from orbiflow.batch import folder as folder_module
 from orbiflow.errors import OutputError, SettingError
 from orbiflow.runtime import Call, Cancel, Finished, ItemDone, Note, find
@@ -190,16 +190,6 @@ def test_two_batches_do_not_share_a_folder(here: Here, call: Call) -> None:
     assert len(here.done) == 3
 
 
-def test_local_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "_serve", small_locally)
-    write_boot(tmp_path / "in" / "boot.json")
-    write_boot(tmp_path / "in" / "sub" / "boot.json")
-    (tmp_path / "in" / "broken.svg").write_text("<svg")
-    given = {"folder": tmp_path / "in", "out": tmp_path / "out", "classes": ["IH4"]}
-    summary, _ = run_call(find("batch").call({**given, "effort": "fast", "workers": 2}))
-    assert (summary["done"], summary["failed"]) == (2, 1)
-
-
 @pytest.mark.parametrize(
     ("given", "names"),
     [
@@ -222,6 +212,13 @@ def test_what_belongs_to_one_silhouette_is_no_setting_of_a_batch(name: str) -> N
         find("batch").call({"folder": "in", name: "a.png"})
 
 
+def test_no_scheduler_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = functools.partial(dask_cluster.DaskCluster, timeout=0.2)
+    monkeypatch.setattr(dask_cluster, "DaskCluster", quick)
+    with refused("tcp://127.0.0.1:1"):
+        run_call(changed(call, scheduler="tcp://127.0.0.1:1"))
+
+
 @pytest.mark.usefixtures("here")
 def test_a_batch_fits_as_fit_does(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
@@ -241,10 +238,3 @@ def test_a_batch_fits_as_fit_does(tmp_path: Path) -> None:
     assert ours.read_bytes() == single.read_bytes()
     with refused("flow", kind=SettingError):
         find("density batch").call({**batch, "components": ["flow"]}).run()
-
-
-def test_no_scheduler_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    quick = functools.partial(dask_cluster.DaskCluster, timeout=0.2)
-    monkeypatch.setattr(dask_cluster, "DaskCluster", quick)
-    with refused("tcp://127.0.0.1:1"):
-        run_call(changed(call, scheduler="tcp://127.0.0.1:1"))

@@ -7,8 +7,9 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -60,6 +61,29 @@ def cluster_fixture() -> Iterator[Any]:
         ) as cluster,
     ):
         yield cluster
+
+
+@contextmanager
+def until(cluster: Any, holds: Callable[[], bool]) -> Iterator[None]:
+    """Wait after the block until something holds of a cluster's tasks and workers."""
+    from distributed.diagnostics.plugin import SchedulerPlugin
+
+    happened = threading.Event()
+
+    class Watch(SchedulerPlugin):
+        name = "watch"
+
+        def transition(self, *_: Any, **__: Any) -> None:
+            if holds():
+                happened.set()
+
+        remove_worker = transition
+
+    cluster.scheduler.add_plugin(Watch())
+    yield
+    if not holds():
+        happened.wait()
+    cluster.scheduler.remove_plugin("watch")
 
 
 def parcels_of(*data: bytes) -> list[Parcel]:
@@ -121,10 +145,7 @@ def test_what_kills_processes_fails_alone(monkeypatch: pytest.MonkeyPatch) -> No
     events: list[Event] = []
     found = answers(LocalProcesses(2), parcels_of(b"a", b"deadly", b"b", b"c"), events)
     assert {key: state_of(answer) for key, answer in found.items()} == {
-        "0": "done",
-        "1": "died",
-        "2": "done",
-        "3": "done",
+        **{"0": "done", "1": "died", "2": "done", "3": "done"}
     }
     end = found["1"].end
     assert isinstance(end, Failed)
@@ -141,11 +162,7 @@ def test_what_kills_workers_fails_alone(monkeypatch: pytest.MonkeyPatch, cluster
     sent = parcels_of(b"a", b"deadly", b"b", b"c", b"d")
     found = answers(DaskCluster(cluster.scheduler_address), sent, events)
     assert {key: state_of(answer) for key, answer in found.items()} == {
-        "0": "done",
-        "1": "died",
-        "2": "done",
-        "3": "done",
-        "4": "done",
+        **{"0": "done", "1": "died", "2": "done", "3": "done", "4": "done"}
     }
     assert any(isinstance(event, Note) for event in events)
     assert found["0"].files == {"file": b"a"}
@@ -155,17 +172,15 @@ def test_a_worker_killed_once_its_result_is_fetched(
     monkeypatch: pytest.MonkeyPatch, cluster: Any
 ) -> None:
     monkeypatch.setattr(dask_cluster, "_serve", deadly)
+    tasks, workers = cluster.scheduler.tasks, cluster.scheduler.workers
     with DaskCluster(cluster.scheduler_address) as executor:
         found = executor.answers(parcels_of(b"a", b"b", b"c"), [].append, Cancel())
-        keys = [next(found).key]
-        tasks = cluster.scheduler.tasks.values()
-        while not all(task.state == "memory" for task in tasks):
-            time.sleep(0.05)
-        time.sleep(0.2)  # most likely the results are here
-        for nanny in list(cluster.workers.values()):
-            os.kill(nanny.pid, signal.SIGKILL)
-        while any(task.state == "memory" for task in tasks):
-            time.sleep(0.05)
+        with until(cluster, lambda: all(own.state == "memory" for own in list(tasks.values()))):
+            keys = [next(found).key]
+        before = {*workers}
+        with until(cluster, lambda: not before & workers.keys()):
+            for nanny in list(cluster.workers.values()):
+                os.kill(nanny.pid, signal.SIGKILL)
         keys += [answer.key for answer in found]
     assert sorted(keys) == ["0", "1", "2"]
 

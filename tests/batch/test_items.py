@@ -33,14 +33,6 @@ def test_names_are_different_usable_and_stay(first: list[str], added: list[str])
         assert not name.startswith((".", "-"))
 
 
-@pytest.mark.parametrize("path", ["index.html.png", "thumbnails.svg", "../up.png", "con/ .png"])
-def test_awkward_names(path: str) -> None:
-    (name,) = folder_names([path], {}, RESERVED).values()
-    assert name not in RESERVED
-    assert "/" not in name
-    assert ".." not in name
-
-
 def test_names_of_files_that_have_gone_are_kept_for_them() -> None:
     assert folder_names(["b/cat.png"], {"b-cat.png": "b-cat"}) == {"b/cat.png": "b-cat-png"}
 

@@ -32,20 +32,3 @@ def test_an_svg_of_a_bending_silhouette(folder: Path, tmp_path: Path, orbiflow) 
     given = {"kind": "bend", "seconds": 3.0, "area": "200x134px", "palette": "ochre"}
     find("animate").call({"result": folder, "out": again, **given}).run()
     assert again.read_text() == out.read_text()
-
-
-@pytest.mark.parametrize(
-    ("options", "about"),
-    [
-        (["--out", "a.webm"], "--out .gif .mp4 .svg a.webm"),
-        (["--area", "99x66px", "--out", "a.mp4"], "--area 99 66"),
-        (["--palette", "mud"], "mud"),
-        (["--tile", "IH7"], "IH7 IH4"),
-    ],
-)
-def test_mistakes(folder: Path, tmp_path: Path, orbiflow, monkeypatch, options, about) -> None:
-    monkeypatch.chdir(tmp_path)
-    outcome = orbiflow("animate", folder, *options)
-    assert outcome.status == 2
-    names(outcome.err, *about.split())
-    assert list(tmp_path.iterdir()) == []

@@ -142,11 +142,8 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
 @pytest.mark.parametrize(
     ("arguments", "about"),
     [
-        (("nowhere",), "nowhere"),
-        (("file.png",), "file.png"),
-        (("empty",), ".png"),
-        (("in", "--out", "in/out"), "in/out"),
-        (("in", "--match", "*.webp"), "1 *.webp"),
+        *((("nowhere",), "nowhere"), (("file.png",), "file.png"), (("empty",), ".png")),
+        *((("in", "--out", "in/out"), "in/out"), (("in", "--match", "*.webp"), "1 *.webp")),
     ],
 )
 def test_mistakes(

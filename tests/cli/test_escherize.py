@@ -8,7 +8,6 @@ import shutil
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import jsonschema
 import numpy as np
@@ -22,18 +21,8 @@ from cli.conftest import call_main
 from orbiflow import __version__
 from orbiflow.cli import terminal
 from orbiflow.runtime import Table
-from orbiflow.tiles import (
-    CLASSES,
-    Fit,
-    Rating,
-    Target,
-    TileModel,
-    load_model,
-    silhouette,
-    write_tile_folder,
-)
+from orbiflow.tiles import CLASSES, Fit, Rating, Target, TileModel, silhouette, write_tile_folder
 from orbiflow.tiles.flowing import overlap_search
-from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.run_folder import writing
 from orbiflow.tiles.run_folder.files import FIGURE_FILES
 from orbiflow.tiles.search import candidates
@@ -112,43 +101,6 @@ def test_tiles_lie_upright_on_the_silhouette(folder: Path, document: dict[str, A
         assert flipped.intersection(drawn).area / flipped.union(drawn).area < own
 
 
-def test_the_model_reproduces_the_polygon(folder: Path, document: dict[str, Any]) -> None:
-    target = Target.read(folder / "boot.png")
-    for entry in document["tiles"]:
-        model = load_model(folder / "new" / "out" / entry["class"] / "model.safetensors")
-        assert model.isohedral_class.name == entry["class"]
-        tile, _ = extract_tile(model)
-        polygon = np.array(entry["polygon"][:-1])
-        assert np.abs(target.to_input(tile.polygon) - polygon).max() < 1e-9
-
-
-def test_pictures_open(folder: Path) -> None:
-    out = folder / "new" / "out"
-    for name in ("IH4", "IH6"):
-        for file, width in {"tiling.png": 1200, "overlay.png": 1200}.items():
-            with Image.open(out / name / file) as image:
-                image.load()
-                assert image.width == width
-                assert len(image.getcolors(2**24) or []) > 2
-    with Image.open(out / "overview.png") as image:
-        image.load()
-        assert image.width == 1920
-
-
-def test_drawings_parse(folder: Path, document: dict[str, Any]) -> None:
-    svg = "{http://www.w3.org/2000/svg}"
-    for entry in document["tiles"]:
-        tile = ElementTree.parse(folder / "new" / "out" / entry["class"] / "tile.svg").getroot()
-        tiling = ElementTree.parse(folder / "new" / "out" / entry["class"] / "tiling.svg").getroot()
-        assert tile.tag == tiling.tag == f"{svg}svg"
-        title = tile.find(f".//{svg}title")
-        assert title is not None
-        assert title.text is not None
-        assert title.text.startswith(f"boot.png, {entry['class']}")
-        assert "NOT CERTIFIED" not in title.text
-        assert len(list(tiling.iter())) > len(list(tile.iter()))
-
-
 def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
@@ -219,16 +171,6 @@ def test_a_forced_tile_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert {path.name for path in written} == FILES
     for name in ("tile.svg", "tiling.svg"):
         assert "boot.json, IH21 (p6), NOT CERTIFIED" in (tmp_path / "IH21" / name).read_text()
-
-
-def test_classes(tmp_path: Path, orbiflow) -> None:
-    path = tmp_path / "classes.png"
-    outcome = orbiflow("classes", "--out", path)
-    assert outcome.status == 0
-    assert all(name in outcome.out for name in CLASSES)
-    with Image.open(path) as image:
-        image.load()
-        assert min(image.size) > 500
 
 
 def test_the_version(orbiflow) -> None:

@@ -72,8 +72,7 @@ def wait_for(process: subprocess.Popen[str], text: str) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
-@pytest.mark.parametrize("whole_group", [False, True], ids=["to the process", "to the group"])
-@pytest.mark.parametrize("stop", STOPS)
+@pytest.mark.parametrize(("whole_group", "stop"), [(True, signal.SIGINT), (False, signal.SIGTERM)])
 def test_what_was_finished_is_written(whole_group: bool, stop: int, tmp_path: Path) -> None:
     out = tmp_path / "out"
     with running(tmp_path, before=FIRST_IS_SHORT) as process:

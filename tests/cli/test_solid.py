@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from exported import boot_run
-from refusals import names
 from solids_read import read_3mf, read_stl
 
 
@@ -30,27 +29,6 @@ def test_the_ending_is_the_format(result: Path, tmp_path: Path, orbiflow, monkey
     assert orbiflow("solid", result, "--kind", "puzzle", "--copies", 3).status == 0
     plates = [read_3mf((tmp_path / f"boot-IH6-puzzle-{k}.3mf").read_bytes()) for k in (1, 2)]
     assert [len(plate) for plate in plates] == [1, 3]
-
-
-@pytest.mark.parametrize(
-    ("words", "about"),
-    [
-        ("-o a.obj", ".stl .3mf"),
-        ("--kind cutters", "cutter"),
-        ("--kind cutter --chamfer 1mm", "--chamfer --kind tile puzzle"),
-        ("--kind cutter --eye 1,2", "--eye"),
-        ("--chamfer 5mm", "--chamfer --height 4"),
-        ("--kind cutter --picture a.svg", "cutter --picture"),
-    ],
-)
-def test_mistakes(
-    words: str, about: str, result: Path, tmp_path: Path, orbiflow, monkeypatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = orbiflow("solid", result, *words.split())
-    assert done.status == 2
-    names(done.err, *about.split())
-    assert not list(tmp_path.iterdir())
 
 
 def test_the_snippet_of_the_page(result: Path, tmp_path: Path, monkeypatch) -> None:

@@ -59,13 +59,9 @@ BIRD = shapely.union_all([oval(120, 40), oval(20, 80), BAR])
 @pytest.mark.parametrize(
     ("name", "shape"),
     [
-        ("css-order.svg", FISH),
-        ("css-combinators.svg", FISH),
-        ("beyond-the-page.svg", FISH),
-        ("namespaced-id.svg", FISH.union(FIN)),
-        ("gradient-to-nothing.svg", CAT),
-        ("path-length.svg", SPIRAL),
-        ("transform-origin.svg", BIRD),
+        *(("css-order.svg", FISH), ("css-combinators.svg", FISH), ("beyond-the-page.svg", FISH)),
+        *(("namespaced-id.svg", FISH.union(FIN)), ("gradient-to-nothing.svg", CAT)),
+        *(("path-length.svg", SPIRAL), ("transform-origin.svg", BIRD)),
     ],
 )
 def test_drawings(name: str, shape: shapely.Polygon) -> None:

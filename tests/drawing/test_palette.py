@@ -93,11 +93,7 @@ def test_spelt_out() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "e76f5",
-        "e76f51,",
-        "e76f51,frame=000000",
-        "paper=ffffff",
-        "outline=0,e76f51",
+        *("e76f5", "e76f51,", "e76f51,frame=000000", "paper=ffffff", "outline=0,e76f51"),
         ",".join(["000000"] * 25),
     ],
 )

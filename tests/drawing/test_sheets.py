@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from bent_tiles import bent_tile
+from orbiflow.arrays import Array
 from orbiflow.density import (
     Density,
     FlowDensity,
@@ -32,10 +33,11 @@ from orbiflow.density import (
     samples_picture,
 )
 from orbiflow.drawing import NARROWEST, Picture, Sheet, field_picture, pdf_pages
+from orbiflow.drawing.canvas import flow_lines, symmetric_seeds
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
-from orbiflow.tiles import bending_picture, overlay_picture, tiling_picture
+from orbiflow.tiles import bending_picture, isohedral_class, overlay_picture, tiling_picture
 from printed import check_inside, letters
 from refusals import refused
 
@@ -221,3 +223,26 @@ def test_a_field_has_lines_to_scale() -> None:
 def test_a_notebook_shows_a_picture() -> None:
     shown = density_picture(example(SPACES[0]), sheet=Sheet.column())._repr_png_()
     assert abs(Image.open(io.BytesIO(shown)).width - 85 / 25.4 * 144) < 1
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
+def test_seeds_are_orbits_and_keep_their_distance(name: str) -> None:
+    group = isohedral_class(name).group()
+    seeds = symmetric_seeds(group, 0.3, tries=100)
+    assert len(seeds) % group.order == 0
+    assert len(seeds) > 10
+    for g in group.cosets:
+        moved = group.wrap(g(seeds))
+        gaps = np.linalg.norm(moved[:, None] - seeds, axis=-1)
+        assert (np.sort(gaps.min(axis=1))[: len(seeds) // 2] < 1e-9).all()
+
+
+def test_flow_lines_follow_the_field() -> None:
+    def turning(points: Array) -> Array:
+        return np.stack([-points[..., 1], points[..., 0]], axis=-1)
+
+    lines = flow_lines(turning, np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 2.0]]), 0.5)
+    assert lines.shape == (2, 13, 2)  # the fixed point has none
+    radii = np.linalg.norm(lines, axis=-1)
+    assert np.ptp(radii, axis=1).max() < 1e-4
+    assert lines[0, -1, 1] > 0 > lines[0, 0, 1]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from orbiflow.fields import PeriodicFeatures
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from refusals import refused
-from strategies import equivariance_error, groups, largest, neural_field, random_tensor, seeds
+from strategies import equivariance_error, groups, largest, neural_field, random_tensor
 
 
 def disturbed(field, seed):
@@ -33,35 +33,6 @@ def test_a_new_field_is_zero():
     assert largest(field(random_tensor(0, 10, 2))) == 0.0
 
 
-def test_the_same_seed_gives_the_same_weights():
-    first, second, other = (
-        torch.cat(
-            [p.detach().ravel() for p in neural_field(wallpaper_group("p2"), seed=s).parameters()]
-        )
-        for s in (3, 3, 4)
-    )
-    assert torch.equal(first, second)
-    assert not torch.equal(first, other)
-
-
-def test_the_global_random_state_is_left_alone():
-    torch.manual_seed(11)
-    expected = torch.rand(3)
-    torch.manual_seed(11)
-    neural_field(wallpaper_group("p2"), seed=5)
-    assert torch.equal(torch.rand(3), expected)
-
-
-@given(groups, seeds)
-def test_features_are_periodic(group, seed):
-    features = PeriodicFeatures(group, 2)
-    points = random_tensor(seed, 4, group.dim)
-    for vector in torch.tensor(group.lattice).mT:
-        torch.testing.assert_close(
-            features(points + 2 * vector), features(points), rtol=0, atol=1e-12
-        )
-
-
 @pytest.mark.parametrize(
     ("dim", "max_frequency", "size"), [(1, 3, 6), (2, 1, 8), (2, 2, 24), (3, 1, 26), (4, 2, 16)]
 )
@@ -75,11 +46,6 @@ def test_features_are_cosines_and_sines_of_half_the_box(dim, max_frequency, size
         values[:, :half].square() + values[:, half:].square(),
         torch.ones(50, half, dtype=torch.float64),
     )
-
-
-def test_single_precision_networks_take_single_precision_points():
-    field = disturbed(neural_field(wallpaper_group("p3"), dtype=torch.float32), 0)
-    assert field(random_tensor(0, 5, 2, dtype=torch.float32)).dtype == torch.float32
 
 
 def test_features_without_a_frequency_are_refused():

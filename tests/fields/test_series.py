@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.fields.fourier import differentiate, evaluate, evaluate_plainly, trigonometric_table
+from orbiflow.fields.fourier import differentiate, evaluate, evaluate_plainly
 from strategies import central_difference, largest, random_tensor, seeds
 
 orders = st.lists(st.integers(0, 4), min_size=1, max_size=3)
@@ -82,14 +82,6 @@ def test_second_derivatives_pass_gradgradcheck(orders):
     assert torch.autograd.gradgradcheck(evaluate, inputs, atol=1e-6, rtol=1e-5)
 
 
-@pytest.mark.parametrize("which", [0, 1])
-def test_derivatives_pass_when_only_one_argument_wants_them(which):
-    inputs = list(weights_and_points(5, [2, 2]))
-    inputs[which].requires_grad_()
-    assert torch.autograd.gradcheck(evaluate, inputs, atol=1e-7, rtol=1e-6)
-    assert torch.autograd.gradgradcheck(evaluate, inputs, atol=1e-5, rtol=1e-5)
-
-
 def test_a_gradient_is_the_same_whether_or_not_it_is_to_be_differentiated_again():
     # points that depend on the weights, as they do inside an integrator
     weights, u = weights_and_points(6, [2, 2])
@@ -109,16 +101,6 @@ def test_differentiated_weights_give_the_derivative(seed, orders, data):
     slopes = central_difference(lambda p: evaluate(weights, p.mT[None])[0].mT, u[0].mT)
     derived = evaluate(differentiate(weights, axis, dim), u)[0]
     torch.testing.assert_close(derived, slopes[..., axis].mT, rtol=1e-9, atol=1e-7)
-
-
-@given(seeds, st.integers(0, 6))
-def test_the_table_holds_harmonics_row_by_row(seed, order):
-    u = random_tensor(seed, 2, 3)
-    table = trigonometric_table(u, order, u.new_empty(2, 2 * order + 1, 3))
-    assert table.shape == (2, 2 * order + 1, 3)
-    for s, row, n in itertools.product(range(2), range(2 * order + 1), range(3)):
-        expected = harmonic(row, order, u[s, n].item())
-        assert table[s, row, n].item() == pytest.approx(expected, abs=1e-13)
 
 
 @pytest.mark.parametrize(("dtype", "away"), [(torch.float64, 2.0**24), (torch.float32, 2.0**10)])

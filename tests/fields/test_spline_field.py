@@ -8,11 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.fields import FourierField, SplineField, jacobian
-from orbiflow.fields.spline_field import cubic_weights, padded, spline_sum
-from orbiflow.flows import Flow
+from orbiflow.fields.spline_field import padded, spline_sum
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
 from refusals import refused
-from strategies import central_difference
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 names = st.sampled_from(SPACES)
@@ -96,48 +94,6 @@ def test_second_derivatives_of_the_sum_against_numerical_ones(dim: int) -> None:
     assert check(lambda t, x: spline_sum(padded(t), x, rates))
 
 
-@given(names, seeds)
-@settings(max_examples=5, deadline=None)
-def test_a_jacobian_can_be_penalised(name: str, seed: int) -> None:
-    spline, _, points = pair(name, seed)
-    slopes = jacobian(spline, points)
-    assert slopes.requires_grad
-    (found,) = torch.autograd.grad(slopes.square().sum(), spline.parameters_)
-    # linear in the parameters, so the square's gradient points at them: Euler
-    expected = 2 * slopes.square().sum()
-    torch.testing.assert_close(found @ spline.parameters_, expected, rtol=1e-9, atol=1e-9)
-    assert float(found.norm()) > 0
-
-
-def test_a_log_density_of_splines_has_its_hessian() -> None:
-    spline, _, _ = pair("torus", 0, 4)
-    with torch.no_grad():
-        spline.parameters_.mul_(0.05)
-    flow = Flow(spline, steps=2)
-    at = torch.tensor([0.31, 0.62], dtype=torch.float64)
-
-    def log_det(point: torch.Tensor) -> torch.Tensor:
-        return flow.log_abs_det_jacobian(point)
-
-    def gradient(point: torch.Tensor) -> torch.Tensor:
-        point = point.clone().requires_grad_()
-        return torch.autograd.grad(log_det(point), point)[0]
-
-    found = torch.autograd.functional.hessian(log_det, at)
-    expected = central_difference(gradient, at, 1e-5)
-    assert float(expected.abs().max()) > 1
-    torch.testing.assert_close(found, expected, rtol=1e-6, atol=1e-6)
-
-
-@given(seeds)
-@settings(max_examples=10, deadline=None)
-def test_weights_are_a_partition_of_unity(seed: int) -> None:
-    torch.manual_seed(seed)
-    weights = cubic_weights(torch.rand(2, 50, dtype=torch.float64), 3).sum(dim=2)
-    assert torch.allclose(weights[:, 0], torch.ones_like(weights[:, 0]))
-    assert torch.allclose(weights[:, 1:], torch.zeros_like(weights[:, 1:]), atol=1e-12)
-
-
 def test_a_field_made_double_is_as_symmetric_as_one_born_so() -> None:
     group = identification_group("sphere")
     field = SplineField(group, 4, smoothness=1.0, dtype=torch.float32).double()
@@ -156,11 +112,6 @@ def test_a_field_made_double_is_as_symmetric_as_one_born_so() -> None:
 def test_other_groups_are_refused(group: CrystallographicGroup) -> None:
     with refused("FourierField"):
         SplineField(group, 2)
-
-
-def test_points_of_another_dimension_are_refused() -> None:
-    with refused("points", "(3, 3)"):
-        SplineField(identification_group("torus"), 2)(torch.zeros(3, 3, dtype=torch.float64))
 
 
 @given(names, seeds)

@@ -7,15 +7,13 @@ from collections.abc import Callable
 import pytest
 import torch
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from torch import Tensor, nn
-from torch.autograd import forward_ad
-from torch.func import functional_call, grad, hessian, jacfwd, jacrev, jvp, vjp, vmap
+from torch.func import functional_call, jacfwd, jacrev, vmap
 
 from orbiflow.fields import SplineField, divergence, jacobian, symmetrize
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
 from refusals import refused
-from strategies import central_difference, groups, neural_field, random_field, random_tensor, seeds
+from strategies import central_difference, neural_field, random_field, random_tensor, seeds
 
 # of torch itself, the first time that forward mode is used
 pytestmark = pytest.mark.filterwarnings(
@@ -56,18 +54,6 @@ PLANE: dict[str, Callable[[int], Field]] = {
 every_kind = pytest.mark.parametrize("kind", PLANE)
 
 
-@few
-@given(groups, st.integers(0, 2), seeds)
-def test_jacobians_of_a_fourier_field_are_its_closed_form(group, max_frequency, seed):
-    field = random_field(group, max_frequency, seed)
-    points = random_tensor(seed, 5, group.dim)
-    exact = field.jacobian(points).detach()
-    for transform in (jacrev, jacfwd):
-        torch.testing.assert_close(
-            vmap(transform(field))(points).detach(), exact, rtol=1e-9, atol=1e-9
-        )
-
-
 @every_kind
 @few
 @given(seeds)
@@ -89,56 +75,6 @@ def test_values_and_divergence_are_mapped(kind, seed):
     torch.testing.assert_close(vmap(vmap(field))(points), field(points), rtol=1e-12, atol=1e-12)
     mapped = vmap(lambda p: divergence(field, p))(points)
     torch.testing.assert_close(mapped, divergence(field, points), rtol=1e-10, atol=1e-10)
-
-
-@every_kind
-def test_products_forward_and_backward_agree_with_the_jacobian(kind):
-    field, points = PLANE[kind](1), random_tensor(1, 6, 2)
-    along, against = random_tensor(2, 6, 2), random_tensor(3, 6, 2)
-    exact = jacobian(field, points).detach()
-    pushed = jvp(field, (points,), (along,))[1].detach()
-    torch.testing.assert_close(pushed, torch.einsum("nij,nj->ni", exact, along))
-    (pulled,) = vjp(field, points)[1](against)
-    torch.testing.assert_close(pulled.detach(), torch.einsum("nij,ni->nj", exact, against))
-    with forward_ad.dual_level():
-        dual = field(forward_ad.make_dual(points, along))
-        tangent = forward_ad.unpack_dual(dual).tangent
-        assert tangent is not None
-        torch.testing.assert_close(tangent.detach(), pushed)
-
-
-@every_kind
-def test_hessians_in_all_four_ways(kind):
-    field, point = PLANE[kind](4), random_tensor(4, 2)
-
-    def total(p: Tensor) -> Tensor:
-        return field(p).sin().sum()
-
-    slopes = lambda p: grad(total)(p).detach()  # noqa: E731
-    numerical = central_difference(slopes, point, 1e-4)
-    for outer in (jacrev, jacfwd):
-        for inner in (jacrev, jacfwd):
-            found = outer(inner(total))(point).detach()
-            torch.testing.assert_close(found, numerical, rtol=1e-5, atol=1e-5)
-    many = vmap(hessian(total))(point.expand(3, 2)).detach()
-    torch.testing.assert_close(many[2], numerical, rtol=1e-5, atol=1e-5)
-
-
-@pytest.mark.parametrize("kind", ["fourier", "spline", "network"])
-def test_gradients_of_parameters_for_each_point(kind):
-    field, points = PLANE[kind](5), random_tensor(5, 4, 2)
-    assert isinstance(field, nn.Module)
-    parameters = {name: p.detach() for name, p in field.named_parameters()}
-
-    def loss(values: dict[str, Tensor], p: Tensor) -> Tensor:
-        return functional_call(field, values, (p,)).square().sum()
-
-    each = vmap(grad(loss), in_dims=(None, 0))(parameters, points)
-    for i, point in enumerate(points):
-        field.zero_grad()
-        field(point).square().sum().backward()
-        for name, parameter in field.named_parameters():
-            torch.testing.assert_close(each[name][i], parameter.grad, rtol=1e-9, atol=1e-9)
 
 
 def test_many_fields_at_once_by_their_parameters():
@@ -165,30 +101,6 @@ def test_a_stack_of_fields_keeps_its_axis():
     points = random_tensor(10, 4, 3, 2)  # four points for each of three fields
     mapped = vmap(lambda p: stack(p[:, None])[:, 0])(points)
     torch.testing.assert_close(mapped, stack(points.transpose(0, 1)).transpose(0, 1))
-
-
-@pytest.mark.parametrize("kind", ["fourier", "spline", "network"])
-def test_single_precision_stays_single(kind):
-    field = PLANE[kind](11)
-    assert isinstance(field, nn.Module)
-    points = random_tensor(11, 5, 2)
-    exact = jacobian(field, points).detach()
-    single = vmap(jacrev(field.float()))(points.float())
-    assert single.dtype == torch.float32
-    torch.testing.assert_close(single.detach().double(), exact, rtol=1e-3, atol=1e-3)
-    forward = vmap(jacfwd(field))(points.float())
-    torch.testing.assert_close(forward, single, rtol=1e-4, atol=1e-4)
-
-
-def test_what_is_found_can_be_trained():
-    field = random_field(wallpaper_group("p4"), 2, 12)
-    points = random_tensor(12, 6, 2)
-    loss = vmap(jacrev(field))(points).square().sum()
-    loss.backward()
-    found = field.parameters_.grad
-    field.parameters_.grad = None
-    field.jacobian(points).square().sum().backward()
-    torch.testing.assert_close(found, field.parameters_.grad, rtol=1e-9, atol=1e-9)
 
 
 def test_points_of_another_type_are_refused_as_ever():

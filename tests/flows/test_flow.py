@@ -1,8 +1,8 @@
-"""The flow of vector fields: map, inverse, log-determinant, shapes, errors."""
+"""The flow of vector fields: map, inverse, log-determinant, symmetry, views, threads, errors."""
 
 import copy
-import io
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,37 +13,25 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from torch import Tensor, nn
 
-from orbiflow.fields import FourierField, symmetrize
+from orbiflow.fields import FourierField
 from orbiflow.flows import METHODS, Flow
+from orbiflow.flows.flow import MULTITHREADED_COORDINATES
 from orbiflow.symmetry import wallpaper_group
 from refusals import refused
 from strategies import (
     TABLED,
-    error_estimate,
     gentle_field,
     groups,
     largest,
-    neural_field,
+    map_equivariance_error,
     plane_groups,
     random_field,
     random_tensor,
     seeds,
     several,
-    space_group,
-    wallpaper_groups,
 )
 
 names = st.sampled_from(sorted(METHODS))
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_convergence_has_the_order_of_the_method_on_a_fourier_field(name):
-    field = gentle_field(wallpaper_group("pgg"), 2, 0, slope=2.0)
-    points = random_tensor(0, 50, 2)
-    with torch.no_grad():
-        exact = Flow(field, steps=128, method="rk5")(points)
-        errors = [largest(Flow(field, steps=n, method=name)(points) - exact) for n in (16, 32)]
-    assert math.log2(errors[0] / errors[1]) == pytest.approx(METHODS[name].order, abs=0.3)
 
 
 @pytest.mark.parametrize("name", ["IH1", "IH6", "IH21", "sphere"])
@@ -78,14 +66,6 @@ def test_the_inverse_undoes_the_flow(group, seed, scheme):
     assert error <= 1e-8
 
 
-@pytest.mark.parametrize("name", TABLED)
-def test_the_inverse_undoes_the_flow_of_every_class_and_space(name):
-    flow = Flow(gentle_field(TABLED[name], 5, 0, slope=6.0), steps=128)
-    points = random_tensor(0, 50, 2)
-    with torch.no_grad():
-        assert largest(flow.inverse(flow(points)) - points) <= 1e-8
-
-
 def test_segments_follow_one_another():
     fields = several(wallpaper_group("p3"), 0)
     points = random_tensor(0, 10, 2)
@@ -97,23 +77,6 @@ def test_segments_follow_one_another():
     for field in reversed(fields):
         backwards = Flow(field, steps=8).inverse(backwards)
     assert torch.equal(Flow(fields, steps=8).inverse(points), backwards)
-
-
-@settings(max_examples=5)
-@given(wallpaper_groups(), seeds)
-def test_the_inverse_undoes_several_segments(group, seed):
-    flow = Flow(several(group, seed), steps=24, method="rk5")
-    points = random_tensor(seed, 5, 2)
-    with torch.no_grad():
-        assert largest(flow.inverse(flow(points)) - points) <= 1e-8
-
-
-def test_twice_the_duration_is_the_flow_twice():
-    field = gentle_field(wallpaper_group("p2"), 2, 0)
-    points = random_tensor(0, 10, 2)
-    long = Flow(field, steps=20, duration=2.0)(points)
-    once = Flow(field, steps=10)
-    torch.testing.assert_close(long, once(once(points)), rtol=0, atol=1e-13)
 
 
 def test_a_negative_duration_is_the_inverse():
@@ -157,20 +120,6 @@ def test_the_log_determinant_is_that_of_the_jacobian_of_the_flow(group, seed):
     )
 
 
-def test_the_log_determinant_of_a_linear_flow_is_its_trace():
-    matrix = random_tensor(0, 2, 2)
-    flow = Flow(lambda p: p @ matrix.mT, steps=3, duration=0.5)
-    found = flow.log_abs_det_jacobian(random_tensor(1, 4, 2))
-    torch.testing.assert_close(found, (0.5 * matrix.trace()).expand(4), rtol=1e-13, atol=1e-13)
-
-
-def test_a_constant_field_translates_and_keeps_volume():
-    points = random_tensor(0, 4, 2)
-    moved, log_det = Flow(torch.ones_like, steps=2).forward_and_log_det(points)
-    torch.testing.assert_close(moved, points + 1)
-    assert log_det.tolist() == [0.0] * 4
-
-
 @settings(max_examples=5)
 @given(plane_groups, seeds, st.integers(1, 3))
 def test_log_determinants_forth_and_back_cancel(group, seed, segments):
@@ -203,51 +152,10 @@ def test_a_closed_form_and_autograd_give_the_same_log_determinant():
     torch.testing.assert_close(by_autograd, closed, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "field",
-    [
-        lambda p: torch.tanh(p) * p.flip(-1),
-        neural_field(wallpaper_group("p4"), hidden=(4,)),
-        symmetrize(torch.tanh, wallpaper_group("p2")),
-        nn.Linear(2, 2).double(),
-    ],
-    ids=["function", "network", "symmetrized", "module"],
-)
-def test_any_callable_serves_as_a_field(field):
-    flow = Flow(field, steps=24, method="rk5")
-    points = random_tensor(0, 4, 2)
-    moved, there = flow.forward_and_log_det(points)
-    back, home = flow.inverse_and_log_det(moved)
-    torch.testing.assert_close(back, points, rtol=0, atol=1e-8)
-    torch.testing.assert_close(there, -home, rtol=0, atol=1e-8)
-
-
 def test_a_module_list_is_taken_as_its_members():
     fields = several(wallpaper_group("p2"), 0)
     points = random_tensor(0, 4, 2)
     assert torch.equal(Flow(nn.ModuleList(fields))(points), Flow(fields)(points))
-
-
-@pytest.mark.parametrize("inverse", [False, True])
-@pytest.mark.parametrize("name", METHODS)
-def test_the_error_estimate_falls_at_the_order_of_the_method(name, inverse):
-    flow = Flow(gentle_field(wallpaper_group("p3"), 2, 0, slope=2.0), steps=16, method=name)
-    points = random_tensor(0, 50, 2)
-    first = error_estimate(flow, points, inverse=inverse)
-    second = error_estimate(flow.with_steps(32), points, inverse=inverse)
-    assert math.log2(first / second) == pytest.approx(METHODS[name].order, abs=0.3)
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_the_error_estimate_predicts_the_error(name):
-    flow = Flow(gentle_field(wallpaper_group("p3"), 2, 0, slope=2.0), steps=16, method=name)
-    points = random_tensor(0, 50, 2)
-    with torch.no_grad():
-        exact = flow.with_steps(512)(points)
-        error = float((flow(points) - exact).norm(dim=-1).max())
-    power = 2 ** METHODS[name].order
-    assert error_estimate(flow, points) * power / (power - 1) == pytest.approx(error, rel=0.2)
-    assert flow.steps == 16
 
 
 def test_a_batch_of_fields_carries_a_batch_of_points():
@@ -263,17 +171,6 @@ def test_a_batch_of_fields_carries_a_batch_of_points():
         torch.testing.assert_close(log_det[s], alone_log_det, rtol=0, atol=1e-13)
 
 
-def test_space_flows_work():
-    group = space_group("P2_1/c", 0)
-    flow = Flow(gentle_field(group, 1, 0), steps=24, method="rk5")
-    points = random_tensor(0, 5, 3)
-    with torch.no_grad():
-        moved, there = flow.forward_and_log_det(points)
-        back, home = flow.inverse_and_log_det(moved)
-    torch.testing.assert_close(back, points, rtol=0, atol=1e-8)
-    torch.testing.assert_close(there, -home, rtol=0, atol=1e-8)
-
-
 def test_single_precision_is_close_to_double():
     flow = Flow(gentle_field(wallpaper_group("p6"), 5, 0), steps=8)
     single = copy.deepcopy(flow).float()
@@ -282,26 +179,6 @@ def test_single_precision_is_close_to_double():
     assert moved.dtype == log_det.dtype == torch.float32
     assert largest(moved - flow(points)) < 2e-5
     assert largest(log_det - flow.log_abs_det_jacobian(points)) < 2e-4
-
-
-def test_a_flow_is_saved_and_restored_inside_a_module():
-    group = wallpaper_group("pgg")
-    model = nn.Sequential(Flow(several(group, 0)), nn.Linear(2, 1).double())
-    buffer = io.BytesIO()
-    torch.save(model.state_dict(), buffer)
-    buffer.seek(0)
-    other = nn.Sequential(
-        Flow([FourierField(group, 2) for _ in range(3)]), nn.Linear(2, 1).double()
-    )
-    points = random_tensor(0, 5, 2)
-    assert not torch.equal(other(points), model(points))
-    other.load_state_dict(torch.load(buffer, weights_only=True))
-    assert torch.equal(other(points), model(points))
-
-
-def test_parameters_of_every_segment_are_found():
-    fields = several(wallpaper_group("pgg"), 0)
-    assert {id(p) for p in Flow(fields).parameters()} == {id(f.parameters_) for f in fields}
 
 
 @pytest.mark.parametrize("shape", [(2,), (0, 2), (3, 4, 2)])
@@ -317,11 +194,6 @@ def test_shapes_of_points_are_kept(shape):
 def test_steps_that_are_no_count_are_refused(bad):
     with refused("steps"):
         Flow(torch.sin, steps=bad)
-
-
-def test_an_unknown_method_is_refused():
-    with refused("heun"):
-        Flow(torch.sin, method="heun")
 
 
 def test_a_flow_of_no_field_is_refused():
@@ -369,3 +241,79 @@ def test_numbers_are_finite(value: Any) -> None:
         Flow(lambda p: p, duration=value)
     with refused("steps"):
         Flow(lambda p: p, steps=value)
+
+
+def test_a_view_integrates_in_its_own_steps():
+    fields = several(wallpaper_group("p4"), 0)
+    flow, points = Flow(fields, steps=4), random_tensor(0, 5, 2)
+    view = flow.with_steps(9, method="midpoint")
+    assert (view.steps, view.method, flow.steps, flow.method) == (9, "midpoint", 4, "rk4")
+    assert flow.with_steps(9).method == "rk4"
+    assert torch.equal(view(points), Flow(fields, steps=9, method="midpoint")(points))
+    assert torch.equal(flow(points), Flow(fields, steps=4)(points))
+
+
+def test_a_view_shares_its_parameters():
+    flow = Flow(several(wallpaper_group("p4"), 0), steps=4)
+    view = flow.with_steps(8)
+    assert [id(p) for p in view.parameters()] == [id(p) for p in flow.parameters()]
+    assert list(view.state_dict()) == list(flow.state_dict())
+    with torch.no_grad():
+        for parameter in view.parameters():
+            parameter.zero_()
+    points = random_tensor(0, 5, 2)
+    assert torch.equal(flow(points), points)
+
+
+@pytest.mark.parametrize("name", ["steps", "method", "duration"])
+def test_a_flow_cannot_be_changed_under_others(name):
+    flow = Flow(torch.sin, steps=4)
+    with pytest.raises(AttributeError):
+        setattr(flow, name, getattr(flow, name))
+
+
+def test_views_are_checked_like_flows():
+    flow = Flow(torch.sin)
+    with refused("steps", 0):
+        flow.with_steps(0)
+    with refused("heun"):
+        flow.with_steps(4, method="heun")
+
+
+@pytest.fixture
+def seen() -> Iterator[list[int]]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    yield []
+    assert torch.get_num_threads() == 3
+    torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize(("count", "threads"), [(5, 1), (MULTITHREADED_COORDINATES, 3)])
+@pytest.mark.parametrize("apply", ["forward", "inverse", "forward_and_log_det"])
+def test_how_many_threads_carry(seen: list[int], count: int, threads: int, apply: str) -> None:
+    def field(points: Tensor) -> Tensor:
+        seen.append(torch.get_num_threads())
+        return 0 * points
+
+    flow = Flow(field, steps=1, method="euler", warn=False)
+    getattr(flow, apply)(torch.zeros(count, 1))
+    assert set(seen) == {threads}
+
+
+@settings(max_examples=10)
+@given(groups, seeds, st.sampled_from(sorted(METHODS)), st.integers(1, 4))
+def test_equivariance_holds_to_rounding_for_any_group(group, seed, method, steps):
+    flow = Flow(random_field(group, 1, seed), method=method, steps=steps, duration=0.1, warn=False)
+    assert map_equivariance_error(flow, group, random_tensor(seed, 8, group.dim)) < 1e-11
+
+
+def test_the_log_determinant_is_invariant():
+    group = wallpaper_group("p4g")
+    flow = Flow(gentle_field(group, 3, 0), steps=2)
+    points = random_tensor(0, 20, 2)
+    with torch.no_grad():
+        expected = flow.log_abs_det_jacobian(points)
+        for g in group.cosets:
+            found = flow.log_abs_det_jacobian(g(points))
+            torch.testing.assert_close(found, expected, rtol=0, atol=1e-12)

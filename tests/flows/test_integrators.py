@@ -1,14 +1,11 @@
 """Runge-Kutta tables: order conditions and the order measured."""
 
-import math
-
 import numpy as np
 import pytest
 import torch
 
 from orbiflow.flows import METHODS, Flow, method
 from refusals import refused
-from strategies import largest
 
 # of Euler, midpoint, Kutta 3, the classical method, Butcher 5
 ORDERS = {"euler": 1, "midpoint": 2, "rk3": 3, "rk4": 4, "rk5": 5}
@@ -24,53 +21,24 @@ def tableau(name):
     return a, np.array(METHODS[name].weights)
 
 
-def test_the_methods_are_those_named():
-    assert {name: row.order for name, row in METHODS.items()} == ORDERS
-    assert all(method(name).name == name for name in METHODS)
-
-
 @pytest.mark.parametrize("name", METHODS)
 def test_order_conditions_hold_up_to_the_order(name):
     a, b = tableau(name)
     c = a.sum(axis=1)
     # one condition a rooted tree (Hairer, Norsett, Wanner, table II.2.2), as (order, lhs, rhs)
     conditions = [
-        (1, b.sum(), 1),
-        (2, b @ c, 1 / 2),
-        (3, b @ c**2, 1 / 3),
-        (3, b @ a @ c, 1 / 6),
-        (4, b @ c**3, 1 / 4),
-        (4, b @ (c * (a @ c)), 1 / 8),
-        (4, b @ a @ c**2, 1 / 12),
-        (4, b @ a @ a @ c, 1 / 24),
-        (5, b @ c**4, 1 / 5),
-        (5, b @ (c**2 * (a @ c)), 1 / 10),
-        (5, b @ (c * (a @ c**2)), 1 / 15),
-        (5, b @ (c * (a @ a @ c)), 1 / 30),
-        (5, b @ (a @ c) ** 2, 1 / 20),
-        (5, b @ a @ c**3, 1 / 20),
-        (5, b @ a @ (c * (a @ c)), 1 / 40),
-        (5, b @ a @ a @ c**2, 1 / 60),
+        *((1, b.sum(), 1), (2, b @ c, 1 / 2), (3, b @ c**2, 1 / 3), (3, b @ a @ c, 1 / 6)),
+        *((4, b @ c**3, 1 / 4), (4, b @ (c * (a @ c)), 1 / 8), (4, b @ a @ c**2, 1 / 12)),
+        *((4, b @ a @ a @ c, 1 / 24), (5, b @ c**4, 1 / 5), (5, b @ (c**2 * (a @ c)), 1 / 10)),
+        *((5, b @ (c * (a @ c**2)), 1 / 15), (5, b @ (c * (a @ a @ c)), 1 / 30)),
+        *((5, b @ (a @ c) ** 2, 1 / 20), (5, b @ a @ c**3, 1 / 20)),
+        *((5, b @ a @ (c * (a @ c)), 1 / 40), (5, b @ a @ a @ c**2, 1 / 60)),
         (5, b @ a @ a @ a @ c, 1 / 120),
     ]
     met = [abs(left - right) < 1e-14 for order, left, right in conditions if order <= ORDERS[name]]
     assert all(met)
     missed = [abs(left - right) for order, left, right in conditions if order == ORDERS[name] + 1]
     assert not missed or max(missed) > 1e-3
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_convergence_has_the_order_of_the_method(name):
-    # dx/dt = x (1 - x), whose flow is known in closed form
-    x = torch.tensor([[0.1], [0.4], [0.8], [1.7]], dtype=torch.float64)
-    time = 2.0
-    exact = x * math.exp(time) / (1 + x * (math.exp(time) - 1))
-    errors = []
-    for steps in (16, 32):
-        flow = Flow(lambda p: p * (1 - p), steps=steps, method=name, duration=time)
-        errors.append(largest(flow(x) - exact))
-    slope = math.log2(errors[0] / errors[1])
-    assert slope == pytest.approx(ORDERS[name], abs=0.3)
 
 
 def test_an_unknown_method_is_refused_with_the_known_ones():

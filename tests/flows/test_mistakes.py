@@ -8,7 +8,7 @@ import torch
 from hypothesis import given
 from torch import nn
 
-from orbiflow.errors import GroupError, OrbiflowError
+from orbiflow.errors import GroupError
 from orbiflow.fields import FourierField, PeriodicFeatures, SplineField, jacobian, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import IDENTIFICATION_SPACES, identification_group, wallpaper_group
@@ -53,15 +53,15 @@ def test_a_float32_field_at_float64_points(kind):
 
 
 @pytest.mark.parametrize(
-    ("points", "message"),
+    ("points", "about"),
     [
-        (np.zeros((3, 2)), "as a torch tensor .* got a ndarray"),
-        (torch.zeros(3, 2, dtype=torch.int64), "floating-point dtype, got torch.int64"),
-        (torch.tensor(1.0), r"shape \(\)"),
+        (np.zeros((3, 2)), "ndarray"),
+        (torch.zeros(3, 2, dtype=torch.int64), "torch.int64"),
+        (torch.tensor(1.0), "()"),
     ],
 )
-def test_points_that_are_none(points, message):
-    with pytest.raises(OrbiflowError, match=message):
+def test_points_that_are_none(points, about):
+    with refused(about):
         Flow(torch.sin)(points)
 
 

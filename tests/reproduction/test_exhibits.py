@@ -9,26 +9,18 @@ import numpy as np
 import pytest
 import torch
 
-from orbiflow.density import SPACES, FlowDensity, make_space
+from orbiflow.density import FlowDensity, make_space
 from orbiflow.density.models import kl_by_quadrature, midpoints
 from orbiflow.drawing import Sheet
 from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix
 from orbiflow.tiles import CLASSES, EscherTile, OccupancySearch, Target, as_model, compare
 from reproduction.animal import Pulled, animal, animal_tile
-from reproduction.classes import (
-    GROUPS,
-    center_orbits,
-    constrained_angles,
-    drawn_elements,
-    identification_error,
-    symbol,
-)
-from reproduction.comparison import goal_tile, goals, impossible_rows
+from reproduction.comparison import goal_tile, goals
 from reproduction.densities import KL, TARGETS, drawn, fitted, kl_of_uniform, target, weighted
 from reproduction.exhibit import FAST, Extent, Findings
 from reproduction.reproduction import EXHIBITS, reproduce
-from reproduction.spaces import deformed, euler_characteristic, orientable, unconstrained_field
+from reproduction.spaces import deformed, unconstrained_field
 from reproduction.symmetrization import KINDS, as_printed, equivariance_error, nested_error, pushed
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "silhouettes"
@@ -75,57 +67,6 @@ def test_overlap_and_gap_are_areas() -> None:
     assert half.gap == pytest.approx(0, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", CLASSES)
-def test_templates_fit_and_groups_have_the_printed_symbols(name: str) -> None:
-    kind = CLASSES[name]
-    assert identification_error(kind) < 1e-12
-    assert symbol(kind.group()) == GROUPS[name]
-
-
-def test_angles_are_those_at_rotation_centres() -> None:
-    assert constrained_angles(CLASSES["IH4"]) == {}
-    assert sorted(constrained_angles(CLASSES["IH21"]).values()) == [60, 120]
-    for name in ("IH7", "IH21", "IH28"):
-        corners = CLASSES[name].template()
-        for vertex, degrees in constrained_angles(CLASSES[name]).items():
-            ends = corners[[vertex - 1, (vertex + 1) % len(corners)]] - corners[vertex]
-            cosine = ends[0] @ ends[1] / np.linalg.norm(ends, axis=1).prod()
-            assert np.degrees(np.arccos(cosine)) == pytest.approx(degrees)
-
-
-@pytest.mark.parametrize("name", CLASSES)
-def test_marks_of_symmetry_belong_to_the_group(name: str) -> None:
-    group = CLASSES[name].group()
-    elements = drawn_elements(group)
-    assert all(group.contains(g) for g in elements)
-    kinds = {"p1": 0, "pg": 1, "p2": 1, "p3": 1, "p4": 1, "p6": 1, "pgg": 2}
-    assert len({g.determinant for g in elements}) == kinds[GROUPS[name]]
-
-
-def test_orbits_of_centres() -> None:
-    orders = {
-        name: [c.order for c in center_orbits(kind.group())] for name, kind in CLASSES.items()
-    }
-    assert orders["IH4"] == [2, 2, 2, 2]
-    assert orders["IH7"] == [3, 3, 3]
-    assert orders["IH21"] == [6, 3, 2]
-    assert orders["IH28"] == [4, 4, 2]
-    assert orders["IH2"] == []
-
-
-def test_spaces_are_what_they_are_called() -> None:
-    found = {
-        s: (euler_characteristic(make_space(s).group), orientable(make_space(s).group))
-        for s in SPACES
-    }
-    assert found == {
-        "torus": (0, True),
-        "sphere": (2, True),
-        "klein-bottle": (0, False),
-        "projective-plane": (1, False),
-    }
-
-
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.title)
 def test_operators_make_fields_symmetric(kind) -> None:
     assert equivariance_error(kind.before(), kind.images) > 0.5
@@ -160,10 +101,6 @@ def test_published_tiles_lie_on_their_goals() -> None:
     assert compare(goal.tiles["arap_largest"], goal.outline).iou == pytest.approx(0.8269, abs=2e-4)
     low, high = (goal.squared().outline.min(axis=0), goal.squared().outline.max(axis=0))
     assert np.allclose(high - low, 200.0)
-
-
-def test_rows_that_no_overlap_can_have() -> None:
-    assert impossible_rows() == ["beetle", "dolphin", "spider"]
 
 
 def test_targets_are_densities_and_samples_follow_them() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import threading
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ import pytest
 from orbiflow.runtime import (
     CallProcess,
     ClassFailed,
-    Event,
     Failed,
     Finished,
     Note,
@@ -41,24 +39,6 @@ def test_a_search_in_a_process(tmp_path: Path) -> None:
     assert isinstance(events[-1], Finished)
     assert events[-1].state == "done"
     assert (tmp_path / "out" / "overview.png").is_file()
-
-
-def test_two_calls_are_started_from_threads() -> None:
-    found: dict[str, list[Event]] = {}
-
-    def work(name: str) -> None:
-        with CallProcess(find("classes").call({"classes": [name]})) as process:
-            found[name] = list(process.events())
-
-    threads = [threading.Thread(target=work, args=(name,)) for name in ("IH3", "IH7")]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for name in ("IH3", "IH7"):
-        last = found[name][-1]
-        assert isinstance(last, Finished)
-        assert [own["class"] for own in last.summary["classes"]] == [name]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -107,16 +87,6 @@ def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
     assert events[-1].failure == "died"
     assert "signal 9" in events[-1].message
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["read.png"]
-
-
-def test_a_process_may_be_started_before_there_is_a_call() -> None:
-    with CallProcess(modules=["orbiflow.tiles.finding"]) as process:
-        assert process.alive
-        process.begin(find("classes").call({"classes": ["IH4"]}))
-        events = list(process.events())
-        assert isinstance(events[-1], Finished)
-        assert events[-1].summary["classes"][0]["class"] == "IH4"
-    assert not process.alive
 
 
 @pytest.mark.skipif(os.name != "posix", reason="processes cannot be held there")

@@ -12,7 +12,6 @@ import pytest
 from orbiflow.errors import OutputError
 from orbiflow.runtime import (
     Cancel,
-    ClassFailed,
     Event,
     Failed,
     Finished,
@@ -35,8 +34,7 @@ def files(folder: Path) -> set[str]:
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_search(workers: int, tmp_path: Path) -> None:
+def test_a_search(tmp_path: Path) -> None:
     events: list[Event] = []
     threads: set[int] = set()
 
@@ -44,7 +42,7 @@ def test_a_search(workers: int, tmp_path: Path) -> None:
         events.append(event)
         threads.add(threading.get_ident())
 
-    finished = run(boot_call(tmp_path, "IH4", "ih6", workers=workers), sink)
+    finished = run(boot_call(tmp_path, "IH4", "ih6"), sink)
     assert finished is events[-1]
     assert finished.state == "done"
     assert threads == {threading.get_ident()}
@@ -79,25 +77,6 @@ def test_a_folder_of_the_run_is_refused_before_any_work(tmp_path: Path) -> None:
         run(boot_call(tmp_path, "IH4"), events.append)
     assert [type(event) for event in events[1:]] == [Failed]
     assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
-
-
-def test_a_search_cancelled_with_nothing_found_leaves_the_earlier_run(tmp_path: Path) -> None:
-    run(boot_call(tmp_path, "IH4"))
-    out = tmp_path / "out"
-    before = {name: (out / name).read_bytes() for name in files(out)}
-    cancel, events = Cancel(), []
-
-    def sink(event: Event) -> None:
-        events.append(event)
-        if isinstance(event, Progress):
-            cancel.cancel()
-
-    finished = run(boot_call(tmp_path, "IH6"), sink, cancel)
-    assert finished.state == "cancelled"
-    assert finished.summary["written"] is False
-    check_order(events, "IH6")
-    assert [e.reason for e in events if isinstance(e, ClassFailed)] == ["interrupted"]
-    assert {name: (out / name).read_bytes() for name in files(out)} == before
 
 
 def test_a_search_cancelled_on_the_way_keeps_what_was_found(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ class RunningStudio:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
-        self.folder = folder
+        self.folder, self.saved = folder, b""
         self.address = f"http://127.0.0.1:{self.port}"
         self.client = httpx.Client(
             base_url=f"{self.address}/api/",
@@ -96,6 +96,17 @@ class RunningStudio:
         """Return a new project whose picture has been read."""
         own = self.client.post("projects", json={"kind": "tile"}).json()["id"]
         self.client.put(f"projects/{own}/input", params={"name": name}, content=data)
+        self.until(lambda: self.project(own)["silhouette"])
+        return own
+
+    def with_tiles(self) -> str:
+        """Return a new project with what one search for all tests has found."""
+        if not self.saved:
+            own = self.with_picture()
+            self.search(own, "IH4")
+            assert self.found(own)
+            self.saved = self.client.get(f"projects/{own}/file").content
+        own = self.client.post("projects/open", content=self.saved).json()["id"]
         self.until(lambda: self.project(own)["silhouette"])
         return own
 

@@ -54,11 +54,8 @@ def page_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
 
 @pytest.fixture(scope="session", name="searched")
 def searched_fixture(studio: RunningStudio) -> str:
-    """A project with a finished search of one class."""
-    own = studio.with_picture()
-    studio.search(own, "IH4")
-    assert studio.found(own)
-    return own
+    """A project with the tile of one class that a search has found."""
+    return studio.with_tiles()
 
 
 @pytest.fixture(name="drawing")

@@ -95,19 +95,6 @@ def taken_away(studio: RunningStudio, own: str, tile: int, **settings: Any) -> s
     return studio.client.get(f"takeaways/{number}/files/{file['name']}").text
 
 
-def test_a_mode_may_be_chosen_before_the_tile_is_there(
-    page: Any, searched: str, tile: dict[str, Any]
-) -> None:
-    asked: list[Any] = []
-    page.route(f"**/tiles/{tile['id']}", lambda route: asked.append(route))
-    page.goto(f"/#/p/{searched}/t/{tile['id']}")
-    page.get_by_role("radio", name="Pull", exact=True).check()
-    while not asked:
-        page.wait_for_timeout(10)
-    asked[0].continue_()
-    page.wait_for_selector("[data-ready=pull]")
-
-
 def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, tile) -> None:
     page, first = closeup, tile["id"]
     choose(page, "Pull")
@@ -227,44 +214,6 @@ def test_the_inside_is_pulled_and_the_outline_stays(closeup, studio, searched: s
     page.get_by_role("button", name="Put it back").click()
     assert proved(page, second) == first
     studio.client.patch(f"projects/{searched}", json={"view": {"closeup": {}}})
-
-
-def test_notes_of_the_tile_are_shown_and_none_of_the_whole_search(
-    page, studio: RunningStudio, searched: str, tile
-) -> None:
-    def noted(route: Any) -> None:
-        answer = route.fetch()
-        route.fulfill(json={**answer.json(), "notes": ["its thinnest part was rounded off"]})
-
-    def searching(route: Any) -> None:
-        project = studio.project(searched)
-        for task in project["tasks"]:
-            task["result"] = {**(task["result"] or {}), "notes": ["rounded off in 1 of 9 tiles"]}
-        route.fulfill(json=project)
-
-    page.route(f"**/tiles/{tile['id']}", noted)
-    page.route(f"**/projects/{searched}", searching)
-    page.goto(f"/#/p/{searched}/t/{tile['id']}")
-    page.get_by_text("Its thinnest part was rounded off").wait_for()
-    assert page.get_by_text("of 9 tiles").count() == 0
-
-
-def test_the_help_says_what_moves_the_view(closeup) -> None:
-    page = closeup
-    box = page.locator(CANVAS).bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    for mode in ("Look", "Pull", "Draw"):
-        choose(page, mode)
-        assert ("Shift" in page.locator("#closeup-help").inner_text()) is (mode != "Look")
-        before = picture(page)
-        page.keyboard.down("Shift")
-        page.mouse.move(x, y)
-        page.mouse.down()
-        page.mouse.move(x + 40, y + 30)
-        page.mouse.up()
-        page.keyboard.up("Shift")
-        assert picture(page) != before
-        assert page.get_by_role("button", name="Undo").is_disabled()
 
 
 def test_lines_and_eyes_repeat_and_are_in_the_file(

@@ -134,20 +134,6 @@ def test_sizes_and_the_other_side(pen: Any, studio: RunningStudio, searched: str
     assert eyes[1][2] == pytest.approx(3 * eyes[0][2], rel=0.02)
 
 
-def test_the_pencil_is_not_in_the_hand_of_who_comes_back(
-    pen: Any, studio: RunningStudio, searched: str
-) -> None:
-    pen.get_by_role("radio", name="Fill").check()
-
-    def tool() -> Any:
-        return studio.project(searched)["view"].get("closeup", {}).get("pen", {}).get("tool")
-
-    studio.until(lambda: tool() == "fill")
-    pen.reload()
-    pen.wait_for_selector(".badge[data-kind=proved]")
-    assert pen.get_by_role("radio", name="Look", exact=True).is_checked()
-
-
 def test_what_is_filled_reaches_into_sharp_tips(page: Any) -> None:
     ring = [[0, 0], [100, 0], [0, 9]]
     page.goto("/")

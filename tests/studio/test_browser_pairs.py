@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
+from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES
 from orbiflow.runtime import ignore
 from orbiflow.studio.project_file import write_project
@@ -19,7 +20,6 @@ from orbiflow.tiles import EscherTile, colouring
 from outlines import FOLDER
 from small_pairs import NAMES, pair_result
 from studio.browser import RunningStudio
-from studio.test_browser_search import whole
 from studio.test_browser_start import READ, begun
 from studio_checks import serious_issues, untidy_parts
 
@@ -33,6 +33,11 @@ PLACE = """async (address) => {
     const [u, v] = inner[inner.length >> 1];
     return [x + a * u + c * v + e, y + b * u + d * v + f];
 }"""
+
+
+def whole(matrix: list[float]) -> Array:
+    """Return a matrix of a canvas in homogeneous coordinates."""
+    return np.array([matrix[0::2], matrix[1::2], [0, 0, 1]])
 
 
 @pytest.fixture(scope="module", name="pair")
@@ -57,22 +62,6 @@ def with_pair(studio: RunningStudio, pair: EscherTile, tmp_path: Path) -> dict[s
     write_project(tmp_path, document, tmp_path / "both.orbiflow")
     content = (tmp_path / "both.orbiflow").read_bytes()
     return studio.client.post("projects/open", content=content).json()
-
-
-def test_long_names_stay_on_their_card(page, studio, pair: EscherTile, tmp_path: Path) -> None:
-    names = ("a gecko of the garden behind the house", "a_night_monkey_in_a_very_very_tall_tree")
-    parts = [
-        part._replace(figure=part.figure.changed(name=name))
-        for part, name in zip(pair.parts, names, strict=True)
-    ]
-    project = with_pair(studio, pair.changed(parts=tuple(parts)), tmp_path)
-    page.set_viewport_size({"width": 360, "height": 800})
-    page.goto(f"/#/p/{project['id']}")
-    stars = page.locator(".card .stars")
-    stars.wait_for()
-    assert all(name in stars.inner_text() for name in names)
-    right = "own => own.getBoundingClientRect().right"
-    assert stars.evaluate(right) <= page.locator(".card .facts").evaluate(right)
 
 
 def test_a_second_picture_is_added_seen_and_taken_away(

@@ -78,12 +78,6 @@ def close_up(page: Any, project: str, tile: int, **look: Any) -> None:
     page.wait_for_timeout(200)
 
 
-def test_one_colour_is_no_picture_to_show(studio: RunningStudio, coloured: str) -> None:
-    plain = studio.with_picture(picture_of((20, 20, 20)), "black.png")
-    found = [studio.project(own)["silhouette"]["coloured"] for own in (plain, coloured)]
-    assert found == [False, True]
-
-
 def test_what_is_added_of_the_background_is_no_colour(studio: RunningStudio) -> None:
     plain = studio.with_picture(picture_of((20, 20, 20)), "black.png")
     size = [studio.project(plain)["silhouette"][name] for name in ("width", "height")]
@@ -114,18 +108,6 @@ def test_it_is_there_by_default_and_no_seam_shows(
             own.get_by_role("button", name="Nearer").click()
             own.wait_for_timeout(120)
         context.close()
-
-
-def test_copies_are_tinted_by_their_colours(page: Any, coloured: str, tile: int) -> None:
-    close_up(page, coloured, tile, line=0)
-    slider = page.get_by_label("Colour over it")
-    assert slider.input_value() == "0.35"
-    slider.fill("1")
-    one = page.locator(CANVAS).evaluate("canvas => canvas.toDataURL()")
-    page.get_by_role("radio", name="lagoon").check()
-    page.wait_for_timeout(100)
-    assert page.locator(CANVAS).evaluate("canvas => canvas.toDataURL()") != one
-    assert not shows_picture(page, CANVAS)
 
 
 def test_one_look_for_all_pages(page: Any, studio: RunningStudio, coloured: str, tile: int) -> None:
@@ -175,38 +157,3 @@ def test_a_preview_follows_each_setting(page: Any, coloured: str, tile: int) -> 
     changed(lambda: page.get_by_role("radio", name="Animation").check())
     page.get_by_text("One moment of the animation").wait_for()
     page.wrong[:] = [said for said in page.wrong if "422" not in said]
-
-
-def test_the_new_file_is_what_comes_next_until_something_is_changed(
-    page: Any, coloured: str, tile: int
-) -> None:
-    page.goto(f"/#/p/{coloured}/take/{tile}")
-    page.locator(".live img").wait_for()
-    make = page.get_by_role("button", name="Make it")
-    make.press("Enter")
-    file = page.locator(".said a")
-    file.wait_for()
-    assert file.evaluate("link => link === document.activeElement")
-    assert page.locator(".earlier a").count() == 0
-    page.get_by_label("What is it for?").select_option("laser")
-    page.get_by_text("You changed something since").wait_for()
-    assert file.count() == 0
-    assert page.locator(".earlier a").count() == 1
-    assert page.evaluate(  # the form comes before what was made
-        """() => {
-            const [kinds, made] = [".wishes input", ".earlier a"].map((own) =>
-                document.querySelector(own));
-            return Boolean(kinds.compareDocumentPosition(made) & Node.DOCUMENT_POSITION_FOLLOWING);
-        }"""
-    )
-
-
-def test_what_will_be_made_stays_in_view(page: Any, coloured: str, tile: int) -> None:
-    page.set_viewport_size({"width": 1440, "height": 900})
-    page.goto(f"/#/p/{coloured}/take/{tile}")
-    page.get_by_label("What is it for?").select_option("laser")
-    page.locator("details").evaluate_all("all => all.forEach((own) => { own.open = true; })")
-    page.locator(".live img").wait_for()
-    page.locator("details:visible").last.scroll_into_view_if_needed()
-    assert page.evaluate("scrollY") > 300
-    assert page.locator(".preview").bounding_box()["y"] >= 0

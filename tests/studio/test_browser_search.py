@@ -7,14 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
-from PIL import Image
 
-from exported import tile_of
-from orbiflow.arrays import Array
-from orbiflow.studio.tile_view import tile_card
-from orbiflow.symmetry import Isometry
-from orbiflow.tiles import CLASSES, EscherTile, colouring, narrowest_neck
 from orbiflow.tiles.page import longer_side
 from studio.browser import RunningStudio, covers_page_once, running_studio, small_searches
 from studio_checks import serious_issues, untidy_parts
@@ -83,63 +76,6 @@ def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -
     assert page.locator(CARD).count() == len(studio.project(own)["tiles"])
 
 
-def test_what_a_search_has_to_say_is_shown(page, studio: RunningStudio, tmp_path) -> None:
-    own = studio.with_picture()
-    size = [studio.project(own)["silhouette"][name] for name in ("width", "height")]
-    pins = Image.new("L", size)
-    pins.paste(255, (150, 200, 250, 300))  # far from the outline
-    pins.save(tmp_path / "pins.png")
-    studio.client.put(f"projects/{own}/pins", content=(tmp_path / "pins.png").read_bytes())
-    small_searches(page, "IH4")
-    page.goto(f"/#/p/{own}/picture")
-    page.get_by_role("button", name="Find tiles").click()
-    said = page.locator(".said-notes")
-    said.get_by_text("keeps its shape there").wait_for()
-    page.wait_for_selector(DONE)
-    assert said.locator("li").count() == len(studio.project(own)["tasks"][0]["result"]["notes"])
-
-
-def test_stop_stays_under_the_mouse_whatever_the_search_does(page, studio: RunningStudio) -> None:
-    own = studio.with_picture()
-    studio.search(own)
-    task = studio.project(own)["tasks"][0]["id"]
-    studio.client.post(f"tasks/{task}/pause")
-    page.goto(f"/#/p/{own}")
-    page.get_by_role("button", name="Go on").wait_for()
-    stop = page.get_by_role("button", name="Stop")
-    stop.hover()
-    page.mouse.down()
-    studio.client.post(f"tasks/{task}/resume")  # it waits, then runs
-    page.get_by_role("button", name="Pause").wait_for()
-    page.mouse.up()
-    page.get_by_role("button", name="Search again").wait_for()
-    assert state(page) == "Stopped."
-
-
-def test_buttons_of_a_task_keep_their_places(page) -> None:
-    page.goto("/")
-    page.wait_for_selector(".drop")
-    places = page.evaluate(
-        """async () => {
-            const { steering } = await import("/js/steering.js");
-            const own = steering(null);
-            document.querySelector("#page").prepend(own.root);
-            return ["waiting", "running", "paused", "waiting"].map((state) => {
-                own.update({ id: 1, state });
-                return [...own.root.children].map((button) => {
-                    const { x, y, width, height } = button.getBoundingClientRect();
-                    return [button.textContent, button.disabled, x, y, width, height];
-                });
-            });
-        }"""
-    )
-    assert [[name for name, *_ in state] for state in places] == [
-        ["Pause", "Stop"], ["Pause", "Stop"], ["Go on", "Stop"], ["Pause", "Stop"]
-    ]  # fmt: skip
-    first = [place for _, *place in places[0]]
-    assert all([place for _, *place in state] == first for state in places)
-
-
 def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> None:
     from playwright.sync_api import expect
 
@@ -196,38 +132,10 @@ def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
         page.close()
 
 
-def test_how_long_a_search_takes_is_chosen_beside_its_button(page, studio: RunningStudio) -> None:
-    own = studio.with_picture()
-    page.goto(f"/#/p/{own}/picture")
-    page.get_by_role("radio", name="Quick").check()
-    with page.expect_request("**/tasks") as caught:
-        page.get_by_role("button", name="Find tiles").click()
-    assert caught.value.post_data_json["settings"]["effort"] == "fast"
-    page.get_by_role("button", name="Stop").click()
-    page.get_by_role("button", name="Search again").wait_for()
-    assert page.get_by_role("radio", name="Quick").is_checked()
-
-
-def test_tiles_of_an_opened_project_are_counted_though_none_were_searched(
-    page, studio: RunningStudio
-) -> None:
-    own = studio.with_picture()
-    studio.search(own, "IH4", "IH5")
-    studio.found(own)
-    saved = studio.client.get(f"projects/{own}/file").content
-    opened = studio.client.post("projects/open", content=saved).json()["id"]
-    page.goto(f"/#/p/{opened}")
-    page.wait_for_selector(CARD)
-    count = len(studio.project(opened)["tiles"])
-    assert state(page).startswith(f"{count} tile")
-
-
 def test_tiles_of_an_outline_since_changed_are_marked_and_searched_anew(
     page, studio: RunningStudio
 ) -> None:
-    own = studio.with_picture()
-    studio.search(own, "IH4")
-    studio.found(own)
+    own = studio.with_tiles()
     small_searches(page, "IH4")
     page.goto(f"/#/p/{own}")
     page.wait_for_selector(CARD)
@@ -236,15 +144,14 @@ def test_tiles_of_an_outline_since_changed_are_marked_and_searched_anew(
     studio.client.put(f"projects/{own}/reading", json={"smooth": 0.05})
     page.locator("summary", has_text="changed the picture").wait_for()
     assert (new.count(), old.count()) == (0, 1)
-    page.get_by_role("button", name="Search again").click()
+    page.get_by_role("button", name=re.compile("^Search")).click()
     page.wait_for_selector("ul:not(details ul) > .card[data-stage=final]")
     assert (new.count(), old.count()) == (1, 1)
 
 
 def test_pulled_versions_of_a_tile_are_on_its_card(page, studio: RunningStudio) -> None:
-    own = studio.with_picture()
-    studio.search(own, "IH4")
-    (first,) = (tile["id"] for tile in studio.found(own))
+    own = studio.with_tiles()
+    (first,) = (tile["id"] for tile in studio.project(own)["tiles"])
 
     def pull(tile: int) -> int:
         start = studio.client.get(f"projects/{own}/tiles/{tile}/space").json()["start"]
@@ -270,9 +177,7 @@ def test_pulled_versions_of_a_tile_are_on_its_card(page, studio: RunningStudio) 
 
 
 def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio) -> None:
-    searched = studio.with_picture()
-    studio.search(searched, "IH4")
-    studio.found(searched)
+    searched = studio.with_tiles()
     small_searches(page, "IH4")
     page.goto(f"/#/p/{searched}")
     page.wait_for_selector(CARD)
@@ -282,35 +187,6 @@ def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio) -> No
     assert caught.value.post_data_json["settings"]["like"] == first
     page.get_by_role("button", name="Stop").click()
     page.get_by_role("button", name="Search again").wait_for()
-
-
-def whole(matrix: list[float]) -> Array:
-    """Return a matrix of a canvas in homogeneous coordinates."""
-    return np.array([matrix[0::2], matrix[1::2], [0, 0, 1]])
-
-
-def test_tilings_are_drawn_as_the_library_has_them(page) -> None:
-    page.goto("/")
-    for name in CLASSES:
-        own = EscherTile(tile_of(name), name=name)
-        told = page.evaluate(
-            """async (card) => {
-                const { Camera, Tiling } = await import("/js/tiling.js");
-                const tiling = new Tiling(card);
-                const camera = new Camera({ ...tiling.middle, scale: 9, turn: 0.3, yDown: false });
-                const copies = tiling.copies(camera, 300, 200);
-                return { copies, view: camera.matrix(300, 200) };
-            }""",
-            tile_card(own, 1, "final"),
-        )
-        view, colours, seen = whole(told["view"]), colouring(own.tile), list[shapely.Polygon]()
-        for copy in told["copies"]:
-            matrix = whole(copy["matrix"])
-            seen.append(shapely.Polygon(own.tile.polygon @ matrix[:2, :2].T + matrix[:2, 2]))
-            element = np.linalg.solve(view, matrix)
-            assert copy["colour"] == colours.colour(Isometry(element[:2, :2], element[:2, 2]))
-        window = shapely.box(0, 0, 300, 200)
-        assert window.difference(shapely.union_all(seen, grid_size=1e-6)).area < 0.01
 
 
 def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched) -> None:
@@ -388,33 +264,6 @@ def test_the_true_size_is_of_the_file_and_follows_the_screen(page, studio, searc
     assert page.get_by_label("How long is one tile?").input_value() == "80"
 
 
-def test_a_neck_is_told_only_where_there_is_one(page) -> None:
-    parts = [shapely.box(0, 0, 6, 6), shapely.box(5, 2, 12, 4), shapely.box(11, 0, 17, 6)]
-    bone = shapely.get_coordinates(shapely.union_all(parts).boundary)[:-1]
-    square = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]])
-    page.goto("/")
-
-    def said(ring: np.ndarray, limit: float) -> str:
-        own = {"polygon": ring.tolist(), "neck": narrowest_neck(ring).ends.tolist(), "y_down": True}
-        return page.evaluate(
-            """async ([card, limit]) => {
-                const { trueSize } = await import("/js/takeaway/truesize.js");
-                const own = trueSize(card);
-                document.body.append(own.root);
-                own.show(34, limit);
-                const text = own.root.innerText;
-                own.root.remove();
-                return text;
-            }""",
-            [own, limit],
-        )
-
-    assert "neck between two parts, in the circle, is 4.0 mm wide" in said(bone, 3.0)
-    assert "Choose a longer tile" not in said(bone, 3.0)
-    assert "Choose a longer tile" in said(bone, 5.0)
-    assert "neck" not in said(square, 100.0)
-
-
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_pages_are_for_everyone(page, studio: RunningStudio, searched, scheme) -> None:
     tile = studio.project(searched)["tiles"][0]["id"]
@@ -428,22 +277,3 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, searched, scheme) -
         assert serious_issues(page) == []
         page.set_viewport_size({"width": 360, "height": 700})
         assert untidy_parts(page) == []
-
-
-def test_a_world_is_turned_in_a_page_of_its_own(
-    page: Any, studio: RunningStudio, searched: str
-) -> None:
-    tile = studio.found(searched)[0]["id"]
-    page.goto(f"/#/p/{searched}/take/{tile}")
-    page.get_by_role("radio", name="Picture", exact=True).check(force=True)
-    page.get_by_label("In another world?").select_option("disc")
-    page.get_by_label("Kind of file").select_option("html")
-    page.get_by_role("button", name="Make it").click()
-    opened = page.get_by_role("link", name="Open")
-    opened.wait_for()
-    with page.context.expect_page() as found:
-        opened.click()
-    world = found.value
-    world.wait_for_function("document.querySelector('#view').dataset.drawn")
-    assert world.get_by_role("button", name="Fit").is_visible()
-    world.close()

@@ -73,17 +73,6 @@ def test_a_drawing_is_shown_in_its_colours_in_its_place(page, studio: RunningStu
     assert min(page.evaluate(seen, [190, 160])) > 250
 
 
-def test_a_busy_picture_is_led_to_the_lasso(page, drawing) -> None:
-    picture = Image.open(drawing)
-    for k in range(8):
-        picture.paste(
-            40, (195 + 12 * (k % 4), 60 + 20 * (k // 4), 203 + 12 * (k % 4), 72 + 20 * (k // 4))
-        )
-    picture.save(drawing)
-    begun(page, drawing)
-    assert "lasso" in page.locator(".said").inner_text()
-
-
 def test_thin_legs_are_said_and_grown_by_a_button(page, studio: RunningStudio) -> None:
     ends = [(40, 60), (20, 160), (380, 60), (380, 160)]
     legs = "".join(f"M200 200L{x} {y}" for x, y in ends)
@@ -114,26 +103,6 @@ def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
     studio.until(lambda: studio.project(own)["reading"]["threshold"] == 0.51)
     page.get_by_role("radio", name="light").press("Space")  # a click may miss what an answer moves
     studio.until(lambda: studio.project(own)["reading"]["invert"] is True)
-
-
-def test_smoothing_joins_parts_as_before_once_something_is_painted(
-    page, studio: RunningStudio, tmp_path
-) -> None:
-    picture = Image.new("L", (300, 200), 255)
-    picture.paste(0, (20, 60, 150, 140))
-    picture.paste(0, (152, 60, 250, 140))  # a gap of less than two per cent of the length
-    picture.save(tmp_path / "halves.png")
-    own = begun(page, tmp_path / "halves.png")
-    whole = area_of(studio.project(own))
-    page.get_by_role("radio", name="Add").check()
-    stroke(page, "canvas.reading", (0.2, 0.28), (0.3, 0.28))
-    studio.until(lambda: area_of(studio.project(own)) > 1.01 * whole)
-    assert "1 part is left out" in page.locator(".said").inner_text()
-    page.get_by_label("Smoothing").focus()
-    for _ in range(15):
-        page.keyboard.press("ArrowRight")
-    studio.until(lambda: area_of(studio.project(own)) > 1.5 * whole)
-    page.get_by_text("1 part is left out").wait_for(state="detached")
 
 
 def test_painting_mends_the_shape_and_can_be_undone(page, drawing, studio: RunningStudio) -> None:
@@ -248,33 +217,6 @@ def test_what_is_painted_while_the_picture_is_nearer_is_where_it_was_painted(
         page.keyboard.press(key)
 
 
-def test_two_fingers_bring_the_picture_nearer_and_paint_nothing(
-    page, drawing, studio: RunningStudio
-) -> None:
-    own = begun(page, drawing)
-    seen = "document.querySelector('canvas.reading').toDataURL()"
-    before = page.evaluate(seen)
-    page.evaluate(
-        """() => {
-            const canvas = document.querySelector("canvas.reading");
-            canvas.setPointerCapture = () => {};
-            const { x, y } = canvas.getBoundingClientRect();
-            const touch = (kind, pointerId, u, v) => canvas.dispatchEvent(new PointerEvent(kind, {
-                pointerId, pointerType: "touch", clientX: x + u, clientY: y + v, bubbles: true,
-            }));
-            touch("pointerdown", 1, 100, 100);
-            touch("pointermove", 1, 104, 100);
-            touch("pointerdown", 2, 200, 100);
-            touch("pointermove", 2, 300, 100);
-            touch("pointerup", 1, 104, 100);
-            touch("pointerup", 2, 300, 100);
-        }"""
-    )
-    assert page.evaluate(seen) != before
-    assert page.get_by_role("button", name="Undo").is_disabled()
-    assert studio.project(own)["mend"] is None
-
-
 @pytest.mark.parametrize("how", ["mouse", "keyboard"])
 def test_a_shape_can_be_drawn(page, studio: RunningStudio, how) -> None:
     page.goto("/")
@@ -365,9 +307,8 @@ def test_an_animal_is_taken_by_keyboard_and_the_project_renamed(page, studio) ->
 
 
 def test_a_project_is_duplicated_with_all_that_is_in_it(page, studio: RunningStudio) -> None:
-    searched, name = studio.with_picture(name="made twice.json"), "made twice"
-    studio.search(searched, "IH4")
-    studio.found(searched)
+    searched, name = studio.with_tiles(), "made twice"
+    studio.client.patch(f"projects/{searched}", json={"name": name})
     page.goto("/")
     page.get_by_role("button", name=f"Duplicate {name}", exact=True).click()
     page.get_by_role("link", name=f"{name} (copy)").wait_for()
@@ -412,42 +353,6 @@ def test_no_table_no_project(page, studio: RunningStudio) -> None:
     page.go_back()
     page.get_by_role("heading", name="Turn an animal into a tile").wait_for()
     studio.until(lambda: len(studio.client.get("projects").json()) == count)
-
-
-def test_a_search_is_told_of_beside_the_picture_and_cards_stay_in_place(
-    page, drawing, studio: RunningStudio
-) -> None:
-    own = begun(page, drawing)
-    assert not page.get_by_text("A search is at work").is_visible()
-    tools = page.get_by_role("radio", name="Add")
-    before = tools.bounding_box()
-    page.locator("canvas.reading").evaluate(
-        """(canvas) => {
-            globalThis.places = [];
-            new MutationObserver(() => {
-                const { y } = document.querySelector(".tools").getBoundingClientRect();
-                globalThis.places.push(Math.round(y + scrollY));
-            }).observe(canvas, { attributes: true, attributeFilter: ["aria-busy"] });
-        }"""
-    )
-    page.get_by_label("Smoothing").press("ArrowRight")
-    studio.until(lambda: studio.project(own)["reading"]["smooth"])
-    page.wait_for_selector(SETTLED)
-    assert len(set(page.evaluate("globalThis.places"))) <= 1
-    assert tools.bounding_box() == before
-    task = {"id": 10**9, "operation": "search", "share": 0.4, "what": "", "error": None}
-    found = {**studio.project(own), "tasks": [{**task, "state": "running", "place": 0}]}
-    page.route(f"**/projects/{own}", lambda route: route.fulfill(json=found))
-    page.reload()
-    page.get_by_text("A search is at work").wait_for()
-
-
-def test_projects_stand_above_the_animals(page, studio: RunningStudio) -> None:
-    studio.with_picture()
-    page.goto("/")
-    page.wait_for_selector(".project")
-    headings = page.locator("h2").all_inner_texts()
-    assert headings[:2] == ["Your projects", "Or take one of ours"]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -11,19 +11,9 @@ import pytest
 import shapely
 
 from bent_tiles import bent_tile
-from exported import dxf_lines
 from orbiflow.studio.taking import with_drawing
 from orbiflow.studio.tile_files import tile_folder
-from orbiflow.tiles import (
-    EscherTile,
-    ExportSettings,
-    certify,
-    export,
-    read_result,
-    save_tiles,
-    scenes,
-)
-from orbiflow.tiles.make import laid_out
+from orbiflow.tiles import EscherTile, certify, read_result, save_tiles
 from studio.served import Client, done, house_tile
 
 
@@ -112,38 +102,6 @@ def test_a_drawing_is_in_the_file_that_is_taken_away(client: Client, address: st
     )
     [file] = task["result"]["files"]
     assert "#d02030" not in client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").text
-
-
-@pytest.mark.parametrize(
-    ("purpose", "layers"), [("laser", {"engrave", "score"}), ("web", {"drawing on colour 1"})]
-)
-def test_lines_over_the_outline_end_there_in_files(
-    tmp_path: Path, purpose: str, layers: set[str]
-) -> None:
-    own = EscherTile(bent_tile("IH4", 40.0))
-    ring = own.tile.polygon
-    edge = {"colour": "#202020", "width": 2.5, "points": ring[: len(ring) // 2].tolist()}
-    fill = {**edge, "width": 9.0, "points": [ring[0].tolist(), own.tile.center.tolist()]}
-    folder, files, _ = with_drawing(
-        json.dumps({"strokes": [edge, fill]}),
-        save_tiles([own], tmp_path / "tile"),
-        {},
-        {},
-        tmp_path / "s",
-    )
-    chosen: Any = {"purpose": purpose, "format": "dxf"}
-    settings = ExportSettings(**chosen, tile_size=40, area=(60, 60))
-    export(folder, tmp_path / "a.dxf", settings, picture=files["picture"])
-    (scene,), _ = scenes(folder, settings, picture=files["picture"])
-    layout, _ = laid_out(read_result(folder), settings)
-    outline = layout.outline.closed[0].flattened(0.01)
-    tiles = shapely.union_all(
-        [shapely.Polygon(outline @ tile.linear.T + tile.offset) for tile in scene.tiles]
-    ).buffer(0.03)
-    _, lines = dxf_lines((tmp_path / "a.dxf").read_text())
-    drawn = [line for line in lines if line.layer.removesuffix(".") in layers]
-    assert drawn
-    assert all(tiles.covers(shapely.LineString(line.points)) for line in drawn)
 
 
 def test_nothing_drawn_changes_nothing(tmp_path: Path) -> None:

@@ -41,11 +41,7 @@ def test_it_is_what_is_made_and_nothing_is_left_of_it(client: Client, address: s
     project, number = address.split("/tiles/")
     known = client.get(project).json()["tasks"]
     settings = {
-        "drawing": True,
-        "purpose": "print",
-        "area": "120x80mm",
-        "format": "png",
-        "dpi": 100,
+        **{"drawing": True, "purpose": "print", "area": "120x80mm", "format": "png", "dpi": 100}
     }
     shown = np.asarray(image_of(preview(client, address, "export", **settings)).convert("RGB"))
     assert client.get(project).json()["tasks"] == known
@@ -92,14 +88,6 @@ def test_a_world_is_made_to_be_turned(client: Client, address: str) -> None:
     assert made.headers["content-type"].startswith("text/html")
     assert "content-disposition" not in made.headers
     assert "sandbox allow-scripts" in made.headers["content-security-policy"]
-
-
-def test_a_drawing_is_on_what_is_printed_in_3d(client: Client, address: str) -> None:
-    with_it, without = (
-        np.asarray(image_of(preview(client, address, "solid", kind="stamp", drawing=own)))
-        for own in (True, False)
-    )
-    assert with_it.shape != without.shape or (with_it != without).any()
 
 
 @pytest.mark.parametrize("there", [True, False])

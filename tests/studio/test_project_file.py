@@ -24,12 +24,8 @@ from orbiflow.tiles import EscherTile, read_result, save_tiles
 from studio.served import SQUARE
 
 DOCUMENT: dict[str, Any] = {
-    "name": "house",
-    "kind": "tile",
-    "view": {},
-    "reading": {},
-    "input": {"name": "house.json"},
-    "tiles": [{"id": 7000, "parent": None}],
+    **{"name": "house", "kind": "tile", "view": {}, "reading": {}},
+    **{"input": {"name": "house.json"}, "tiles": [{"id": 7000, "parent": None}]},
 }
 
 
@@ -101,11 +97,7 @@ def test_what_is_no_project(content: bytes, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "document",
     [
-        b"",
-        b"[]",
-        b"{}",
-        b"\xff",
-        b"[" * 100_000,
+        *(b"", b"[]", b"{}", b"\xff", b"[" * 100_000),
         json.dumps({**DOCUMENT, "format": "orbiflow-project/9"}).encode(),
         json.dumps({**DOCUMENT, "format": FORMAT, "tiles": {}}).encode(),
         json.dumps({**DOCUMENT, "format": FORMAT, "view": 3}).encode(),
@@ -122,11 +114,7 @@ def test_what_is_said_of_a_project_is_checked(
 
 def test_entries_lead_nowhere(saved: bytes, tmp_path: Path) -> None:
     names = (
-        "../evil",
-        "/etc/evil",
-        "tiles/../../evil",
-        "tiles/1/../../../evil",
-        "C:\\evil",
+        *("../evil", "/etc/evil", "tiles/../../evil", "tiles/1/../../../evil", "C:\\evil"),
         "x.sh",
     )
     project = opened(tmp_path, changed(saved, **dict.fromkeys(names, b"x")))

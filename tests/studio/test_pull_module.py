@@ -198,23 +198,6 @@ def test_a_pull_too_far_stops_at_a_tile_and_can_go_back(followed, name: str) -> 
     assert pulled(tile, answers[0]["parameters"]).certificate.valid
 
 
-def test_a_hand_that_rests_moves_nothing() -> None:
-    program = """
-import { Puller } from "MODULES/pull.js";
-const space = JSON.parse((await import("node:fs")).readFileSync(0));
-const puller = new Puller(space);
-puller.grab(3, 0.5, 1e9);
-const before = puller.body();
-const moved = puller.pull(puller.held());
-const after = puller.body();
-console.log(JSON.stringify([moved, Math.max(...after.map((v, k) => Math.abs(v - before[k])))]));
-"""
-    space = space_json(EscherTile(bent_tile("IH1", 30.0)))
-    moved, most = run_in_node(program, space)
-    assert moved < 1e-9
-    assert most < 1e-7
-
-
 def test_what_is_drawn_is_carried_simplified_and_rubbed_out() -> None:
     program = """
 import { Carry } from "MODULES/carry.js";

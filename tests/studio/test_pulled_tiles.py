@@ -87,12 +87,6 @@ def test_what_lies_on_a_tile_comes_along_to_another_class(name: str, y_down: boo
     assert heard == sorted(heard)
 
 
-def test_notes_of_a_tile_are_told_once() -> None:
-    tile = squirrel("IH4").changed(notes=("rounded", "rounded", "grown"), no_map="too thin")
-    told = tile_view({"figures": []}, tile)["notes"]
-    assert told == ["rounded", "grown", "too thin"]
-
-
 @settings(max_examples=4)
 @given(swirled.filter(is_sound), seeds)
 def test_what_the_browser_is_told_is_the_space_of_the_tile(tile: Tile, seed: int) -> None:

@@ -131,18 +131,6 @@ def test_what_is_refused_is_in_the_pages_words(client: Client) -> None:
     assert answer.json()["error"].startswith("smoothing must be")
 
 
-def test_what_is_painted_is_called_by_what_the_page_calls_it(client: Client) -> None:
-    address = new_project(client)
-    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
-    own = client.get(address).json()["silhouette"]
-    mask = Image.new("L", (own["width"], own["height"]))
-    mask.putpixel((0, 0), 255)
-    told = client.put(f"{address}/pins", content=painted(mask)).json()["refused"]
-    assert told.startswith("what you painted with “Keep its shape”: ")
-    assert "pins" not in told
-    assert "mask" not in told
-
-
 @pytest.mark.parametrize("mask", ["pins", "emphasis"])
 @settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(radius=st.sampled_from([0, 1, 2, 4, 8, 30, 120, 2000]), at=st.tuples(*[st.floats(0, 1)] * 2))
@@ -228,56 +216,6 @@ def test_a_new_picture_ends_the_search_of_the_old_one(tmp_path: Path) -> None:
         assert states == {"read": "done", "search": "cancelled"}
 
 
-def test_a_picture_without_a_shape_says_what_to_do(client: Client) -> None:
-    address = new_project(client)
-    blank = painted(Image.new("L", (50, 50), 255))
-    task = done(client, client.put(f"{address}/input?name=blank.png", content=blank))
-    assert task["state"] == "failed"
-    assert task["error"].startswith("blank.png: ")
-    assert client.get(address).json()["silhouette"] is None
-    assert make(client, address, "search")["error"].startswith("there is no silhouette yet")
-
-
-def test_doubts_are_said_once_in_the_words_of_the_page(client: Client) -> None:
-    address = new_project(client)
-    picture = Image.new("L", (400, 300), 255)
-    pen = ImageDraw.Draw(picture)
-    pen.ellipse((30, 30, 270, 270), fill=0)
-    pen.ellipse((100, 100, 200, 200), fill=255)
-    pen.rectangle((300, 100, 380, 200), fill=0)
-    done(client, client.put(f"{address}/input?name=a.png", content=painted(picture)))
-    own = client.get(address).json()["silhouette"]
-    apart, hole = own["doubts"]
-    assert "by a larger smoothing, or try another edge (Where it ends)" in apart
-    assert hole.endswith("try another edge (Where it ends) or another side (The animal is)")
-    assert len(own["left_out"]) == 1
-    said = " ".join([*own["notes"], apart, hole])
-    assert "kept the largest" not in said
-    assert said.count("filled") == 1
-    assert "--" not in said
-
-
-@pytest.mark.parametrize(
-    ("settings", "told"),
-    [
-        ({"tile_size": 1e9}, "the length of a tile (in mm) must be above 0 and at most 20000, got"),
-        (
-            {"tile_size": "1000000000mm"},
-            "the length of a tile: '1000000000mm' is longer than 100 m",
-        ),
-        ({"warn_neck": -1}, "warn neck (in mm) must be from 0 to 20000, got -1"),
-        ({"dpi": 0}, "the number of dots per inch must be from 1 to 10000, got 0"),
-    ],
-)
-def test_refusals_name_settings_in_plain_words(
-    client: Client, project: str, settings: dict[str, Any], told: str
-) -> None:
-    ask = {"operation": "export", "settings": {"tile": tile_number(900, 0), **settings}}
-    answer = client.post(f"{project}/tasks", json=ask)
-    assert answer.status_code == 422
-    assert answer.json()["error"].startswith(told)
-
-
 @pytest.mark.parametrize(
     ("operation", "settings", "name"),
     [
@@ -328,14 +266,6 @@ def test_forms_come_from_settings(client: Client, name: str) -> None:
     for own in schema["properties"].values():
         assert own["description"].endswith(".")
     assert not {"out", "result", "force", "workers", "project", "task"} & set(schema["properties"])
-
-
-def test_forms_know_what_a_choice_changes(client: Client) -> None:
-    told = client.get("/api/operations/export/schema").json()["x-presets"]["purpose"]
-    assert told["print"] == told["web"] == {"clip": True}
-    assert told["laser"] == {"cut": "skeleton", "outline": 0.01, "warn_neck": 1.5}
-    stickers = {"cut": "pieces", "area": [210, 297], "margin": 10.0, "marks": True, "offset": 2.0}
-    assert told["stickers"] == stickers
 
 
 def test_views_are_merged_and_say_who_changed_them(client: Client, project: str) -> None:
@@ -404,18 +334,6 @@ def test_tiles_of_an_outline_since_mended_are_known_as_such_in_a_file_too(client
     assert is_outdated(card, store.project(name))
     mended = saved_and_opened()
     assert is_outdated(mended["tiles"][0], mended)
-
-
-def test_a_project_with_a_picture_that_was_painted_over_comes_back(client: Client) -> None:
-    address = new_project(client)
-    done(client, client.post(f"{address}/animal", json={"name": "bat"}))
-    done(client, client.put(f"{address}/mend", content=painted(Image.new("RGBA", (9, 9)))))
-    content = client.get(f"{address}/file").content
-    opened = client.post("/api/projects/open", content=content).json()
-    assert opened["mend"]
-    for name in ("name", "input", "reading"):
-        assert opened[name] == client.get(address).json()[name]
-    assert opened["silhouette"]["outline"] == client.get(address).json()["silhouette"]["outline"]
 
 
 @pytest.mark.parametrize("content", [SQUARE, b"PK", b""])

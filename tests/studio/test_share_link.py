@@ -75,11 +75,7 @@ def test_link_names_no_file_of_this_machine(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "",
-        "nonsense!",
-        "abcd",
-        packed([1, 2]),
-        packed({"tile": 3}),
+        *("", "nonsense!", "abcd", packed([1, 2]), packed({"tile": 3})),
         packed({"tile": {}})[:-6],
         "ä" * 8,
         base64.urlsafe_b64encode(zlib.compress(b"[" * 100_000)).decode(),

@@ -26,7 +26,6 @@ from strategies import (
     random_orthogonal,
     random_tensor,
     seeds,
-    space_group,
     wallpaper_groups,
 )
 
@@ -112,15 +111,6 @@ def test_groups_of_other_dimensions_and_other_things_are_not_equal():
     assert wallpaper_group("p1") != CrystallographicGroup.generate(np.eye(3))
     assert wallpaper_group("p1") != "p1"
     assert copy.deepcopy(wallpaper_group("p6m")) == wallpaper_group("p6m")
-
-
-def test_the_largest_space_group_equals_its_primitive_form():
-    group = space_group("Fm-3m", 4)
-    half = group.lattice @ np.array([[0, 1, 1], [1, 0, 1], [1, 1, 0]]) / 2
-    primitive = CrystallographicGroup.generate(half, group.cosets)
-    assert primitive.order == 48
-    assert primitive == group
-    assert hash(primitive) == hash(group)
 
 
 @settings(max_examples=10)

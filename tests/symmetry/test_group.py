@@ -21,19 +21,7 @@ from orbiflow.symmetry import (
     wallpaper_group,
 )
 from refusals import refused
-from strategies import (
-    SPACE_GROUPS,
-    angles,
-    elements,
-    fractional_group,
-    groups,
-    lattices,
-    plane_groups,
-    random_orthogonal,
-    random_points,
-    seeds,
-    space_group,
-)
+from strategies import angles, elements, groups, lattices, plane_groups, random_points, seeds
 
 
 def fractional(group, vectors):
@@ -52,18 +40,6 @@ def test_products_and_inverses_of_cosets_are_contained(group):
         assert group.contains(g.inverse())
 
 
-@pytest.mark.parametrize("name", SPACE_GROUPS)
-def test_space_groups_have_the_order_of_the_international_tables(name):
-    assert space_group(name, seed=1).order == SPACE_GROUPS[name][1]
-
-
-def test_the_largest_space_group_is_closed():
-    group = space_group("Fm-3m", seed=2)
-    rng = np.random.default_rng(0)
-    for i, j in rng.integers(0, group.order, (300, 2)):
-        assert group.contains(group.cosets[i] @ group.cosets[j].inverse())
-
-
 @given(groups)
 def test_cosets_are_distinct_modulo_the_lattice(group):
     for g, h in itertools.combinations(group.cosets, 2):
@@ -80,21 +56,6 @@ def test_the_identity_comes_first_and_translations_lie_in_the_cell(group):
     assert steps.max() < 1 - 1e-9
 
 
-@given(st.data())
-def test_a_group_does_not_depend_on_the_order_of_its_generators(data):
-    group = data.draw(groups)
-    generators = data.draw(st.permutations(group.cosets))
-    again = CrystallographicGroup.generate(group.lattice, generators)
-    assert again.order == group.order
-    assert all(group.contains(g) for g in again.cosets)
-
-
-@given(st.data())
-def test_every_product_with_a_lattice_translation_is_contained(data):
-    group = data.draw(groups)
-    assert group.contains(data.draw(elements(group)))
-
-
 @given(st.data(), st.floats(1e-3, 0.05))
 def test_elements_moved_off_the_lattice_are_not_contained(data, amount):
     group = data.draw(groups)
@@ -108,15 +69,11 @@ def test_isometries_of_another_dimension_are_not_contained():
 
 
 @given(groups, seeds)
-def test_wrap_lands_in_the_cell(group, seed):
-    steps = fractional(group, group.wrap(random_points(seed, 3, 4, group.dim, size=20.0)))
+def test_wrap_moves_into_the_cell_by_lattice_vectors(group, seed):
+    p = random_points(seed, 3, 4, group.dim, size=20.0)
+    steps = fractional(group, group.wrap(p))
     assert steps.min() >= -1e-12
     assert steps.max() < 1 + 1e-12
-
-
-@given(groups, seeds)
-def test_wrap_moves_by_lattice_vectors(group, seed):
-    p = random_points(seed, 3, 4, group.dim, size=20.0)
     assert is_lattice_vector(group, group.wrap(p) - p, 1e-12)
 
 
@@ -187,19 +144,6 @@ def test_conjugating_by_a_similarity_carries_elements_along(data, angle, scale, 
     assert moved.cell_volume == pytest.approx(scale**2 * group.cell_volume, rel=1e-12)
 
 
-@given(seeds, seeds)
-def test_conjugation_works_in_three_dimensions(seed, other):
-    group = space_group("P2_1/c", seed)
-    rng = np.random.default_rng(other)
-    m, v = random_orthogonal(rng, 3), rng.normal(size=3)
-    moved = group.conjugate(m, v)
-    p = rng.normal(size=3)
-    for g in group.cosets:
-        h = Isometry(m @ g.linear @ m.T, m @ g.translation + v - m @ g.linear @ m.T @ v)
-        assert moved.contains(h, 1e-8)
-        np.testing.assert_allclose(h(m @ p + v), m @ g(p) + v, atol=1e-12)
-
-
 @given(lattices("oblique"), st.floats(0.2, 3), st.floats(-1, 1))
 def test_any_linear_map_conjugates_p2_to_p2(lattice, stretch, shear):
     moved = wallpaper_group("p2", lattice).conjugate([[stretch, shear], [0.0, 1.0]])
@@ -213,14 +157,16 @@ def test_a_shear_does_not_normalise_a_group_with_more_than_half_turns(name):
         wallpaper_group(name).conjugate([[1.0, 0.3], [0.0, 1.0]])
 
 
-def test_a_singular_conjugation_is_refused():
-    with refused("lattice", kind=GroupError):
-        wallpaper_group("p1").conjugate(np.ones((2, 2)))
-
-
-@pytest.mark.parametrize(("linear", "offset"), [(np.eye(3), None), (np.eye(2), np.zeros(3))])
-def test_a_conjugation_of_another_dimension_is_refused(linear, offset):
-    with refused("(2, 2)", np.shape(linear), kind=GroupError):
+@pytest.mark.parametrize(
+    ("linear", "offset", "about"),
+    [
+        (np.eye(3), None, (3, 3)),
+        (np.eye(2), np.zeros(3), (2, 2)),
+        (np.ones((2, 2)), None, "lattice"),
+    ],
+)
+def test_a_singular_conjugation_or_one_of_another_dimension_is_refused(linear, offset, about):
+    with refused(about, kind=GroupError):
         wallpaper_group("p1").conjugate(linear, offset)
 
 
@@ -259,40 +205,18 @@ def test_a_glide_by_a_fraction_of_the_lattice_multiplies_the_order(parts):
 
 
 @pytest.mark.parametrize(
-    ("lattice", "match"),
+    "lattice",
     [
-        ([[1.0, 2.0], [1.0, 2.0]], "linearly dependent"),
-        ([[1.0, 1.0], [0.0, 1e-8]], "linearly dependent"),
-        ([[1.0, 0.0], [0.0, 0.0]], "zero"),
-        ([[1.0, np.nan], [0.0, 1.0]], "zero, NaN or infinite"),
-        ([[1e308, 1e308], [0.0, 1e308]], "lengths must be between"),
-        ([[1.0, 0.0]], r"\(d, d\) matrix"),
-        ([1.0, 1.0], r"\(d, d\) matrix"),
-        (np.zeros((0, 0)), r"\(d, d\) matrix"),
+        *([[1.0, 2.0], [1.0, 2.0]], [[1.0, 1.0], [0.0, 1e-8]], [[1.0, 0.0], [0.0, 0.0]]),
+        *([[1.0, np.nan], [0.0, 1.0]], [[1e308, 1e308], [0.0, 1e308]]),
+        *([[1.0, 0.0]], [1.0, 1.0], np.zeros((0, 0))),
     ],
 )
-def test_degenerate_lattices_are_refused(lattice, match):
-    with pytest.raises(GroupError, match=match):
+def test_degenerate_lattices_are_refused(lattice):
+    with refused("lattice", kind=GroupError):
         CrystallographicGroup.generate(lattice)
 
 
 def test_generators_of_another_dimension_are_refused():
     with refused("generator 0", "R^3", "R^2", kind=GroupError):
         CrystallographicGroup.generate(np.eye(2), [identity(3)])
-
-
-def test_a_lattice_is_kept_apart_from_the_callers_array():
-    lattice = np.eye(2)
-    group = CrystallographicGroup.generate(lattice)
-    lattice[0, 0] = 7.0
-    assert group.cell_volume == 1.0
-    with refused("read-only", kind=ValueError):
-        group.lattice[0, 0] = 7.0
-
-
-def test_a_screw_axis_closes_after_its_number_of_turns():
-    group = fractional_group(
-        np.diag([1.0, 1.0, 4.0]), [([[0, -1, 0], [1, 0, 0], [0, 0, 1]], (0, 0, 0.25))], "P4_1"
-    )
-    heights = sorted(group.translations[:, 2].round(12).tolist())
-    assert heights == [0.0, 1.0, 2.0, 3.0]

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError
-from orbiflow.symmetry import WALLPAPER_GROUPS, group_by_name, space_group, wallpaper_group
+from orbiflow.symmetry import space_group
 from orbiflow.symmetry.group_symbols import USUAL, find_hall, find_setting, plain
 from refusals import refused
 
@@ -42,8 +42,10 @@ BLANKS = {
 }
 
 
-@pytest.mark.parametrize("blanks", BLANKS)
-@pytest.mark.parametrize("typesetting", TYPESETTING)
+@pytest.mark.parametrize(
+    ("typesetting", "blanks"),
+    [*((way, "none") for way in TYPESETTING), *(("plain", blanks) for blanks in BLANKS)],
+)
 def test_every_setting_in_every_way_to_write_it(typesetting: str, blanks: str) -> None:
     for row in TABLE[:USUAL]:
         extension = row.ext.strip("\0")
@@ -61,16 +63,12 @@ def test_every_setting_in_every_way_to_write_it(typesetting: str, blanks: str) -
 @pytest.mark.parametrize("change", [str.lower, str.upper, str.swapcase])
 def test_large_and_small_letters(change) -> None:
     for row in TABLE[:USUAL]:
+        short = find_setting(gemmi, row.short_name())
+        assert short is not None
+        assert short.number == row.number
         found = find_setting(gemmi, change(row.xhm().replace(" ", "")))
         assert found is not None
         assert found.xhm() == row.xhm()
-
-
-def test_every_short_symbol_is_of_its_number() -> None:
-    for row in TABLE[:USUAL]:
-        found = find_setting(gemmi, row.short_name())
-        assert found is not None
-        assert found.number == row.number
 
 
 FULL = (
@@ -114,46 +112,25 @@ def test_numbers(number: int) -> None:
 
 
 KNOWN = {
-    "P2_1": "P 1 21 1",
-    "P 2_1/c": "P 1 21/c 1",
-    "P2(1)/c": "P 1 21/c 1",
-    "p2_{1}/c": "P 1 21/c 1",
-    "P21/n": "P 1 21/n 1",
-    "P 21/b": "P 1 1 21/b",
-    "I4(1)/amd:2": "I 41/a m d:2",
-    "P6(3)/mmc": "P 63/m m c",
-    "R-3:H": "R -3:H",
-    "R3:R": "R 3:R",
-    "R-3mH": "R -3 m:H",
-    "R -3 m R": "R -3 m:R",
-    "H 3 2": "R 3 2:H",
-    "Fd-3m:2": "F d -3 m:2",
-    "F d -3 m Z": "F d -3 m:2",
-    "F d -3 m S": "F d -3 m:1",
-    "Fm3m": "F m -3 m",
-    "Pa3": "P a -3",
-    "Cmce": "C m c a",
-    "Aem2": "A b m 2",
-    "P3_221": "P 32 2 1",
-    "P 3221": "P 32 2 1",
-    "P321": "P 3 2 1",
-    "C2/c:b1": "C 1 2/c 1",
-    "I2_1": "I 1 21 1",
-    "B2_1": "B 1 21 1",
-    "B 2": "B 1 1 2",
-    "P_21/c": "P 1 21/c 1",
-    "P_1_21/c_1": "P 1 21/c 1",
-    "P_21": "P 1 21 1",
-    "P_n_m_a": "P n m a",
-    "I_41/a_m_d:2": "I 41/a m d:2",
-    "P 2_1/n 2_1/m 2_1/a": "P n m a",
-    "P2_1/n2_1/m2_1/a": "P n m a",
-    "P21/m21/n21/b": "P m n b",
-    "C 2/m 2/c 2_1/e": "C m c a",
-    "P_2/m_2/m_2/m": "P m m m",
-    r"$F\,4_1/d\,\bar{3}\,2/m$:2": "F d -3 m:2",
-    "F 41/d -3 2/m :2": "F d -3 m:2",
-    "R -3 2/c:R": "R -3 c:R",
+    **{"P2_1": "P 1 21 1", "P 2_1/c": "P 1 21/c 1", "P2(1)/c": "P 1 21/c 1"},
+    **{"p2_{1}/c": "P 1 21/c 1", "P21/n": "P 1 21/n 1", "P 21/b": "P 1 1 21/b"},
+    **{"I4(1)/amd:2": "I 41/a m d:2", "P6(3)/mmc": "P 63/m m c", "R-3:H": "R -3:H"},
+    **{"R3:R": "R 3:R", "R-3mH": "R -3 m:H", "R -3 m R": "R -3 m:R", "H 3 2": "R 3 2:H"},
+    **{"Fd-3m:2": "F d -3 m:2", "F d -3 m Z": "F d -3 m:2", "F d -3 m S": "F d -3 m:1"},
+    **{"Fm3m": "F m -3 m", "Pa3": "P a -3", "Cmce": "C m c a", "Aem2": "A b m 2"},
+    **{"P3_221": "P 32 2 1", "P 3221": "P 32 2 1", "P321": "P 3 2 1", "C2/c:b1": "C 1 2/c 1"},
+    **{"I2_1": "I 1 21 1", "B2_1": "B 1 21 1", "B 2": "B 1 1 2", "P_21/c": "P 1 21/c 1"},
+    **{"P_1_21/c_1": "P 1 21/c 1", "P_21": "P 1 21 1", "P_n_m_a": "P n m a"},
+    **{"I_41/a_m_d:2": "I 41/a m d:2", "P 2_1/n 2_1/m 2_1/a": "P n m a"},
+    **{"P2_1/n2_1/m2_1/a": "P n m a", "P21/m21/n21/b": "P m n b", "C 2/m 2/c 2_1/e": "C m c a"},
+    **{"P_2/m_2/m_2/m": "P m m m", r"$F\,4_1/d\,\bar{3}\,2/m$:2": "F d -3 m:2"},
+    **{"F 41/d -3 2/m :2": "F d -3 m:2", "R -3 2/c:R": "R -3 c:R", "227:2": "F d -3 m:2"},
+    **{"227:1": "F d -3 m:1", "62:cab": "P b n m", "14:b1": "P 1 21/c 1", "166:R": "R -3 m:R"},
+    **{"No. 225": "F m -3 m", "#225": "F m -3 m", "P 4 / m m m": "P 4/m m m"},
+    **{"I41/amdZ": "I 41/a m d:2", "P4/nmmS": "P 4/n m m:1", "Pbar1": "P -1"},
+    **{"Fdbar3m:1": "F d -3 m:1", "Pm3barm": "P m -3 m", "F 4d 2 3 -1d": "F d -3 m:1"},
+    **{"P 2c -2ac": "P c a 21", "-P 2ac 2ab": "P b c a", "-P 6c 2c": "P 63/m m c"},
+    "-F 4vw 2vw 3": "F d -3 m:2",
 }
 
 
@@ -167,46 +144,21 @@ def test_names_that_people_write(name: str, setting: str) -> None:
     [
         "C2_1",  # C 1 21 1 is number 5, C 1 1 21 number 4
         *(
-            "P 2 1",
-            "P 32 1",
-            "P 3_2 1",
-            "P3_21",
-            "P 2_1 2_1 2 1",
-            "P_3_21",
-            "P_2_1/c",
+            *("P 2 1", "P 32 1", "P 3_2 1", "P3_21", "P 2_1 2_1 2 1", "P_3_21", "P_2_1/c"),
             "P 2/n 2/m 2/a",  # an axis that is none of P n m a
-            "P 21/n m a",
-            "P 42/m 2/m 2/m",
-            "P 3/m 2/m 2/m",
-            "P 2/m -3 2/m",
-            "P2_7",
-            "P2/_c",
+            *("P 21/n m a", "P 42/m 2/m 2/m", "P 3/m 2/m 2/m", "P 2/m -3 2/m", "P2_7", "P2/_c"),
             "P21/c/c",
         ),
         *("P21_/c", "P 21c", "P21-c", "P2_1/", "/P21", "P", "P-", "_", ":", "P:1", "P 21:1"),
         *(
-            "Pnma:2",
-            "Fd-3m:3",
-            "R-3:1",
-            "P-3:H",
-            "H 3:R",
-            "H m",
-            "X 1",
-            "P 2 2",
-            "P 1 1",
-            "P 2c",
-            "P 4n",
+            *("Pnma:2", "Fd-3m:3", "R-3:1", "P-3:H", "H 3:R", "H m", "X 1", "P 2 2", "P 1 1"),
+            *("P 2c", "P 4n"),
         ),
         *(
-            "-P 4",
-            "-I 4",
-            "Hall: P2_1",
-            "Hall: P 21/c",
-            "Hall: Q 2",
-            "Hall",
-            "hall: x",
+            *("-P 4", "-I 4", "Hall: P2_1", "Hall: P 21/c", "Hall: Q 2", "Hall", "hall: x"),
             "P 2 ybc zz",
         ),
+        *("14:3", "225:2", "300", "#0", "0:1", "P 31 2", "I 4 2 3", "-R 3"),
         *("14 15", "231", "P 21/c 14", "Fd-3m (origin 3)", "<sub>", "$$", "\\bar", "P\u0305"),
     ],
 )
@@ -249,57 +201,6 @@ def test_the_symbols_of_hall() -> None:
         assert gemmi.find_spacegroup_by_ops(gemmi.GroupOps(found)).number == row.number
     assert space_group("hall: P 2").name == "P 1 1 2"
     assert space_group("HALL:P 2 (0 0 1)").order == 2
-
-
-def test_groups_of_spaces_by_typeset_names() -> None:
-    assert group_by_name("P2_1/c").name == "P 1 21/c 1"
-    with pytest.raises(GroupError):
-        group_by_name("C2_1")
-
-
-@pytest.mark.parametrize("name", WALLPAPER_GROUPS)
-def test_plane_groups_are_read_with_blanks_or_refused(name: str) -> None:
-    for written in (" ".join(name), f" {name} ", f"${name}$"):
-        assert wallpaper_group(written).name == name
-        assert group_by_name(written).name == name
-    for capital in (name.capitalize(), name.upper()):
-        assert wallpaper_group(capital).name == name
-    for wrong in (f"{name}x", f"{name[0]}_{name[1:]}"):
-        with refused("wallpaper group", kind=GroupError):
-            wallpaper_group(wrong)
-
-
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [
-        ("227:2", "F d -3 m:2"),
-        ("227:1", "F d -3 m:1"),
-        ("62:cab", "P b n m"),
-        ("14:b1", "P 1 21/c 1"),
-        ("166:R", "R -3 m:R"),
-        ("No. 225", "F m -3 m"),
-        ("#225", "F m -3 m"),
-        ("P 4 / m m m", "P 4/m m m"),
-        ("I41/amdZ", "I 41/a m d:2"),
-        ("P4/nmmS", "P 4/n m m:1"),
-        ("Pbar1", "P -1"),
-        ("Fdbar3m:1", "F d -3 m:1"),
-        ("Pm3barm", "P m -3 m"),
-        ("F 4d 2 3 -1d", "F d -3 m:1"),
-        ("P 2c -2ac", "P c a 21"),
-        ("-P 2ac 2ab", "P b c a"),
-        ("-P 6c 2c", "P 63/m m c"),
-        ("-F 4vw 2vw 3", "F d -3 m:2"),
-    ],
-)
-def test_numbers_with_settings_and_symbols_of_hall(name: str, meant: str) -> None:
-    assert space_group(name).name == meant
-
-
-@pytest.mark.parametrize("name", ["14:3", "225:2", "300", "#0", "0:1", "P 31 2", "I 4 2 3", "-R 3"])
-def test_what_has_no_sure_meaning_is_refused(name: str) -> None:
-    with refused("space group", kind=GroupError):
-        space_group(name)
 
 
 def test_no_symbol_of_hall_is_taken_for_another_group() -> None:

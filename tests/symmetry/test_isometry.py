@@ -7,19 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError, NotAnIsometryError
-from orbiflow.symmetry import Isometry, identity, translation
+from orbiflow.symmetry import Isometry, identity
 from refusals import refused
 from strategies import isometries, random_points, seeds
 
 dims = st.sampled_from((1, 2, 3, 5))
 triples = dims.flatmap(lambda d: st.tuples(isometries(d), isometries(d), isometries(d)))
 single = dims.flatmap(isometries)
-
-
-@given(triples)
-def test_composition_is_associative(three):
-    f, g, h = three
-    assert ((f @ g) @ h).is_close(f @ (g @ h), 1e-13)
 
 
 @given(triples, seeds)
@@ -35,24 +29,10 @@ def test_inverse_undoes_from_either_side(g):
     assert (g @ g.inverse()).is_close(identity(g.dim), 1e-13)
 
 
-@given(triples)
-def test_determinant_is_multiplicative(three):
-    f, g, _ = three
-    assert (f @ g).determinant == f.determinant * g.determinant
-
-
 @given(single, seeds)
 def test_push_is_the_difference_of_two_images(g, seed):
     p, v = random_points(seed, 2, 6, g.dim)
     np.testing.assert_allclose(g.push(v), g(p + v) - g(p), atol=1e-13)
-
-
-@given(single, seeds)
-def test_distances_are_kept(g, seed):
-    p, q = random_points(seed, 2, 6, g.dim)
-    np.testing.assert_allclose(
-        np.linalg.norm(g(p) - g(q), axis=-1), np.linalg.norm(p - q, axis=-1), rtol=1e-13
-    )
 
 
 @given(single, seeds, st.sampled_from([(torch.float64, 1e-14), (torch.float32, 5e-6)]))
@@ -71,13 +51,6 @@ def test_gradients_pass_through_the_action():
     g(p)[0].backward()
     assert p.grad is not None
     assert p.grad.tolist() == [0.0, -1.0]
-
-
-@given(st.lists(st.floats(-5, 5), min_size=1, max_size=4))
-def test_translation_adds_its_vector(vector):
-    g = translation(vector)
-    assert g(np.zeros(len(vector))).tolist() == vector
-    assert g.push(np.ones(len(vector))).tolist() == [1.0] * len(vector)
 
 
 def test_parts_cannot_be_changed_from_outside():

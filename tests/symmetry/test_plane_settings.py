@@ -16,22 +16,17 @@ SIX = THREE + "-x,-y y,-x+y x-y,x "
 FOUR = "x,y -x,-y -y,x y,-x "
 ACROSS, ALONG = "-y,-x -x+y,y x,x-y ", "y,x x-y,-y -x,-x+y "
 TABLES = {
-    ("p1",): ("oblique", "x,y"),
-    ("p2", "p211"): ("oblique", "x,y -x,-y"),
+    **{("p1",): ("oblique", "x,y"), ("p2", "p211"): ("oblique", "x,y -x,-y")},
     ("pm", "p1m1"): ("rectangular", "x,y -x,y"),
-    ("pg", "p1g1"): ("rectangular", "x,y -x,y+1/2"),
-    ("cm", "c1m1"): ("centred", "x,y -x,y"),
+    **{("pg", "p1g1"): ("rectangular", "x,y -x,y+1/2"), ("cm", "c1m1"): ("centred", "x,y -x,y")},
     ("pmm", "p2mm"): ("rectangular", "x,y -x,-y -x,y x,-y"),
     ("pmg", "p2mg"): ("rectangular", "x,y -x,-y -x+1/2,y x+1/2,-y"),
     ("pgg", "p2gg"): ("rectangular", "x,y -x,-y -x+1/2,y+1/2 x+1/2,-y+1/2"),
-    ("cmm", "c2mm"): ("centred", "x,y -x,-y -x,y x,-y"),
-    ("p4",): ("square", FOUR),
+    **{("cmm", "c2mm"): ("centred", "x,y -x,-y -x,y x,-y"), ("p4",): ("square", FOUR)},
     ("p4m", "p4mm"): ("square", FOUR + "-x,y x,-y y,x -y,-x"),
     ("p4g", "p4gm"): ("square", FOUR + "-x+1/2,y+1/2 x+1/2,-y+1/2 y+1/2,x+1/2 -y+1/2,-x+1/2"),
-    ("p3",): ("hexagonal", THREE),
-    ("p3m1",): ("hexagonal", THREE + ACROSS),
-    ("p31m",): ("hexagonal", THREE + ALONG),
-    ("p6",): ("hexagonal", SIX),
+    **{("p3",): ("hexagonal", THREE), ("p3m1",): ("hexagonal", THREE + ACROSS)},
+    **{("p31m",): ("hexagonal", THREE + ALONG), ("p6",): ("hexagonal", SIX)},
     ("p6m", "p6mm"): ("hexagonal", SIX + ACROSS + ALONG),
     # the other setting, in which a and b are exchanged
     ("p11m",): ("rectangular", "x,y x,-y"),
@@ -40,11 +35,8 @@ TABLES = {
     ("p2gm",): ("rectangular", "x,y -x,-y -x,y+1/2 x,-y+1/2"),
 }
 CELLS = {
-    "oblique": (1.3, 0.9, 73.0),
-    "rectangular": (1.0, 1.7),
-    "centred": (1.0, 1.7),
-    "square": (2.0, 2.0),
-    "hexagonal": (1.5, 1.5),
+    **{"oblique": (1.3, 0.9, 73.0), "rectangular": (1.0, 1.7), "centred": (1.0, 1.7)},
+    **{"square": (2.0, 2.0), "hexagonal": (1.5, 1.5)},
 }
 CENTRED = [[0.5, 0.5], [0.5, -0.5]]  # its primitive vectors (a + b) / 2 and (a - b) / 2, by columns
 ROWS = [(name, *row) for names, row in TABLES.items() for name in names]

@@ -68,15 +68,8 @@ def test_operators_are_read_as_another_program_reads_them(rows):
     [
         *("", "x", "x,y", "x,y,z,x", "x,y,w", "x,y,+", "x,y,*z", "x,y,z*", "x,y,1/0", "x,y,z+-1"),
         *(
-            "x,y,1e9",
-            "x,y," + "1" * 300,
-            "x,y,z" * 99,
-            "x,y,1/2/3",
-            "x,y,.",
-            "x,y,z\0",
-            "xy,y,z",
-            "x++y,y,z",
-            "x,y,z" + " " * 200,
+            *("x,y,1e9", "x,y," + "1" * 300, "x,y,z" * 99, "x,y,1/2/3", "x,y,.", "x,y,z\0"),
+            *("xy,y,z", "x++y,y,z", "x,y,z" + " " * 200),
         ),
         "x,y,__import__('os')",
     ],

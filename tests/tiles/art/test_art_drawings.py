@@ -18,7 +18,6 @@ from artworks import EYE, art_settings, flat, squirrel
 from orbiflow.drawing import palette
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import (
-    CLASSES,
     Artwork,
     Over,
     Uses,
@@ -274,25 +273,23 @@ def test_artwork_is_carried_as_it_is_seen(body: str, plain: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    "text",
     [
-        ('<svg viewBox="0 0 10 99"><rect width="3" height="3"/></svg>', "must have its aspect"),
-        ("<svg><g/></svg>", "draws nothing that is filled or stroked"),
-        ('<svg><rect x="-1e300" width="1e301" height="3"/></svg>', "reaches much too far"),
-        ('<svg><path d="M0 0 L9e7 0 L9e7 9e7 Z"/></svg>', "too intricate to be carried"),
-        ("<svg><rect", "not well-formed XML"),
-        ("<html/>", "not an <svg> drawing"),
-        ('<!DOCTYPE a [<!ENTITY b SYSTEM "c">]><svg/>', "only entities of a short plain text"),
+        '<svg viewBox="0 0 10 99"><rect width="3" height="3"/></svg>',  # of another aspect
+        "<svg><g/></svg>",
+        '<svg><rect x="-1e300" width="1e301" height="3"/></svg>',
+        '<svg><path d="M0 0 L9e7 0 L9e7 9e7 Z"/></svg>',  # too intricate to be carried
+        *("<svg><rect", "<html/>", '<!DOCTYPE a [<!ENTITY b SYSTEM "c">]><svg/>'),
     ],
 )
-def test_drawings_that_are_refused(text: str, message: str, tmp_path: Path) -> None:
+def test_drawings_that_are_refused(text: str, tmp_path: Path) -> None:
     path = tmp_path / "drawing.svg"
     path.write_text(text)
-    with pytest.raises(InputFileError, match=message):
+    with refused("drawing.svg", kind=InputFileError):
         read_over(path, squirrel("IH4"))
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH21"])
 def test_long_lines_bend_with_the_tile(name: str, tmp_path: Path) -> None:
     tile = squirrel(name)
     body = '<line/><polyline points="300,250 700,250" fill="none" stroke="#000"/>'

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from artworks import art_settings, checkerboard, squirrel
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import CLASSES, Over, Page, artwork, render_artwork
+from orbiflow.tiles import Over, Page, artwork, render_artwork
 from orbiflow.tiles.make.repeats import rectangle
 from orbiflow.tiles.page import Box
 from refusals import refused
@@ -23,7 +22,7 @@ def two_by_two(page: Page) -> Page:
 
 
 @pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     tile = squirrel(name)
     settings = art_settings(repeat="basic", tile_size="60px", colour=how, stretch=0.05)
@@ -68,14 +67,6 @@ def test_half_the_cell_where_the_lattice_has_it(turn: float, repeat) -> None:
     steps = np.linalg.solve(basis, np.linalg.solve(found.linear, ways.T))
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
     assert abs(round(np.linalg.det(steps))) == 1
-
-
-@pytest.mark.parametrize("name", ["IH2", "IH3", "IH5", "IH6", "IH7", "IH21", "IH28"])
-def test_lattices_with_a_rectangle_are_hardly_stretched(name: str) -> None:
-    art = artwork(squirrel(name), art_settings(repeat="basic", tile_size="300px", stretch=0.0))
-    assert re.search("whole pixels stretch it|nothing is stretched", art.notes[0])
-    values = np.linalg.svd(art.page.stretch, compute_uv=False)
-    assert values[0] / values[1] < 1.002  # whole pixels alone
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.3, -1.2])

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
-from scipy.ndimage import binary_erosion
 
 from artworks import (
     EYE,
@@ -24,7 +23,7 @@ from artworks import (
 from orbiflow.drawing import palette
 from orbiflow.tiles import CLASSES, ArtSettings, Artwork, Over, artwork, render_artwork
 from orbiflow.tiles.make import art_scene
-from orbiflow.tiles.motifs import NOWHERE, carried_places, picture_paint, runs
+from orbiflow.tiles.motifs import NOWHERE, runs
 from orbiflow.tiles.motifs.raster import region_sides
 from orbiflow.tiles.silhouette import triangulate
 
@@ -49,7 +48,7 @@ def rgb(colour: str) -> np.ndarray:
     return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_a_flat_picture_covers_the_plane(name: str) -> None:
     tile = squirrel(name)
     made = render_artwork(artwork(tile, PAGE, Over(flat(tile, "#c02040"))))
@@ -57,7 +56,7 @@ def test_a_flat_picture_covers_the_plane(name: str) -> None:
     assert (made == rgb("#c02040")).all()
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_each_sample_is_in_one_copy(name: str) -> None:
     art = artwork(squirrel(name), settings(samples=1))
     made = render_artwork(art)
@@ -68,7 +67,7 @@ def test_each_sample_is_in_one_copy(name: str) -> None:
     assert (made == expected).all(axis=2).mean() > 0.9999
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_a_checkerboard_is_carried(name: str) -> None:
     tile = squirrel(name)
     board = checkerboard(tile, 6)
@@ -112,20 +111,6 @@ def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
     assert reds < 40 * (shown.sum() + 8)
     mirrored = np.linalg.det(tile.tile.group.linear_parts) < 0
     assert mirrored.any() == (name in ("IH2", "IH3", "IH5", "IH6"))
-
-
-def test_the_map_onto_the_raster_has_no_fold() -> None:
-    tile = squirrel("IH6")
-    art = artwork(tile, PAGE, Over(flat(tile, "white")))
-    grid = picture_paint(art.pictures[0], art.tile, art.density(0), art.page.count).grid
-    bending, frame = tile.require_map()
-    images, rest = frame.to_input(bending.images), frame.to_input(bending.rest)
-    places, _ = carried_places(grid, images, rest, bending.triangles)
-    whole = np.asarray(binary_erosion(grid.inside(tile.tile.polygon), iterations=2), dtype=bool)
-    down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
-    turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]
-    inside = whole[:-1, :-1]
-    assert (turn[inside] > 0).all() or (turn[inside] < 0).all()
 
 
 def test_triangles_and_what_is_around_them() -> None:

@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-from PIL import Image, ImageDraw
 
 from artworks import art_settings, flat, squirrel
 from orbiflow.drawing import PALETTES
-from orbiflow.studio.silhouette_file import read_input, silhouette_file
-from orbiflow.tiles import (
-    FileContent,
-    Over,
-    ReadingSettings,
-    Target,
-    are_told_apart,
-    artwork,
-    page_picture,
-)
+from orbiflow.tiles import FileContent, Over, Target, are_told_apart, artwork, page_picture
 
 
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 1.0])
@@ -46,21 +33,6 @@ def test_a_dark_picture_that_is_asked_for_is_laid_and_said(
     made = artwork(tile, art_settings(palette=chosen), Over(flat(tile, colour)))
     assert made.pictures[0] is not None
     assert any("told apart" in note for note in made.notes) == is_said
-
-
-@pytest.mark.parametrize(("ink", "is_told"), [((16, 16, 16), False), ((60, 140, 90), True)])
-def test_the_studio_begins_without_the_picture_of_a_black_icon(
-    tmp_path: Path, ink: tuple[int, int, int], is_told: bool
-) -> None:
-    image = Image.new("RGB", (300, 220), "white")
-    pen = ImageDraw.Draw(image)
-    pen.ellipse((40, 30, 260, 190), fill=ink)
-    pen.ellipse((90, 60, 112, 82), fill="white")
-    image.save(tmp_path / "input.png")
-    read_input(tmp_path, "icon.png", ReadingSettings())
-    shown = json.loads(silhouette_file(tmp_path).read_text())["shown"]
-    assert shown["told_apart"] == is_told
-    assert shown["coloured"]
 
 
 def test_a_drawing_in_its_own_ink_is_shown_black() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from exported import tile_of, tiles
-from orbiflow.tiles import CLASSES, Curve, Tile
+from orbiflow.tiles import Curve, Tile
 from orbiflow.tiles.page import fitted, outline, turning
 from orbiflow.tiles.page.outlines import CORNER, SHARP_CORNER
 
@@ -96,12 +96,6 @@ def test_smooth_tiles_tile_as_exactly_as_polygons(tile: Tile, share: float) -> N
     assert (
         shapely.hausdorff_distance(polygon.exterior, shapely.LinearRing(tile.polygon)) <= tolerance
     )
-
-
-@pytest.mark.parametrize("name", CLASSES)
-def test_smooth_tiles_are_shorter_to_write(name: str) -> None:
-    tile = tile_of(name)
-    assert len(outline(tile, 0.02 * tile.radius).closed[0].pieces) < len(tile.polygon) / 3
 
 
 def test_curves_that_would_cross_are_fitted_more_closely() -> None:

@@ -21,10 +21,8 @@ from scipy.spatial import KDTree
 
 from artworks import EYE, face, squirrel
 from exported import Line, dxf_lines, svg_lines
-from orbiflow.drawing import palette
 from orbiflow.tiles import ExportSettings, Scene, scenes, sheet_content
 from orbiflow.tiles.make.drawings import burnt
-from orbiflow.tiles.motifs import drawn_motif
 from orbiflow.tiles.page import Curve, Motif, Part, Style, boundary, region_of
 from refusals import refused
 
@@ -223,10 +221,7 @@ def test_sheets_share_the_engraving_out() -> None:
     tile = squirrel("IH4")
     whole = {
         **PAGE,
-        "cut": "skeleton",
-        "clip": True,
-        "eyes": ((*EYE, 60.0),),
-        "area": (120.0, 90.0),
+        **{"cut": "skeleton", "clip": True, "eyes": ((*EYE, 60.0),), "area": (120.0, 90.0)},
     }
     one, several = (
         scenes(tile, ExportSettings(**{**whole, "bed": bed}))[0] for bed in (None, (70.0, 60.0))
@@ -247,12 +242,3 @@ def test_sheets_share_the_engraving_out() -> None:
         for curve in scene.curves(scene.layers[0]):
             assert (curve.bounds() > low - 1e-9).all()
             assert (curve.bounds() < high + 1e-9).all()
-
-
-def test_engraved_lines_are_scored_along_their_middle() -> None:
-    wide, thin = (
-        drawn_motif(squirrel("IH4"), ExportSettings(strokes="hatch"), palette("ink"), hairlines=k)
-        for k in (False, True)
-    )
-    area = region_of(wide.parts[0]).buffer(1e-6)
-    assert area.covers(shapely.MultiLineString([c.flattened(1) for c in thin.parts[0].curves]))

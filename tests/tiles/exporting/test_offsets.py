@@ -54,16 +54,6 @@ def test_a_gap_that_closes_is_a_note_with_its_place() -> None:
     assert offset_ring(gap, 0.4, 1e-3)[1] == ""
 
 
-def test_a_gap_that_is_less_deep_than_the_offset_closes_too() -> None:
-    gap = np.array([[0, 0], [20, 0], [20, 4], [6, 4], [6, 5], [20, 5], [20, 9], [0, 9.0]])
-    assert (
-        "1 gap closes where the outline is less than 60 mm across"
-        in offset_ring(gap, 30.0, 1e-3)[1]
-    )
-    box = np.array([[0, 0], [20, 0], [20, 4], [0, 4.0]])
-    assert offset_ring(box, 60.0, 1e-3)[1] == ""
-
-
 @pytest.mark.parametrize("offset", [6.0, -1.0])
 @pytest.mark.parametrize("name", ["IH1", "IH5"])
 def test_pieces_in_the_file(name: str, offset: float) -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from typing import Any
 
 import numpy as np
-import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 from artworks import art_settings, squirrel, upside_down
 from orbiflow.drawing import palette, rgb
@@ -19,7 +16,6 @@ from orbiflow.tiles import (
     ArtSettings,
     ExportSettings,
     Uses,
-    art_file,
     artwork,
     render_artwork,
     scenes,
@@ -76,18 +72,6 @@ def test_art_and_export_put_tiles_in_the_same_places(
     page = shapely.box(0, 0, 211.7, 148)
     shown = [page.intersects(one) for one in np.asarray(shapely.polygons(painted))]
     assert apart(painted[shown], found) < 1e-6
-
-
-def test_a_length_stays_that_length() -> None:
-    art = artwork(
-        squirrel("IH4"), ArtSettings(**{"area": "300x200.3mm", "tile_size": "80mm", "dpi": 97})
-    )
-    svg, png = str(art_file(art, "svg")), art_file(art, "png")
-    assert 'width="300mm" height="200.3mm" viewBox="0 0 300 200.3"' in svg
-    assert isinstance(png, bytes)
-    image = Image.open(io.BytesIO(png))
-    assert image.size == (round(300 * 97 / 25.4), round(200.3 * 97 / 25.4))
-    assert image.info["dpi"] == pytest.approx((97, 97), abs=0.01)
 
 
 def test_whole_tiles_alone_are_painted() -> None:

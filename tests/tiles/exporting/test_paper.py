@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from artworks import EYE, squirrel
+from artworks import squirrel
 from exported import Line, polygons, svg_lines, tile_of
 from orbiflow.errors import SettingError
 from orbiflow.tiles import EscherTile, ExportSettings, Scene, as_tile, scenes, sheet_content
@@ -58,16 +58,6 @@ def test_a_page_to_colour_is_lines_within_a_border() -> None:
     np.testing.assert_allclose(np.ptp(border.points, axis=0), (190, 277), atol=1e-3)
 
 
-def test_a_page_to_colour_has_eyes() -> None:
-    plain, _ = drawn(squirrel("IH4"), purpose="colouring", tile_size=90)
-    scene, lines = drawn(squirrel("IH4"), purpose="colouring", tile_size=90, eyes=(EYE,))
-    assert len(scene.layers) > len(plain.layers)
-    assert scene.layers[0].style == (None, "#000000", 0.25)
-    points = np.concatenate([line.points for line in lines])
-    assert (points >= 10 - 1e-3).all()
-    assert (points <= np.array([200, 287]) + 1e-3).all()
-
-
 @pytest.mark.parametrize("name", ["IH1", "IH4", "IH5", "IH21"])
 def test_a_template_says_which_edges_fit_together(name: str) -> None:
     scene, lines = drawn(squirrel(name), purpose="template", tolerance=0.3)
@@ -112,13 +102,6 @@ def test_partners_are_images_of_each_other() -> None:
 def evenly(points: np.ndarray) -> np.ndarray:
     line, shares = shapely.LineString(points), np.linspace(0, 1, 33)
     return shapely.get_coordinates(shapely.line_interpolate_point(line, shares, normalized=True))
-
-
-def test_a_template_of_a_given_size_and_one_without_a_silhouette() -> None:
-    settings = ExportSettings(purpose="template", tile_size=70)
-    (scene,), notes = scenes(tile_of("IH5"), settings)
-    assert scene.facts["tile_size"] == 70
-    assert notes[-1] == "the template has no silhouette: no map of it is known"
 
 
 @pytest.mark.parametrize("offset", [2.0, -1.0])

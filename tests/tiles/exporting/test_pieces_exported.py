@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
-from orbiflow.tiles import CLASSES, ExportSettings, Tile, as_tile, scenes, sheet_content
+from orbiflow.tiles import ExportSettings, Tile, as_tile, scenes, sheet_content
 from orbiflow.tiles.make import cut_ring
 from orbiflow.tiles.make.layout import layout
 from orbiflow.tiles.make.nesting import Arrangement, on_sheet
@@ -58,7 +58,7 @@ def diameter(polygon: shapely.Polygon) -> float:
     return float(pdist(shapely.get_coordinates(polygon.convex_hull)).max())
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 @pytest.mark.parametrize("spacing", [0.0, 2.5])
 def test_pieces_keep_their_distance_and_the_page(name: str, spacing: float) -> None:
     (sheet,) = cut(tile_of(name), spacing=spacing, area=(220.0, 160.0), kerf=0.1)
@@ -123,26 +123,6 @@ def test_a_kerf_wider_than_a_slit() -> None:
     with refused("kerf", "slit", "0.20 mm"):
         cut_ring(slit, 0.25, 0.0)
     assert shapely.Polygon(cut_ring(slit, 0.15, 0.0)).is_valid
-
-
-@settings(max_examples=15, deadline=None)
-@given(st.floats(0.02, 1.0), st.just(0.0) | st.floats(1e-3, 0.35))
-def test_offset_there_and_back(kerf: float, clearance: float) -> None:
-    shape = np.array([[0, 0], [30, 3], [33, 20], [18, 12], [5, 24], [8, 10.0]])
-    region = shapely.Polygon(cut_ring(shape, kerf, clearance))
-    left = region.buffer(-kerf / 2, quad_segs=64)
-    wanted = shapely.Polygon(shape).buffer(-clearance / 2, join_style="mitre", mitre_limit=9)
-    # the round beam leaves fillets in inner corners, and nothing else
-    assert left.symmetric_difference(wanted).area < 0.5 * max(kerf, clearance) ** 2 + 1e-6
-
-
-def test_files_of_all_formats_have_the_same_pieces() -> None:
-    found = []
-    for form in ("svg", "dxf"):
-        own = ExportSettings(cut="pieces", kerf=0.15, area=(120.0, 90.0), tile_size=30, format=form)
-        found.append(scenes(tile_of("IH4"), own)[0][0])
-    one, other = ([tile.offset for tile in scene.tiles] for scene in found)
-    np.testing.assert_array_equal(one, other)
 
 
 def test_a_fit_test_cuts_two_neighbours_five_times() -> None:

@@ -14,7 +14,6 @@ from PIL import Image
 from artworks import art_settings, squirrel, write_run
 from orbiflow.errors import CertificationError, InputFileError, OutputError
 from orbiflow.tiles import (
-    AnimationSettings,
     ArtSettings,
     ClassFailure,
     EscherTile,
@@ -23,7 +22,6 @@ from orbiflow.tiles import (
     LikenessSearch,
     SearchResult,
     Tile,
-    animate,
     art,
     artwork,
     escherize_class,
@@ -64,14 +62,6 @@ def sources(folder: Path, found: EscherTile) -> list[Any]:
     return [folder, str(folder), folder / "result.json", read_result(folder), found]
 
 
-def test_a_folder_that_was_written_is_a_run_s(folder: Path, found: EscherTile) -> None:
-    document = json.loads((folder / "result.json").read_text())
-    assert [tile["class"] for tile in document["tiles"]] == ["IH4"]
-    assert document["settings"]["placements"] == 20
-    assert (folder / "IH4" / "model.safetensors").is_file()
-    np.testing.assert_array_equal(read_result(folder).tile.polygon, found.tile.polygon)
-
-
 def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(
     tmp_path: Path, found: EscherTile
 ) -> None:
@@ -107,18 +97,6 @@ def test_everything_that_holds_a_tile_is_exported_alike(
     assert all(other == first for other in others)
 
 
-def test_everything_with_a_map_is_drawn_alike(
-    tmp_path: Path, folder: Path, found: EscherTile
-) -> None:
-    settings = art_settings(area="90x60px", tile_size="40px", eyes=((210.0, 190.0),))
-    drawn = [
-        drawing(source, tmp_path / f"{k}.png", settings).read_bytes()
-        for k, source in enumerate(sources(folder, found))
-    ]
-    assert len(set(drawn)) == 1
-    assert Image.open(io.BytesIO(drawn[0])).size == (90, 60)
-
-
 @pytest.mark.parametrize("ending", ["svg", "pdf", "dxf", "png", "json"])
 def test_the_ending_decides_an_export_s_format(
     ending: str, tmp_path: Path, found: EscherTile
@@ -133,27 +111,6 @@ def test_the_ending_decides_an_export_s_format(
     assert plain.files[0].read_bytes().startswith(b"{")
 
 
-def test_the_ending_decides_an_animation_s_format(tmp_path: Path, found: EscherTile) -> None:
-    settings = AnimationSettings(**{"seconds": 0.5, "area": "96x64px"})
-    animate(found, tmp_path / "a.svg", settings)
-    assert (tmp_path / "a.svg").read_text().lstrip().startswith("<")
-    settings = settings.replace(fps=4)
-    animate(found, tmp_path / "a.gif", settings)
-    assert (tmp_path / "a.gif").read_bytes().startswith(b"GIF")
-
-
-def test_an_ending_of_no_format_is_refused_unless_settings_say_it(
-    tmp_path: Path, found: EscherTile
-) -> None:
-    out = tmp_path / "a.xyz"
-    with refused("out", ".xyz", "format", ".pdf"):
-        export(found, out)
-    with refused("out", "a.xyz", ".gif"):
-        animate(found, out)
-    assert not out.exists()
-    assert export(found, out, ExportSettings(format="json")).files == (out,)
-
-
 def test_a_tile_without_a_map_needs_the_target_for_pictures(tmp_path: Path) -> None:
     target, tile = animal("squirrel.dat"), squirrel("IH4").tile
     plain = Tile(tile.polygon, tile.group, "IH4")
@@ -163,11 +120,6 @@ def test_a_tile_without_a_map_needs_the_target_for_pictures(tmp_path: Path) -> N
         art(plain, tmp_path / "eye.png", seen)
     assert drawing(with_map(plain, target), tmp_path / "eye.png", seen).is_file()
     assert with_map(plain, target).notes
-
-
-def test_a_rank_of_a_folder_keeps_its_map(tmp_path: Path) -> None:
-    run = write_run(tmp_path / "run", "IH5")
-    assert with_map(read_result(run, "IH5")).bending is not None
 
 
 def test_a_picture_goes_through_the_map(tmp_path: Path, found: EscherTile) -> None:

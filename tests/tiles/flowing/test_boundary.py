@@ -91,15 +91,6 @@ def test_polygon_follows_the_curve(name: str) -> None:
     assert certify(tile).edge_matching == "segments"
 
 
-@pytest.mark.parametrize("name", CLASSES)
-def test_straight_edges_keep_few_vertices(name: str) -> None:
-    kind = CLASSES[name]
-    model = TileModel(kind, torch.zeros(1), max_frequency=1)
-    # the corners, and the midpoint of an edge that turns about it
-    centres = sum(pair.first == pair.second for pair in kind.identified_edges)
-    assert len(extract_tile(model)[0].polygon) == len(kind.template()) + centres
-
-
 def test_a_crossing_boundary_is_refused_unless_forced() -> None:
     with refused("IH21", kind=CertificationError):
         extract_tile(crossed())

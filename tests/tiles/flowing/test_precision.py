@@ -1,6 +1,5 @@
 """Tiles stay certified whatever precision a model has been through."""
 
-import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -55,13 +54,6 @@ def test_no_cast_loses_the_certificate(
     if exact is not None:
         assert model.vertices is not None
         assert torch.equal(model.vertices, exact)
-
-
-@pytest.mark.parametrize("name", ["IH4", "IH5", "IH28"])
-def test_the_group_of_a_rounded_model_is_that_of_its_polygon(name: str) -> None:
-    model = started(name, 1, from_template=False).float()
-    tile, _ = extract_tile(model)
-    assert certify(tile, tolerance=1e-12).valid
 
 
 def test_a_rounded_model_still_maps_in_its_own_precision() -> None:

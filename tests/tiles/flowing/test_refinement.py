@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import CertificationError
 from orbiflow.runtime import Cancel, Cancelled
-from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup, wallpaper_group
+from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from orbiflow.tiles import CLASSES, EscherTile, Tile, certify, dirichlet_tile, refine
 from orbiflow.tiles.search import TileVariations
 from refusals import refused
@@ -147,20 +147,15 @@ def test_it_can_be_cancelled() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    "change",
     [
-        ({"loss": 3}, "the loss must be a function"),
-        ({"loss": lambda p: p}, r"one number .* got a tensor"),
-        ({"loss": lambda p: float(p.detach().sum())}, "one number that depends on the polygon"),
-        ({"loss": lambda p: p.detach().sum()}, "one number that depends on the polygon"),
-        ({"loss": lambda p: p.sum() / 0}, "not a finite number"),
-        ({"pull": -1}, "pull must be"),
-        ({"steps": 0}, "steps must be"),
-        ({"points": 2001}, "points must be"),
+        *({"loss": 3}, {"loss": lambda p: p}, {"loss": lambda p: float(p.detach().sum())}),
+        *({"loss": lambda p: p.detach().sum()}, {"loss": lambda p: p.sum() / 0}),
+        *({"pull": -1}, {"steps": 0}, {"points": 2001}),
     ],
 )
-def test_mistakes_are_told(change, words: str) -> None:
-    with pytest.raises(OrbiflowError, match=words):
+def test_mistakes_are_told(change) -> None:
+    with refused(*change):
         refine(**{"tile": template("IH4"), "loss": perimeter, **change})
 
 
@@ -170,31 +165,3 @@ def test_what_does_not_tile_is_refused() -> None:
     )
     with refused("tile", kind=CertificationError):
         refine(square, perimeter)
-
-
-def test_every_group_has_a_space() -> None:
-    sizes = {
-        name: TileVariations(any_cell(wallpaper_group(name), 5)).matrix.shape[1]
-        for name in WALLPAPER_GROUPS
-    }
-    assert min(sizes.values()) >= 3
-
-
-def test_touching_is_blamed_only_where_it_ends_the_descent(monkeypatch) -> None:
-    """Near a minimum the longest step may touch, and shorter ones not lower the loss."""
-    from orbiflow.tiles.flowing import refinement
-
-    def steep(polygon: Tensor) -> Tensor:
-        first.append(polygon.detach().clone())
-        away = polygon - first[0]
-        return 1 + away[:, 1].sum() + 1e12 * away.square().sum()
-
-    def notes(widths: list[float]) -> str:
-        found = iter([1.0, *widths])
-        monkeypatch.setattr(refinement, "_clearance", lambda _: next(found, widths[-1]))
-        first.clear()
-        return refine(template("IH4"), steep, points=24, steps=3).notes[0]
-
-    first: list[Tensor] = []
-    assert "touched" not in notes([0.0, 0.0, 1.0])
-    assert "touched" in notes([0.0])

@@ -52,38 +52,6 @@ def test_agrees_with_shapely(seed: int, corners: int, clockwise: bool) -> None:
     assert np.abs(phi.numpy() - np.where(inside, distance, -distance)).max() < 1e-12
 
 
-def test_the_polygons_are_of_both_kinds() -> None:
-    polygons = [shapely.Polygon(star_polygon(seed).numpy()) for seed in range(100)]
-    assert all(p.is_valid for p in polygons)
-    convex = sum(p.convex_hull.area - p.area < 1e-12 for p in polygons)
-    assert 5 <= convex <= 95
-
-
-@given(seeds)
-def test_stacks_broadcast(seed: int) -> None:
-    vertices = torch.stack([star_polygon(seed + i) for i in range(3)])
-    points = random_tensor(seed, 3, 7, 2)
-    each = [signed_distance(p, v) for p, v in zip(points, vertices, strict=True)]
-    assert torch.equal(signed_distance(points, vertices), torch.stack(each))
-    shared = [signed_distance(points[0], v) for v in vertices]
-    assert torch.equal(signed_distance(points[0], vertices), torch.stack(shared))
-    one = [signed_distance(p, vertices[0]) for p in points]
-    assert torch.equal(signed_distance(points, vertices[0]), torch.stack(one))
-
-
-@given(seeds)
-def test_gradient_points_away_from_the_nearest_boundary_point(seed: int) -> None:
-    vertices = star_polygon(seed)
-    polygon = shapely.Polygon(vertices.numpy())
-    points = smooth_points(seed, polygon).requires_grad_()
-    phi = signed_distance(points, vertices)
-    (gradient,) = torch.autograd.grad(phi.sum(), points)
-    assert (gradient.norm(dim=-1) - 1).abs().max().item() < 1e-12
-    offset = points.detach() - torch.tensor(nearest(points.detach().numpy(), polygon.exterior))
-    outward = offset / offset.norm(dim=-1, keepdim=True) * phi.detach().sign()[:, None]
-    assert (gradient - outward).abs().max().item() < 1e-10
-
-
 @given(seeds)
 def test_derivatives_match_differences(seed: int) -> None:
     vertices = star_polygon(seed)

@@ -14,11 +14,9 @@ from safetensors.numpy import save
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import CLASSES, Bending, Frame, TileMap, TileModel, as_map, as_model, load_model
-from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.tile_map import BENDING, FORMAT, MAX_BYTES
 from refusals import refused
 from sealed import sealed
-from strategies import seeds
 
 
 def candidate(name: str, seed: int = 0, segments: int = 1, size: int = 1) -> TileModel:
@@ -51,13 +49,6 @@ def assert_same(one: TileModel, other: TileModel) -> None:
     assert all(torch.equal(mine[name], theirs[name]) for name in mine)
 
 
-@settings(max_examples=7)
-@given(st.sampled_from(list(CLASSES)), seeds, st.integers(1, 3))
-def test_round_trip(name: str, seed: int, segments: int) -> None:
-    model = candidate(name, seed, segments)
-    assert_same(model, as_model(as_map(model)))
-
-
 @pytest.mark.parametrize("name", CLASSES)
 def test_round_trip_through_a_file(name: str, tmp_path: Path) -> None:
     model = candidate(name, 7, 2)
@@ -65,15 +56,6 @@ def test_round_trip_through_a_file(name: str, tmp_path: Path) -> None:
     path.write_bytes(as_map(model).to_bytes())
     loaded = load_model(path)
     assert_same(model, loaded)
-
-
-def test_a_restored_model_gives_the_same_polygon(tmp_path: Path) -> None:
-    tile, fine = extract_tile(candidate("IH6", 3))
-    path = tmp_path / "model.safetensors"
-    path.write_bytes(as_map(fine).to_bytes())
-    again, _ = extract_tile(load_model(str(path)))
-    assert np.array_equal(tile.polygon, again.polygon)
-    assert np.array_equal(tile.group.lattice, again.group.lattice)
 
 
 def test_the_frame_is_kept_bit_for_bit(tmp_path: Path) -> None:
@@ -107,12 +89,6 @@ def test_the_bending_is_kept_bit_for_bit(tmp_path: Path) -> None:
         assert_same(as_model(again), as_model(saved))
 
 
-def test_files_without_a_bending_have_none(tmp_path: Path) -> None:
-    path = tmp_path / "model.safetensors"
-    path.write_bytes(good())
-    assert TileMap.read(path).bending is None
-
-
 def with_bending(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
     bending = two_triangles()
     arrays = dict(zip(BENDING, (bending.rest, bending.images, bending.triangles), strict=True))
@@ -127,42 +103,31 @@ def with_bending(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
 
 
 REST, IMAGES, TRIANGLES = BENDING
-BAD_BENDINGS: dict[str, tuple[Callable[[], bytes], str]] = {
-    "rest missing": (with_bending(REST, None), "the model's bending.rest is missing"),
-    "images missing": (with_bending(IMAGES, None), "the model's bending.images is missing"),
-    "triangles missing": (with_bending(TRIANGLES, None), "bending.triangles is missing"),
-    "too many points": (with_bending(REST, np.zeros((100_001, 2))), "images must be .*shape"),
-    "too many triangles": (
-        with_bending(TRIANGLES, np.zeros((200_001, 3), dtype=np.int64)),
-        "1 to 200000 triangles, got 4 and 200001",
-    ),
-    "no triangles": (with_bending(TRIANGLES, np.zeros((0, 3), dtype=np.int64)), "got 4 and 0"),
-    "index too large": (with_bending(TRIANGLES, np.array([[0, 1, 4]])), "indices of its 4"),
-    "index negative": (with_bending(TRIANGLES, np.array([[0, 1, -1]])), "indices of its 4"),
-    "index huge": (
-        with_bending(TRIANGLES, np.array([[0, 1, 2**64 - 1]], dtype=np.uint64)),
-        "indices of its 4",
-    ),
-    "index a float": (with_bending(TRIANGLES, np.array([[0.0, 1.0, 2.0]])), "whole numbers"),
-    "turned over": (with_bending(TRIANGLES, np.array([[2, 1, 0]])), "flat or turned over"),
-    "flat": (with_bending(TRIANGLES, np.array([[0, 0, 1]])), "flat or turned over"),
-    "images folded": (
-        with_bending(IMAGES, np.array([[0, 0], [1, 0], [0.2, 0.5], [0.5, 0.0]])),
-        "images: 1 triangles are flat or turned over",
-    ),
-    "rest NaN": (with_bending(REST, np.full((4, 2), np.nan)), "finite"),
-    "rest in 3-D": (with_bending(REST, np.zeros((4, 3))), "rest must be .*shape"),
+BAD_BENDINGS: dict[str, Callable[[], bytes]] = {
+    "rest missing": with_bending(REST, None),
+    "images missing": with_bending(IMAGES, None),
+    "triangles missing": with_bending(TRIANGLES, None),
+    "too many points": with_bending(REST, np.zeros((100_001, 2))),
+    "too many triangles": with_bending(TRIANGLES, np.zeros((200_001, 3), dtype=np.int64)),
+    "no triangles": with_bending(TRIANGLES, np.zeros((0, 3), dtype=np.int64)),
+    "index too large": with_bending(TRIANGLES, np.array([[0, 1, 4]])),
+    "index negative": with_bending(TRIANGLES, np.array([[0, 1, -1]])),
+    "index huge": with_bending(TRIANGLES, np.array([[0, 1, 2**64 - 1]], dtype=np.uint64)),
+    "index a float": with_bending(TRIANGLES, np.array([[0.0, 1.0, 2.0]])),
+    "turned over": with_bending(TRIANGLES, np.array([[2, 1, 0]])),
+    "flat": with_bending(TRIANGLES, np.array([[0, 0, 1]])),
+    "images folded": with_bending(IMAGES, np.array([[0, 0], [1, 0], [0.2, 0.5], [0.5, 0.0]])),
+    "rest NaN": with_bending(REST, np.full((4, 2), np.nan)),
+    "rest in 3-D": with_bending(REST, np.zeros((4, 3))),
 }
 
 
 @pytest.mark.parametrize("case", BAD_BENDINGS)
 def test_bad_bendings_are_refused(case: str, tmp_path: Path) -> None:
-    make, message = BAD_BENDINGS[case]
     path = tmp_path / "model.safetensors"
-    path.write_bytes(make())
-    with pytest.raises(InputFileError, match=message) as caught:
+    path.write_bytes(BAD_BENDINGS[case]())
+    with refused(path, kind=InputFileError):
         TileMap.read(path)
-    assert str(path) in str(caught.value)
 
 
 def test_single_precision_is_widened() -> None:
@@ -210,69 +175,58 @@ def good() -> bytes:
 
 FIELD = "flow.segments.0.parameters_"
 NESTED = "[" * 100_000 + "]" * 100_000
-BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
-    "empty": (lambda: b"", "not a tile model saved by orbiflow"),
-    "pickle": (lambda: pickle.dumps({"angle": 0.0}), "not a tile model saved by orbiflow"),
-    "text": (lambda: b"hello, world, this is no model\n" * 9, "not a tile model saved by orbiflow"),
-    "cut in the header": (lambda: good()[:100], "not a tile model saved by orbiflow"),
-    "cut in the data": (lambda: good()[:-8], "damaged"),
-    "one byte more": (lambda: good() + b"\0", "damaged"),
-    "header length": (lambda: b"\xff" * 8 + good()[8:], "not a tile model saved by orbiflow"),
-    "no metadata": (with_metadata(None), "no 'orbiflow-tile/1'"),
-    "other format": (with_metadata({"format": "pt"}), "no 'orbiflow-tile/1'"),
-    "no settings": (with_metadata({FORMAT: "null"}), "not a tile model saved"),
-    "settings no JSON": (with_metadata({FORMAT: "{"}), "not a tile model saved"),
-    "settings a list": (with_metadata({FORMAT: "[1, 2]"}), "not a tile model saved by orbiflow"),
-    "no checksum": (with_metadata({FORMAT: "{}"}), "has no checksum"),
-    "settings empty": (lambda: sealed(with_metadata({FORMAT: "{}"})()), "settings"),
-    "settings nested": (with_metadata({FORMAT: NESTED}), "not a tile model saved"),
-    "unknown class": (with_settings(**{"class": "IH94"}), "unknown isohedral class 'IH94'"),
-    "class a number": (with_settings(**{"class": 1e300}), "unknown isohedral class"),
-    "other class": (with_settings(**{"class": "IH28"}), "shape"),
-    "frequency huge": (with_settings(max_frequency=10**30), "from 0 to 60, got 1000"),
-    "frequency 61": (with_settings(max_frequency=61), "from 0 to 60, got 61"),
-    "frequency -1": (with_settings(max_frequency=-1), "from 0 to 60, got -1"),
-    "frequency 2.5": (with_settings(max_frequency=2.5), "whole number from 0 to 60, got 2.5"),
-    "frequency other": (with_settings(max_frequency=3), "must be real numbers of shape"),
-    "segments huge": (with_settings(segments=10**9), "say 1000000000 segments"),
-    "segments two": (with_settings(segments=2), "say 2 segments, its arrays hold 1"),
-    "steps huge": (with_settings(steps=10**12), "from 1 to 1000000"),
-    "steps true": (with_settings(steps=True), "whole number from 1 to 1000000, got True"),
-    "method": (with_settings(method="rk99"), "rk99"),
-    "smoothness NaN": (
-        lambda: sealed(with_settings(smoothness=77.5)().replace(b"77.5", b" NaN")),
-        "smoothness must be .*from 0 to 100",
+BAD_FILES: dict[str, Callable[[], bytes]] = {
+    "empty": lambda: b"",
+    "pickle": lambda: pickle.dumps({"angle": 0.0}),
+    "text": lambda: b"hello, world, this is no model\n" * 9,
+    "cut in the header": lambda: good()[:100],
+    "cut in the data": lambda: good()[:-8],
+    "one byte more": lambda: good() + b"\0",
+    "header length": lambda: b"\xff" * 8 + good()[8:],
+    "no metadata": with_metadata(None),
+    "other format": with_metadata({"format": "pt"}),
+    "no settings": with_metadata({FORMAT: "null"}),
+    "settings no JSON": with_metadata({FORMAT: "{"}),
+    "settings a list": with_metadata({FORMAT: "[1, 2]"}),
+    "no checksum": with_metadata({FORMAT: "{}"}),
+    "settings empty": lambda: sealed(with_metadata({FORMAT: "{}"})()),
+    "settings nested": with_metadata({FORMAT: NESTED}),
+    "unknown class": with_settings(**{"class": "IH94"}),
+    "class a number": with_settings(**{"class": 1e300}),
+    "other class": with_settings(**{"class": "IH28"}),
+    "frequency huge": with_settings(max_frequency=10**30),
+    "frequency 61": with_settings(max_frequency=61),
+    "frequency -1": with_settings(max_frequency=-1),
+    "frequency 2.5": with_settings(max_frequency=2.5),
+    "frequency other": with_settings(max_frequency=3),
+    "segments huge": with_settings(segments=10**9),
+    "segments two": with_settings(segments=2),
+    "steps huge": with_settings(steps=10**12),
+    "steps true": with_settings(steps=True),
+    "method": with_settings(method="rk99"),
+    "smoothness NaN": lambda: sealed(with_settings(smoothness=77.5)().replace(b"77.5", b" NaN")),
+    "smoothness huge": with_settings(smoothness=1e308),
+    "smoothness null": with_settings(smoothness=None),
+    "frame a number": with_settings(frame=7),
+    "frame empty": with_settings(frame={}),
+    "frame flat": with_settings(
+        frame={**Frame(np.eye(2), np.zeros(2)).as_dict(), "linear": [[1, 1], [1, 1]]}
     ),
-    "smoothness huge": (with_settings(smoothness=1e308), "smoothness must be .*from 0 to 100"),
-    "smoothness null": (with_settings(smoothness=None), "smoothness must be"),
-    "frame a number": (with_settings(frame=7), "frame is incomplete"),
-    "frame empty": (with_settings(frame={}), "frame is incomplete: 'size'"),
-    "frame flat": (
-        with_settings(
-            frame={**Frame(np.eye(2), np.zeros(2)).as_dict(), "linear": [[1, 1], [1, 1]]}
-        ),
-        "has no inverse",
-    ),
-    "angle missing": (
-        with_array("angle", None),
-        "angle must be real numbers of shape .*, got 'nothing'",
-    ),
-    "angle a vector": (with_array("angle", np.zeros(1)), "angle must be real numbers of shape"),
-    "offset too long": (with_array("offset", np.zeros(3)), r"got an array of shape \(3,\)"),
-    "field too long": (with_array(FIELD, np.zeros(7)), r"got an array of shape \(7,\)"),
-    "angle NaN": (with_array("angle", np.array(np.nan)), "angle must be finite"),
-    "offset infinite": (with_array("offset", np.array([0.0, np.inf])), "offset must be finite"),
+    "angle missing": with_array("angle", None),
+    "angle a vector": with_array("angle", np.zeros(1)),
+    "offset too long": with_array("offset", np.zeros(3)),
+    "field too long": with_array(FIELD, np.zeros(7)),
+    "angle NaN": with_array("angle", np.array(np.nan)),
+    "offset infinite": with_array("offset", np.array([0.0, np.inf])),
 }
 
 
 @pytest.mark.parametrize("case", BAD_FILES)
 def test_bad_files_are_refused(case: str, tmp_path: Path) -> None:
-    make, message = BAD_FILES[case]
     path = tmp_path / "model.safetensors"
-    path.write_bytes(make())
-    with pytest.raises(InputFileError, match=message) as caught:
+    path.write_bytes(BAD_FILES[case]())
+    with refused(path, kind=InputFileError):
         load_model(path)
-    assert str(path) in str(caught.value)
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:

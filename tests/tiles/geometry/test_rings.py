@@ -8,7 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles import Tile, centroid, orient, reverse, signed_area, subdivided
+from orbiflow.tiles import (
+    Tile,
+    centroid,
+    orient,
+    resampled,
+    reverse,
+    ring_length,
+    signed_area,
+    subdivided,
+)
 from strategies import dyadic_rings
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -77,3 +86,14 @@ def test_subdividing_keeps_the_vertices_and_the_region(ring: np.ndarray, pieces:
     assert signed_area(points) == pytest.approx(signed_area(ring), rel=1e-9)
     steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).reshape(-1, pieces)
     assert np.allclose(steps, steps[:, :1], atol=1e-12 * np.abs(ring).max())
+
+
+@given(dyadic_rings(), st.integers(3, 80), st.floats(0, 1))
+def test_points_are_evenly_spaced_on_the_ring(ring: np.ndarray, count: int, phase: float) -> None:
+    line = shapely.LinearRing(ring)
+    points = resampled(ring, count, phase)
+    assert points.shape == (count, 2)
+    spacing = line.length / count
+    assert ring_length(ring) == pytest.approx(line.length, rel=1e-12)
+    expected = [line.interpolate((k + phase) * spacing).coords[0] for k in range(count)]
+    assert np.abs(points - expected).max() < 1e-9 * line.length

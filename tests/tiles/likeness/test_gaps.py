@@ -68,14 +68,3 @@ def test_gradient(seed: int, gap: float) -> None:
         assert (ahead - behind) / 2e-6 == pytest.approx(
             (np.conj(along) @ way).real, rel=1e-4, abs=1e-4
         )
-
-
-@given(seeds)
-def test_motions_change_nothing(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    ring = fork(-0.02) + 1e-3 * complex_points(rng.normal(size=(240, 2)))
-    turn = np.exp(2j * np.pi * rng.random())
-    value, along = missing_gaps(ring, 0.02)
-    moved, turned = missing_gaps(turn * ring + 1 - 2j, 0.02)
-    assert moved == pytest.approx(value, rel=1e-6)
-    assert abs(turned - turn * along).max() < 1e-4 * abs(along).max()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from orbiflow.arrays import Complex
 from orbiflow.tiles.likeness import Measures, mark_gradient
@@ -58,19 +57,6 @@ def test_wrinkles_and_the_mark_have_theirs(seed: int) -> None:
     slide, along = rng.uniform(-1, 1, COUNT), measures.wrinkles(z, places)[2]
     more, less = (measures.wrinkles(z, places + step * slide)[0] for step in (STEP, -STEP))
     assert abs((more - less) / (2 * STEP) - along @ slide) < 2e-3 * (abs(along).sum() + 1e-3)
-
-
-@given(seeds, st.floats(0.1, 10), st.floats(-3.2, 3.2), st.complex_numbers(max_magnitude=10))
-def test_motions_and_scale_change_nothing(
-    seed: int, scale: float, turn: float, shift: complex
-) -> None:
-    rng = np.random.default_rng(seed)
-    rest = outline(rng)
-    measures, z = Measures(rest), bent(rest, rng)
-    moved = scale * np.exp(1j * turn) * z + shift
-    assert measures.values(moved) == pytest.approx(measures.values(z), abs=1e-9)
-    wrinkles = [measures.wrinkles(own, np.arange(COUNT))[0] for own in (moved, z)]
-    assert wrinkles[0] == pytest.approx(wrinkles[1], abs=1e-7)
 
 
 def test_an_outline_at_rest_has_no_wrinkles() -> None:

@@ -114,18 +114,6 @@ def test_hairs_are_counted_by_length(width: float, length: float) -> None:
     )
 
 
-@pytest.mark.parametrize("width", [0.005, 0.009])
-def test_a_thin_neck_is_hair(width: float) -> None:
-    ring = dumbbell(width, 0.5)
-    assert hair_share(ring, 0.01) == pytest.approx(1.0 / ring_length(ring), rel=1e-2)
-
-
-def test_a_slit_is_counted_by_length() -> None:
-    ring = slit_square(0.005, 0.8)
-    assert slit_share(ring, 0.01) == pytest.approx(1.605 / ring_length(ring), rel=1e-2)
-    assert hair_share(ring, 0.01) == 0
-
-
 @pytest.mark.parametrize("case", [*USELESS, *NOT_SIMPLE])
 def test_what_is_no_polygon_is_refused(case: str) -> None:
     ring = USELESS[case] if case in USELESS else NOT_SIMPLE[case]

@@ -72,13 +72,9 @@ def test_variety_is_weighed_against_the_score() -> None:
 @pytest.mark.parametrize(
     ("change", "name"),
     [
-        ({"scores": [[0.1]]}, "scores"),
-        ({"scores": [np.nan]}, "scores"),
-        ({"scores": ["best"]}, "scores"),
-        ({"count": 0}, "count"),
-        ({"twin": 1.5}, "twin"),
-        ({"variety": -1.0}, "variety"),
-        ({"variety": np.inf}, "variety"),
+        *(({"scores": [[0.1]]}, "scores"), ({"scores": [np.nan]}, "scores")),
+        *(({"scores": ["best"]}, "scores"), ({"count": 0}, "count"), ({"twin": 1.5}, "twin")),
+        *(({"variety": -1.0}, "variety"), ({"variety": np.inf}, "variety")),
     ],
 )
 def test_bad_arguments(change: dict[str, object], name: str) -> None:

@@ -71,18 +71,6 @@ def test_condensed_is_the_whole_solved_for_the_inside() -> None:
     assert condensed.forces(forces) == pytest.approx(on_outline, rel=1e-6, abs=1e-5)
 
 
-def test_pulled_solves_the_whole() -> None:
-    pinned, z = body(), shapes(2)
-    towards, strength = z[: pinned.size], 300.0
-    matrix = whole_matrix(pinned)
-    mu = np.zeros(len(pinned))
-    mu[: pinned.size] = strength / pinned.size
-    right = pinned.forces(z)
-    right[: pinned.size] += mu[: pinned.size, None] * towards
-    expected = np.linalg.solve(matrix + np.diag(mu), right)
-    assert pinned.pulled(z, towards, strength, 1) == pytest.approx(expected, abs=1e-8)
-
-
 def test_similar_copies_cost_what_their_size_does() -> None:
     pinned = body()
     turned = 1.3 * pinned.rest[:, None] * np.exp(0.7j) + 2

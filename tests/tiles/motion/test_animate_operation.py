@@ -58,12 +58,6 @@ def test_a_file_is_written_and_told_of(folder: Path, tmp_path: Path) -> None:
         assert image.size == (96, 64)
 
 
-def test_a_name_of_its_own(folder: Path, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    small(folder, None, kind="grow", fps=4.0, tile="IH4").run()
-    assert [path.name for path in tmp_path.iterdir()] == ["boot-IH4-grow.gif"]
-
-
 def test_a_cancelled_one_writes_nothing(folder: Path, tmp_path: Path) -> None:
     cancel = Cancel()
 
@@ -90,11 +84,6 @@ def test_a_cancelled_one_writes_nothing(folder: Path, tmp_path: Path) -> None:
 def test_settings_that_cannot_be(fields, about: tuple[object, ...]) -> None:
     with refused(*about, kind=SettingError):
         animation(result="out", **fields)
-
-
-def test_an_svg_has_no_pictures_per_second() -> None:
-    with refused("fps", "format", "svg", kind=SettingError):
-        animation(result="out", out="a.svg", fps=5).run()
 
 
 def test_mistakes_are_said_before_the_work(folder: Path, tmp_path: Path) -> None:

@@ -81,13 +81,6 @@ def test_a_palette_keeps_the_colours_that_were_used(colours: list[str]) -> None:
     assert np.abs(pixels(palette_png(picture, colours)) - np.array(values)).max() <= 8
 
 
-def test_white_stays_white() -> None:
-    sketch = Sketch(WINDOW, Sheet.screen(200), paper="#ffffff")
-    sketch.fill(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), "#c9d3dc")
-    image = pixels(sketch.picture().png())
-    assert share(image, (255, 255, 255)) > 0.9
-
-
 def test_sizes_that_cannot_be_made() -> None:
     with refused("300 by 0 pixels"):
         Sketch((0.0, 0.0, 1.0, 1e-3), Sheet.screen(300)).picture().png()

@@ -14,8 +14,17 @@ import pytest
 from PIL import Image
 
 from orbiflow.drawing import PALETTES, Sheet, rgb
-from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import Page, Tiling, colouring, copies_meeting, tiling_picture, tilings_png
+from orbiflow.symmetry import rotation_matrix, wallpaper_group
+from orbiflow.tiles import (
+    Page,
+    Tile,
+    Tiling,
+    colouring,
+    copies_meeting,
+    tile_picture,
+    tiling_picture,
+    tilings_png,
+)
 from refusals import refused
 from some_tilings import NAMED
 
@@ -96,3 +105,15 @@ def test_the_page() -> None:
     for snippet in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
         exec(compile(snippet, "tilings.md", "exec"), names)
     assert isinstance(names["several"], Tiling)
+
+
+@pytest.mark.parametrize(("top", "y_down"), [(1.0, False), (-1.0, True)])
+def test_a_tile_is_drawn_upright(top: float, y_down: bool) -> None:
+    """A triangle that points up in its own coordinates points up on the page."""
+    tile = Tile(np.array([[0.0, 0.0], [2.0, 0.0], [1.0, top]]), wallpaper_group("p1"))
+    text = tile_picture(tile, y_down=y_down, title="Cat & <mouse>").svg()
+    assert "Cat & <mouse>" in [own.text for own in ElementTree.fromstring(text).iter()]
+    numbers = re.findall(r"-?\d+\.?\d*", re.findall(r' d="([^"]*)"', text)[-1])
+    path = np.array(numbers, float).reshape(-1, 2)
+    assert path[2, 1] < path[0, 1]  # SVG's y points down
+    assert path[0, 0] < path[1, 0]  # not mirrored

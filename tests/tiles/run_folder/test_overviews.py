@@ -164,53 +164,12 @@ def test_small_tilings_are_those_of_the_tile(target: Target, bent: EscherTile) -
     assert shapely.union_all(pieces).area > 0.99 * window.area
 
 
-def test_what_was_read_is_shown_if_it_is_there(target: Target, bent: EscherTile) -> None:
-    read, bare = (Page(index_page([bent], [target], ["IH4"], read=own)) for own in (True, False))
-    assert "read.png" in [picture["src"] for picture in read.all("img")]
-    assert "left out, a hole, filled." in " ".join(read.words.split())
-    assert "What was read" not in bare.words
-    assert len(read.all("svg")) == len(bare.all("svg")) - 1  # one picture of it is enough
-
-
 def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> None:
     bad = replace(flowed.certificate, reasons=("it <overlaps> itself",))
     uncertified = replace(flowed)
     vars(uncertified)["certificate"] = bad  # no real reason has characters to escape
     page = Page(index_page([uncertified], [target], ["IH6"]))
     assert "Not certified: it <overlaps> itself." in page.words
-
-
-def test_figures_are_those_that_were_taken(
-    target: Target, bent: EscherTile, flowed: EscherTile
-) -> None:
-    of_bent, of_flowed = (
-        Page(
-            index_page(
-                [tile.changed(likeness=replace(tile.likeness, pinned=pinned))], [target], ["IH4"]
-            )
-        ).words
-        for tile, pinned in ((bent, 0.0042), (flowed, None))
-    )
-    for figure in ("Deformation", f"{bent.likeness.deformation:.3f}", "Pinned parts", "0.0042"):
-        assert figure in of_bent
-        assert figure not in of_flowed
-    for figure in (
-        "Score",
-        f"{flowed.score:.3g}",
-        f"{flowed.likeness.metrics.iou:.3f}",
-        "Thinnest neck",
-    ):
-        assert figure in of_flowed
-
-
-@pytest.mark.parametrize(("count", "size"), [(1, 1320), (2, 1920), (3, 1920), (7, 1920)])
-def test_an_overview_of_any_number(
-    target: Target, bent: EscherTile, flowed: EscherTile, count: int, size: int
-) -> None:
-    picture = Image.open(io.BytesIO(overview_png(([bent, flowed] * 4)[:count], [target])))
-    assert picture.width == size
-    assert 600 < picture.height < 2100
-    assert len(picture.getcolors(2**24) or []) > 50
 
 
 @pytest.mark.parametrize("wide", [1.0, 90.0, 1 / 90])
@@ -225,18 +184,6 @@ def test_the_page_is_one_of_the_files_of_a_run(tmp_path: Path) -> None:
     known = written_files(tmp_path)
     assert {"index.html", "overview.png", "IH4/field.png", "IH4/tiling.png"} <= known
     assert folder_names(["IH4", "IH4"]) == ["IH4", "IH4-2"]
-
-
-def test_what_was_decided_and_what_failed_is_on_the_sheets(
-    target: Target, bent: EscherTile
-) -> None:
-    noted = replace(target, notes=("filled 3 holes <of> it",))
-    page = Page(index_page([bent], [noted], ["IH4"]))
-    assert "filled 3 holes <of> it" in page.words
-    assert not [item for item in Page(index_page([bent], [target], ["IH4"])).all("ul")
-                if item.get("class") == "notes"]  # fmt: skip
-    plain = overview_png([bent], [target])
-    assert overview_png([bent], [target], failures=[ClassFailure("IH7", "no tile")]) != plain
 
 
 def test_a_sheet_shows_stars_and_how_tiles_lie(target: Target, bent: EscherTile) -> None:

@@ -19,13 +19,12 @@ from orbiflow.tiles import (
     resampled,
     signed_area,
 )
-from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.geometry import apart
 from orbiflow.tiles.likeness import Elastic
 from orbiflow.tiles.search import Goal, Placements, TileSpace, best_placements
 from orbiflow.tiles.search.bending import TWIN_DISTANCE, bent_tiles
-from orbiflow.tiles.search.co_deformation import BODIES, drawn_to_tiles, held_on_tiles
-from outlines import SMALL, animal, bent_squirrel, flowless, squirrel_orientations
+from orbiflow.tiles.search.co_deformation import drawn_to_tiles, held_on_tiles
+from outlines import SMALL, animal, bent_squirrel, squirrel_orientations
 from strategies import seeds
 
 RING = resampled(animal("squirrel.dat").normal, 60)
@@ -47,15 +46,7 @@ def off_the_space(space: TileSpace, z: Complex) -> float:
     return float(abs(space.in_order(space.nearest(outlines).vertices) - outlines).max())
 
 
-@pytest.mark.parametrize("name", CLASSES)
-def test_springs_draw_to_tiles(name: str) -> None:
-    z, space = drawn_to_tiles(BODY, CLASSES[name], placements(name))
-    assert z.shape == (len(BODY), 10)
-    rest = np.repeat(BODY.rest[:, None], 10, axis=1)
-    assert off_the_space(space, z) < 0.2 * off_the_space(space, rest)
-
-
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 def test_the_energy_never_grows(name: str) -> None:
     z, space = drawn_to_tiles(BODY, CLASSES[name], placements(name))
     z = held_on_tiles(BODY, space, z, 1).points  # on the tiles
@@ -71,16 +62,7 @@ def test_the_energy_never_grows(name: str) -> None:
     assert tiles.offset.shape == (10, 2)
 
 
-@pytest.mark.parametrize("name", CLASSES)
-def test_several_rounds_are_the_same_as_one_by_one(name: str) -> None:
-    z, space = drawn_to_tiles(BODY, CLASSES[name], placements(name, 3))
-    single = z
-    for _ in range(4):
-        single = held_on_tiles(BODY, space, single, 1).points
-    assert held_on_tiles(BODY, space, z, 4).points == pytest.approx(single, abs=1e-9)
-
-
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
 @settings(max_examples=4)
 @given(seed=seeds)
 def test_a_tile_stays_as_it_is(name: str, seed: int) -> None:
@@ -122,18 +104,6 @@ def test_bent_squirrels_certify(name: str, mirrored: bool) -> None:
     assert apart.max() < 1e-3
 
 
-def test_the_model_keeps_every_vertex() -> None:
-    """Without a field the start tile is the bent tile, in the group's own frame."""
-    case = bent_squirrel("IH4")
-    model = flowless("IH4", case.bent, case.factor, case.shift)
-    place = model.place(model.prototile()[0]).detach().numpy()[0]
-    n = case.bent.orientation.fine.size
-    order = (np.arange(n) + case.bent.placement.starts[0]) % n
-    vertices = plane_points(case.factor * case.bent.ring + case.shift)
-    assert abs(place - vertices[order]).max() < 1e-12
-    assert certify(extract_tile(model)[0]).valid
-
-
 def test_finalists_are_in_order_and_told() -> None:
     shares: list[float] = []
     several = replace(SMALL, finalists=3, multiples=(2,))
@@ -147,18 +117,6 @@ def test_finalists_are_in_order_and_told() -> None:
     assert dropped <= 3
     again, _ = bent_tiles(*own)
     assert [bent.fidelity.score for bent in again] == scores
-
-
-def test_more_rounds_cost_no_more() -> None:
-    """By what a firm body minimises; the order of tiles has another measure."""
-    firm = replace(SMALL, bodies=("firm",), carved=0)
-    side, kind = squirrel_orientations()[0], CLASSES["IH5"]
-    settings = (firm, replace(firm, rounds=40))
-    found = [bent_tiles([side], kind, own)[0][0].points[:, None] for own in settings]
-    _, _, body = side.bodies(BODIES["firm"])
-    few, more = (float(objective(body, z)[0]) for z in found)
-    assert more < few
-    assert SMALL.rounds < 40
 
 
 def test_finalists_are_the_best_of_all_bodies_and_no_twins() -> None:

@@ -72,7 +72,7 @@ def test_corners_find_back_to_a_tile(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("share", [0.2, 1.0])
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH4", "IH5", "IH21"])
 def test_no_placement_becomes_worse(name: str, share: float) -> None:
     kind = CLASSES[name]
     placements = best_placements(kind, complex_points(RING), 12)

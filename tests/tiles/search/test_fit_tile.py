@@ -15,8 +15,6 @@ from orbiflow.tiles import (
     TileModel,
     certified_tiles,
     certify,
-    fit_descent,
-    fit_occupancy,
     fit_tile,
     trainable,
 )
@@ -43,17 +41,6 @@ def test_the_two_steps_give_what_the_search_gives(method: str) -> None:
     assert all(certify(tile.tile).valid for tile in tiles)
     (best,), _ = searched(TARGET, ["IH4"], settings)
     assert np.array_equal(tiles[0].tile.polygon, best.tile.polygon)
-
-
-def test_what_the_methods_of_their_own_give() -> None:
-    descent, occupancy = SETTINGS["descent"], SETTINGS["occupancy"]
-    assert isinstance(descent, OverlapSearch)
-    assert isinstance(occupancy, OccupancySearch)
-    for found in (fit_descent(TARGET, "IH4", descent), fit_occupancy(TARGET, "IH4", occupancy)):
-        tiles = certified_tiles(TARGET, found)
-        assert tiles[0].certificate.valid
-        scores = [tile.score for tile in tiles]
-        assert scores == sorted(scores, reverse=True)
 
 
 def test_a_model_may_be_trained_before_it_is_certified() -> None:

@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,7 +15,6 @@ from orbiflow.runtime import Cancel, Cancelled, Event, Progress
 from orbiflow.tiles import (
     CLASSES,
     IsohedralClass,
-    Tiling,
     certify,
     complex_points,
     isohedral_class,
@@ -190,34 +188,6 @@ def test_a_search_finds_certified_pairs() -> None:
         assert len(pair.tiling.prototiles) == 2
         # vertices of edges that are nearly straight may begin an edge elsewhere
         assert pair.mixed == pytest.approx(mixing(pair.tiling), abs=0.02)
-
-
-def test_copies_cover_the_plane_once() -> None:
-    tiling = pairs()[0].tiling
-    polygons = [own.polygon for own in tiling.prototiles]
-    x, y = tiling.center
-    reach = 1.5
-    window = shapely.box(x - reach, y - reach, x + reach, y + reach)
-    copies = [
-        shapely.Polygon(g(polygon))
-        for polygon in polygons
-        for g in tiling.group.elements_near(tiling.center, 4 * reach, source=polygon.mean(axis=0))
-    ]
-    inside = [copy for copy in copies if copy.intersects(window)]
-    areas = sum(copy.intersection(window).area for copy in inside)
-    assert areas == pytest.approx(window.area, rel=1e-9)
-    assert shapely.union_all(inside).intersection(window).area == pytest.approx(
-        window.area, rel=1e-9
-    )
-
-
-def test_a_point_of_the_path_that_moved_is_refused() -> None:
-    pair = pairs()[0]
-    on_path = pair.body.size + pair.body.glue.length // 2
-    ring, other = (pair.body.rings(pair.points)[k].copy() for k in (0, 1))
-    ring[pair.body.places[0][: len(ring)] == on_path] += 1e-6
-    broken = Tiling(pair.tiling.group, [plane_points(ring), plane_points(other)])
-    assert not certify(broken).valid
 
 
 def test_levels_and_moves_do_not_tear_a_pair() -> None:

@@ -19,13 +19,8 @@ HEAD = "230,190,140"
 
 def pinned_call(folder: Path, pin: str) -> Call:
     document = {
-        "schema_version": 2,
-        "operation": "escherize",
-        "image": str(SQUIRREL),
-        "out": str(folder / "out"),
-        "classes": ["IH4"],
-        "effort": "fast",
-        "workers": 1,
+        **{"schema_version": 2, "operation": "escherize", "image": str(SQUIRREL)},
+        **{"out": str(folder / "out"), "classes": ["IH4"], "effort": "fast", "workers": 1},
         "pin": [pin],
     }
     return call_from_json(document)

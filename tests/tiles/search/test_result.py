@@ -1,21 +1,15 @@
 """The choice among finalists."""
 
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
-import scipy.spatial
 import shapely
 import torch
 
 from orbiflow.errors import CertificationError
-from orbiflow.tiles import CLASSES, EscherTile, Fit, Target, TileMap, TileModel, as_model, certify
-from orbiflow.tiles.result_file import tile_json
-from orbiflow.tiles.search.candidates import SAMPLE_COUNTS
+from orbiflow.tiles import CLASSES, EscherTile, Fit, Target, TileModel, certify
 from orbiflow.tiles.search.finished_tiles import best_tiles
 from refusals import refused
-from strategies import divided_start, random_tensor
 
 KIND = CLASSES["IH21"]
 
@@ -70,14 +64,6 @@ def test_no_certified_finalist() -> None:
     assert str(caught.value).count("crosses itself") == 1  # the same reason is given once
 
 
-def test_force_keeps_the_uncertified_and_says_so() -> None:
-    target = Target.from_polygon(KIND.template())
-    result = best_tile(target, finalists(2.0), starts=1, seconds=0.0, force=True)
-    assert not result.certificate.valid
-    assert "not simple" in result.certificate.reasons[0]
-    assert 0 < result.likeness.metrics.iou < 1
-
-
 def test_force_prefers_the_certified() -> None:
     # the crossing tile covers the target better than the certified one, which is moved away
     target = Target.from_polygon(KIND.template())
@@ -89,33 +75,3 @@ def test_force_prefers_the_certified() -> None:
     assert result.certificate.valid
     assert result.likeness.metrics.iou < worse.likeness.metrics.iou
     assert result.search.dropped == 0
-
-
-@pytest.mark.parametrize("name", ["IH4", "IH6", "IH28"])
-@pytest.mark.parametrize("y_down", [False, True])
-def test_a_file_alone_places_the_tile_in_the_input(name: str, y_down: bool, tmp_path: Path) -> None:
-    kind = CLASSES[name]
-    target = Target.from_polygon(30 * kind.template() + 500, y_down=y_down)
-    model = TileModel(kind, torch.tensor([0.3]), max_frequency=2, smoothness=0.0)
-    with torch.no_grad():
-        for parameter in model.flow.parameters():
-            parameter.add_(0.02 * random_tensor(4, *parameter.shape, size=1.0))
-    result = best_tile(target, model, starts=1, seconds=0.0)
-    polygon = np.array(tile_json(result)["polygon"])[:-1]
-    path = tmp_path / "model.safetensors"
-    assert result.map is not None
-    path.write_bytes(result.map.to_bytes())
-
-    saved = TileMap.read(path)
-    assert saved.frame is not None
-    loaded = as_model(saved)
-    pieces = 2 * -(-SAMPLE_COUNTS[0] // (2 * len(kind.template())))
-    with torch.no_grad():
-        curve = saved.frame.to_input(loaded(divided_start(loaded, pieces)))[0].numpy()
-    # half of the polygon is flowed, the other half its image: the map has both
-    nearest = np.asarray(scipy.spatial.KDTree(curve).query(polygon)[0])
-    assert nearest.max() < 1e-9
-    assert np.abs(curve[::pieces] - polygon[list(result.tile.corners)]).max() < 1e-9
-    back = loaded.inverse(torch.tensor(saved.frame.to_normal(polygon))[None]).detach()
-    on_template = shapely.Polygon(kind.template()).exterior
-    assert shapely.distance(shapely.points(back[0].numpy()), on_template).max() < 1e-6

@@ -71,11 +71,6 @@ def test_the_same_tiles_whatever_the_number_of_workers() -> None:
         assert (one.map and one.map.settings) == (other.map and other.map.settings)
 
 
-def test_every_seed_that_settings_take_can_be_searched_with() -> None:
-    own = replace(QUICK, seed=2**32 - 1, iterations=1, affine_iterations=1, turns=1, points=20)
-    assert isinstance(escherize_class(TARGET, "IH21", own), EscherTile)
-
-
 def test_the_number_of_threads_is_put_back() -> None:
     before = torch.get_num_threads()
     torch.set_num_threads(2)
@@ -214,19 +209,6 @@ def test_a_fit_is_left_between_two_steps(workers: int) -> None:
     assert multiprocessing.active_children() == []
 
 
-@both
-def test_a_search_may_be_cancelled_before_it_begins(workers: int) -> None:
-    cancel = Cancel()
-    cancel.cancel()
-    events: list[Event] = []
-    results, failures = searched(
-        TARGET, NAMES, QUICK, workers=workers, on_event=events.append, cancel=cancel
-    )
-    assert results == []
-    assert [f.name for f in failures] == NAMES
-    assert len(events) == 1 + 2 * len(NAMES)
-
-
 def test_one_class_alone_is_cancelled_by_an_exception() -> None:
     cancel = Cancel()
     endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
@@ -277,7 +259,7 @@ def test_several_of_a_class_differ(settings: LikenessSearch | OverlapSearch) -> 
 
 
 def test_more_effort_never_scores_less() -> None:
-    """In a class, also where several of its tiles are asked for, and in the whole search."""
+    """In a class, also where several of its tiles are asked for."""
     least = LikenessSearch(
         placements=20, held=4, starts=2, finalists=1, rounds=4, carved=0, multiples=(2,), phases=1
     )
@@ -290,11 +272,6 @@ def test_more_effort_never_scores_less() -> None:
     for per_class, phases in ((1, 4), (2, 2)):
         few, more = (score(replace(least, phases=count), per_class) for count in (1, phases))
         assert few < more if phases == 4 else few <= more
-    names = ["IH4", "IH5", "IH6"]
-    one, more = (searched(SQUIRREL, names, replace(least, phases=k))[0] for k in (1, 3))
-    assert more[0].score > one[0].score
-    scores = [{tile.name: tile.score for tile in tiles} for tiles in (one, more)]
-    assert all(scores[1][name] >= scores[0][name] for name in names)
 
 
 def test_later_phases_are_of_promising_classes() -> None:

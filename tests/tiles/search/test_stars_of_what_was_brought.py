@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-import shapely
 
-from orbiflow.studio.silhouette_file import load_target, read_input
-from orbiflow.tiles import EscherTile, ReadingSettings, Target
-from orbiflow.tiles.likeness import Likeness
+from orbiflow.symmetry import wallpaper_group
+from orbiflow.tiles import EscherTile, Likeness, Rating, Target, Tile
 from orbiflow.tiles.search.finished_tiles import rated
 from orbiflow.tiles.silhouette import left_out_share
 
@@ -47,14 +43,8 @@ def test_stars_fall_with_what_was_left_out(
     assert found.rating.stars == pytest.approx(stars * whole.stars / 5, abs=0.25)
 
 
-def test_the_studio_remembers_what_was_seen(tmp_path: Path) -> None:
-    read = target("M10 20 60 20 60 40 10 40Z")
-    ring = shapely.Polygon(read.outline)
-    (tmp_path / "input.svg").write_text(
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
-        f'<path d="{BODY} M10 20 60 20 60 40 10 40Z"/></svg>'
-    )
-    read_input(tmp_path, "a.svg", ReadingSettings())
-    again = load_target(tmp_path)
-    assert np.isclose(shapely.Polygon(again.outline).area, ring.area)
-    assert left_out_share(again) == pytest.approx(0.4, abs=1e-3)
+def test_a_line_never_has_stars() -> None:
+    line = Target.from_polygon([[0, 0], [100, 0], [100, 2], [0, 2]])
+    tile = EscherTile(Tile(line.outline, wallpaper_group("p1")), likeness=Likeness(known_score=0.9))
+    (own,) = rated([tile], line)
+    assert own.rating == Rating(1)

@@ -1,5 +1,6 @@
 """The linear space of a class's tiles."""
 
+import itertools
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from orbiflow.tiles import (
     signed_area,
 )
 from orbiflow.tiles.search import Placements, TileSpace, best_placements
+from orbiflow.tiles.search.tile_space import _compositions, _count, edge_lengths
 from outlines import animal
 from strategies import angles, seeds
 
@@ -126,35 +128,6 @@ def test_the_nearest_tiles_match_and_certify(name: str) -> None:
     assert certified == 3
 
 
-@pytest.mark.parametrize("name", CLASSES)
-@given(seed=seeds)
-def test_a_tile_is_nearest_to_itself(name: str, seed: int) -> None:
-    own = space(name)
-    first = own.in_order(own.nearest(outlines(own, seed)).vertices)
-    again = own.nearest(first)
-    assert abs(own.in_order(again.vertices) - first).max() < 1e-7
-    assert again.distance.max() < 1e-12
-
-
-@given(seeds)
-def test_in_order_undoes_the_placements(seed: int) -> None:
-    own = space("IH4")
-    values = outlines(own, seed)
-    ordered = np.take_along_axis(values, own.order, axis=1)
-    assert np.array_equal(own.in_order(ordered), values)
-
-
-@pytest.mark.parametrize("name", TURNING)
-@settings(max_examples=5)
-@given(seed=seeds, turn=angles)
-def test_best_turns_go_with_the_outline(name: str, seed: int, turn: float) -> None:
-    own = space(name)
-    goals = outlines(own, seed)
-    still, turned = own.best_turns(goals), own.best_turns(goals * np.exp(1j * turn))
-    apart = np.exp(2j * (turned - still - turn))  # an axis, not an arrow
-    assert abs(apart - 1).max() < 1e-6
-
-
 @pytest.mark.parametrize("name", TURNING)
 @given(seed=seeds, error=st.floats(0.2, 1.4))
 def test_best_turns_suit_a_tile_turned_away(name: str, seed: int, error: float) -> None:
@@ -175,3 +148,24 @@ def test_classes_without_glides_keep_their_turns() -> None:
             own = space(name)
             own.turn(np.full(own.count, 0.3))
             assert (own.best_turns(outlines(own, 0)) == 0.3).all()
+
+
+@pytest.mark.parametrize("multiplicities", [(2, 2, 2), (1, 2, 1, 1, 1), (2, 2, 1, 1), (2, 1)])
+def test_compositions_are_all_there(multiplicities: tuple[int, ...]) -> None:
+    for total in (4, 9, 12):
+        brute = {
+            row
+            for row in itertools.product(range(1, total), repeat=len(multiplicities))
+            if np.dot(row, multiplicities) == total
+        }
+        found = _compositions(multiplicities, total)
+        assert {tuple(row) for row in found.tolist()} == brute
+        assert len(found) == len(brute) == _count(multiplicities, total)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_lengths_fit_the_class(name: str) -> None:
+    lengths = edge_lengths(CLASSES[name], 24)
+    assert (lengths.sum(axis=1) == 24).all()
+    for pair in CLASSES[name].identified_edges:
+        assert (lengths[:, pair.first] == lengths[:, pair.second]).all()

@@ -26,7 +26,6 @@ from orbiflow.tiles import (
     ExportSettings,
     LikenessSearch,
     Over,
-    Page,
     SolidSettings,
     artwork,
     colouring,
@@ -79,15 +78,6 @@ def test_both_figures_are_measured_and_the_worse_one_ranks() -> None:
             assert part.figure.rating is not None
 
 
-def test_the_first_figure_lies_on_its_silhouette() -> None:
-    first, second = pair().parts
-    np.testing.assert_allclose(first.place.linear, np.eye(2), atol=1e-12)
-    own = shapely.Polygon(first.place(first.figure.tile.polygon))
-    goal = shapely.Polygon(pair_result().target.outline)
-    assert own.intersection(goal).area > 0.5 * goal.area
-    assert second.place.scale > 0
-
-
 @given(seeds, st.integers(0, 1))
 def test_maps_of_both_figures_have_inverses(seed: int, number: int) -> None:
     figure = pair().parts[number].figure
@@ -115,19 +105,6 @@ def test_maps_keep_what_the_marks_say(number: int) -> None:
     way = 1 if signed_area(rest) > 0 else -1
     kept = fidelity(complex_points(rest)[::way], complex_points(moved)[::way], known.cost)
     assert kept.mark == pytest.approx(known.mark, abs=0.1)
-
-
-def test_a_window_is_covered_once() -> None:
-    tiling = pair().tiling
-    (left, low), (right, high) = tiling.box
-    window = shapely.box(left, low, right, high)
-    copies = [shapely.Polygon(ring) for ring in copies_meeting(tiling, window.bounds).rings()]
-    assert sum(own.intersection(window).area for own in copies) == pytest.approx(
-        window.area, rel=1e-9
-    )
-    assert shapely.union_all(copies).intersection(window).area == pytest.approx(
-        window.area, rel=1e-9
-    )
 
 
 def test_a_saved_pair_is_the_same(tmp_path: Path) -> None:
@@ -267,12 +244,6 @@ def test_every_frame_of_a_morph_is_a_tiling(kind: str) -> None:
         assert shapely.union_all(rings).intersection(window).area == pytest.approx(
             window.area, rel=1e-4
         )
-
-
-def test_a_page_has_the_colours_of_figures() -> None:
-    page = Page.of_window(pair().tiling, (*pair().tiling.box[0], *pair().tiling.box[1]), 200.0)
-    kinds = page.copies.prototiles
-    assert not set(page.colours[kinds == 0].tolist()) & set(page.colours[kinds == 1].tolist())
 
 
 def test_a_search_that_is_stopped_keeps_its_first_look() -> None:

@@ -11,15 +11,12 @@ from orbiflow.symmetry import rotation_matrix, wallpaper_group
 from orbiflow.tiles import CLASSES, Tile, Tiling, arrangement, dirichlet_tile
 
 WORDS = {
-    "IH1": "rows, all alike",
-    "IH2": "brick rows, every other row turned over",
+    **{"IH1": "rows, all alike", "IH2": "brick rows, every other row turned over"},
     "IH3": "rows, every other row facing the other way",
     "IH4": "rows, every other row upside down",
     "IH5": "rows, upside down and turned over by turns",
-    "IH6": "every other one upside down, half turned over",
-    "IH7": "three around a point",
-    "IH21": "six around a point",
-    "IH28": "four around a point",
+    **{"IH6": "every other one upside down, half turned over", "IH7": "three around a point"},
+    **{"IH21": "six around a point", "IH28": "four around a point"},
 }
 
 

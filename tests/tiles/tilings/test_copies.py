@@ -1,14 +1,23 @@
-"""Copies as integers are the copies that isometries make."""
+"""Patches cover their window with nothing too much, and copies as integers are theirs."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from exported import tile_of, tiles
-from orbiflow.tiles import CLASSES, Tile, colouring, copies_inside, copies_meeting, edges, patch
+from exported import tile_of
+from orbiflow.symmetry import identity, translation
+from orbiflow.tiles import (
+    CLASSES,
+    Tile,
+    aspects,
+    colouring,
+    copies_inside,
+    copies_meeting,
+    edges,
+    isohedral_class,
+    patch,
+)
 from orbiflow.tiles.tilings.tiling import coset_and_cell
 from refusals import refused
 
@@ -17,40 +26,6 @@ def window_of(tile: Tile, shift: tuple[float, float], size: tuple[float, float])
     middle = tile.center + tile.radius * np.array(shift)
     half = tile.radius * np.array(size)
     return (*(middle - half), *(middle + half))
-
-
-shifts = st.tuples(st.floats(-5, 5), st.floats(-5, 5))
-sizes = st.tuples(st.floats(0.05, 4), st.floats(0.05, 4))
-
-
-@settings(max_examples=20, deadline=None)
-@given(tiles, shifts, sizes)
-def test_those_that_meet_a_window_are_its_patch(tile, shift, size) -> None:
-    window = window_of(tile, shift, size)
-    found = copies_meeting(tile, window)
-    ours = set(zip(found.cosets.tolist(), map(tuple, found.cells.tolist()), strict=True))
-    assert ours == {coset_and_cell(tile.group, g) for g in patch(tile, window)}
-    assert len(ours) == len(found)
-
-
-@settings(max_examples=20, deadline=None)
-@given(tiles, shifts, sizes)
-def test_those_inside_are_those_of_the_patch_that_are_whole(tile, shift, size) -> None:
-    window = window_of(tile, shift, size)
-    found = copies_inside(tile, window)
-    rings = [g(tile.polygon) for g in patch(tile, window)]
-    low, high = np.array(window).reshape(2, 2)
-    rounding = 1e-9 * (tile.radius + float(np.abs(window).max()))
-    # those that only touch the window's border are inside or not, as rounding has it
-    surely, perhaps = (
-        sum(bool((r >= low + by).all() and (r <= high - by).all()) for r in rings)
-        for by in (rounding, -rounding)
-    )
-    assert surely <= len(found) <= perhaps
-    for k, ring in enumerate(found.images(tile.polygon)):
-        np.testing.assert_allclose(ring, found.isometry(k)(tile.polygon), atol=1e-9 * tile.radius)
-        assert (ring >= low - rounding).all()
-        assert (ring <= high + rounding).all()
 
 
 @pytest.mark.parametrize("name", CLASSES)
@@ -85,3 +60,38 @@ def test_too_many() -> None:
     tile = tile_of("IH1")
     with refused("window", 20000):
         copies_inside(tile, window_of(tile, (0, 0), (200, 200)))
+
+
+WINDOW = (-4.0, -3.0, 5.0, 2.5)
+
+
+def test_window_inside_one_tile() -> None:
+    tile = Tile(isohedral_class("IH7").template(), isohedral_class("IH7").group())
+    (only,) = patch(tile, (0.1, 0.1, 0.2, 0.2))
+    assert only.is_close(identity(2))
+
+
+def test_foreign_isometry() -> None:
+    tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
+    with refused("Isometry", "p1"):
+        aspects(tile, [translation((0.1, 0.0))])
+
+
+@pytest.mark.parametrize("window", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, np.nan, 1), (0, 0, 1)])
+def test_windows_that_are_none(window: tuple[float, ...]) -> None:
+    tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
+    with refused("window"):
+        patch(tile, window)
+
+
+def test_a_long_thin_window() -> None:
+    tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
+    found = patch(tile, (0.1, 0.1, 9000.1, 0.1 + 1e-9))
+    assert len(found) == pytest.approx(9000 / 1.5, abs=2)
+
+
+@pytest.mark.parametrize("window", [(-500, -500, 500, 500), (0, 0, 1e9, 1)])
+def test_too_many_tiles(window: tuple[float, ...]) -> None:
+    tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
+    with refused("window", 20000):
+        patch(tile, window)

@@ -4,11 +4,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup, rotation_matrix
+from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup
 from orbiflow.tiles import CLASSES
 from orbiflow.tiles.tilings import commutant
 from orbiflow.tiles.tilings.isohedral import stretch_matrix
@@ -39,15 +38,3 @@ def test_dimension_and_commuting(data: st.DataObject) -> None:
         assert np.abs(linear @ maps - maps @ linear).max() < 1e-9
     stretched = group.conjugate(maps[0])
     assert stretched.order == group.order
-
-
-@given(seeds, st.floats(-3, 3))
-def test_the_family_turns_with_the_group(seed: int, angle: float) -> None:
-    turn = rotation_matrix(angle)
-    mirrored = np.stack([np.eye(2), np.diag([1.0, -1.0])])
-    basis = commutant(turn @ mirrored @ turn.T)
-    parameter = random_tensor(seed, 1, 1, size=1.0)
-    ends = stretch_matrix(basis, torch.cat([parameter, -parameter])).numpy()
-    plain = stretch_matrix(commutant(mirrored), parameter).numpy()[0]
-    wanted = turn @ plain @ turn.T
-    assert min(np.abs(end - wanted).max() for end in ends) < 1e-9

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
+    IsohedralClass,
     Tile,
     Tiling,
     certify,
@@ -20,7 +22,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.page import outline
 from refusals import refused
-from some_tilings import NAMED, SQUARE, dirichlet_tilings, mirror_tiles, tilings
+from some_tilings import SQUARE, dirichlet_tilings, mirror_tiles, tilings
 
 
 @settings(max_examples=12, deadline=None)
@@ -106,17 +108,6 @@ def test_the_skeleton_has_every_edge_once(tiling: Tiling, seed: int) -> None:
         assert other != copy
 
 
-def test_a_whole_patch_has_each_inner_vertex_once() -> None:
-    """Eighths about the origin: sixteen edges of eight triangles, one vertex in their middle."""
-    tiling = NAMED["its eighth"][0]
-    copies = copies_meeting(tiling, (-0.01, -0.01, 0.01, 0.01))
-    found = skeleton(edges(tiling), copies)
-    assert len(copies) == 8
-    assert len(found) == 16
-    assert (found.other >= 0).sum() == 8
-    assert len(set(found.ends.ravel().tolist())) == 9
-
-
 @settings(max_examples=12, deadline=None)
 @given(st.one_of(mirror_tiles(), dirichlet_tilings(most=1)))
 def test_outlines_of_symmetric_tiles_tile(tiling: Tiling) -> None:
@@ -176,3 +167,28 @@ def test_corners_stay_where_they_were() -> None:
     brick = Prototile(BRICKS.prototiles[0].polygon, (1, 2))
     (after,) = edge_to_edge(Tiling(BRICKS.group, [brick])).prototiles
     assert after.polygon[list(after.corners)].tolist() == [[2, 0], [2, 1]]
+
+
+def test_the_templates(kind: IsohedralClass) -> None:
+    found = edges(Tile(kind.template(), kind.group())).identifications
+    expected = {(pair.first, pair.second, pair.reversed) for pair in kind.identified_edges}
+    assert {(pair.first, pair.second, pair.reversed) for pair in found} == expected
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_bent_tiles(kind: IsohedralClass, make_tile, turned: bool) -> None:
+    tile = make_tile(kind, seed=3, stretch=0.1, per_edge=15)
+    if turned:  # the other sense, and begun within an edge
+        count = len(tile.polygon)
+        tile = Tile(np.roll(tile.polygon[::-1], -4, axis=0), tile.group)
+        corners = sorted((count - 1 - k * 15 - 4) % count for k in range(count // 15))
+        assert list(edges(tile).starts) == corners
+    else:
+        assert edges(tile).starts == tile.corners
+    own = edges(tile)
+    assert sum(len(own.points(k)) - 1 for k in range(len(own.starts))) == len(tile.polygon)
+    for pair in own.identifications:
+        image = pair.isometry(own.points(pair.first))
+        image = image[::-1] if pair.reversed else image
+        np.testing.assert_allclose(image, own.points(pair.second), atol=1e-9)
+        assert own.across[pair.second].is_close(pair.isometry)

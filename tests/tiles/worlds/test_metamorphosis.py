@@ -24,7 +24,7 @@ tiles = st.builds(
 ).filter(is_sound)
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(tiles, st.sampled_from(["right", "down", "middle"]), st.integers(1, 2))
 def test_nothing_gaps_or_overlaps(tile: Any, goes: Any, stages: int) -> None:
     chosen = ArtSettings(metamorphosis=goes, stages=stages, area=(150.0, 100.0))
@@ -77,7 +77,7 @@ def test_stages_go_there_and_back() -> None:
         ArtSettings(stages=2)
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(st.sampled_from(["IH1", "IH4", "IH5", "IH7", "IH21", "IH28"]), st.data())
 def test_a_tile_becomes_another_of_its_class(name: str, data: Any) -> None:
     drawn = st.builds(swirled_tile, st.just(name), st.integers(0, 999), st.floats(0.05, 0.25))

@@ -263,15 +263,6 @@ def test_what_has_no_such_world_says_why(
         art(escher(name), tmp_path / "a.png", ArtSettings(**given_settings))
 
 
-def test_a_long_band_has_no_hole() -> None:
-    found, _ = world_of(escher("IH28"), ArtSettings(world="band", area=(240.0, 30.0)))
-    rings = [
-        shapely.make_valid(shapely.Polygon(curve.flattened(0.01))) for _, curve in found.outlines(0)
-    ]
-    seen = shapely.box(1, 6, 239, 24)
-    assert seen.difference(shapely.union_all(rings, grid_size=1e-4)).area < 0.001 * seen.area
-
-
 @settings(max_examples=4)
 @given(sound(ORDERS), st.sampled_from([None, (2, 1), (-1, 3), (4, 0)]))
 def test_a_cylinder_meets_itself(tile: Any, arms: Any) -> None:

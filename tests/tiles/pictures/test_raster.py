@@ -12,7 +12,6 @@ from PIL import Image
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import Sheet, field_picture, palette
-from orbiflow.drawing.canvas import flow_lines, symmetric_seeds
 from orbiflow.tiles import Tile, classes_png, isohedral_class, overlay_picture, tiling_picture
 from orbiflow.tiles.pictures.overlays import ADDED, COMMON, MISSING
 from refusals import refused
@@ -112,29 +111,6 @@ def test_field_must_return_vectors() -> None:
         field_picture(lambda p: p[..., 0], group, sheet=Sheet.screen(100)).file()
     with refused("field", "(267, 400, 2)"):
         field_picture(lambda p: p * np.nan, group, sheet=Sheet.screen(100)).file()
-
-
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
-def test_seeds_are_orbits_and_keep_their_distance(name: str) -> None:
-    group = isohedral_class(name).group()
-    seeds = symmetric_seeds(group, 0.3, tries=100)
-    assert len(seeds) % group.order == 0
-    assert len(seeds) > 10
-    for g in group.cosets:
-        moved = group.wrap(g(seeds))
-        gaps = np.linalg.norm(moved[:, None] - seeds, axis=-1)
-        assert (np.sort(gaps.min(axis=1))[: len(seeds) // 2] < 1e-9).all()
-
-
-def test_flow_lines_follow_the_field() -> None:
-    def turning(points: Array) -> Array:
-        return np.stack([-points[..., 1], points[..., 0]], axis=-1)
-
-    lines = flow_lines(turning, np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 2.0]]), 0.5)
-    assert lines.shape == (2, 13, 2)  # the fixed point has none
-    radii = np.linalg.norm(lines, axis=-1)
-    assert np.ptp(radii, axis=1).max() < 1e-4
-    assert lines[0, -1, 1] > 0 > lines[0, 0, 1]
 
 
 def test_nine_classes() -> None:
