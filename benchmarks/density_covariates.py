@@ -28,7 +28,6 @@ from rivals import trained
 from scipy import optimize, special, stats
 
 from orbiflow.density import ConditionalEstimator
-from orbiflow.density.covariates import Covariates
 
 UNSEEN = 5_000
 """The most rows of a test."""
@@ -225,14 +224,15 @@ def compare(names: list[str], device: str) -> None:
         train, test = np.flatnonzero(~rows.test), np.flatnonzero(rows.test)[:UNSEEN]
         some, new = ({n: c[k] for n, c in rows.known.items()} for k in (train, test))
         group = None if rows.group is None else rows.group[train]
+        roles = {name: f"cycle:{period:g}" for name, period in rows.periods.items()}
         begin = time.perf_counter()
-        fit = ConditionalEstimator(unit="radians", cycles=rows.periods)
+        fit = ConditionalEstimator(unit="radians", columns=roles)
         fit.fit(rows.angles[train], some, groups=group)
         times = [time.perf_counter() - begin]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of covariates far beyond the rows of the fit
             ours, without = fit.score(rows.angles[test], new), fit.score(rows.angles[test])
-        x = Covariates.of(some, rows.periods).features(rows.known).numpy()
+        x = fit.conditional_density_.covariates.features(rows.known).numpy()
         begin = time.perf_counter()
         angles = rows.angles[train], rows.angles[test]
         linear = linear_circular(angles[0], x[train], angles[1], x[test]).mean()

@@ -1,11 +1,17 @@
 """Writing and refusing tables, shared by the tests of what reads them."""
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from hypothesis import HealthCheck, settings
 
+from orbiflow.arrays import Array
 from orbiflow.density import read_table
+from orbiflow.density.data import Source, TableRows
+from orbiflow.density.tables import SpaceSettings, TableSettings, read_rows
 from orbiflow.errors import InputFileError
+from orbiflow.runtime import ignore
 from refusals import refused
 
 PROPERTY = settings(
@@ -19,9 +25,20 @@ def write(tmp_path: Path, content: str | bytes, name: str = "a.csv") -> Path:
     return path
 
 
-def refuse(path: Path, about: str, columns: list[str] | None = None, width: int | None = 2) -> None:
-    """Reading a file is refused, by words that name the file and all that it is about."""
+def values_of(table: Source) -> Array:
+    """All columns (N, k) of a table of numbers."""
+    return np.stack([table.numbers(k) for k in range(len(table.names))], axis=1)
+
+
+def rows_of_file(path: Path, **settings: Any) -> TableRows:
+    """The rows of a file on a torus in degrees."""
+    where = SpaceSettings(space="torus", unit="degrees")
+    return read_rows(path, TableSettings(**settings), ignore, where=where)
+
+
+def refuse(path: Path, about: str, **options: Any) -> None:
+    """Reading a file's numbers is refused, by words that name the file and all that it is about."""
     with refused(*about.split(), kind=InputFileError) as caught:
-        read_table(path, columns=columns, width=width)
+        values_of(read_table(path, **options))
     assert str(caught.value).startswith(f"{path}: ")
-    assert len(str(caught.value)) < 2 * len(str(path)) + 400
+    assert len(str(caught.value)) < 2 * len(str(path)) + 500

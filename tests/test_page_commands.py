@@ -79,6 +79,7 @@ COLUMNS = {
     "rolled": "phi1,Phi,phi2", "directions": "lat,lon", "poles": "lat,lon",
 }  # fmt: skip
 OF_A_PAGE = {
+    ("docs/columns.md", "wind"): "dir,speed,w,day,hour,site",
     ("docs/conditionals.md", "new"): COLUMNS["weather"],
     ("docs/densities.md", "new"): "lat,lon,phi,length,temperature",
     ("docs/densities.md", "places"): "day,lon,lat,depth",
@@ -87,12 +88,12 @@ OF_A_PAGE = {
 }
 COAST = {"type": "LineString", "coordinates": [[0, 0], [20, 30], [60, 40]]}
 ROWS = 60
-LENGTHS = {"length", "temperature", "pressure", "depth", "x", "y", "z"}
+LENGTHS = {"length", "temperature", "pressure", "depth", "speed", "w", "x", "y", "z"}
 
 
 def column(name: str, count: int, random: np.random.Generator) -> list[object]:
     """Some values that a column of this name may have."""
-    if name in ("protein", "cell", "airport", "polarity"):
+    if name in ("protein", "cell", "airport", "polarity", "site"):
         words = {"polarity": "NR", "airport": ["JFK", "EWR"]}.get(name, "ABCDEFGHIJKL")
         return [words[k % len(words)] for k in range(count)]
     if name in ("hour", "day"):

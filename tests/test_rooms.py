@@ -97,7 +97,9 @@ PAST_DOORS = {
     "tiles/search/test_carried.py: tiles.silhouette.bending": "the most points of a map",
     "tiles/search/test_two_figures.py: tiles.motion.kinds": "every frame, not the file",
     "tiles/silhouette/test_sampling.py: tiles.search.co_deformation": "bodies sampled for it",
-    "cli/test_density_patches.py: density.spaces.patches": "what the command's rows are made of",
+    "tiles/exporting/test_lengths.py: settings.kinds": "how lengths are read, not which settings",
+    "tiles/exporting/test_lengths.py: settings.units": "how lengths are read, not which settings",
+    "test_without_extras.py: settings.extras": "what is said where an extra is missing",
     "density/cross_validation/test_cross_validation.py: batch.parcels": "a worker's part, here",
     "density/pictures/test_plots.py: density.operations.drawing": "the operation that draws",
 }

@@ -24,7 +24,7 @@ BASE_HAS = ("starlette", "uvicorn", "platformdirs")
 def bare_fixture(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Return an environment in which packages of extras cannot be imported, in child processes too."""
     absent = tmp_path_factory.mktemp("absent")
-    for name in (*EXTRAS, "skimage", "sklearn", "pandas"):
+    for name in (*EXTRAS, "skimage", "sklearn"):
         if name not in BASE_HAS:
             text = f'raise ModuleNotFoundError("No module named {name!r}", name="{name}")\n'
             (absent / f"{name}.py").write_text(text)
@@ -138,7 +138,7 @@ def test_what_is_missing_is_said_with_its_cure(bare: dict[str, str], tmp_path: P
     done = run(["-c", MISSING, fit, overlap], bare, tmp_path)
     assert done.returncode == 0, done.stderr
     one, other = done.stderr.splitlines()
-    names(one, "orbiflow density fit", "torch", "pip install 'orbiflow[density]'")
+    names(one, "orbiflow density fit", "pandas", "pip install 'orbiflow[density]'")
     names(other, "orbiflow escherize", "torch", "pip install 'orbiflow[flows]'")
     estimator, groups = done.stdout.splitlines()[-2:]
     assert estimator == "orbiflow.DensityEstimator, torch, density"

@@ -195,12 +195,12 @@ CODE
     awk -F, 'BEGIN { print "lat,lon,cell" }
         $1 ~ /^-?[0-9]/ { printf "%s,%s,%d_%d\n", $1, $2, ($1 + 90) / 2, ($2 + 180) / 2 }' \
         "$FIRES" >"$work/wildfires-cells.csv"
-    orbiflow density cv "$work/wildfires-cells.csv" --columns lat,lon --space sphere --group cell \
+    orbiflow density cv "$work/wildfires-cells.csv" --columns lat,lon,cell=group --space sphere \
         --folds 5 --against mixture --against uniform --out "$work/wildfires-cv"
 }
 
 image_patches() {
-    fit image-patches "$data/patches.csv" theta,phi --space klein-bottle
+    fit image-patches "$data/patches.csv" theta,phi --space klein-bottle --unit radians
     draw "density samples surface" --regions 0.5,0.9
     region 0.5,0.9
     score --region <<'TABLE'

@@ -230,7 +230,7 @@ def test_a_batch_fits_as_fit_does(tmp_path: Path) -> None:
     file = tmp_path / "in" / "one.csv"
     np.savetxt(file, rows_of, delimiter=",", header="phi,psi,w,chain", comments="")
     given = {"space": "torus", "unit": "radians", "components": ["kernels"], "seed": 3}
-    given |= {"weights": "w", "group": "chain", "missing": "marginalise"}
+    given |= {"columns": ["w=weight", "chain=group"], "missing": "marginalise"}
     find("density fit").call({**given, "data": file, "out": tmp_path / "fit"}).run()
     batch = {**given, "folder": tmp_path / "in", "out": tmp_path / "out"}
     assert find("density batch").call(batch).run().summary["done"] == 1

@@ -110,7 +110,7 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
     np.savetxt(tmp_path / "in" / "one.csv", draws, delimiter=",")
     outcome = orbiflow(
         *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
-        *("--space", "torus", "--components", "mixture"),
+        *("--space", "torus", "--unit", "radians", "--components", "mixture"),
     )
     assert outcome.status == 0, outcome.err
     row = rows(tmp_path / "out")["one.csv"]
@@ -129,7 +129,7 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
         assert orbiflow("density", "plot", *model, "--format", form).status == 0
     again = orbiflow(
         *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
-        *("--space", "torus", "--components", "chains"),
+        *("--space", "torus", "--unit", "radians", "--components", "chains"),
     )
     assert again.status == 0, again.err
     assert sorted(path.name for path in (tmp_path / "out" / "one").iterdir()) == [

@@ -14,6 +14,7 @@ from orbiflow.density import read_density
 from refusals import names
 
 FIT = ["--max-frequency", 1, "--segments", 1]
+ANGLES = ["--columns", "lat=angle:degrees,lon=angle:degrees"]
 
 
 def table(folder: Path, rows: int = 100, name: str = "data.csv") -> Path:
@@ -31,7 +32,7 @@ def fitted_fixture(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], 
     @functools.cache
     def fitted(space: str) -> Path:
         folder = tmp_path_factory.mktemp(space)
-        units = ["--unit", "degrees"] if space == "torus" else []
+        units = ANGLES if space == "torus" else []
         fit = ["density", "fit", table(folder), "--space", space, *units, *FIT]
         assert run(list(map(str, [*fit, "--out", folder / "model"]))) == 0
         return folder / "model"
@@ -42,11 +43,11 @@ def fitted_fixture(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], 
 @pytest.mark.parametrize("space", ["torus", "projective-plane"])
 def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
-    fitted = orbiflow(
-        "density", "fit", data, "--space", space, "--unit", "degrees", "--out", model, *FIT
-    )
+    columns = "lat=angle:degrees,lon=angle:degrees" if space == "torus" else "lat,lon"
+    how = ("--space", space, "--columns", columns, "--out", model)
+    fitted = orbiflow("density", "fit", data, *how, *FIT)
     assert fitted.status == 0, fitted.err
-    names(fitted.out, 100)
+    names(fitted.out, columns)
     report = json.loads((model / "report.json").read_text())
     assert report["columns"] == ["lat", "lon"]
     assert report["report"]["mass"] == pytest.approx(1.0, abs=2e-3)
@@ -137,7 +138,8 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
     data, model, out = tmp_path / "data.csv", tmp_path / "model", tmp_path / "plots"
     rows = rng.normal(0, 0.5, (80, 3))
     data.write_text("a,b,c\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
-    fit = ("density", "fit", data, "--space", "torus", "--max-frequency", 1, "--segments", 1)
+    three = ",".join(f"{name}=angle:radians" for name in "abc")
+    fit = ("density", "fit", data, "--space", "torus", "--columns", three, *FIT)
     fitted = orbiflow(*fit, "--out", model)
     assert fitted.status == 0
     plot = ("density", "plot", "--model", model, "--out", out)
@@ -216,7 +218,7 @@ def test_the_model_is_whole_and_readable(fitted) -> None:
 
 def test_a_fit_that_the_limit_ended_says_so(tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
-    fit = ("density", "fit", data, "--space", "torus", "--unit", "degrees", "--out", model)
+    fit = ("density", "fit", data, "--space", "torus", *ANGLES, "--out", model)
     fitted = orbiflow(*fit, *FIT, "--seconds", 0)
     said = "stopped by the limit of 0 s: another run may differ"
     assert said in fitted.out
@@ -227,7 +229,7 @@ def test_a_fit_that_the_limit_ended_says_so(tmp_path: Path, orbiflow) -> None:
 
 def test_nothing_of_an_earlier_model_stays(tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
-    fit = ("density", "fit", data, "--space", "torus", "--unit", "degrees", "--out", model)
+    fit = ("density", "fit", data, "--space", "torus", *ANGLES, "--out", model)
     fit = (*fit, "--components", "mixture")
     plot = ("density", "plot", "--model", model, "--out", model)
     assert orbiflow(*fit).status == 0
@@ -246,9 +248,7 @@ def test_a_fit_does_not_touch_what_it_did_not_write(tmp_path: Path, orbiflow) ->
     data, model = table(tmp_path), tmp_path / "model"
     model.mkdir()
     (model / "density.png").write_text("mine")
-    refused = orbiflow(
-        "density", "fit", data, "--space", "torus", "--unit", "degrees", *FIT, "--out", model
-    )
+    refused = orbiflow("density", "fit", data, "--space", "torus", *ANGLES, *FIT, "--out", model)
     assert refused.status == 2
     names(refused.err, "density.png")
     assert (model / "density.png").read_text() == "mine"

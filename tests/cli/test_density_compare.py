@@ -78,11 +78,19 @@ def test_models_are_compared_by_the_names_of_their_columns(folder: Path, orbiflo
         good["mean"], abs=1e-6
     )
     grouped = orbiflow(
-        "density", "compare", *models, "--data", folder / "held.csv", "--group", "name",
-        "--out", folder / "c.csv",
+        "density", "compare", *models, "--data", folder / "held.csv", "--columns",
+        "name=group", "--out", folder / "c.csv",
     )  # fmt: skip
     assert grouped.status == 0, grouped.err
     names(grouped.out, 30)
+    data = write(folder / "w.csv", "phi,psi,w", np.column_stack([angles(2), np.arange(1, 121)]))
+    done = orbiflow(
+        "density", "compare", *models, "--data", data, "--columns", "w=weight", "--out", out
+    )
+    assert done.status == 0, done.err
+    scores = [float(row["log_prob"]) for row in rows]
+    good = next(s for s in json.loads(out.read_text())["scores"] if s["name"] == "good")
+    assert good["mean"] == pytest.approx(np.average(scores, weights=range(1, 121)), abs=1e-6)
     (row,) = table_of(folder / "c.csv")
     assert (row["first"], row["better"]) == ("good", "good")
 
@@ -107,8 +115,18 @@ def test_rows_that_a_model_was_fitted_to_are_known(folder: Path, orbiflow: Any) 
 
 def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
     flipped = write(folder / "b.csv", "psi,phi", angles(5, rows=60)[:, ::-1])
-    how = ("--space", "torus", "--unit", "degrees", "--permutations", 99, "--bootstrap", 200)
-    done = orbiflow("density", "compare", "-d", folder / "good.csv", "-d", flipped, *how)
+    how = (
+        "--space",
+        "torus",
+        "--unit",
+        "degrees",
+        "--permutations",
+        99,
+        "--divergence",
+        "--bootstrap",
+        200,
+    )
+    done = orbiflow("density", "compare", "-d", folder / "good.csv", "-d", flipped, *how[:-3])
     assert done.status == 0, done.err
     out = folder / "d.csv"
     done = orbiflow(
@@ -126,8 +144,9 @@ def test_groups_of_data_sets_are_no_columns_of_theirs(folder: Path, orbiflow: An
     for name, seed in (("x", 1), ("y", 2)):
         write(folder / f"{name}.csv", "station,phi,psi", angles(seed)[:18], labels)
     done = orbiflow(
-        "density", "compare", "-d", folder / "x.csv", "-d", folder / "y.csv", "--group", "station",
-        "--space", "torus", "--unit", "degrees", "--permutations", 49, "--out", folder / "xy.json",
+        "density", "compare", "-d", folder / "x.csv", "-d", folder / "y.csv",
+        "--columns", "station=group", "--space", "torus", "--unit", "degrees",
+        "--permutations", 49, "--out", folder / "xy.json",
     )  # fmt: skip
     assert done.status == 0, done.err
     found = json.loads((folder / "xy.json").read_text())
@@ -203,10 +222,11 @@ def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orb
     assert xs.max() == 180
     assert xs.min() == -180
     assert feature["properties"]["held"] == 0.8
-    write(tmp_path / "t.csv", "a,b,c", rng.normal(0, 1, (90, 3)))
+    write(tmp_path / "t.csv", "phi,psi,chi", rng.vonmises(0, 1, (90, 3)))
     fit = orbiflow(
-        "density", "fit", tmp_path / "t.csv", "--space", "torus", *QUICK, "--out", tmp_path / "t"
-    )
+        "density", "fit", tmp_path / "t.csv", "--space", "torus", "--unit", "radians", *QUICK,
+        "--out", tmp_path / "t",
+    )  # fmt: skip
     assert fit.status == 0, fit.err
     done = orbiflow("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.json")
     assert done.status == 0, done.err
@@ -237,20 +257,29 @@ def test_score_refuses_other_columns(folder: Path, orbiflow: Any) -> None:
 PAIR = ("compare", "-m", "good", "-m", "poor", "-d", "held.csv")
 
 MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
-    "no group": ((*PAIR, "--group", "who"), "who"),
+    "no group": ((*PAIR, "--columns", "who=group"), "who"),
+    "weight": (
+        (*("compare", "-d", "good.csv", "-d", "odd.csv", "--space", "torus"), "--columns",
+         "phi=angle:degrees,2=weight"),
+        "--columns weight",
+    ),
     "no file": ((*PAIR[:-1], "none.csv"), "none"),
     "no model": (("compare", "-m", "good", "-m", "nope", "-d", "held.csv"), "nope"),
     "other columns": (
-        ("compare", "-d", "good.csv", "-d", "held.csv", "--space", "torus", "--unit", "degrees"),
-        "--columns",
+        ("compare", "-d", "good.csv", "-d", "odd.csv", "--space", "torus", "--unit", "degrees"),
+        "good phi, psi odd phi, chi --columns",
     ),
-    "no unit": (("compare", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"), "--unit"),
+    "no unit": (
+        ("compare", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"),
+        "phi=angle:degrees,psi=angle:degrees",
+    ),
     "place": (("region", "-m", "good", "-o", "none/r.json"), "none"),
 }  # fmt: skip
 
 
 def test_mistakes(folder: Path, orbiflow: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
+    write(folder / "odd.csv", "phi,chi", angles(4))
     for case, (arguments, about) in MISTAKES.items():
         done = orbiflow("density", *arguments)
         assert done.status == 2, case
@@ -262,7 +291,7 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
     one = write(tmp_path / "one.csv", "x,y", places[:40])
     other = write(tmp_path / "other.csv", "x,y", places[40:])
     command = ("density", "compare", "-d", one, "-d", other, "--permutations", 19, "--space")
-    done = orbiflow(*command, "4*2", "--cell", "10,10", "--bootstrap", 100)
+    done = orbiflow(*command, "4*2", "--cell", "10,10")
     assert done.status == 0, done.err
     assert "no cell was given" not in done.out
     fit = ("density", "fit", one, *QUICK, "--space", "p4gm", "--out", tmp_path / "m")

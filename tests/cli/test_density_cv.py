@@ -10,12 +10,13 @@ import pytest
 from density.cross_validation.small_tables import table_of
 from refusals import names
 
-QUICK = ("--space", "torus", "--components", "mixture", "--against", "uniform", "--folds", 2)
+HOW = "--space torus --unit radians --components mixture --against uniform --folds 2"
+QUICK = HOW.split()
 
 
 def test_twice(tmp_path: Path, orbiflow: Any) -> None:
     data, out = table_of(tmp_path, 40, protein=[f"p{k // 4}" for k in range(40)]), tmp_path / "out"
-    command = ("density", "cv", data, "--out", out, "--group", "protein", *QUICK)
+    command = ("density", "cv", data, "--out", out, "--columns", "protein=group", *QUICK)
     first = orbiflow(*command)
     assert first.status == 0, first.err
     names(first.out, "folds/mixture-1-01", 40, 10, "mixture", "uniform", out / "index.html")
@@ -30,8 +31,8 @@ def test_twice(tmp_path: Path, orbiflow: Any) -> None:
     ("arguments", "about"),
     [
         (("--folds", "41"), "41 40"),
-        (("--group", "protein", "--folds", "11"), "11 10"),
-        (("--group", "chain"), "chain phi psi protein"),
+        (("--columns", "protein=group", "--folds", "11"), "11 10"),
+        (("--columns", "chain=group"), "chain phi psi protein"),
         (("--columns", "phi,chi"), "chi"),
         (("--against", "mixture,magic"), "--against"),
         (("--against", "mixture"), "--components --against"),

@@ -47,14 +47,14 @@ def rows_of(report: Any) -> int:
 @pytest.mark.filterwarnings("ignore::orbiflow.errors.DataWarning")
 def test_files_and_frames_are_read_alike(fit: Any) -> None:
     pytest.importorskip("pyarrow")
-    said = fit(TABLE, "--columns", "phi", "--given", "hour,elevation,level", ending="parquet")
-    model = ConditionalEstimator(unit="degrees", components="mixture").fit(
-        TABLE[["phi"]], TABLE[["hour", "elevation", "level"]]
-    )
+    given = "hour,elevation=linear,level=word"
+    said = fit(TABLE, "--columns", "phi", "--given", given, ending="parquet")
+    estimator = ConditionalEstimator(columns="phi", unit="degrees", components="mixture")
+    model = estimator.fit(TABLE, given=given)
     known = model.conditional_density_.covariates.columns
     for one, own in zip(said["given"]["covariates"], known, strict=True):
         assert (one["name"], one["period"], one["words"]) == (own.name, own.period, [*own.words])
-    assert [own.kind.split()[-1] for own in known] == ["24", "numbers", "words"]
+    assert [own.kind for own in known] == ["cycle:24", "linear", "3 words"]
 
 
 def test_times_are_refused(fit: Any) -> None:
@@ -64,10 +64,11 @@ def test_times_are_refused(fit: Any) -> None:
     assert "'when' holds times" in error
 
 
-@pytest.mark.parametrize("role", [("--linear", "elevation"), ("--given", "elevation")])
+@pytest.mark.parametrize(
+    "role", [("--columns", "phi,elevation=linear"), ("--given", "elevation=linear")]
+)
 def test_codes_are_refused_in_all_columns(fit: Any, role: tuple[str, str]) -> None:
-    columns = "phi,elevation" if role[0] == "--linear" else "phi"
-    ask = ("--columns", columns, *role)
+    ask = role if role[0] == "--columns" else ("--columns", "phi", *role)
     wrong = TABLE.copy()
     wrong.loc[3, "elevation"] = -9999
     error = fit(wrong, *ask)
@@ -83,5 +84,5 @@ def test_two_values_are_doubted(orbiflow: Any, tmp_path: Path) -> None:
     table = TABLE.assign(rain=RNG.integers(0, 2, ROWS))
     table.to_csv(tmp_path / "table.csv", index=False)
     words = ("density", "fit", tmp_path / "table.csv", "--space", "torus", "--unit", "degrees")
-    how = ("--columns", "phi,rain", "--linear", "rain", "--components", "mixture")
+    how = ("--columns", "phi,rain=linear", "--components", "mixture")
     assert "'rain' has two values alone" in orbiflow(*words, *how, "-o", tmp_path / "two").out

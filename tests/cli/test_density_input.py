@@ -25,16 +25,16 @@ def table(folder: Path, scale: float, *, first: str = "", count: int = 40) -> Pa
 def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "model"
     fit = ("density", "fit", table(tmp_path, 1.0), "--space", "torus", "--out", out, *SMALL)
-    fitted = orbiflow(*fit)
-    assert fitted.status == 0, fitted.err
-    names(fitted.out, "radians")
-    said = orbiflow(*fit, "--unit", "radians")
-    assert "radians" not in said.out
-    table(tmp_path, 50.0)
-    refused = orbiflow(*fit)
-    assert refused.status == 2
-    names(refused.err, "--unit", "degrees", "radians", "turns")
-    assert orbiflow(*fit, "--unit", "degrees").status == 0
+    for scale, unit in ((1.0, "radians"), (50.0, "degrees")):
+        table(tmp_path, scale)
+        asked = orbiflow(*fit)
+        assert asked.status == 2
+        words = f"phi angle=angle:{unit},psi angle=angle:{unit}"
+        names(asked.err, f"--columns '{words}'")
+        said = orbiflow(*fit, "--columns", words)
+        assert said.status == 0, said.err
+        names(said.out, words)
+        assert orbiflow(*fit, "--unit", unit).status == 0
     report = json.loads((out / "report.json").read_text())
     assert report["space"]["unit"] == "degrees"
     assert report["columns"] == ["phi angle", "psi angle"]
@@ -44,9 +44,11 @@ def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
 @pytest.mark.parametrize("space", ["torus", "klein-bottle"])
 def test_columns_that_number_the_rows_are_left_out(space: str, tmp_path: Path, orbiflow) -> None:
     data, out = table(tmp_path, 1.0, first="id,"), tmp_path / "model"
-    fitted = orbiflow("density", "fit", data, "--space", space, "--out", out, *SMALL)
+    how = ("--space", space, "--unit", "radians", "--out", out)
+    columns = ("--columns", "phi angle,psi angle") if space == "klein-bottle" else ()
+    fitted = orbiflow("density", "fit", data, *how, *columns, *SMALL)
     assert fitted.status == 0, fitted.err
-    names(fitted.out, "'id'")
+    assert bool(columns) or "left out id" in fitted.out
     assert json.loads((out / "report.json").read_text())["columns"] == ["phi angle", "psi angle"]
     scores = tmp_path / "scores.csv"
     assert orbiflow("density", "score", data, "--model", out, "--out", scores).status == 0
@@ -57,7 +59,8 @@ def test_missing_values_and_no_header(tmp_path: Path, orbiflow) -> None:
     data, out = table(tmp_path, 1.0), tmp_path / "model"
     rows = data.read_text(encoding="utf-8-sig").splitlines()[1:]
     data.write_text("\n".join(["x,1.0", *rows, "0.5,"]) + "\n")
-    fit = ("density", "fit", data, "--space", "torus", "--out", out, *SMALL)
+    both = "x=angle:radians,1.0=angle:radians"
+    fit = ("density", "fit", data, "--space", "torus", "--columns", both, "--out", out, *SMALL)
     assert "--drop-missing" in orbiflow(*fit).err
     fitted = orbiflow(*fit, "--drop-missing")
     assert fitted.status == 0, fitted.err
@@ -67,15 +70,17 @@ def test_missing_values_and_no_header(tmp_path: Path, orbiflow) -> None:
     assert orbiflow(*score).status == 0
     assert scores.read_text().splitlines()[-1] == "0.5,,"
     data.write_text("\n".join(["a,0.1,0.2", *(f"b,{row}" for row in rows)]) + "\n")
+    fit = ("density", "fit", data, "--space", "torus", "--out", out, *SMALL)
     assert "--header" in orbiflow(*fit).err
-    assert orbiflow(*fit, "--no-header").status == 0
+    names(orbiflow(*fit, "--no-header").err, "--columns 2=angle:radians,3=angle:radians")
+    assert orbiflow(*fit, "--no-header", "--unit", "radians").status == 0
 
 
 def test_the_mean_says_of_how_many_rows_it_is(
     tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data, out = table(tmp_path, 1.0, count=60), tmp_path / "model"
-    fit = ("density", "fit", data, "--space", "torus", "--out", out, *SMALL)
+    fit = ("density", "fit", data, "--space", "torus", "--unit", "radians", "--out", out, *SMALL)
     values = np.loadtxt(data, delimiter=",", skiprows=1, encoding="utf-8-sig")
 
     def mean_of(done, rows: str) -> tuple[int, float]:

@@ -49,17 +49,17 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
         ("fit places.csv --space sphere --components chains", "Sphere 2 chains"),
         ("fit gaps.csv --space klein-bottle --missing marginalise", "--missing marginalise"),
         ("fit gaps.csv --space torus --missing marginalise --components flow", "--components"),
-        ("fit gaps.csv --space torus", "--missing marginalise"),
-        ("fit nothing.csv --space torus", "nothing.csv 0"),
-        ("fit weights.csv --space torus --weights w", "0 1 -1"),
+        ("fit gaps.csv --space torus --unit radians", "--drop-missing 9 psi"),
+        ("fit nothing.csv --space torus --unit radians", "nothing.csv phi"),
+        ("fit weights.csv --space torus --unit radians --columns w=weight", "0 1 -1"),
         (
             "cv gaps.csv --space torus --missing marginalise --components flow",
             "--missing marginalise",
         ),
         ("plot -m model3 --regions 0.5", "--regions 3"),
         ("plot -m model2 --data gaps.csv", "--drop-missing"),
-        ("compare -d places.csv -d beyond.csv --space sphere", "beyond 95 90 lat lon 30"),
-        ("compare -d two.csv -d gaps.csv --space torus", "--drop-missing"),
+        ("compare -d places.csv -d beyond.csv --space sphere", "beyond 95 90 lat 30"),
+        ("compare -d two.csv -d gaps.csv --space torus --unit radians", "--drop-missing"),
     ],
 )
 def test_mistakes(words: str, about: str, folder: Path, orbiflow) -> None:
@@ -90,7 +90,8 @@ def test_rows_that_lack_a_value_can_be_left_out_of_pictures(
 def test_a_flow_that_was_meant_and_not_tried_is_said(
     tmp_path: Path, folder: Path, orbiflow
 ) -> None:
-    fit = ("density", "fit", folder / "two.csv", "--space", "torus", "--out", tmp_path / "m")
+    how = ("--space", "torus", "--unit", "radians", "--out", tmp_path / "m")
+    fit = ("density", "fit", folder / "two.csv", *how)
     said = "no flow was tried: with fewer than 300 rows, here 40, none gains anything"
     for options, told in (
         (("--components", "kernels,flow"), True),

@@ -17,14 +17,15 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     rows = data_of(120)
     text = "phi,length,temperature\n" + "\n".join(",".join(map(str, row)) for row in rows)
     Path("rows.csv").write_text(text)
-    how = ["--space", "torus", "--unit", "degrees", "--linear", "length,temperature"]
+    declared = "phi=angle:degrees,length=positive,temperature=linear"
+    how = ["--space", "torus", "--columns", declared]
     done = orbiflow("density", "fit", "rows.csv", *how, "--components", "kernels", "-o", "fit")
     assert done.status == 0, done.err
     report = json.loads(Path("fit/report.json").read_text())
     assert report["space"]["name"] == "mixed"
     assert report["log_likelihood"]["natural"] > report["log_likelihood"]["uniform"] > -30
     assert orbiflow("density", "score", "rows.csv", "-m", "fit", "-o", "s.csv").status == 0
-    done = orbiflow("density", "conditional", "-m", "fit", "--given", "length=1.51", "-o", "part")
+    done = orbiflow("density", "conditional", "-m", "fit", "--at", "length=1.51", "-o", "part")
     assert done.status == 0, done.err
     table = np.loadtxt("part/density.csv", delimiter=",", skiprows=1)
     assert table[:, 1].min() < 288 < 294 < table[:, 1].max()
@@ -65,12 +66,18 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     found = json.loads(Path("cv/report.json").read_text())
     assert found["uniform"] < 0
     for words, about in (
-        (["--space", "sphere", "--linear", "length"], "90"),
-        (["--space", "torus", "--unit", "degrees", "--linear", "speed"], "--period speed"),
-        (["--space", "torus", "--period", "phi"], "--period 0"),
-        (["--space", "torus", "--linear", "length", "--period", "length=2"], "length"),
+        ("sphere --columns phi,temperature,length=linear", "90"),
+        (
+            "torus --unit degrees",
+            "--columns phi=angle:degrees,length=positive,temperature=positive",
+        ),
+        ("torus --columns phi,length=linear", "phi=angle:degrees,length=linear"),
+        ("torus --columns phi=angle:degrees,speed=linear", "speed"),
+        ("torus --columns phi=cycle:0", "--columns phi cycle:0"),
+        ("torus --columns length=linear,length=cycle:2", "length"),
+        ("torus --columns phi=positive", "phi line"),
     ):
-        done = orbiflow("density", "fit", "rows.csv", *words, "-o", "no")
+        done = orbiflow("density", "fit", "rows.csv", "--space", *words.split(), "-o", "no")
         assert done.status == 2
         names(done.err, *about.split())
 
@@ -82,7 +89,7 @@ def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
     lat = 20 * np.sin(2 * np.pi * day / 365) + 5 * rng.normal(size=150)
     rows = np.column_stack([day, rng.normal(10, 20, 150), lat, 3 + lat / 20 + rng.random(150)])
     np.savetxt("rows.csv", rows, delimiter=",", header="day,lon,lat,depth", comments="")
-    how = ["--space", "sphere", "--linear", "depth", "--period", "day=365"]
+    how = ["--space", "sphere", "--columns", "lat,lon,day=cycle:365,depth=positive"]
     how += ["--components", "mixture"]
     done = orbiflow("density", "fit", "rows.csv", *how, "-o", "fit")
     assert done.status == 0, done.err
@@ -91,7 +98,7 @@ def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
     assert report["space"]["base"]["name"] == "sphere"
     done = orbiflow("density", "score", "rows.csv", "-m", "fit", "--given", "day", "-o", "g.csv")
     assert done.status == 0, done.err
-    done = orbiflow("density", "conditional", "-m", "fit", "--given", "day=91", "-o", "spring")
+    done = orbiflow("density", "conditional", "-m", "fit", "--at", "day=91", "-o", "spring")
     assert done.status == 0, done.err
     done = orbiflow("density", "marginal", "-m", "spring", "--columns", "lat,lon", "-o", "place")
     assert done.status == 0, done.err
@@ -99,7 +106,7 @@ def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
     done = orbiflow("density", "marginal", "-m", "fit", "--columns", "lat", "-o", "half")
     assert done.status != 0
     names(done.err, "sphere")
-    pictures = ["--data", "rows.csv", "--along", "depth", "--at", "3,4", "-o", "p"]
+    pictures = ["--data", "rows.csv", "--along", "depth", "--slices", "3,4", "-o", "p"]
     done = orbiflow("density", "plot", "-m", "fit", *pictures)
     assert done.status == 0, done.err
     assert {path.name for path in Path("p").iterdir()} >= {"series.png", "beside.png"}
@@ -124,14 +131,14 @@ def test_hours_on_a_torus(tmp_path: Path, orbiflow, monkeypatch) -> None:
     hour = rng.vonmises(3.0, 2.0, 80) * 12 / np.pi % 24
     rows = np.column_stack([hour, np.degrees(rng.vonmises(0, 1, 80))])
     np.savetxt("rows.csv", rows, delimiter=",", header="hour,heading", comments="")
-    how = ["--space", "torus", "--unit", "degrees", "--period", "hour=24"]
+    how = ["--space", "torus", "--unit", "degrees"]  # an hour is a cycle by its name
     done = orbiflow("density", "fit", "rows.csv", *how, "--components", "mixture", "-o", "fit")
     assert done.status == 0, done.err
     assert orbiflow("density", "sample", "-m", "fit", "-n", 200, "-o", "s.csv").status == 0
     drawn = np.loadtxt("s.csv", delimiter=",", skiprows=1)
     assert ((drawn[:, 0] >= 0) & (drawn[:, 0] < 24)).all()
     assert np.median(drawn[:, 0]) == pytest.approx(11.5, abs=1.5)
-    done = orbiflow("density", "conditional", "-m", "fit", "--given", "heading=0", "-o", "c")
+    done = orbiflow("density", "conditional", "-m", "fit", "--at", "heading=0", "-o", "c")
     assert done.status == 0, done.err
     table = np.loadtxt("c/density.csv", delimiter=",", skiprows=1)
     assert table[0, 0] == 0

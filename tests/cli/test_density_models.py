@@ -93,40 +93,16 @@ def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, or
     assert "WARNING" not in said("torus.csv", "torus")
     assert "WARNING" not in said("degrees.csv", "degrees")
     assert "WARNING" not in said("sphere.csv", "sphere")
-    words = said("degrees.csv", "torus")
-    assert "degrees.csv: column 'p" in words
-    assert "beyond 2 pi, and the model's angles are in radians: if these are degrees" in words
-    assert "all values are within 2 pi, and the model's angles are in degrees" in said(
-        "torus.csv", "degrees"
+    refused = orbiflow(
+        "density", "score", folder / "degrees.csv", "-m", folder / "torus", "-o", out
     )
-    assert "latitudes and longitudes are in degrees: if these are radians" in said(
-        "torus.csv", "sphere", "--columns", "1,2"
-    )
-    one = ("density", "conditional", "-m", folder / "torus", "--out", tmp_path / "m", "--given")
-    assert "WARNING: column 'psi' has 45, beyond 2 pi" in orbiflow(*one, "psi=45").out
-    assert "WARNING" not in orbiflow(*one, "psi=4.5").out
-    degrees = (
-        "density",
-        "conditional",
-        "-m",
-        folder / "degrees",
-        "--out",
-        tmp_path / "m",
-        "--given",
-    )
-    assert "WARNING: column 'psi' has 400, beyond 360" in orbiflow(*degrees, "psi=400").out
-    assert "stand for a missing value: leave it out" in orbiflow(*degrees, "psi=-999").err
-    assert "'psi' must be a finite number, got inf" in orbiflow(*one, "psi=1e400").err
-
-
-def test_cells_in_another_unit_than_the_model(folder: Path, tmp_path: Path, orbiflow) -> None:
-    data = tmp_path / "cells.csv"
-    data.write_text("phi,psi\n0.5 rad,1 rad\n0.1 rad,1.5 rad\n")
-    how = ("density", "score", data, "--out", tmp_path / "x.csv", "-m")
-    assert orbiflow(*how, folder / "torus").status == 0
-    refused = orbiflow(*how, folder / "degrees")
     assert refused.status == 2
-    names(refused.err, "radians", "degrees")
+    names(refused.err, "degrees.csv", "turn", "line")
+    names(said("torus.csv", "degrees"), "WARNING", "radians", "phi", "psi")
+    names(said("torus.csv", "sphere", "--columns", "1,2"), "WARNING", "radians")
+    one = ("density", "conditional", "-m", folder / "torus", "--out", tmp_path / "m", "--at")
+    names(orbiflow(*one, "psi=45").err, "psi", 45, "turn")
+    assert "WARNING" not in orbiflow(*one, "psi=4.5").out
 
 
 @pytest.mark.parametrize(("out", "about"), [("empty", "empty"), ("none/x.csv", "none")])

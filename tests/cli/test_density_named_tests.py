@@ -24,13 +24,14 @@ def folder_fixture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-HOW = ("--space", "torus", "--unit", "degrees", "--permutations", "99")
+HOW = ("--space", "torus", "--unit", "degrees")
+FEW = ("--permutations", "99")
 
 
 @pytest.mark.usefixtures("folder")
 def test_tables_and_parts_of_one_give_the_same(orbiflow) -> None:
     tables = ("-d", "a.csv", "-d", "b.csv", "-d", "c.csv")
-    done = orbiflow("density", "compare", *tables, *HOW, "--out", "t.json")
+    done = orbiflow("density", "compare", *tables, *HOW, *FEW, "--out", "t.json")
     assert done.status == 0, done.err
     found = json.loads(Path("t.json").read_text())
     by_name = {(one["name"], one["column"]): one for one in found["tests"]}
@@ -38,14 +39,16 @@ def test_tables_and_parts_of_one_give_the_same(orbiflow) -> None:
     assert by_name["watson-williams", "psi"]["p"] > 0.01
     assert ("kuiper", "phi") not in by_name  # it is of two samples
     names(done.out, "watson-williams", "Fisher, 1993")
-    done = orbiflow("density", "compare", "-d", "all.csv", "--by", "kind", *HOW, "--out", "u.json")
+    done = orbiflow(
+        "density", "compare", "-d", "all.csv", "--by", "kind", *HOW, *FEW, "--out", "u.json"
+    )
     assert done.status == 0, done.err
     assert json.loads(Path("u.json").read_text())["tests"] == found["tests"]
 
 
 @pytest.mark.usefixtures("folder")
 def test_some_tests_of_two_tables_as_csv(orbiflow) -> None:
-    call = ("density", "compare", "-d", "a.csv", "-d", "b.csv", *HOW)
+    call = ("density", "compare", "-d", "a.csv", "-d", "b.csv", *HOW, *FEW)
     done = orbiflow(*call, "--tests", "kuiper,common-median", "--out", "t.csv")
     assert done.status == 0, done.err
     rows = list(csv.DictReader(Path("t.csv").read_text().splitlines()))
@@ -64,15 +67,14 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
     for kind in "ab":
         own = [lines[0], *(line for line in lines if line.startswith(kind))]
         Path(f"{kind}.csv").write_text("\n".join(own))
-    how = ("--space", "torus", "--unit", "degrees", "--tests", "all", "--columns", "phi")
-    how = (*how, "--permutations", "199")
+    how = (*HOW, "--permutations", "199", "--tests", "all", "--columns")
     found = {}
     for name, options in {
-        "rows": ("-d", "nests.csv", "--by", "kind"),
-        "groups": ("-d", "nests.csv", "--by", "kind", "--group", "nest"),
-        "files": ("-d", "a.csv", "-d", "b.csv", "--group", "nest"),
+        "rows": ("phi", "-d", "nests.csv", "--by", "kind"),
+        "groups": ("phi,nest=group", "-d", "nests.csv", "--by", "kind"),
+        "files": ("phi,nest=group", "-d", "a.csv", "-d", "b.csv"),
     }.items():
-        done = orbiflow("density", "compare", *options, *how, "--out", f"{name}.json")
+        done = orbiflow("density", "compare", *how, *options, "--out", f"{name}.json")
         assert done.status == 0, done.err
         found[name] = json.loads(Path(f"{name}.json").read_text())["tests"]
     assert min(one["p"] for one in found["rows"]) < 0.01
@@ -83,7 +85,7 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
     )
     assert [one["p"] for one in found["files"]] == [one["p"] for one in found["groups"]]
     names(done.out, 24)
-    done = orbiflow("density", "compare", "-d", "a.csv", "-d", "nests.csv", "--group", "nest", *how)
+    done = orbiflow("density", "compare", *how, "phi,nest=group", "-d", "a.csv", "-d", "nests.csv")
     names(done.err, "a and nests")
 
 
@@ -96,7 +98,7 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
         (("-d", "a.csv", "-d", "b.csv", *HOW, "--by", "phi"), "--by --data"),
         (("-d", "all.csv", *HOW, "--by", "phi"), "--by 2 50"),
         (("-d", "all.csv", *HOW, "--by", "name"), "name"),
-        (("-d", "all.csv", *HOW, "--by", "kind", "--group", "kind"), "1"),
+        (("-d", "all.csv", *HOW, "--by", "kind", "--columns", "kind=group"), "1"),
         (("-d", "all.csv", "--by", "kind"), "--space"),
         (("-d", "a.csv", *HOW), "--data"),
     ],

@@ -50,7 +50,7 @@ def test_marginal_and_conditional(tmp_path: Path, model: Path, orbiflow: Run) ->
     assert (one / "density.csv").read_text().startswith("psi,density\n")
     assert values[:, 1].sum() * 0.5 == pytest.approx(1, abs=1e-4)  # steps of half a degree
 
-    given = ("density", "conditional", "--model", model, "--given", "chi=-100")
+    given = ("density", "conditional", "--model", model, "--at", "chi=-100")
     assert orbiflow(*given, "--out", two).status == 0
     values = np.loadtxt(two / "density.csv", delimiter=",", skiprows=1)
     assert values[:, 2].sum() * 9 == pytest.approx(1, abs=1e-3)
@@ -78,7 +78,7 @@ def blend(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_samples_of_three_angles(tmp_path: Path, blend: Path, orbiflow: Run) -> None:
-    asked = ("density", "conditional", "-m", blend, "--given", "b=100", "--sample", 400)
+    asked = ("density", "conditional", "-m", blend, "--at", "b=100", "--sample", 400)
     texts: list[str] = []
     for name, seed in (("one", 3), ("two", 3), ("three", 4)):
         done = orbiflow(*asked, "--seed", seed, "--out", tmp_path / name)
@@ -127,14 +127,14 @@ def test_it_can_be_cancelled_in_the_middle(tmp_path: Path, blend: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "about"),
     [
-        ("conditional --given chi", "psi=-45 chi"),
-        ("conditional --given chi=much", "psi=-45"),
-        ("conditional --given chi=nan", "chi"),
-        ("conditional --given omega=3", "omega phi psi chi"),
-        ("conditional --given chi=3,chi=4", "chi"),
-        ("conditional --given phi=1,psi=2,chi=3", ""),
-        ("conditional --given chi=3 --columns chi", "--columns --given"),
-        ("conditional --given ,", "--given"),
+        ("conditional --at chi", "psi=-45 chi"),
+        ("conditional --at chi=much", "psi=-45"),
+        ("conditional --at chi=nan", "chi"),
+        ("conditional --at omega=3", "omega phi psi chi"),
+        ("conditional --at chi=3,chi=4", "chi"),
+        ("conditional --at phi=1,psi=2,chi=3", ""),
+        ("conditional --at chi=3 --columns chi", "--columns --at"),
+        ("conditional --at ,", "--at"),
         ("marginal --columns ,", "--columns"),
         ("marginal --columns 4", "4"),
         ("marginal --columns phi,1", "phi"),
@@ -150,14 +150,15 @@ def test_mistakes(words: str, about: str, tmp_path: Path, model: Path, orbiflow:
 
 def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     data, model, out = table(tmp_path / "gaps.csv", gaps=True), tmp_path / "m", tmp_path / "s.csv"
-    fit = ("density", "fit", data, *QUICK, "--space", "torus", "--weights", "count", "--out", model)
+    weight = ("--columns", "count=weight")
+    fit = ("density", "fit", data, *QUICK, *weight, "--space", "torus", "--out", model)
     done = orbiflow(*fit, "--missing", "marginalise")
     assert done.status == 0, done.err
     names(done.out, "2 of 59", "1 row")
     assert json.loads((model / "report.json").read_text())["columns"] == ["phi", "psi", "chi"]
     done = orbiflow(
         *("density", "score", data, "--model", model, "--out", out),
-        *("--missing", "marginalise", "--weights", "count"),
+        *("--missing", "marginalise", *weight),
     )
     assert done.status == 0, done.err
     names(done.out, "3 of 60")
@@ -167,18 +168,18 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     values = np.array([float(row.split(",")[-1]) for row in rows])
     whole = np.delete(np.arange(60), [3, 4, 5])
     mean = np.average(values[whole], weights=1 + whole % 3)
-    names(done.out, f"{mean:.4f}", 57, "count")
+    names(done.out, f"{mean:.4f}", 57, "weighted")
     refused = orbiflow(*fit)
-    names(refused.err, "--drop-missing", "--missing marginalise")
+    names(refused.err, "line 5", "psi", "--drop-missing")
     assert orbiflow(*fit, "--missing", "drop").status == 0
 
 
 @pytest.mark.parametrize(
     ("options", "about"),
     [
-        ("--weights weight", "weight"),
-        ("--weights phi --columns phi,psi", "phi"),
-        ("--weights chi", "0 1 -"),
+        ("--columns heft=weight", "heft"),
+        ("--columns phi=weight,phi", "phi"),
+        ("--columns chi=weight,count=ignore", "0 1 -"),
         ("--missing marginalise --drop-missing", "--missing"),
         ("--missing marginalise --space sphere --columns phi,psi", "--missing marginalise"),
     ],

@@ -24,10 +24,10 @@ def angles_fixture(tmp_path: Path) -> Path:
 
 
 def test_angles(angles: Path, tmp_path: Path, orbiflow) -> None:
-    columns = ("--space", "torus", "--columns", "phi,wind direction", "--unit", "radians")
     out, picture = tmp_path / "s.json", tmp_path / "roses.png"
-    command = ("density", "summary", angles, *columns, "--missing", "marginalise")
-    done = orbiflow(*command, "--out", out, "--picture", picture)
+    command = ("density", "summary", angles, "--space", "torus", "--unit", "radians")
+    command = (*command, "--missing", "marginalise", "--columns")
+    done = orbiflow(*command, "phi,wind direction", "--out", out, "--picture", picture)
     assert done.status == 0, done.err
     for text in ("Tests of uniformity", "Fisher-Lee", "± (95 %)", f"written to {out}"):
         assert text in " ".join(done.out.split())
@@ -36,8 +36,8 @@ def test_angles(angles: Path, tmp_path: Path, orbiflow) -> None:
     assert abs(document["columns"][0]["mean"] - 1) < document["columns"][0]["half_width"]
     with Image.open(picture) as image:
         assert image.width == 1600
-    more = ("--weights", "w", "--group", "chain", "--level", "0.9", "--out", tmp_path / "s.csv")
-    done = orbiflow(*command, *more)
+    columns = "phi,wind direction,w=weight,chain=group"
+    done = orbiflow(*command, columns, "--level", "0.9", "--out", tmp_path / "s.csv")
     names(done.out, 30)
     rows = list(csv.DictReader((tmp_path / "s.csv").read_text().splitlines()))
     assert [row["name"] for row in rows] == ["phi", "wind direction"]
@@ -60,8 +60,8 @@ def test_directions_and_axes(space: str, tmp_path: Path, orbiflow) -> None:
 
 
 def test_what_little_tells_is_said(tmp_path: Path, orbiflow) -> None:
-    for rows, said in ((["10,20", "10,90", "10,5"], "a"), (["10,20"], "a")):
-        (tmp_path / "few.csv").write_text("\n".join(["a,b", *rows]) + "\n")
+    for rows, said in ((["10,20", "10,90", "10,5"], "phi"), (["10,20"], "phi")):
+        (tmp_path / "few.csv").write_text("\n".join(["phi,psi", *rows]) + "\n")
         out = ("--out", tmp_path / "s.json")
         done = orbiflow(
             "density", "summary", tmp_path / "few.csv", "--space", "torus", "--unit", "degrees",
@@ -83,10 +83,11 @@ def test_what_little_tells_is_said(tmp_path: Path, orbiflow) -> None:
         (("--space", "sphere", "--missing", "marginalise"), "--missing drop"),
         (("--space", "torus", "--out", "a.txt"), "--out .json .csv"),
         (("--space", "torus", "--level", "1"), "--level"),
-        (("--space", "torus", "--group", "none"), "none"),
+        (("--space", "torus", "--columns", "phi,none=group"), "none"),
     ],
 )
 def test_mistakes(options: tuple[str, ...], about: str, angles: Path, orbiflow) -> None:
-    done = orbiflow("density", "summary", angles, "--columns", "phi", *options)
+    columns = () if "--columns" in options else ("--columns", "phi")
+    done = orbiflow("density", "summary", angles, *columns, *options)
     assert done.status == 2
     names(done.err, *about.split())

@@ -1,4 +1,4 @@
-"""Orientations through the commands: files of microscopes, symmetries, options that contradict."""
+"""Orientations through the commands: symmetries, options that contradict."""
 
 from __future__ import annotations
 
@@ -8,77 +8,25 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from scipy.spatial.transform import Rotation
 
-from orbiflow.density import RotationSpace
 from refusals import names
 
 
-def channel_text(angles: np.ndarray) -> str:
-    head = "Channel Text File\nPrj\ttest\nJobMode\tGrid\nEuler angles refer to Sample Coordinate "
-    head += "system (CS0)!\tMag\t300\nPhases\t1\n3.6;3.6;3.6\t90;90;90\tCopper\t11\t225\n"
-    head += "Phase\tX\tY\tBands\tError\tEuler1\tEuler2\tEuler3\tMAD\tBC\tBS\n"
-    rows = (f"1\t0\t0\t8\t0\t{a}\t{b}\t{c}\t0.5\t100\t90\n" for a, b, c in angles.tolist())
-    return head + "".join(rows)
-
-
-def ang(angles: np.ndarray) -> str:
-    head = "# TEM_PIXperUM 1.0\n# Phase 1\n# Symmetry 43\n#\n"
-    rows = (f" {a} {b} {c} 0.0 0.0 3000.0 0.9 1 20 1.2\n" for a, b, c in angles.tolist())
-    return head + "".join(rows)
-
-
-def test_files_of_microscopes_are_read(tmp_path: Path, orbiflow: Any) -> None:
-    turns = Rotation.from_rotvec(np.random.default_rng(0).normal(0, 0.1, (80, 3)))
-    space = RotationSpace(form="bunge", unit="degrees")
-    angles = space.from_chart(torch.tensor((turns * Rotation.from_euler("x", 1)).as_quat())).round(
-        4
-    )
-    (tmp_path / "a.ctf").write_text(channel_text(angles))
-    (tmp_path / "a.ang").write_text(ang(np.radians(angles)))
-    means = []
-    for name in ("a.ctf", "a.ang"):
-        unit = "degrees" if name == "a.ctf" else "radians"
-        done = orbiflow(
-            "density", "fit", tmp_path / name, "--space", "rotation-space", "--crystal", "m-3m",
-            "--specimen", "222", "--unit", unit, "--components", "kernels", "-o", tmp_path / "m",
-        )  # fmt: skip
-        assert done.status == 0, done.err
-        scored = orbiflow(
-            "density", "score", tmp_path / name, "-m", tmp_path / "m", "-o", tmp_path / "s.csv"
-        )
-        means.append(float(scored.out.split("mean log density ")[1].split()[0]))
-        assert "took " in done.out
-    assert means[0] == pytest.approx(means[1], abs=1e-2)
-
-
-def test_points_without_an_orientation_are_doubted(tmp_path: Path, orbiflow: Any) -> None:
-    angles = np.random.default_rng(0).uniform(1, 80, (60, 3)).round(3)
-    angles[:7] = 0
-    (tmp_path / "a.ctf").write_text(channel_text(angles))
-    how = ("--space", "cubic-orientations", "--components", "kernels", "-o", tmp_path / "m")
-    done = orbiflow("density", "fit", tmp_path / "a.ctf", *how, "--unit", "degrees")
-    names(done.out, 0, 7)
-    assert "WARNING: Phase" not in done.out
-    mixed = (tmp_path / "a.ctf").read_text().replace("\n1\t0", "\n2\t0", 5)
-    (tmp_path / "b.ctf").write_text(mixed)
-    done = orbiflow("density", "fit", tmp_path / "b.ctf", *how, "--unit", "degrees")
-    names(done.out, "WARNING: Phase", 55, 5, "--where Phase=1")
-    one = orbiflow(
-        "density", "fit", tmp_path / "b.ctf", *how, "--unit", "degrees", "--where", "phase=1"
-    )
-    assert one.status == 0, one.err
-    names(one.out, "55 of 60", "phase=1")
-    assert "WARNING: Phase" not in one.out
-    angles = np.radians(angles)
+def test_angles_beyond_a_turn_mark_points_without_an_orientation(
+    tmp_path: Path, orbiflow: Any
+) -> None:
+    angles = np.random.default_rng(0).uniform(0.02, 1.4, (60, 3)).round(5)
     angles[:7] = 12.56637
-    (tmp_path / "a.ang").write_text(ang(angles))
-    done = orbiflow("density", "fit", tmp_path / "a.ang", *how)
-    names(done.err, "--missing-codes 12.56637", "--drop-missing")
-    codes = ("--missing-codes", "12.56637", "--drop-missing")
-    done = orbiflow("density", "fit", tmp_path / "a.ang", *how, *codes)
+    np.savetxt(tmp_path / "a.csv", angles, delimiter=",", header="phi1,Phi,phi2", comments="")
+    how = ("--space", "cubic-orientations", "--components", "kernels", "--unit", "radians")
+    fit = ("density", "fit", tmp_path / "a.csv", *how, "-o", tmp_path / "m")
+    done = orbiflow(*fit)
+    assert done.status == 2
+    names(done.err, "line 2", "--missing-codes 12.56637", "--drop-missing")
+    done = orbiflow(*fit, "--missing-codes", "12.56637", "--drop-missing")
     assert done.status == 0, done.err
+    names(done.out, "7 rows")
 
 
 WRONG = {
@@ -140,6 +88,7 @@ def test_rotations_of_another_form_than_the_model_are_refused(
         name = tmp_path / f"{number}.csv"
         np.savetxt(name, values, delimiter=",", header=header, comments="")
     how = ("--space", "rotation-space", "--crystal", "222", "--components", "kernels")
+    how += ("--unit", "radians")
     done = orbiflow("density", "fit", tmp_path / "0.csv", *how, "-o", tmp_path / "m")
     assert done.status == 0, done.err
     done = orbiflow(
@@ -156,6 +105,7 @@ def test_rotations_of_another_form_than_the_model_are_refused(
         comments="",
     )
     symmetry = ("--crystal", "cubic", "--specimen", "222", "-o", tmp_path / "c.json")
+    symmetry += ("--unit", "radians")
     done = orbiflow("density", "compare", *both, *symmetry)
     assert done.status == 0, done.err
     assert (tmp_path / "c.json").exists()

@@ -135,7 +135,7 @@ def test_data_come_back_as_they_were_given(
     )
     mean = np.loadtxt(found, delimiter=",", skiprows=1)[:, 1]
     assert ((mean >= 0) & (mean < 360)).all()
-    asked = f"density conditional --model {folder} --given psi=0 --sample 200 --out {part}"
+    asked = f"density conditional --model {folder} --at psi=0 --sample 200 --out {part}"
     assert orbiflow(*asked.split()).status == 0
     assert (np.loadtxt(part / "samples.csv", skiprows=1) >= 0).all()
 

@@ -124,7 +124,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "project": (lambda: sphere.project(torch.rand(3, 5)), "3 5"),
     "to bytes": (lambda: density_to_bytes("density"), "density"),  # type: ignore[arg-type]
     "read": (lambda: read_density(3), "file 3"),  # type: ignore[arg-type]
-    "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown 3"),  # type: ignore[arg-type]
+    "estimator": (lambda: DensityEstimator(3).fit(POINTS), "takes 3"),  # type: ignore[arg-type]
     "estimator's data": (lambda: DensityEstimator().fit([1.0]), "shape"),
 }
 

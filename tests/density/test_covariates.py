@@ -35,6 +35,7 @@ from orbiflow.density.covariates.joint import JointDensity, joint_torus
 from orbiflow.density.covariates.kernels import ConditionalKernels
 from orbiflow.density.covariates.network import NeuralMixture
 from orbiflow.density.covariates.regression import CircularRegression
+from orbiflow.density.data import given_roles
 from orbiflow.density.fitting import Rows
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import ProductSpace, Torus
@@ -63,7 +64,7 @@ def drawn(count: int, seed: int = 0) -> tuple[Any, dict[str, Any], Any]:
 @pytest.fixture(scope="module")
 def fit() -> ConditionalEstimator:
     angles, cells, _ = drawn(500)
-    return ConditionalEstimator(**QUICK, cycles={"hour": 24}).fit(angles, cells)
+    return ConditionalEstimator(**QUICK, columns={"hour": "cycle:24"}).fit(angles, cells)
 
 
 def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
@@ -77,7 +78,7 @@ def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
     cells["kind"][:3] = ["a", "b", "c"]
     if isinstance(space, Torus):
         del cells["kind"]  # there is a joint density, which takes none
-    covariates = Covariates.of(cells, {"hour": 24})
+    covariates = Covariates.of(cells, given_roles(list(cells), cells, {}, are_asked=False))
     x = covariates.features(cells)
     points = space.to_chart(rng.uniform(-1, 1, (40, dims)))
     wide = torch.tensor(rng.uniform(0.05, 3, len(covariates.columns)))
@@ -233,8 +234,6 @@ def test_what_is_given_must_be_known(fit: ConditionalEstimator) -> None:
         ConditionalEstimator(**QUICK).fit(angles, {"x": np.ones(40)})
     with refused("rows", "30", "20"):
         ConditionalEstimator(**QUICK).fit(angles[:20], {"x": np.arange(20.0)})
-    with refused("cycles", "day"):
-        ConditionalEstimator(**QUICK, cycles={"day": 365}).fit(angles, cells)
     with warned("temperature", "1000", kind=DataWarning):
         fit.at(temperature=1000, hour=3, residue="GLY")
 

@@ -11,6 +11,7 @@ from orbiflow.density import (
     DensityEstimator,
     QuotientSpace,
     Torus,
+    UndeclaredError,
     compare_samples,
     density_picture,
     summarize_axes,
@@ -61,7 +62,7 @@ def test_frames_are_scored_by_name(fitted: DensityEstimator) -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "words"), [("phi,chi", "phi chi"), ("a,b", "phi those"), ("phi,phi", "psi")]
+    ("names", "words"), [("phi,chi", "phi chi"), ("a,b", "phi psi"), ("phi,phi", "psi")]
 )
 def test_frames_of_other_columns_are_refused(
     names: str, words: str, fitted: DensityEstimator
@@ -70,9 +71,9 @@ def test_frames_of_other_columns_are_refused(
         fitted.score_samples(frame(ANGLES, names))
 
 
-def test_more_columns_than_those_of_the_fit_are_refused(fitted: DensityEstimator) -> None:
-    with refused("those", "fit"):
-        fitted.score_samples(frame(np.hstack([ANGLES, ANGLES[:, :1]]), "phi,psi,chi"))
+def test_more_columns_than_those_of_the_fit_are_not_looked_at(fitted: DensityEstimator) -> None:
+    more = frame(ANGLES, "phi,psi").assign(site="north", speed=1.0)[["speed", "psi", "site", "phi"]]
+    assert np.array_equal(fitted.score_samples(more), fitted.score_samples(ANGLES))
 
 
 def test_fits_without_names_take_frames_by_position() -> None:
@@ -99,7 +100,6 @@ ORDERS = {
     ("sphere", "lon,lat"): "lat,lon",
     ("sphere", "ra,dec"): "dec,ra",
     ("sphere", "dec,inc"): "inc,dec",
-    ("sphere", "x,y"): "y,x",
     ("sphere", "z,y,x"): "x,y,z",
     ("projective-plane", "trend,plunge"): "plunge,trend",
     ("rotation-space", "w,x,y,z"): "x,y,z,w",
@@ -115,12 +115,14 @@ def test_names_say_the_order(space: str, names: str) -> None:
     values /= np.linalg.norm(values, axis=1, keepdims=True)
     if names.count(",") == 1 and space != "klein-bottle":
         values *= 60  # degrees that are no radians
+    unit = "radians" if space in ("cubic-orientations", "klein-bottle") else None
     right, mixed = ORDERS[space, names], frame(values, names)
     ordered = mixed[right.split(",")]
     with warned(*right.split(","), kind=DataWarning):
-        fitted = DensityEstimator(space, components="kernels").fit(mixed)
+        fitted = DensityEstimator(space, components="kernels", unit=unit).fit(mixed)
     assert list(fitted.feature_names_in_) == right.split(",")
-    want = DensityEstimator(space, components="kernels").fit(ordered).score_samples(ordered)
+    want = DensityEstimator(space, components="kernels", unit=unit).fit(ordered)
+    want = want.score_samples(ordered)
     assert np.array_equal(fitted.score_samples(mixed), want)
     assert np.array_equal(fitted.score_samples(ordered), want)
 
@@ -129,32 +131,29 @@ def test_columns_beside_a_space_keep_their_names() -> None:
     values = np.hstack([PLACES, RNG.normal(10, 1, (40, 1))])[:, [1, 2, 0]]
     table = frame(values, "lon,depth,lat")
     with warned("lat", kind=DataWarning):
-        fitted = made("sphere", linear=["depth"]).fit(table)
+        fitted = made("sphere", columns="depth=positive").fit(table)
     assert list(fitted.feature_names_in_) == ["lat", "lon", "depth"]
-    right = made("sphere", linear=[2]).fit(values[:, [2, 0, 1]])
+    right = made("sphere", columns={2: "positive"}).fit(values[:, [2, 0, 1]])
     assert np.allclose(fitted.score_samples(table), right.score_samples(values[:, [2, 0, 1]]))
 
 
-def test_too_many_columns_are_refused() -> None:
-    with refused("lat", "lon", kind=SettingError):
-        made("sphere").fit(frame(RNG.normal(size=(40, 3)), "lat,lon,mag"))
-
-
 def test_units_are_known_or_refused() -> None:
-    with refused("degrees", "2", kind=SettingError):
+    with refused("turn", kind=SettingError):
         made("torus").fit(ANGLES)
+    with refused("phi=angle:degrees,psi=angle:degrees", kind=UndeclaredError) as caught:
+        made("torus").fit(frame(ANGLES, "phi,psi"))
+    again = made("torus", columns=caught.value.proposal).fit(frame(ANGLES, "phi,psi"))
+    assert again.space_ == Torus(2, unit="degrees")
     assert made("torus").fit(np.radians(ANGLES)).space_ == Torus(2, unit="radians")
     assert made("torus").fit(frame(ANGLES, "phi_deg,psi_deg")).space_ == Torus(2, unit="degrees")
     with refused("unit", "radians", kind=SettingError):
         made("sphere", unit="radians").fit(np.radians(PLACES))
     with refused("unit", "degrees", kind=SettingError):
         made(Torus(2), unit="degrees").fit(ANGLES)
-    with warned("unit", kind=DataWarning):
-        made("torus", unit="radians").fit(RNG.uniform(-180, 180, (40, 2)))
-    with warned("unit", kind=DataWarning):
-        made("torus", unit="degrees").fit(RNG.uniform(-3.1, 3.1, (40, 2)))
     turning = np.degrees(RNG.uniform(-3, 3, (40, 2)).cumsum(axis=0)) + 2000
-    assert made("torus", unit="degrees").fit(turning).space_.unit == "degrees"
+    for data in (RNG.uniform(-180, 180, (40, 2)), turning):
+        with refused("turn", kind=SettingError):
+            made("torus", unit="radians").fit(data)
 
 
 def test_radians_on_the_sphere_are_refused_or_doubted() -> None:
@@ -201,10 +200,10 @@ def test_missing_values_are_named() -> None:
         made("torus").fit(np.exp(1j * ANGLES))
 
 
-def test_other_quantities_are_doubted() -> None:
-    for name in ("temperature", "bond_length", "count"):
-        with warned(name, "name", kind=DataWarning):
-            made("torus", unit="degrees").fit(frame(ANGLES, f"phi,{name}"))
+@pytest.mark.parametrize("name", ["temperature", "bond_length", "count"])
+def test_other_quantities_are_asked_for(name: str) -> None:
+    with refused(name, kind=UndeclaredError):
+        made("torus", unit="degrees").fit(frame(ANGLES, f"phi,{name}"))
 
 
 def test_fractions_are_doubted_or_read() -> None:

@@ -12,9 +12,12 @@ from orbiflow.density import (
     AngleRegressor,
     ConditionalEstimator,
     DensityEstimator,
+    Role,
+    UndeclaredError,
     fit_parametric,
     make_space,
 )
+from orbiflow.density.data import given_roles
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from refusals import names, refused, warned
 
@@ -99,31 +102,38 @@ HOURS = RNG.uniform(0, 24, ROWS)
 
 
 @pytest.mark.parametrize(
-    ("name", "values", "is_cyclic"),
+    ("name", "values", "role"),
     [
-        ("hour", HOURS, True),
-        ("hr", HOURS, True),
-        ("hour", HOURS * 20, False),
-        ("month", RNG.integers(1, 13, ROWS), True),
-        ("weekday", RNG.integers(0, 7, ROWS), True),
-        ("doy", RNG.integers(1, 366, ROWS), True),
-        ("heading", RNG.uniform(0, 360, ROWS), True),
-        ("warm", HOURS, False),
+        ("hour", HOURS, "cycle:24"),
+        ("hr", HOURS, "cycle:24"),
+        ("month", RNG.integers(1, 13, ROWS), "cycle:12"),
+        ("weekday", RNG.integers(0, 7, ROWS), "cycle:7"),
+        ("doy", RNG.integers(1, 366, ROWS), "cycle:365.25"),
+        ("heading", RNG.uniform(0, 360, ROWS), "angle:degrees"),
+        ("warm", HOURS, None),
+        ("hour", HOURS * 20, None),
     ],
 )
-def test_names_say_cycles(name: str, values: np.ndarray, is_cyclic: bool) -> None:
-    said = [text for text in kinds({name: values}) if "cyclic" in text]
-    assert len(said) == is_cyclic
-    assert all(f"'{name}'" in text for text in said)
-    assert kinds({name: values}, cycles={name: 400}) == []
-    assert kinds({name: values}, cycles={name: None}) == []
+def test_numbers_have_the_role_of_their_name_or_are_asked_for(
+    name: str, values: np.ndarray, role: str | None
+) -> None:
+    given = {name: values}
+    if role is None:
+        with refused(name, kind=SettingError):
+            kinds(pandas.DataFrame(given))
+    else:
+        turn = Role.of(role).turn
+        found = given_roles([name], given, {}, "degrees")[name]
+        assert (str(found), found.turn) == (role, turn)
+        assert kinds(given) == []
+    assert kinds(given, columns={name: "cycle:480"}) == []
+    assert kinds(given, columns={name: "linear"}) == []
 
 
 def test_both_ends_of_a_day_are_one() -> None:
-    with warned("24", kind=DataWarning):
-        model = fit({"hour": HOURS})
-    same = fit({"hour": HOURS}, cycles={"hour": 24})
-    plain = fit({"hour": HOURS}, cycles={"hour": None})
+    model = fit({"hour": HOURS})
+    same = fit({"hour": HOURS}, columns={"hour": "cycle:24"})
+    plain = fit({"hour": HOURS}, columns={"hour": "linear"})
     scores = [own.score_samples(ANGLES, {"hour": HOURS}) for own in (model, same, plain)]
     assert np.array_equal(scores[0], scores[1])
     assert model.at(hour=0).score(ANGLES) == pytest.approx(model.at(hour=24).score(ANGLES))
@@ -149,11 +159,12 @@ def test_dates_are_no_numbers() -> None:
 @pytest.mark.parametrize("spread", [1, 1_000])
 def test_large_whole_numbers_lose_their_differences(spread: int) -> None:
     numbers = 2**62 + spread * np.arange(ROWS)
+    real = {"columns": {"key": "linear"}}
     with refused("key"):
-        kinds({"key": numbers})
-    assert kinds({"key": numbers - 2**62}) == []
+        kinds({"key": numbers}, **real)
+    assert kinds({"key": numbers - 2**62}, **real) == []
     with refused("key"):
-        kinds({"key": np.full(ROWS, 7)})
+        kinds({"key": np.full(ROWS, 7)}, **real)
 
 
 def test_a_series_is_a_column() -> None:
@@ -165,7 +176,8 @@ def test_a_series_is_a_column() -> None:
         assert np.array_equal(model.score_samples(column), right)
     with refused("phi"):
         model.score_samples(warm)
-    assert kinds(warm) == kinds({"warm": HOURS})
+    real = {"columns": {"warm": "linear"}}
+    assert kinds(warm, **real) == kinds({"warm": HOURS}, **real)
     with refused("shape"):
         DensityEstimator(**KIND).fit(phi.rename(None))
 
@@ -173,8 +185,8 @@ def test_a_series_is_a_column() -> None:
 def test_two_values_are_doubted_where_a_density_is_asked_for() -> None:
     table = pandas.DataFrame({"phi": ANGLES[:, 0], "rain": LEVELS > 1}).astype(float)
     with warned("rain", kind=DataWarning):
-        DensityEstimator(**KIND, linear=["rain"]).fit(table)
-    assert kinds({"rain": table["rain"]}) == []
+        DensityEstimator(**KIND, columns={"phi": "angle", "rain": "linear"}).fit(table)
+    assert kinds({"rain": table["rain"]}, columns={"rain": "linear"}) == []
 
 
 def test_whole_hours_with_gaps() -> None:
@@ -183,7 +195,7 @@ def test_whole_hours_with_gaps() -> None:
     table.loc[[2, 5], "hour"] = np.nan
     table.loc[7, "phi"] = np.nan
     with warned("rounded", 1, kind=DataWarning):
-        model = DensityEstimator(**KIND, period={"hour": 24}, missing="marginalise").fit(table)
+        model = DensityEstimator(**KIND, missing="marginalise").fit(table)
     assert np.isfinite(model.score_samples(table)).all()
     assert float(model.marginal("hour").score(table[["hour"]].dropna())) == pytest.approx(
         -np.log(24), abs=0.2
@@ -191,17 +203,13 @@ def test_whole_hours_with_gaps() -> None:
 
 
 def test_arguments_are_used_or_refused() -> None:
-    frame = pandas.DataFrame(PAIRS, columns=["phi", "psi"])
     model = DensityEstimator(**KIND)
-    with refused("columns", kind=SettingError):
-        model.fit(frame, columns=["phi"])
-    for wrong in (["phi"], ["phi", "psi", "chi"], "ab"):
+    for wrong in (["phi"], ["phi", "psi", "chi"], "ab", 3):
         with refused("columns", kind=SettingError):
-            model.fit(PAIRS, columns=wrong)
-    assert list(model.fit(PAIRS, columns=["phi", "psi"]).feature_names_in_) == ["phi", "psi"]
+            model.set_params(columns=wrong).fit(PAIRS)
+    model.set_params(columns=["phi", "psi"])
+    assert list(model.fit(PAIRS).feature_names_in_) == ["phi", "psi"]
     assert model.conditional(psi=10).feature_names_in_.tolist() == ["phi"]
-    with refused("columns", kind=SettingError):
-        ConditionalEstimator(**KIND).fit(frame, HOURS[:, None], columns=["phi"])
     for call in (model.fit, model.score):
         with refused("None", kind=SettingError):
             call(PAIRS, np.ones(ROWS))
@@ -228,12 +236,35 @@ def test_unknown_names_are_refused(call: Any) -> None:
 
 def test_one_strange_value_does_not_make_a_cycle_a_plain_number() -> None:
     hours = RNG.uniform(0, 24, ROWS)
-    for strange in (99.0, -1.0, 24.5):
+    for strange in (99.0, -13.0, 25.5):
         hours[0] = strange
         with refused("hour", 24, f"{strange:g}"):
-            ConditionalEstimator(**KIND).fit(ANGLES, pandas.DataFrame({"hour": hours}))
-    plain = ConditionalEstimator(**KIND, cycles={"hour": None})
-    assert plain.fit(ANGLES, {"hour": hours}).conditional_density_.covariates.columns[0].line
+            fit(pandas.DataFrame({"hour": hours}))
+    plain = fit({"hour": hours}, columns={"hour": "linear"})
+    assert plain.conditional_density_.covariates.columns[0].line
+
+
+def test_words_that_do_not_recur_are_refused() -> None:
+    dates = pandas.date_range("2026-01-01", periods=ROWS, freq="h").astype(str)
+    with refused("when", ROWS, kind=SettingError):
+        kinds({"when": np.array(dates)})
+
+
+def test_columns_of_the_frame_are_given() -> None:
+    table = pandas.DataFrame({"phi": ANGLES[:, 0], "hour": HOURS, "site": WORDS, "level": LEVELS})
+    model = ConditionalEstimator(columns="phi=angle:degrees", components="mixture")
+    model.fit(table, {"hour": "cycle:24", "level": "word"})
+    apart = ConditionalEstimator(**KIND, columns={"level": "word"})
+    apart.fit(ANGLES, table[["hour", "level"]])
+    right = apart.score_samples(ANGLES, table[["hour", "level"]])
+    for given in (table, table[["hour", "level"]], ["hour", "level"]):
+        assert np.array_equal(model.score_samples(table, given), right)
+    with refused("site", "cycle:24"):
+        model.fit(table, {"site": "cycle:24"})
+    with refused("level", kind=UndeclaredError) as caught:
+        model.fit(table, ["hour", "level"])
+    model.fit(table, caught.value.proposal)
+    assert model.conditional_density_.covariates.names == ["hour", "level"]
 
 
 def test_a_whole_number_is_the_same_word_as_a_float() -> None:

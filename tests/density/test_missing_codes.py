@@ -40,13 +40,15 @@ def columns(draw: st.DrawFn) -> np.ndarray:
 
 def read(column: np.ndarray, role: str) -> None:
     """Read a column as `fit` does, which then ends because no row counts."""
-    angles, none = ANGLES[: len(column)], np.zeros(len(column))
-    how: dict[str, Any] = {"unit": "degrees", "components": "mixture"}
+    none = np.zeros(len(column))
+    table = pandas.DataFrame({"phi": ANGLES[: len(column)], "x": column})
+    roles = {"phi": "angle:degrees", "x": "linear"}
     if role == "covariate":
-        ConditionalEstimator(**how).fit(angles[:, None], {"x": column}, none)
+        columns = {"phi": "angle:degrees"}
+        estimator = ConditionalEstimator(columns=columns, components="mixture")
+        estimator.fit(table, {"x": "linear"}, none)
     else:
-        table = pandas.DataFrame({"phi": angles, "x": column})
-        DensityEstimator(**how, linear=["x"]).fit(table, sample_weight=none)
+        DensityEstimator(columns=roles, components="mixture").fit(table, sample_weight=none)
 
 
 ROLES = st.sampled_from(["covariate", "column"])
@@ -105,16 +107,15 @@ def test_other_numbers_far_from_all_are_doubted(role: str) -> None:
 def test_points_of_a_cell() -> None:
     points = RNG.normal(0, 0.1, (60, 2))
     points[7, 1] = -9999
-    with refused("-9999", "1", kind=SettingError):
+    with refused("-9999", "row 8", kind=SettingError):
         DensityEstimator("p4m", components="kernels").fit(points)
 
 
 def test_columns_beside_a_sphere() -> None:
     table = pandas.DataFrame({"lat": RNG.normal(48, 3, 60), "lon": RNG.normal(9, 3, 60)})
     table["depth"], table["hour"] = RNG.gamma(2, 5, 60), RNG.uniform(0, 24, 60)
-    model = DensityEstimator(
-        "sphere", linear=["depth"], period={"hour": 24}, components="kernels"
-    ).fit(table)
+    columns = "lat,lon,depth=linear,hour"
+    model = DensityEstimator("sphere", columns=columns, components="kernels").fit(table)
     for name, code in (("depth", -9999), ("depth", 999.9), ("hour", 99), ("lat", -99.9)):
         wrong = table.copy()
         wrong.loc[3, name] = code
@@ -126,7 +127,8 @@ def test_columns_beside_a_sphere() -> None:
 
 
 def test_codes_are_refused_where_covariates_are_given() -> None:
-    model = ConditionalEstimator(unit="degrees", components="mixture", cycles={"tide": 12.4}).fit(
+    columns = {"p": "linear", "tide": "cycle:12.4"}
+    model = ConditionalEstimator(unit="degrees", components="mixture", columns=columns).fit(
         ANGLES[:120, None], {"p": PRESSURE, "tide": RNG.uniform(0, 12.4, 120)}
     )
     model.at(p=999.9, tide=3.0)
@@ -138,5 +140,6 @@ def test_codes_are_refused_where_covariates_are_given() -> None:
 def test_prices_are_no_codes() -> None:
     prices = RNG.choice([9.99, 19.99, 99.99, 999.99], 120)
     table = pandas.DataFrame({"phi": ANGLES[:120], "price": prices})
-    model = DensityEstimator("torus", unit="degrees", linear=["price"], components="kernels")
+    columns = "phi=angle:degrees,price=linear"
+    model = DensityEstimator("torus", columns=columns, components="kernels")
     assert np.isfinite(model.fit(table).score(table))

@@ -17,6 +17,7 @@ from orbiflow.density import (
     Density,
     DensityEstimator,
     MixedTorus,
+    Role,
     Torus,
     UniformDensity,
     conditional,
@@ -43,7 +44,7 @@ def data_of(count: int, seed: int = 0) -> np.ndarray:
 
 @pytest.fixture(scope="module", name="fit")
 def fit_fixture() -> DensityEstimator:
-    settings = {"components": "mixture,chains", "unit": "degrees", "linear": (1,)}
+    settings = {"components": "mixture,chains", "unit": "degrees", "columns": {1: "linear"}}
     return DensityEstimator("torus", **settings).fit(data_of(400)[:, :2])
 
 
@@ -132,7 +133,9 @@ def test_it_is_near_the_truth_and_far_above_independence() -> None:
         return np.column_stack([own, 3 + np.cos(own) / 2 + 0.2 * rng.normal(size=len(own))])
 
     held = rows(unseen)
-    fit = DensityEstimator("torus", linear=(1,), components="kernels,mixture,chains", seed=0)
+    fit = DensityEstimator(
+        "torus", columns={1: "linear"}, components="kernels,mixture,chains", seed=0
+    )
     fit.fit(rows(angle))
     truth = stats.vonmises.logpdf(held[:, 0], 2)
     truth += stats.norm.logpdf(held[:, 1], 3 + np.cos(held[:, 0]) / 2, 0.2)
@@ -157,7 +160,7 @@ def test_files_give_the_same_density_back(fit: DensityEstimator, tmp_path: Path)
 def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     data = np.column_stack([rng.vonmises(0, 2, (300, 4)), rng.normal(size=300)])
-    space = MixedTorus.for_columns(data, {4: None}, "abcde")
+    space = MixedTorus.for_columns(data, [Role("angle")] * 4 + [Role("linear")], "abcde")
     whole = DensityEstimator(space, components="chains").fit(data).density_
     for part in (marginal(whole, [1, 2, 4]), conditional(whole, {0: 0.1})):
         assert isinstance(part.space, MixedTorus)
@@ -169,7 +172,12 @@ def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
 def test_rows_that_lack_a_value_count_by_the_others() -> None:
     data = data_of(300)
     data[::3, 1], data[1::3, 2] = np.nan, np.nan
-    settings = {"unit": "degrees", "linear": (1, 2), "missing": "marginalise", "seed": 0}
+    settings = {
+        "unit": "degrees",
+        "columns": {1: "linear", 2: "linear"},
+        "missing": "marginalise",
+        "seed": 0,
+    }
     fit = DensityEstimator("torus", components="kernels,mixture", **settings).fit(data)
     some = data[:6].copy()
     scores = fit.score_samples(some)
@@ -178,43 +186,43 @@ def test_rows_that_lack_a_value_count_by_the_others() -> None:
 
 
 @pytest.mark.parametrize(
-    ("space", "linear", "words"),
-    [("sphere", (1,), "shape 50 1"), ("torus", ("speed",), "speed"), ("torus", (0, 0), "twice")],
+    ("columns", "words"),
+    [({"speed": "linear"}, "speed"), ("a=linear", "2"), ({5: "linear"}, "5"), ("a=lin,b", "lin")],
 )
-def test_columns_that_cannot_be_real(space: str, linear: tuple, words: str) -> None:
-    with refused(*words.split()):
-        DensityEstimator(space, linear=linear).fit(np.ones((50, 2)))
+def test_columns_that_cannot_be_real(columns: Any, words: str) -> None:
+    with refused(*words.split(), kind=SettingError):
+        DensityEstimator(columns=columns).fit(np.ones((50, 2)))
 
 
 def test_a_column_of_one_value_and_lines_that_are_none() -> None:
     data = data_of(50)[:, :2]
     data[:, 1] = 1.5
     with refused("one value"):
-        DensityEstimator("torus", unit="degrees", linear=(1,)).fit(data)
+        DensityEstimator("torus", unit="degrees", columns={1: "linear"}).fit(data)
     wrongs: list[Any] = [[(1.0, 0.0)], [(np.nan, 1.0)], [(1.0,)], ["ab"]]
     for wrong in wrongs:
         with pytest.raises(OrbiflowError):
             MixedTorus(wrong)
-    with refused("space", "says", kind=SettingError):
-        DensityEstimator(MixedTorus([None, (0, 1)]), linear=(1,)).fit(data)
+    with refused("2", "3", kind=SettingError):
+        DensityEstimator(MixedTorus([None, (0, 1)])).fit(np.ones((50, 3)))
 
 
 def test_radians_in_the_place_of_degrees_are_doubted() -> None:
     rows = data_of(200)[:, :2] + (150.0, 0.0)
-    settings = {"components": "mixture", "unit": "degrees", "linear": (1,)}
+    settings = {"components": "mixture", "unit": "degrees", "columns": {1: "linear"}}
     fit = DensityEstimator("torus", **settings).fit(rows)
     rows[:, 0] = (rows[:, 0] + 180) % 360 - 180
     fit.score_samples(rows)
     rows[:, 0] = np.radians(rows[:, 0])
-    with warned("seem", "radians"):
+    with warned("column1", "radians"):
         fit.score_samples(rows)
 
 
-@pytest.mark.parametrize("how", [{}, {"linear": (1,)}], ids=["angles", "mixed"])
-def test_warnings_are_where_the_data_are_given(how: dict[str, Any]) -> None:
+def test_warnings_are_where_the_data_are_given() -> None:
     rng = np.random.default_rng(0)
-    data = np.column_stack([rng.uniform(-3, 3, 60), rng.normal(size=60)])[:, : 1 + len(how)]
-    estimator = DensityEstimator("torus", unit="degrees", components="mixture", **how)
-    with warned("within", "2") as found:
-        estimator.fit(data)
+    data = np.column_stack([rng.uniform(-3, 3, 60), rng.normal(size=60)])
+    data[:20, 1] = 50.0
+    columns = {1: "linear"}
+    with warned("column2", "50", "20") as found:
+        DensityEstimator(columns=columns, components="mixture").fit(data)
     assert {Path(one.filename).name for one in found} == {Path(__file__).name}

@@ -249,7 +249,7 @@ def test_beside_others_it_is_a_candidate() -> None:
 
 def test_a_saved_fit_keeps_its_parameters(tmp_path: Path) -> None:
     angles = np.random.default_rng(0).vonmises([0.2, -1.0], 3.0, (80, 2))
-    fit = DensityEstimator("torus", components="von-mises").fit(angles, columns=["phi", "psi"])
+    fit = DensityEstimator(columns="phi,psi", components="von-mises").fit(angles)
     orbiflow.save(fit, tmp_path / "fit")
     again = orbiflow.load(tmp_path / "fit")
     assert isinstance(again, DensityEstimator)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,7 +144,7 @@ def test_samples_have_the_entropy_of_the_density(name: str, seed: int) -> None:
 def test_em_finds_a_direction_that_goes_with_the_day() -> None:
     rows, _ = place_and_season(600, 0)
     unseen, truth = place_and_season(600, 1)
-    how = {"linear": [3], "period": {4: 365.0}, "components": "kernels"}
+    how: Any = {"columns": {3: "linear", 4: "cycle:365"}, "components": "kernels"}
     space = DensityEstimator("sphere", **how).fit(rows).space_
     points = space.to_chart(rows)
     start = AdaptiveKernels(

@@ -183,7 +183,10 @@ def place_and_season(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 def test_a_fit_is_near_the_truth() -> None:
     rows, _ = place_and_season(1000, 0)
     unseen, truth = place_and_season(1000, 1)
-    how: dict[str, Any] = {"linear": [3], "period": {4: 365.0}, "components": "kernels,mixture"}
+    how: dict[str, Any] = {
+        "columns": {3: "linear", 4: "cycle:365"},
+        "components": "kernels,mixture",
+    }
     fit = DensityEstimator("sphere", **how).fit(rows)
     regret = float((truth - fit.score_samples(unseen)).mean())
     assert 0 < regret < 0.25
@@ -200,14 +203,13 @@ def test_columns_beside_come_last_or_have_names() -> None:
     for name in order:
         structured[name] = frame[name]
     how: dict[str, Any] = {"components": "mixture", "seed": 0}
-    fit = DensityEstimator("sphere", linear=["depth"], period={"day": 365}, **how).fit(structured)
-    assert list(fit.feature_names_in_) == ["x", "y", "z", "day", "depth"]
-    plain = fit.score_samples(rows[:, [0, 1, 2, 4, 3]])
+    columns = "depth=linear,day=cycle:365"
+    fit = DensityEstimator("sphere", columns=columns, **how).fit(structured)
+    assert list(fit.feature_names_in_) == ["x", "y", "z", "depth", "day"]
+    plain = fit.score_samples(rows)
     np.testing.assert_allclose(fit.score_samples(structured), plain)
-    with refused("come", kind=SettingError):
-        DensityEstimator("sphere", linear=[0], **how).fit(rows)
-    with refused("column", "left", kind=SettingError):
-        DensityEstimator("sphere", linear=[0, 1], **how).fit(rows[:, :2])
+    with refused("3", "2", kind=SettingError):
+        DensityEstimator("sphere", columns=dict.fromkeys((0, 1), "linear"), **how).fit(rows[:, :3])
     with refused("meaning", "together"):
         fit.marginal("x", "depth")
     with refused("meaning", "together"):
@@ -258,7 +260,9 @@ def test_widths_are_tuned_where_columns_have_nothing_in_common() -> None:
     rng = np.random.default_rng(0)
     rows, _ = place_and_season(300, 0)
     rows[:, 3] = rng.integers(0, 5, 300) + 0.01 * rng.normal(size=300)  # five narrow layers
-    fit = DensityEstimator("sphere", linear=[3], period={4: 365.0}, components="kernels").fit(rows)
+    fit = DensityEstimator(
+        "sphere", columns={3: "linear", 4: "cycle:365"}, components="kernels"
+    ).fit(rows)
     points = fit.space_.to_chart(rows)
     found = tuned_concentrations(fit.space_, Rows(points), 1e7)
     assert found is not None

@@ -135,13 +135,14 @@ def test_covariates_have_labels() -> None:
     x = pandas.DataFrame({"warm": RNG.uniform(0, 90, ROWS), "side": [*"ab"] * 30}, NAMES)
     y = pandas.DataFrame({"phi": np.degrees(RNG.vonmises(np.radians(x["warm"]), 9))}, NAMES)
     mixed = x.iloc[SHUFFLED]
-    model = ConditionalEstimator(**KIND).fit(y, x)
+    real: Any = {**KIND, "columns": {"warm": "linear"}}
+    model = ConditionalEstimator(**real).fit(y, x)
     right = model.score_samples(y, x)
     columns = {"warm": mixed["warm"], "side": x["side"]}
     for given in (mixed, columns):
         assert np.array_equal(model.score_samples(y, given), right)
         assert model.score(y, given) == pytest.approx(right.mean())
-    assert np.array_equal(ConditionalEstimator(**KIND).fit(y, columns).score_samples(y, x), right)
+    assert np.array_equal(ConditionalEstimator(**real).fit(y, columns).score_samples(y, x), right)
     weighed = model.score(y, mixed, WEIGHTS.iloc[SHUFFLED])
     assert weighed == pytest.approx(np.average(right, weights=WEIGHTS))
     for call in (model.fit, model.score, model.score_samples):
@@ -152,7 +153,8 @@ def test_covariates_have_labels() -> None:
 def test_targets_of_regressions_have_labels() -> None:
     x = pandas.DataFrame({"x": RNG.uniform(0, 90, ROWS)}, NAMES)
     y = pandas.Series(np.degrees(RNG.vonmises(np.radians(x["x"]), 9)), NAMES, name="phi")
-    one, other = (AngleRegressor(**KIND).fit(x, own) for own in (y, y.iloc[SHUFFLED]))
+    real: Any = {**KIND, "columns": {"x": "linear"}}
+    one, other = (AngleRegressor(**real).fit(x, own) for own in (y, y.iloc[SHUFFLED]))
     assert np.array_equal(one.predict(x), other.predict(x))
     assert one.predict(x).shape == (ROWS,)
     assert one.score(x, y.iloc[SHUFFLED], WEIGHTS.iloc[SHUFFLED]) == one.score(x, y, WEIGHTS)

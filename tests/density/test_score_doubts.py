@@ -32,34 +32,40 @@ def models() -> dict[str, DensityEstimator]:
     return {**found, "sphere": made("sphere", PLACES), "plane": made("projective-plane", PLACES)}
 
 
-OTHERS = {
-    ("degrees", "radians"): ANGLES,
-    ("radians", "degrees"): np.degrees(ANGLES),
-    ("turns", "radians"): ANGLES,
-    ("turns", "degrees"): np.degrees(ANGLES),
-    ("sphere", "radians"): np.radians(PLACES),
-    ("plane", "radians"): np.radians(PLACES),
-}
+METHODS = ["score_samples", "score", "score_gradient"]
 
 
-@pytest.mark.parametrize("method", ["score_samples", "score", "score_gradient"])
-@pytest.mark.parametrize("case", OTHERS)
-def test_data_in_another_unit_are_doubted(
-    case: tuple[str, str], method: str, models: dict[str, DensityEstimator]
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("model", "data"),
+    [("degrees", ANGLES), ("sphere", np.radians(PLACES)), ("plane", np.radians(PLACES))],
+)
+def test_radians_in_the_place_of_degrees_are_doubted(
+    model: str, data: np.ndarray, method: str, models: dict[str, DensityEstimator]
 ) -> None:
-    model, unit = case
-    with warned(unit, kind=DataWarning) as caught:
-        getattr(models[model], method)(OTHERS[case])
+    with warned("radians", kind=DataWarning) as caught:
+        getattr(models[model], method)(data)
     assert caught[0].filename == __file__
 
 
-def test_codes_are_refused(models: dict[str, DensityEstimator]) -> None:
-    for model, data in (("degrees", np.degrees(ANGLES)), ("radians", ANGLES)):
-        for rows in (np.vstack([data, [[999, 1.0]]]), [[999, 1.0]]):
-            with refused("column1", "999", "1", kind=SettingError):
-                models[model].score_samples(rows)
-    with refused("column2", "-9999", "1", kind=SettingError):
-        models["sphere"].score_samples(np.vstack([PLACES, [[48, -9999]]]))
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("model", "data"),
+    [
+        ("radians", np.degrees(ANGLES)),
+        ("turns", ANGLES),
+        ("turns", np.degrees(ANGLES)),
+        ("degrees", np.vstack([np.degrees(ANGLES), [[999, 1.0]]])),
+        ("degrees", [[999, 1.0]]),
+        ("sphere", np.vstack([PLACES, [[48, -9999]]])),
+        ("radians", ANGLES + 20 * math.pi),
+    ],
+)
+def test_data_beyond_a_turn_are_refused(
+    model: str, data: Any, method: str, models: dict[str, DensityEstimator]
+) -> None:
+    with refused("turn", kind=SettingError):
+        getattr(models[model], method)(data)
 
 
 EDGE = np.linspace(-5, 5, 50)
@@ -70,8 +76,6 @@ RIGHT = {
     "few of them": ("degrees", np.degrees(ANGLES[:3])),
     "those of a compass": ("degrees", np.degrees(ANGLES) % 360),
     "radians": ("radians", ANGLES),
-    "radians that turn": ("radians", ANGLES + 20 * math.pi),
-    "a row that turns": ("radians", ANGLES[:1] + 10 * math.pi),
     "places": ("sphere", PLACES),
     "a profile": ("sphere", np.stack([48 + 0 * EDGE, 10 + EDGE], axis=1)),
 }
@@ -94,17 +98,14 @@ def test_small_angles_in_degrees_are_not_doubted() -> None:
         model.score_samples(np.stack([EDGE, EDGE], axis=1))
 
 
-def test_known_angles_beyond_a_turn_are_doubted(models: dict[str, DensityEstimator]) -> None:
-    for model, value, words in (
-        ("degrees", 400, "400 360 degrees 40"),
-        ("radians", 45, "45 2 radians"),
-        ("turns", 1.5, "1 turns"),
-    ):  # fmt: skip
-        with warned(*words.split(), kind=DataWarning) as caught:
-            models[model].conditional({1: value})
-        assert caught[0].filename == __file__
-        with refused("999", kind=SettingError):
-            models[model].conditional({0: 999})
+@pytest.mark.parametrize(
+    ("model", "value"), [("degrees", 400), ("degrees", 999), ("radians", 45), ("turns", 1.5)]
+)
+def test_known_angles_beyond_a_turn_are_refused(
+    model: str, value: float, models: dict[str, DensityEstimator]
+) -> None:
+    with refused("turn", value, kind=SettingError):
+        models[model].conditional({1: value})
 
 
 @pytest.mark.parametrize(("model", "value"), [("degrees", -45), ("radians", 6.2), ("turns", 0.9)])

@@ -12,7 +12,7 @@ import pytest
 from orbiflow.density import DensityEstimator, compare_samples, summarize_axes
 from orbiflow.density.operations.queries import score
 from orbiflow.density.operations.summary import summary
-from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
+from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError
 from orbiflow.loading import save
 from orbiflow.runtime import Event, Note
@@ -30,7 +30,7 @@ def principal(path: Path, columns: tuple[str, ...] | None = None) -> tuple[tuple
     found = summary(
         path,
         SpaceSettings(space="projective-plane"),
-        reading=CountedRowSettings(columns=columns),
+        reading=RowSettings(columns=columns),
         on_event=events.append,
     )
     told = " ".join(event.text for event in events if isinstance(event, Note))
@@ -66,7 +66,7 @@ def test_frames_with_strikes() -> None:
 def test_codes_among_strikes_are_refused() -> None:
     coded = BY_STRIKE.copy()
     coded.loc[3, "strike"] = 999
-    with pytest.warns(DataWarning), refused("999", "1", kind=SettingError):
+    with refused("999", "row 4", kind=SettingError):
         summarize_axes(coded)
 
 
@@ -106,5 +106,6 @@ def test_a_strike_on_a_torus_is_an_angle(tmp_path: Path) -> None:
     path = tmp_path / "planes.csv"
     path.write_text("dip,strike\n30,0\n30,0\n30,0\n")
     events: list[Event] = []
-    summary(path, SpaceSettings(space="torus", unit="degrees"), on_event=events.append)
+    reading = RowSettings(columns=("dip=angle:degrees", "strike=angle:degrees"))
+    summary(path, SpaceSettings(space="torus"), reading=reading, on_event=events.append)
     assert not any("right-hand" in str(event) for event in events)

@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import read_table
-from orbiflow.density.tables import append_columns
+from orbiflow.density.tables import append_columns, files
 from orbiflow.errors import InputFileError
 from refusals import refused
-from table_files import PROPERTY, refuse, write
+from table_files import PROPERTY, refuse, rows_of_file, write
 
 # npy
 
@@ -40,21 +40,17 @@ def npy(array: np.ndarray, **options: bool) -> bytes:
 @pytest.mark.parametrize("name", ["a.npy", "a"])
 def test_npy(tmp_path: Path, array: np.ndarray, name: str) -> None:
     path = write(tmp_path, npy(array), name)
-    table = read_table(path, columns=None, width=2)
-    assert table.values.tolist() == [[1, 2], [3, 4]]
-    assert table.values.dtype == np.float64
-    assert table.columns == (("lat", "lon") if array.dtype.names else ("column1", "column2"))
-    assert table.lines.tolist() == [1, 2]
-    assert (table.header, table.delimiter) == (None, None)
-    out = append_columns(table, path, {"LAT": [5, 6]}).decode().splitlines()
-    assert out[0] == ("lat,lon,LAT_2" if array.dtype.names else "column1,column2,LAT")
+    table = read_table(path)
+    fields = array.dtype.names
+    assert (table.is_named, table.is_array) == (fields is not None, fields is None)
+    assert table.place(1) == "row 2"
+    rows = rows_of_file(path, columns=("1=linear", "lon=linear" if fields else "2=linear"))
+    assert rows.values.tolist() == [[1, 2], [3, 4]]
+    assert rows.values.dtype == np.float64
+    assert rows.columns == (("lat", "lon") if fields else ("column1", "column2"))
+    out = append_columns(rows, {"LAT": [5, 6]}).decode().splitlines()
+    assert out[0] == ("lat,lon,LAT_2" if fields else "column1,column2,LAT")
     assert out[1:] == ["1,2,5", "3,4,6"]
-
-
-def test_npy_choice(tmp_path: Path) -> None:
-    path = write(tmp_path, npy(np.array([[1, 2, 3]])), "a.npy")
-    assert read_table(path, columns=["3", "column1"], width=2).values.tolist() == [[3, 1]]
-    refuse(path, "columns 2 3")
 
 
 def claim(shape: str, descr: str = "'<f8'") -> bytes:
@@ -72,11 +68,9 @@ def claim(shape: str, descr: str = "'<f8'") -> bytes:
         (npy(np.zeros((2, 2, 2))), "shape"),
         (npy(np.array(1.0)), "shape"),
         (npy(np.zeros((0, 2))), "rows"),
-        (npy(np.zeros((2, 0))), "0"),
+        (npy(np.zeros((2, 0))), "rows"),
         (npy(np.array([["a", "b"]])), "column1 <U1"),
         (npy(np.array([[1j, 2]])), "column1 complex128"),
-        (npy(np.array([[1j, 2, 3]])), "0"),
-        (npy(np.array([[1, 2], [np.nan, np.inf]])), "2 column1"),
         (npy(np.zeros((9, 2)))[:-1], "144 143"),
         (claim("(10000000, 9000)"), "720000000000"),
         (claim("(4611686018427387904, 4)"), "147573952589676412928"),
@@ -97,9 +91,12 @@ def test_bad_npy(tmp_path: Path, content: bytes, message: str) -> None:
     refuse(write(tmp_path, content, "a.npy"), message)
 
 
-def test_npy_column_that_is_text(tmp_path: Path) -> None:
-    array = np.array([(1, b"a")], dtype=[("lat", "f4"), ("s", "S3")])
-    refuse(write(tmp_path, npy(array), "a.npy"), "column s", ["lat", "s"])
+def test_npy_columns_of_no_numbers(tmp_path: Path) -> None:
+    array = np.array([(1, b"a", np.nan)], dtype=[("lat", "f4"), ("s", "S3"), ("x", "f8")])
+    path = write(tmp_path, npy(array), "a.npy")
+    for columns, about in (("lat=linear,s=linear", "column s"), ("lat=linear,x=linear", "x value")):
+        with refused(path, *about.split(), kind=InputFileError):
+            rows_of_file(path, columns=tuple(columns.split(",")))
 
 
 # Parquet
@@ -108,7 +105,7 @@ def test_npy_column_that_is_text(tmp_path: Path) -> None:
 def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with refused("orbiflow[parquet]"):
-        read_table(write(tmp_path, "PAR1", "a.parquet"), columns=None, width=2)
+        read_table(write(tmp_path, "PAR1", "a.parquet"))
     refuse(write(tmp_path, "1,2", "a.parquet"), "begin parquet")
 
 
@@ -119,26 +116,30 @@ def parquet(tmp_path: Path, columns: dict[str, Any], names: list[str] | None = N
     return path
 
 
-def test_parquet(tmp_path: Path) -> None:
+def test_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = parquet(tmp_path, {"lat": [1.0, 3], "city": ["a", "b"], "lon.x": [2**60 + 1, 4]})
-    table = read_table(path, columns=None, width=2)
-    assert table.values.tolist() == [[1, 2**60], [3, 4]]
-    assert table.columns == ("lat", "lon.x")
-    assert table.lines.tolist() == [1, 2]
-    assert append_columns(table, path, {"p": [5, 6]}).startswith(
-        b"lat,lon.x,p\n1,1.152921505e+18,5\n"
-    )
-    refuse(path, "city string", ["lat", "CITY"])
-    refuse(path, "column x", ["x"])
-    with refused("rows", "1", kind=InputFileError):
-        read_table(path, columns=None, width=2, max_rows=1)
+    table = read_table(path)
+    assert [table.is_numeric(k) for k in range(3)] == [True, False, True]
+    assert table.cells(1).tolist() == ["a", "b"]
+    rows = rows_of_file(path, columns=("lat=linear", "lon.x=linear"))
+    assert rows.values.tolist() == [[1, 2**60], [3, 4]]
+    assert append_columns(rows, {"p": [5, 6]}).startswith(b"lat,lon.x,p\n1,1.152921505e+18,5\n")
+    for columns, about in (("lat=linear,CITY=linear", "city a"), ("x=linear", "column x")):
+        with refused(path, *about.split(), kind=InputFileError):
+            rows_of_file(path, columns=tuple(columns.split(",")))
+    monkeypatch.setattr(files, "MAX_ROWS", 1)
+    refuse(path, "rows 1")
 
 
 def test_parquet_nulls_and_repeated_names(tmp_path: Path) -> None:
-    refuse(parquet(tmp_path, {"a": [1, None, 2], "b": [1.0, None, float("nan")]}), "cells 3 2")
-    refuse(parquet(tmp_path, {"a": np.zeros(0), "b": np.zeros(0)}), "rows")
+    path = parquet(tmp_path, {"a": [1, None, 2], "b": [1.0, None, float("nan")]})
+    with refused(path, 3, "row 2", kind=InputFileError):
+        rows_of_file(path, columns=("a=linear", "b=linear"))
+    path = parquet(tmp_path, {"a": np.zeros(0), "b": np.zeros(0)})
+    with refused(path, "rows", kind=InputFileError):
+        rows_of_file(path, columns=("a=linear", "b=linear"))
     path = parquet(tmp_path, {"a": [1], "b": [2], "c": [3]}, ["a", "a", "c"])
-    refuse(path, "columns 1 2", ["1", "c"])
+    refuse(path, "columns a")
 
 
 @PROPERTY
@@ -150,7 +151,8 @@ def test_damaged_parquet(tmp_path: Path, data: st.DataObject) -> None:
         content[i] ^= data.draw(st.integers(1, 255))
     path.write_bytes(content[: data.draw(st.integers(4, len(content)))])
     try:
-        table = read_table(path, columns=None, width=2, max_rows=1000)
+        table = read_table(path)
+        lengths = {len(table.cells(k)) for k in range(len(table.names))}
     except InputFileError:
         return
-    assert len(table.values) == len(table.lines)
+    assert len(lengths) == 1

@@ -13,8 +13,8 @@ from refusals import refused
 
 @pytest.fixture(scope="module", name="fit")
 def fit_fixture() -> DensityEstimator:
-    settings = {"components": "mixture,chains", "unit": "degrees", "linear": (1, 2)}
-    return DensityEstimator("torus", **settings).fit(data_of(800))
+    columns = "phi=angle:degrees,length=positive,temperature=linear"
+    return DensityEstimator(columns=columns, components="mixture,chains").fit(data_of(800))
 
 
 def test_a_length_follows_its_angle(fit: DensityEstimator) -> None:

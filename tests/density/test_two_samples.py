@@ -11,7 +11,15 @@ import pytest
 import torch
 from scipy.stats import binom, vonmises
 
-from orbiflow.density import ComparisonSettings, Sphere, compare_samples, make_space
+from orbiflow.density import (
+    ComparisonSettings,
+    DensityEstimator,
+    Sphere,
+    compare_models,
+    compare_samples,
+    make_space,
+    named_tests,
+)
 from orbiflow.density.comparing import RowSketch, mmd_test
 from orbiflow.density.comparing.resampling import Groups, chosen_rows
 from refusals import refused
@@ -155,7 +163,8 @@ def test_divergences_are_near_those_of_the_densities() -> None:
     one = rng.vonmises([0.0, 0.0], kappa, (rows, 2))
     other = rng.vonmises([0.0, shift], kappa, (rows, 2))
     found = compare_samples(
-        {"a": one, "b": other}, settings=ComparisonSettings(permutations=99, bootstrap=300)
+        {"a": one, "b": other},
+        settings=ComparisonSettings(permutations=99, bootstrap=300, divergence=True),
     ).divergence
     assert found is not None
     t = (np.arange(4000) + 0.5) / 4000 * 2 * math.pi - math.pi
@@ -175,20 +184,22 @@ def test_data_far_apart_and_few_rows() -> None:
     rng = np.random.default_rng(1)
     far = compare_samples(
         {"a": rng.vonmises(0, 50, (60, 2)), "b": rng.vonmises(3, 50, (60, 2))},
-        settings=ComparisonSettings(bootstrap=100),
+        settings=ComparisonSettings(bootstrap=100, divergence=True),
     )
     assert far.differ
     assert far.divergence is not None
     assert far.divergence.jensen_shannon.value == pytest.approx(math.log(2), abs=0.05)
     assert far.divergence.accuracy.value > 0.98
-    few = compare_samples({"a": rng.vonmises(0, 1, (8, 2)), "b": rng.vonmises(0, 1, (9, 2))})
+    few = compare_samples(
+        {"a": rng.vonmises(0, 1, (8, 2)), "b": rng.vonmises(0, 1, (9, 2))},
+        settings=ComparisonSettings(divergence=True),
+    )
     assert few.divergence is None
     assert any("not estimated" in note for note in few.notes)
     assert json.loads(json.dumps(few.to_json(), allow_nan=False))["divergence"] is None
     same = rng.vonmises(0, 1, (30, 2))
-    assert not compare_samples(
-        {"a": same, "b": same}, settings=ComparisonSettings(permutations=99, bootstrap=100)
-    ).differ
+    alike = compare_samples({"a": same, "b": same}, settings=ComparisonSettings(permutations=99))
+    assert (alike.differ, alike.divergence, alike.notes) == (False, None, ())  # nobody asked
 
 
 @pytest.mark.parametrize(
@@ -216,6 +227,36 @@ def test_data_far_apart_and_few_rows() -> None:
 def test_mistakes(call: Any, message: str) -> None:
     with refused(*message.split()):
         call(np.random.default_rng(0).vonmises(0, 1, (20, 2)))
+
+
+@pytest.mark.parametrize("test", [compare_samples, named_tests])
+def test_what_columns_declare_of_rows_counts(test: Any) -> None:
+    rng, nests = np.random.default_rng(0), np.repeat(np.arange(8), 5)
+    rows = {
+        name: np.column_stack([rng.vonmises(0, 1, 40), nests + k])
+        for k, name in ((0, "a"), (8, "b"))
+    }
+    angles = {name: own[:, :1] for name, own in rows.items()}
+    labels = {name: own[:, 1] for name, own in rows.items()}
+    how = {"settings": ComparisonSettings(permutations=99)}
+    declared = test(rows, columns="phi=angle,nest=group", **how)
+    assert declared == test(angles, columns="phi=angle", groups=labels, **how)
+    with refused("group", "groups"):
+        test(rows, columns="phi=angle,nest=group", groups=labels)
+    with refused("weight", "ignore"):
+        test(rows, columns="phi=angle,nest=weight")
+
+
+def test_models_find_columns_of_frames_by_name() -> None:
+    pandas = pytest.importorskip("pandas")
+    rows = np.random.default_rng(0).vonmises([0.5, -1.0], [6.0, 2.0], (80, 2))
+    frame = pandas.DataFrame(rows, columns=["phi", "psi"])
+    models = {
+        name: DensityEstimator(unit="radians", components=name).fit(frame)
+        for name in ("mixture", "kernels")
+    }
+    mixed = frame.assign(site="a")[["site", "psi", "phi"]]
+    assert compare_models(models, mixed) == compare_models(models, rows)
 
 
 @pytest.mark.parametrize("name", SPACES)

@@ -29,6 +29,7 @@ from orbiflow.density import (
     Space,
     Sphere,
     Torus,
+    UndeclaredError,
     density_picture,
     density_to_bytes,
     make_space,
@@ -373,7 +374,7 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(tmp_path: P
         return dict(call.run().summary)
 
     where = {"space": "rotation-space", "data": table}
-    with refused("2 pi"):
+    with refused("unit", "degrees", kind=UndeclaredError):
         run("fit", **where, out=folder)
     run("fit", **where, unit="degrees", out=folder, picture=True)
     assert (folder / "thumbnail.png").exists()

@@ -14,11 +14,18 @@ from shapely.geometry import shape as geometry
 
 from orbiflow.arrays import Array
 from orbiflow.density import summarize_angles, summarize_axes, summarize_directions
-from orbiflow.density.data_space import DataColumns
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.pictures.frames import angle_axis, view_of
 from orbiflow.density.regions import DensityLevels, outlines, to_geojson
-from orbiflow.density.spaces import ProjectivePlane, RoundSpace, Space, Sphere, Torus, make_space
+from orbiflow.density.spaces import (
+    DataColumns,
+    ProjectivePlane,
+    RoundSpace,
+    Space,
+    Sphere,
+    Torus,
+    make_space,
+)
 
 SHIFTS = st.tuples(st.floats(0, 360), st.booleans(), st.integers(0, 2**31))
 
@@ -33,7 +40,8 @@ def column(shift: float, from_zero: bool, seed: int, period: float = 360.0) -> A
 
 
 def space_of(name: str, values: Array, **how: Any) -> Space:
-    return DataColumns(name, **how).of(values, None).space
+    known = DataColumns(name, **how)
+    return known.of(known.read(values))
 
 
 @given(SHIFTS)
@@ -45,10 +53,10 @@ def test_values_come_back_as_they_were(shift: tuple[float, bool, int]) -> None:
         (rows := np.stack([angles], 1), space_of("torus", rows, unit="degrees")),
         (rows := np.stack([latitudes, angles], 1), space_of("sphere", rows)),
         (rows := np.stack([latitudes, angles], 1), space_of("projective-plane", rows)),
-        (rows := np.stack([hours], 1), space_of("torus", rows, period={0: 24})),
+        (rows := np.stack([hours], 1), space_of("torus", rows, columns={0: "cycle:24"})),
         (
             rows := np.stack([latitudes, angles, latitudes, hours], 1),
-            space_of("sphere", rows, linear=[2], period={3: 24}),
+            space_of("sphere", rows, columns={2: "linear", 3: "cycle:24"}),
         ),
     ):
         again = make_space(space.name, **json.loads(json.dumps(space.settings())))
@@ -84,7 +92,7 @@ def test_axes_of_pictures_begin_where_the_data_do(written: list[bool]) -> None:
     assert angle_axis(hours, 0)[2] == ["−12", "−6", "0", "6", "12"]
 
 
-HOURS: dict[str, Any] = {"period": {0: 24}, "linear": [1]}
+HOURS: dict[str, Any] = {"columns": {0: "cycle:24", 1: "linear"}}
 
 
 @pytest.mark.parametrize(

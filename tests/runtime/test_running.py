@@ -138,7 +138,13 @@ def test_a_fit_that_is_cancelled_writes_nothing(tmp_path: Path) -> None:
             cancel.cancel()
 
     call = find("density fit").call(
-        {"data": data, "space": "torus", "out": tmp_path / "out", "max_frequency": 2}
+        {
+            "data": data,
+            "space": "torus",
+            "unit": "radians",
+            "out": tmp_path / "out",
+            "max_frequency": 2,
+        }
     )
     assert run(call, sink, cancel).state == "cancelled"
     check_order(events)

@@ -8,6 +8,7 @@ import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from density.blends import random_kernels
-from orbiflow.density import Mixture, Torus, density_to_bytes, guess, read_density
-from orbiflow.density.tables import Table, seen_column
+from orbiflow.density import Mixture, Role, Torus, density_to_bytes, read_density
 from orbiflow.studio import density_tasks
 from orbiflow.studio.density_routes import EXAMPLES, TABLES
 from orbiflow.studio.density_tasks import table_view
@@ -80,9 +80,9 @@ def test_a_table_is_looked_at(client: Client) -> None:
     own, task = uploaded(client, BENDS, "bends of a chain.csv")
     assert task["result"]["rows"] == ROWS
     table = client.get(f"{own}/density").json()["table"]
-    assert [(column["name"], column["seems"]) for column in table["columns"]] == [
-        ("phi", "degrees"),
-        ("psi", "degrees"),
+    assert [(column["name"], column["role"]) for column in table["columns"]] == [
+        ("phi", "angle:degrees"),
+        ("psi", "angle:degrees"),
     ]
     assert len(table["first"]) == density_tasks.FIRST_ROWS
     assert table["guess"]["space"] == "torus"
@@ -108,7 +108,7 @@ def test_the_space_is_guessed(text: str, tmp_path: Path) -> None:
     assert (found["space"], list(found["columns"])) == HEADS[text]
 
 
-NAMES = ["phi", "lat", "lon", "x", "y", "z", "theta", "id", "pole lon", ""]
+NAMES = ["phi", "lat", "lon", "x", "y", "z", "theta", "id", "pole lon", "speed"]
 
 
 @given(
@@ -118,13 +118,13 @@ NAMES = ["phi", "lat", "lon", "x", "y", "z", "theta", "id", "pole lon", ""]
 )
 def test_a_guess_names_columns_of_the_table(names: list[str], seed: int, scale: float) -> None:
     values = np.random.default_rng(seed).uniform(-scale, scale, (5, len(names)))
-    values[2, 0] = np.nan
-    table = Table(values, tuple(names), np.arange(5), (), None, None)
-    columns = [seen_column(name, values[:, k]) for k, name in enumerate(names)]
-    found = guess(columns, table)
-    assert set(found.columns) <= set(names)
-    assert (found.space is None) == (not found.columns)
-    assert (found.unit is None) == (found.space in (None, "sphere", "projective-plane"))
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "table.csv")
+        np.savetxt(path, values, delimiter=",", header=",".join(names), comments="")
+        view = table_view(path)
+    assert [Role.of(column["role"]).kind for column in view["columns"]]
+    assert set(view["guess"]["columns"]) <= set(names)
+    assert (view["guess"]["space"] is None) == (not view["guess"]["columns"])
 
 
 def array_bytes(array: np.ndarray, **options: Any) -> bytes:
@@ -136,7 +136,7 @@ def array_bytes(array: np.ndarray, **options: Any) -> bytes:
 def test_arrays_are_read(client: Client) -> None:
     own, task = uploaded(client, array_bytes(np.linspace(0, 350, 20).reshape(10, 2)), "winds.npy")
     assert (task["state"], task["result"]["columns"]) == ("done", 2)
-    assert client.get(f"{own}/density").json()["table"]["guess"]["unit"] == "degrees"
+    assert client.get(f"{own}/density").json()["table"]["guess"]["space"] == "torus"
 
 
 HOSTILE = {

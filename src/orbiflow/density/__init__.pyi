@@ -15,6 +15,9 @@ from .conditional_estimator import AngleRegressor as AngleRegressor
 from .conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .covariates.files import conditional_to_bytes as conditional_to_bytes
 from .covariates.files import read_conditional as read_conditional
+from .data.roles import Role as Role
+from .data.rows import TableError as TableError
+from .data.source import UndeclaredError as UndeclaredError
 from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
@@ -45,6 +48,7 @@ from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
 from .models.network import VonMisesNetwork as VonMisesNetwork
 from .models.sine import VonMisesSine as VonMisesSine
+from .operations.saved import rows_of_model as rows_of_model
 from .orientations import OrientationSummary as OrientationSummary
 from .orientations import summarize_orientations as summarize_orientations
 from .pictures.coastlines import read_coastlines as read_coastlines
@@ -102,9 +106,5 @@ from .summaries import summarize_angles as summarize_angles
 from .summaries import summarize_axes as summarize_axes
 from .summaries import summarize_directions as summarize_directions
 from .tables.files import read_table as read_table
-from .tables.guesses import code_notes as code_notes
-from .tables.guesses import guess as guess
-from .tables.guesses import seen_columns as seen_columns
-from .tables.table import Table as Table
-from .tables.table import TableError as TableError
-from .tables.table import find as find
+from .tables.overview import table_overview as table_overview
+from .tables.settings import TableSettings as TableSettings

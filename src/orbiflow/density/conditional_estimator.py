@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
@@ -20,24 +19,28 @@ from orbiflow.density.covariates import (
     check_complete,
     fit_conditional,
 )
-from orbiflow.density.data import alongside, as_data, as_numbers, cells_of, columns_of, frame_of
+from orbiflow.density.data import (
+    Asked,
+    alongside,
+    as_data,
+    as_numbers,
+    asked_roles,
+    cells_of,
+    columns_of,
+    frame_of,
+    given_roles,
+    is_declared,
+)
 from orbiflow.density.estimator import DensityEstimator, RandomState, seed_of
 from orbiflow.density.fitting import Progress, mean_of, weighed
 from orbiflow.density.inference import Trend, axes_named, trend_of
-from orbiflow.density.spaces import MixedTorus, Space, Torus, check_measure
+from orbiflow.density.spaces import MixedTorus, Torus, check_measure
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.settings import as_whole, described, is_a
 
 
-def _signature() -> inspect.Signature:
-    """The parameters of `DensityEstimator`, and the cycles of covariates."""
-    (space, *others) = inspect.signature(DensityEstimator).parameters.values()
-    cycles = inspect.Parameter("cycles", inspect.Parameter.KEYWORD_ONLY, default=None)
-    return inspect.Signature([space, cycles, *others])
-
-
 class ConditionalEstimator(DensityEstimator):
-    """Exact, normalised density of the data where covariates are known: p(data | x).
+    """Exact, normalised density p(X | given) of data where covariates are known: `fit(X, given)`.
 
     Covariates are real numbers, cyclic ones such as hours of the day, and words, alone and together.
     Rows held out choose among conditional kernels, a neural mixture, the conditional of a joint density
@@ -46,9 +49,9 @@ class ConditionalEstimator(DensityEstimator):
 
     Args:
         space: As for `DensityEstimator`, like all others.
-        cycles: After what cyclic covariates begin again, by their names, such as {"hour": 24}, and None
-            of plain numbers. Others are cyclic, with a `DataWarning`, if their values suit and they are
-            called hour, month, weekday, doy or, beside angles, after an angle.
+        columns: Roles of covariates, too, by their names: {"hour": "cycle:24", "level": "word"}.
+            Text is words. Numbers have the role of their name; others are asked for in data frames,
+            and real in arrays.
 
     After `fit`: what a `DensityEstimator` has, `conditional_density_` and `conditional_report_`, which
     says what the covariates gain and what is chosen.
@@ -63,17 +66,6 @@ class ConditionalEstimator(DensityEstimator):
 
     conditional_density_: ConditionalDensity
     conditional_report_: ConditionalReport
-    __signature__ = _signature()
-
-    def __init__(
-        self,
-        space: str | Space = "torus",
-        *,
-        cycles: Mapping[str, float | None] | None = None,
-        **settings: Any,
-    ) -> None:
-        super().__init__(space, **settings)
-        self.cycles = cycles
 
     def fit(  # pyright: ignore[reportIncompatibleMethodOverride]
         self,
@@ -82,31 +74,39 @@ class ConditionalEstimator(DensityEstimator):
         sample_weight: ArrayLike | None = None,
         *,
         groups: ArrayLike | None = None,
-        columns: Sequence[str] | None = None,
         progress: Progress | None = None,
     ) -> Self:
         """Fit to data (N, k) and what is known of each row.
 
         Args:
             X: The data, as for `DensityEstimator.fit`.
-            given: Columns: a data frame, a mapping {"name": values}, or an array (N, c), whose columns
-                are called x1, x2 and so on. Text is words, all else numbers.
+            given: Columns of the frame X with their roles, {"hour": "cycle:24", "site": "word"}, or
+                columns of their own: a data frame, a mapping {"name": values}, or an array (N, c),
+                whose columns are called x1, x2 and so on.
             sample_weight: How much each row counts (N,).
             groups: A label (N,) a row: rows of one are held out together.
-            columns: Names of an array's columns, as for `DensityEstimator.fit`.
             progress: Hears the share of the work done.
 
         Raises:
             OrbiflowError: For data as `DensityEstimator.fit`; for missing values among the covariates,
                 one that has one value alone, another number of rows, and fewer than 30 rows.
         """
-        _, given, sample_weight, groups = alongside(
-            X=X, given=given, sample_weight=sample_weight, groups=groups
+        declared = asked_roles(given) if is_declared(given) else None
+        beside = {} if declared is not None else {"given": given}
+        _, sample_weight, groups, *aligned = alongside(
+            X=X, sample_weight=sample_weight, groups=groups, **beside
         )
-        cells = columns_given(given)
         check_complete(self.missing)
-        read = self._read(X, columns)
-        covariates = self._covariates(cells)
+        if declared is None:
+            cells = columns_given(aligned[0])
+            read = self._read(X, apart=list(cells))
+        else:
+            names = [str(name) for name in declared]
+            read = self._read(X, others=names, apart=names)
+            cells = dict(read.given)
+        sample_weight, groups = read.beside(sample_weight, groups)
+        are_asked = declared is not None or is_frame(given)
+        covariates = self._covariates(cells, declared or {}, are_asked)
         self._fit(read, sample_weight, groups, progress)
         points = self._chart(read.values)
         self.conditional_density_, self.conditional_report_ = fit_conditional(
@@ -134,17 +134,21 @@ class ConditionalEstimator(DensityEstimator):
         """
         if given is None:
             return super().score_samples(X, measure=measure)
-        _, given = alongside(X=X, given=given)
+        if not is_declared(given):
+            _, given = alongside(X=X, given=given)
         own = self._conditional()
         check_measure(measure, own.space)
         points = self.points_of(X)
+        given = X if is_declared(given) else given
         return own.log_prob(points, self._x(given, len(points)), measure=measure).numpy()
 
     def score(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, X: ArrayLike, given: Any = None, sample_weight: ArrayLike | None = None
     ) -> float:
         """Mean log density of data (N, k), weighted, in natural measure; as `score_samples`."""
-        _, given, sample_weight = alongside(X=X, given=given, sample_weight=sample_weight)
+        others = {} if given is None or is_declared(given) else {"given": given}
+        _, sample_weight, *aligned = alongside(X=X, sample_weight=sample_weight, **others)
+        given = aligned[0] if aligned else given
         scores = torch.as_tensor(self.score_samples(X, given))
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
@@ -209,18 +213,16 @@ class ConditionalEstimator(DensityEstimator):
         densities = (self.at({**(given or {}), along: one}).density_ for one in values)
         return trend_of(densities, axis, values, levels=levels)
 
-    def _covariates(self, cells: Mapping[str, Values]) -> Covariates:
+    def _covariates(
+        self, cells: Mapping[str, Values], declared: Asked, are_asked: bool
+    ) -> Covariates:
         """Return what covariates of a fit are; warn of what is doubtful."""
-        turn = self.space_.period if isinstance(self.space_, Torus) else None
-        found = Covariates.of(cells, cycles := self.cycles or {}, turn)
-        for own in found.columns:
-            if own.period is not None and own.name not in cycles:
-                text = (
-                    f"{own.name!r} was taken for cyclic, of period {own.period:g}, by its name: "
-                    f"cycles={{{own.name!r}: {own.period:g}}} says so, and None there that it is a "
-                    "plain number"
-                )
-                warnings.warn(text, DataWarning, stacklevel=3)
+        asked = {
+            **asked_roles(self.columns),
+            **{k: r for k, r in declared.items() if r is not None},
+        }
+        roles = given_roles(list(cells), cells, asked, self.unit, are_asked=are_asked)
+        found = Covariates.of(cells, roles)
         for doubt in found.fit_doubts(cells):
             warnings.warn(doubt, DataWarning, stacklevel=3)
         return found
@@ -317,6 +319,12 @@ class AngleRegressor(ConditionalEstimator):
             regressor_tags=RegressorTags(),
             classifier_tags=None,
         )
+
+
+def is_frame(given: Any) -> bool:
+    """Return whether covariates are a data frame, and no arrays with or without names."""
+    is_mapping = is_a(given, Mapping) and not hasattr(given, "dims")
+    return not is_mapping and columns_of(given, "given") is not None
 
 
 def columns_given(given: Any, names: Sequence[str] | None = None) -> dict[str, Values]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import numbers
-import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
@@ -15,18 +14,20 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
-    NAN_CURE,
+    DIRECTIONS,
     OUTPUTS,
-    Data,
+    Frame,
+    TableRows,
     alongside,
-    data_of,
+    asked_roles,
+    choose_as_fitted,
     frame_of,
-    in_space_order,
-    named_by,
+    is_number_name,
     require_table,
+    rows_of,
     runs_of_draws,
+    with_dip_directions,
 )
-from orbiflow.density.data_space import DataColumns
 from orbiflow.density.fitting import (
     DensitySettings,
     FitReport,
@@ -51,7 +52,7 @@ from orbiflow.density.inference import (
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
-from orbiflow.density.spaces import Space, check_measure
+from orbiflow.density.spaces import DataColumns, Space, check_measure
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.settings import as_choice, as_instance, as_whole, check_names, fields_of, refusal
 
@@ -83,7 +84,7 @@ def _refuse_targets(y: object) -> None:
 
 def _signature() -> inspect.Signature:
     """The constructor's parameters, which include all settings by name."""
-    own = {"unit": None, "missing": "refuse", "linear": (), "period": None}
+    own = {"columns": None, "unit": None, "missing": "refuse"}
     others = own | {entry.name: entry.default for entry in fields_of(DensitySettings)}
     kinds = inspect.Parameter
     return inspect.Signature(
@@ -100,11 +101,12 @@ class DensityEstimator(FittedFigures):
     Args:
         space: "torus", "sphere" and other names that `make_space` takes; the name of a group, such as
             "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
-        unit: The unit of angles, and of rotations in three columns: "radians", "degrees" or "turns".
-            Default: radians, if no value is beyond 2 pi.
-        linear: Columns that are real numbers, such as lengths or temperatures, by their names or
-            numbers from 0: on a torus any, on other spaces after the space's own columns.
-        period: Periods of columns, likewise, such as {"hour": 24}.
+        columns: What the columns are, in the words of the command line: roles by names, or by numbers
+            from 0, {"dir": "angle:degrees", "speed": "positive"}; or "dir=angle:degrees,speed".
+            Of a data frame, columns whose names say it need no role, and others are asked for; those of
+            weights, counts and groups are named here, too. Of an array they may name the columns, which
+            are angles in radians unless declared.
+        unit: The unit of angles that name none: "radians", "degrees" or "turns".
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
         settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
@@ -132,17 +134,15 @@ class DensityEstimator(FittedFigures):
         self,
         space: str | Space = "torus",
         *,
+        columns: Any = None,
         unit: str | None = None,
         missing: str = "refuse",
-        linear: Sequence[str | int] = (),
-        period: Mapping[str | int, float] | None = None,
         **settings: Any,
     ) -> None:
         self.space = space
+        self.columns = columns
         self.unit = unit
         self.missing = missing
-        self.linear = linear
-        self.period = period
         check_names(settings, fields_of(DensitySettings), "DensityEstimator")
         defaults = {entry.name: entry.default for entry in fields_of(DensitySettings)}
         vars(self).update({**defaults, **settings})
@@ -153,20 +153,19 @@ class DensityEstimator(FittedFigures):
 
     def fit(
         self,
-        X: ArrayLike,
+        X: ArrayLike | TableRows,
         y: object = None,
         sample_weight: ArrayLike | None = None,
         *,
         groups: ArrayLike | None = None,
-        columns: Sequence[str] | None = None,
         progress: Progress | None = None,
     ) -> Self:
         """Fit to data (N, k) in the space's own units; there is no `y` but None.
 
-        Data are an array or a data frame (pandas, polars, pyarrow, xarray) with as many columns as the
-        space takes, or draws of a sampler (ArviZ's InferenceData, an xarray.Dataset along chain and
-        draw). Of a frame whose columns have names, later frames are read by these names. What is
-        doubtful is a `DataWarning`.
+        Data are an array or a data frame (pandas, polars, pyarrow, xarray) whose columns are as
+        declared, or draws of a sampler (ArviZ's InferenceData, an xarray.Dataset along chain and draw).
+        Of a frame whose columns have names, later frames are read by these names. What is doubtful is a
+        `DataWarning`.
 
         Args:
             sample_weight: of the rows (N,), at least 0: how much each counts in everything that is
@@ -174,31 +173,35 @@ class DensityEstimator(FittedFigures):
             groups: a label (N,) a row: rows of one are held out together where parts are chosen, for
                 densities of new groups (proteins, stations, fires). Default: none, of draws in chains
                 the tenths of each chain, because neighbouring draws are alike.
-            columns: names of an array's columns; those of a frame have names.
 
         Raises:
-            OrbiflowError: for data that are not of the space, in another order than its columns, or of
-                an unknown unit; too few points, weights that are none, a setting out of range, or one
-                that has no meaning on a torus of so many angles.
+            UndeclaredError: for columns of a frame of which nothing says what they are; `proposal` is
+                what may be declared.
+            OrbiflowError: for data that are not of the space or contradict what is declared; too few
+                points, weights that are none, a setting out of range, or one that has no meaning on a
+                torus of so many angles.
         """
         _refuse_targets(y)
         _, sample_weight, groups = alongside(X=X, sample_weight=sample_weight, groups=groups)
-        read = self._read(X, columns)
+        rows = self._read(X)
+        sample_weight, groups = rows.beside(sample_weight, groups)
         if groups is None and not self.settings().flow_alone:
             groups = runs_of_draws(X)
-        return self._fit(read, sample_weight, groups, progress)
+        return self._fit(rows, sample_weight, groups, progress)
 
-    def _read(self, X: ArrayLike, columns: Sequence[str] | None) -> Data:
-        """Return the data of a fit and the names of their columns; set their space."""
-        known = self._columns()
-        found = data_of(known.name, X, in_order=False, stacklevel=5)
-        found = in_space_order(known.name, found, known.beside(found), stacklevel=4)
-        self.space_, values, names = known.of(*named_by(found, columns))
-        return Data(values, names)
+    def _read(self, X: Any, others: Sequence[str] = (), apart: Sequence[str] = ()) -> TableRows:
+        """Return the rows of a fit; set their space.
+
+        Columns `others` are kept as what is given; roles of the names `apart` are of no data.
+        """
+        known = self._columns(apart)
+        rows = X if isinstance(X, TableRows) else known.read(X, others)
+        self.space_ = known.of(rows)
+        return rows
 
     def _fit(
         self,
-        read: Data,
+        read: TableRows,
         sample_weight: ArrayLike | None,
         groups: ArrayLike | None,
         progress: Progress | None,
@@ -209,17 +212,18 @@ class DensityEstimator(FittedFigures):
             refuse_flow_settings(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
         how: dict[str, Any] = {"weights": sample_weight, "groups": groups, "progress": progress}
-        how |= {"missing": self.missing, "columns": read.names}
+        names = read.columns if read.source.is_named else None
+        how |= {"missing": self.missing, "columns": names}
         found = fit_chosen(self.space_, points, settings, **how)
         self._keep(found, read)
         return self
 
-    def _keep(self, found: tuple[Density, FitReport], read: Data) -> None:
+    def _keep(self, found: tuple[Density, FitReport], read: TableRows) -> None:
         """Set what there is after a fit to data."""
         self.density_, self.report_ = found
         self.n_features_in_ = read.values.shape[1]
-        if read.names is not None:
-            self.feature_names_in_ = np.array(read.names, dtype=object)
+        if read.source.is_named:
+            self.feature_names_in_ = np.array(read.columns, dtype=object)
         elif hasattr(self, "feature_names_in_"):
             del self.feature_names_in_  # of an earlier fit
 
@@ -236,7 +240,7 @@ class DensityEstimator(FittedFigures):
             OrbiflowError: before `fit`, or for another density.
 
         >>> angles = np.random.default_rng(0).vonmises(0, 2, (60, 1))
-        >>> fit = DensityEstimator("torus", components="von-mises").fit(angles, columns=["phi"])
+        >>> fit = DensityEstimator("torus", columns="phi", components="von-mises").fit(angles)
         >>> list(fit.parameters())
         ['mean_phi', 'concentration_phi']
         """
@@ -414,40 +418,36 @@ class DensityEstimator(FittedFigures):
         given = {name: getattr(self, name) for name in names}
         return {name: v for name, v in given.items() if v != defaults[name].default}
 
-    def _columns(self) -> DataColumns:
-        seed = self.settings().seed
-        return DataColumns(self.space, self.unit, self.linear, self.period or {}, seed)
+    def _columns(self, apart: Sequence[str] = ()) -> DataColumns:
+        lower = {name.casefold() for name in apart}
+        asked = asked_roles(self.columns)
+        own = {key: role for key, role in asked.items() if str(key).casefold() not in lower}
+        return DataColumns(self.space, self.unit, own, self.settings().seed)
 
     def _checked(self, X: ArrayLike) -> Array:
         """Return data in the order of the fit; warn of those that seem to be in another unit."""
         density, data = self._fitted(), self._in_order(X)
         require_table(data)
         names = getattr(self, "feature_names_in_", None)
-        for doubt in data_doubts(density, data, names, NAN_CURE):
+        for doubt in data_doubts(density, data, names):
             warnings.warn(doubt, DataWarning, stacklevel=3)
         return data
 
     def _in_order(self, X: ArrayLike) -> Array:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""
-        data, names = data_of(self.space_.data_name, X, in_order=False, stacklevel=5)
+        source, space = Frame.of(X), self.space_
         fitted = [str(name) for name in getattr(self, "feature_names_in_", ())]
-        if names is None or list(names) == fitted:
-            return data
-        if all(re.fullmatch(r"(column|angle)\d+", name) for name in fitted):  # they have no names
-            found, known = Data(data, names), DataColumns(self.space_)
-            return in_space_order(known.name, found, known.beside(found), stacklevel=5).values
-        if sorted(names) != sorted(fitted) or len(set(fitted)) < len(fitted):
-            # a frame may have other cases, as tables may
-            cases = [name.casefold() for name in names]
-            if sorted(cases) == sorted({name.casefold() for name in fitted}):
-                return data[:, [cases.index(name.casefold()) for name in fitted]]
-            missing = [name for name in fitted if name not in names]
-            raise OrbiflowError(
-                f"the columns are {', '.join(names)}, and the fit has seen {', '.join(fitted)}"
-                + f": there is no {', '.join(missing)}" * bool(missing)
-                + "; choose those of the fit"
-            )
-        return data[:, [names.index(name) for name in fitted]]
+        if source.is_named and fitted and not all(map(is_number_name, fitted)):
+            roles = [role and str(role) for role in space.roles(len(fitted))]
+            chosen = choose_as_fitted(source, {"columns": fitted, "roles": roles}, {})
+        elif source.is_named:  # the fit's have no names
+            chosen = DataColumns(space).chosen(source, {}, set())
+            for note in chosen.notes:
+                warnings.warn(note, DataWarning, stacklevel=4)
+        else:
+            chosen = choose_as_fitted(source, {}, {})
+        rows = rows_of(source, chosen)
+        return (with_dip_directions(rows)[0] if space.data_name in DIRECTIONS else rows).values
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""
@@ -459,7 +459,7 @@ class DensityEstimator(FittedFigures):
 
     def _of(self, density: Density, names: list[str]) -> DensityEstimator:
         """A fitted estimator of a density that was derived."""
-        params = {name: v for name, v in self.get_params().items() if name != "space"}
+        params = {n: v for n, v in self.get_params().items() if n not in ("space", "columns")}
         return DensityEstimator.fitted(density, columns=names, **params)
 
     def _fitted(self) -> Density:

@@ -14,18 +14,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import alongside, as_data, data_of, unit_of, written_from_zero
+from orbiflow.density.data import alongside, written_from_zero
 from orbiflow.density.fitting import SAME, concentration
-from orbiflow.density.spaces import to_latlon, to_vectors, whole_turn
+from orbiflow.density.spaces import DataColumns, to_latlon, to_vectors, whole_turn
 from orbiflow.density.uniformity import bingham_p, kuiper_p, rao_p, rayleigh_p, watson_p
 from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
-from orbiflow.settings import as_array
+from orbiflow.errors import OrbiflowError
 
 MIN_ROWS = 25
 """Rows or groups below which an interval is rough (Fisher, 1993, section 4.4.4)."""
@@ -125,8 +126,8 @@ class AxisSummary:
 
 def summarize_angles(
     data: ArrayLike,
-    names: tuple[str, ...] | None = None,
     *,
+    columns: Any = None,
     unit: str | None = None,
     weights: ArrayLike | None = None,
     groups: ArrayLike | None = None,
@@ -136,8 +137,8 @@ def summarize_angles(
 
     Args:
         data: Angles (n, d); a row counts in the columns in which it has a number.
-        names: Names of the columns.
-        unit: "radians", "degrees" or "turns". Default: radians, if no value is beyond 2 pi.
+        columns: What the columns are, as `DensityEstimator` takes it.
+        unit: The unit of angles that name none; those of arrays are in radians.
         weights: How much each row counts (n,); only ratios matter.
         groups: What each row belongs to, (n,); rows of one group are not independent.
         level: Level of the intervals.
@@ -147,22 +148,25 @@ def summarize_angles(
     (51, 0.711)
     """
     data, weights, groups = alongside(data=data, weights=weights, groups=groups)
-    found = as_data(data)
-    values = as_array(found.values, "data", (...,), finite=False)
-    values = as_array(
-        values[:, None] if values.ndim == 1 else values, "data", ("n", "d"), finite=False
-    )
-    names = names or found.names or tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
-    turn = whole_turn(unit_of("torus", values, names, unit))
-    columns: list[AngleSummary] = []
+    if not hasattr(data, "columns") and np.ndim(data) == 1:
+        data = np.asarray(data)[:, None]
+    read = DataColumns("torus", unit, columns).read(data, stacklevel=3)
+    weights, groups = read.beside(weights, groups)
+    if wrong := [str(role) for role in read.roles if role is None or role.kind != "angle"]:
+        raise OrbiflowError(f"a summary is of angles, and a column is {wrong[0]}: leave it out")
+    if len({role.unit for role in read.roles if role is not None}) > 1:
+        raise OrbiflowError("the columns are angles in several units: convert them to one")
+    values, names = read.values, read.columns
+    turn = whole_turn(read.unit or "radians")
+    found: list[AngleSummary] = []
     for name, column in zip(names, values.T, strict=True):
         own, rows = chosen_rows(column[:, None], weights, groups, level)
-        columns.append(_angle_summary(name, own[:, 0] / turn, turn, rows))
+        found.append(_angle_summary(name, own[:, 0] / turn, turn, rows))
     pairs: list[Correlation] = []
     for i, j in combinations(range(len(names)), 2):
         own, rows = chosen_rows(values[:, [i, j]], weights, groups, level)
         pairs.append(_correlation(names[i], names[j], own * (2 * np.pi / turn), rows))
-    return columns, pairs
+    return found, pairs
 
 
 def _angle_summary(name: str, turns: Array, turn: float, rows: WeighedRows) -> AngleSummary:
@@ -247,6 +251,7 @@ def _fisher_lee(a: Array, b: Array, rows: WeighedRows) -> float | None:
 def summarize_directions(
     data: ArrayLike,
     *,
+    columns: Any = None,
     unit: str | None = None,
     weights: ArrayLike | None = None,
     groups: ArrayLike | None = None,
@@ -255,11 +260,12 @@ def summarize_directions(
     """Summarise directions, (n, 2) of latitude and longitude in degrees or (n, 3) of unit vectors.
 
     `unit` is "degrees" for those that could be taken for radians, which are refused otherwise.
-    `weights`, `groups` and `level` are those of `summarize_angles`.
+    `columns`, `weights`, `groups` and `level` are those of `summarize_angles`.
     """
     data, weights, groups = alongside(data=data, weights=weights, groups=groups)
-    table, names = data_of("sphere", data)
-    unit_of("sphere", table, names, unit)
+    read = DataColumns("sphere", unit, columns).read(data, stacklevel=3)
+    weights, groups = read.beside(weights, groups)
+    table = read.values
     vectors, rows = chosen_rows(to_vectors(table), weights, groups, level)
     mean, resultant, cone = _mean_direction(vectors, rows)
     count, k, fisher_cone = len(vectors), None, None
@@ -277,6 +283,7 @@ def summarize_directions(
 def summarize_axes(
     data: ArrayLike,
     *,
+    columns: Any = None,
     unit: str | None = None,
     weights: ArrayLike | None = None,
     groups: ArrayLike | None = None,
@@ -284,8 +291,9 @@ def summarize_axes(
 ) -> AxisSummary:
     """Summarise axes, either end of each as in `summarize_directions`."""
     data, weights, groups = alongside(data=data, weights=weights, groups=groups)
-    table, names = data_of("projective-plane", data)
-    unit_of("projective-plane", table, names, unit)
+    read = DataColumns("projective-plane", unit, columns).read(data, stacklevel=3)
+    weights, groups = read.beside(weights, groups)
+    table = read.values
     vectors, rows = chosen_rows(to_vectors(table), weights, groups, level)
     products = vectors[:, :, None] * vectors[:, None, :]
     tensor = np.tensordot(rows.weights, products, axes=1)

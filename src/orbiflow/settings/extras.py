@@ -15,6 +15,7 @@ EXTRAS = {
     "torch": "flows",
     "matplotlib": "density",
     "contourpy": "density",
+    "pandas": "density",
     "starlette": "studio",
     "uvicorn": "studio",
     "platformdirs": "studio",

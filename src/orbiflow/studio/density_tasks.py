@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -55,10 +54,10 @@ class FitChoice(Settings, group="Density"):
     """Where the rows live."""
 
     columns: tuple[str, ...]
-    """Columns of the table."""
+    """Columns of the table, and what they are, such as phi=angle:degrees."""
 
     unit: Literal["radians", "degrees", "turns"] | None = None
-    """Unit of angles."""
+    """Unit of angles that name none."""
 
     def check(self) -> None:
         """Check that there are columns, few enough to draw."""
@@ -90,7 +89,7 @@ def density(
     fit_events = as_part(on_event, 0.0, FIT_SHARE)
     call.operation.function(**call.arguments, on_event=fit_events, cancel=cancel)
     cancel.check()
-    view = _view(folder, data, choice, as_part(on_event, FIT_SHARE, 1.0))
+    view = _view(folder, data, as_part(on_event, FIT_SHARE, 1.0))
     cancel.check()
     write_json(folder / VIEW, view)
     for other in folder.parent.iterdir():
@@ -99,14 +98,23 @@ def density(
     return Outcome({"fit": job.task, "rows": view["rows"]})
 
 
-def _view(folder: Path, data: Path, choice: FitChoice, on_event: Sink) -> dict[str, Any]:
+def _view(folder: Path, data: Path, on_event: Sink) -> dict[str, Any]:
     """Return what a page shows of a fit, and write the files of its surface and its map."""
-    from orbiflow.density import PlotSettings, flat_data, flat_frame, read_table, surface_data
+    from orbiflow.density import (
+        PlotSettings,
+        TableSettings,
+        flat_data,
+        flat_frame,
+        read_density,
+        rows_of_model,
+        surface_data,
+    )
 
-    fitted = _model(folder)
-    space, names = fitted.space, choice.columns
+    fitted, saved = read_density(folder / FIT / "density.safetensors")
+    space, names = fitted.space, tuple(saved["columns"])
     on_event(Progress(0.0, "drawing"))
-    rows = read_table(data, columns=names, width=None, drop_missing=True).values
+    asked = TableSettings(drop_missing=True)
+    rows = rows_of_model(data, asked, fitted, saved, ignore).values
     points = space.to_chart(rows)
     if space.is_planar:
         surface = surface_data(
@@ -253,26 +261,29 @@ def table_view(path: Path) -> dict[str, Any]:
 
     Raises `OrbiflowError` if it is no table of numbers, or too large.
     """
-    from orbiflow.density import TableError, code_notes, read_table, seen_columns
+    from orbiflow.density import TableError, read_table, table_overview
 
     try:
-        table = read_table(path, columns=None, width=None, max_rows=MAX_ROWS, keep_missing=True)
+        table = read_table(path)
+        seen = table_overview(table, MAX_SHOWN)
     except TableError as error:
         cause = str(error).removeprefix(f"{path}: ").partition(";")[0]
         raise OrbiflowError(
             f"this table cannot be read: {cause}; save it again as CSV, with a row for each thing and "
             "plain numbers in its columns: decimal points, and nothing between thousands"
         ) from None
-    shown = table.columns[:MAX_SHOWN]
-    if max(map(len, shown)) > MAX_NAME_LETTERS:
+    if (rows := len(table.cells(0))) > MAX_ROWS:
+        raise OrbiflowError(
+            f"this table has {rows} rows, and at most {MAX_ROWS} are taken here; draw a sample of them"
+        )
+    names = [column["name"] for column in seen["columns"]]
+    if max(map(len, names)) > MAX_NAME_LETTERS:
         raise OrbiflowError(f"the name of a column has over {MAX_NAME_LETTERS} letters; shorten it")
-    columns, guessed = seen_columns(table, MAX_SHOWN)
-    first = table.values[:FIRST_ROWS, : len(shown)].tolist()
+    shown = [table.numbers(table.names.index(name))[:FIRST_ROWS].tolist() for name in names]
+    first = list(zip(*shown, strict=True))
     return {
-        "rows": len(table.values),
-        "columns": [asdict(column) for column in columns],
-        "more": len(table.columns) - len(shown),
+        "rows": rows,
+        "more": len(table.names) - len(names),
         "first": [[None if math.isnan(v) else float(f"{v:.6g}") for v in row] for row in first],
-        "notes": [*table.notes, *code_notes(table)],
-        "guess": asdict(guessed),
+        **seen,
     }

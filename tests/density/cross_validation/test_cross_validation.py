@@ -223,7 +223,7 @@ def test_processes_and_their_deaths_change_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data = table_of(tmp_path, 24, protein=[f"p{k // 3}" for k in range(24)])
-    cheap = {"group": "protein", "components": ["kernels"], "against": ["uniform"]}
+    cheap = {"columns": ["protein=group"], "components": ["kernels"], "against": ["uniform"]}
     with monkeypatch.context() as patch:
         patch.setattr(work, "executor_for", lambda *_: Here())
         run_call(call_of(data, **cheap, out=tmp_path / "here"))
@@ -242,7 +242,7 @@ def test_groups_are_on_one_side_of_every_split(
 ) -> None:
     groups = np.random.default_rng(0).integers(0, 9, 60)  # numbers, and no data
     data = table_of(tmp_path, 60, station=groups)
-    call = call_of(data, group="station", times=2, components=["kernels"], against=parts)
+    call = call_of(data, columns=["station=group"], times=2, components=["kernels"], against=parts)
     run_call(call)
     report = report_of(call)
     assert (report["groups"], report["columns"]) == (9, ["phi", "psi"])
@@ -275,7 +275,7 @@ def test_weights_and_rows_that_lack_angles(here: Here, tmp_path: Path) -> None:
     phi, psi = (column.astype(object) for column in angles(60).T)
     psi[::7] = ""
     data = write_table(tmp_path / "w.csv", {"phi": phi, "psi": psi, "weight": weights})
-    call = call_of(data, weights="weight", missing="marginalise", against=["kernels"])
+    call = call_of(data, columns=["weight=weight"], missing="marginalise", against=["kernels"])
     run_call(call)
     rows = rows_of(call)
     assert all((row["fold"] == "") == (row["weight"] == "0") for row in rows)
@@ -385,11 +385,11 @@ def test_mistakes(fields: dict[str, Any], names: set[str]) -> None:
     ("fields", "message"),
     [
         ({"folds": 49}, "49 folds 48"),
-        ({"group": "protein"}, "groups 3 2"),
-        ({"group": "nothere"}, "nothere"),
+        ({"columns": ["protein=group"]}, "groups 3 2"),
+        ({"columns": ["nothere=group"]}, "nothere"),
         ({"columns": ["phi", "chi"]}, "chi"),
-        ({"weights": "protein"}, "number"),
-        ({"space": "sphere", "unit": None, "columns": ["phi"]}, "latitude longitude"),
+        ({"columns": ["protein=weight"]}, "number"),
+        ({"space": "sphere", "unit": None, "columns": ["phi"]}, "sphere 1 phi"),
     ],
 )
 def test_mistakes_that_the_table_shows(
@@ -410,7 +410,7 @@ def test_a_setting_has_one_name_in_whatever_order(parts: list[str]) -> None:
     assert own is None or set(own) == set(parts)
 
 
-@pytest.mark.parametrize(("fold", "message"), [(9, "40 9 column3 0")])
+@pytest.mark.parametrize(("fold", "message"), [(9, "40 9 3 0")])
 def test_no_such_fold(tmp_path: Path, fold: int, message: str) -> None:
     np.save(tmp_path / "rows.npy", np.column_stack([angles(40), np.arange(40) % 4]))
     call = fold_call(

@@ -1,3 +1,4 @@
+from .data_sets import UNWEIGHTED as UNWEIGHTED
 from .data_sets import DataComparison as DataComparison
 from .data_sets import Divergence as Divergence
 from .data_sets import compare_samples as compare_samples

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,13 +17,19 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
-from orbiflow.density.data import alongside, cells_of, data_of, group_numbers, unit_of
+from orbiflow.density.data import TableRows, alongside, cells_of, group_numbers
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
-from orbiflow.density.spaces import Space, space_for
-from orbiflow.errors import DataWarning, OrbiflowError
-from orbiflow.settings import as_array, is_a
+from orbiflow.density.spaces import DataColumns, Space
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError, literal
+from orbiflow.settings import is_a
 
 T = TypeVar("T")
+
+UNWEIGHTED = (
+    "{columns} declares a weight, and tests of data sets count all rows alike: declare it as ignore, "
+    "or as count if it says how often a row was seen"
+)
+"""Why weights are refused, which would count for nothing."""
 
 
 @dataclass(frozen=True)
@@ -117,19 +123,21 @@ def compare_samples(
     space: str | Space = "torus",
     settings: ComparisonSettings | None = None,
     *,
+    columns: Any = None,
     unit: str | None = None,
     groups: Mapping[str, ArrayLike] | None = None,
     progress: Progress = lambda _share, _what: None,
 ) -> DataComparison:
     """Test whether two data sets come from one density, and measure how far apart they are.
 
-    The test is `mmd_test`, the divergences are `cross_fitted`.
+    The test is `mmd_test`, the divergences, if settings ask for them, are `cross_fitted`.
 
     Args:
         samples: Two data sets (N, k) by their names, in the space's own units.
         space: The space, as `DensityEstimator` takes it.
         settings: Permutations of the test, level, resamples and seed.
-        unit: Unit of angles, as `DensityEstimator` takes it.
+        columns: What the columns are, as `DensityEstimator` takes it.
+        unit: Unit of angles that name none.
         groups: A label for each row, by the same names; equal labels in both data sets are one group.
             Whole groups are permuted, held out and resampled.
         progress: A function that is called with the share of the work done, and what is being done.
@@ -147,7 +155,8 @@ def compare_samples(
     seed = settings.seed
     if not is_a(samples, Mapping) or len(samples) != 2:
         raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
-    own, names, _, both = sample_points(samples, space, unit, seed)
+    known = DataColumns(space, unit, columns, seed)
+    own, names, _, both, groups = sample_points(samples, known, groups)
     sizes, points = (len(both[0]), len(both[1])), torch.cat(both)
     first = np.arange(len(points)) < sizes[0]
     members = Groups.of(None if groups is None else labels_of(groups, samples, sizes), len(points))
@@ -161,69 +170,80 @@ def compare_samples(
     if test.rows < len(points):
         notes.append(f"the test looks at {test.rows} of {len(points)} rows, drawn at random")
     divergence = None
-    try:
-        told: Progress = lambda share, what: progress(0.3 + 0.7 * share, what)  # noqa: E731
-        divergence = cross_fitted(own, points, first, members, settings, told)
-    except OrbiflowError as error:
-        notes.append(f"how far apart they are was not estimated: {error}")
+    if settings.divergence:
+        try:
+            told: Progress = lambda share, what: progress(0.3 + 0.7 * share, what)  # noqa: E731
+            divergence = cross_fitted(own, points, first, members, settings, told)
+        except OrbiflowError as error:
+            notes.append(f"how far apart they are was not estimated: {error}")
     groups_in_all = members.count if members.given else None
     found = (sizes, groups_in_all, test, divergence, settings.level, settings.bootstrap, seed)
     return DataComparison((names[0], names[1]), *found, tuple(notes))
 
 
 def sample_points(
-    samples: Mapping[str, ArrayLike], space: str | Space, unit: str | None, seed: int
-) -> tuple[Space, list[str], tuple[str, ...], list[Tensor]]:
-    """Return the space of data sets, their names, those of their columns, and their chart points.
+    samples: Mapping[str, ArrayLike], columns: DataColumns, groups: Mapping[str, ArrayLike] | None
+) -> tuple[Space, list[str], tuple[str, ...], list[Tensor], Mapping[str, ArrayLike] | None]:
+    """Return the space of data sets, their names, those of their columns, chart points and groups.
 
-    Raises `OrbiflowError` if there are not two or more by their names, with the same columns.
+    The groups are those given, or those of a column that is declared as such. Raises `OrbiflowError` if
+    there are not two data sets or more by their names, with the same columns, and for weights.
     """
     if not is_a(samples, Mapping) or len(samples) < 2:
         raise OrbiflowError(
             "give two data sets or more by their names, such as {'before': a, 'after': b}"
         )
-    name, names = space.name if isinstance(space, Space) else space, list(samples)
-    tables: list[np.ndarray] = []
-    columns: tuple[str, ...] | None = None
-    for own, table in samples.items():
-        values, others = data_of(name, table, f"data set {own}", stacklevel=4)
-        if columns and others and columns != others and sorted(columns) == sorted(others):
-            values = values[:, [others.index(column) for column in columns]]
-        columns = columns or others
-        tables.append(as_array(values, f"data set {own}", ("N", "k")))
-    widths = [table.shape[1] for table in tables]
-    if len(set(widths)) > 1:
-        raise OrbiflowError(
-            f"the data sets have {' and '.join(map(str, widths))} columns: give all in one form"
-        )
-    if not all(len(table) for table in tables):
-        raise OrbiflowError("a data set has no rows")
-    if isinstance(space, Space):
-        known = space
-    else:
-        found = unit_of(space, np.concatenate(tables), columns, unit)
-        known = _space_of(space, names, tables, found, seed)
-    points = [_named(own, known.to_chart, table) for own, table in zip(names, tables, strict=True)]
-    return known, names, columns or known.columns, points
+    names = list(samples)
 
+    def read(table: Any) -> TableRows:
+        return columns.read(table, stacklevel=7)
 
-def _space_of(
-    space: str, names: list[str], tables: list[np.ndarray], unit: str, seed: int
-) -> Space:
-    """Return the space that suits both data sets."""
+    found = [_named(own, read, table) for own, table in samples.items()]
+    first = found[0]
+    if first.weights is not None:
+        raise SettingError(UNWEIGHTED)
+    if first.labels is not None:
+        if groups is not None:
+            raise OrbiflowError(
+                "a column is declared as group, and groups are given: leave one out"
+            )
+        pairs = zip(names, found, strict=True)
+        groups = {name: rows.labels for name, rows in pairs if rows.labels is not None}
+    for k, other in enumerate(found):
+        if other.values.shape[1] != first.values.shape[1]:
+            widths = " and ".join(str(rows.values.shape[1]) for rows in found)
+            raise OrbiflowError(f"the data sets have {widths} columns: give all in one form")
+        if list(map(str, other.roles)) != list(map(str, first.roles)):
+            raise OrbiflowError(
+                f"{names[0]} has {first.declaration}, and {names[k]} {other.declaration}: declare the "
+                "same columns"
+            )
+        same = sorted(first.columns) == sorted(other.columns) and other.source.is_named
+        if same and first.columns != other.columns:
+            order = [other.columns.index(column) for column in first.columns]
+            found[k] = replace(other, values=other.values[:, order], columns=first.columns)
+    values = np.concatenate([rows.values for rows in found])
+    every = replace(first, numbers=np.zeros(len(values), dtype=np.int64), values=values)
     try:
-        return space_for(space, np.concatenate(tables), unit=unit, seed=seed)
+        known = columns.of(every)
     except OrbiflowError:
         # the number of a row in both tables together would lead nowhere
-        for name, table in zip(names, tables, strict=True):
-            _named(name, lambda own: space_for(space, own, unit=unit, seed=seed), table)
+        for name, rows in zip(names, found, strict=True):
+            _named(name, columns.of, rows)
         raise
+    points = [
+        _named(own, known.to_chart, rows.values) for own, rows in zip(names, found, strict=True)
+    ]
+    called = first.columns if first.source.is_named else known.columns
+    return known, names, called, points, groups
 
 
-def _named(name: str, call: Callable[[np.ndarray], T], table: np.ndarray) -> T:
+def _named(name: str, call: Callable[[Any], T], table: Any) -> T:
     """Call a function with a data set, and let its errors say which one it was."""
     try:
         return call(table)
+    except SettingError as error:
+        raise SettingError(literal(f"{name}: ") + error.template) from error
     except OrbiflowError as error:
         raise OrbiflowError(f"{name}: {error}") from error
 

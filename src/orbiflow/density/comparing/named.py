@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.comparing.statistics import Found, Labels
 from orbiflow.density.fitting import highest_log_likelihood
 from orbiflow.density.models import images_of
-from orbiflow.density.spaces import MixedTorus, Space, Torus
+from orbiflow.density.spaces import DataColumns, MixedTorus, Space, Torus
 from orbiflow.errors import OrbiflowError, SettingError, literal
 
 MIN_SAMPLE = 5
@@ -267,8 +267,8 @@ def named_tests(
     space: str | Space = "torus",
     settings: ComparisonSettings | None = None,
     *,
+    columns: Any = None,
     unit: str | None = None,
-    columns: Sequence[str] | None = None,
     groups: Mapping[str, ArrayLike] | None = None,
 ) -> SampleTests:
     """Test by name whether two or more samples have equal means, concentrations or distributions.
@@ -281,8 +281,8 @@ def named_tests(
         space: The space, as `DensityEstimator` takes it: a torus, a sphere of any dimension, axes or
             rotations.
         settings: The tests (default: all that there are on the space), permutations and seed.
-        unit: Unit of angles, as `DensityEstimator` takes it.
-        columns: Names of the columns of data sets that are arrays.
+        columns: What the columns are, as `DensityEstimator` takes it.
+        unit: Unit of angles that name none.
         groups: A label for each row, by the same names. Rows of one group are not independent: every p
             is then from permutations of whole groups, each of which must be in one sample alone.
 
@@ -296,7 +296,8 @@ def named_tests(
     True
     """
     settings = settings or ComparisonSettings()
-    own, names, called, points = sample_points(samples, space, unit, settings.seed)
+    known = DataColumns(space, unit, columns, settings.seed)
+    own, names, called, points, groups = sample_points(samples, known, groups)
     sizes = tuple(map(len, points))
     if min(sizes) < MIN_SAMPLE:
         few = names[sizes.index(min(sizes))]
@@ -305,7 +306,7 @@ def named_tests(
         )
     labels = np.repeat(np.arange(len(sizes)), sizes)
     members = None if groups is None else _members(groups, samples, labels)
-    sides, every, there = _vectors(own, torch.cat(points), tuple(columns or called))
+    sides, every, there = _vectors(own, torch.cat(points), tuple(called))
     asked = _asked(settings, there, own, len(sizes), members is not None)
     found: list[NamedTest] = []
     for name in asked:

@@ -259,7 +259,8 @@ def compare_models(
 
     Args:
         models: The models by their names, all of one space and unit.
-        data: Rows (N, k) that none of them was fitted to, in the space's own units.
+        data: Rows (N, k) that none of them was fitted to, in the space's own units. Estimators find the
+            columns of a data frame by the names of their fits.
         settings: Resamples, level and seed of the intervals.
         groups: A label for each row, as for `compare_scores`.
 
@@ -271,7 +272,12 @@ def compare_models(
     densities = {name: density_of(model, name) for name, model in models.items()}
     require_one_space({name: density.space for name, density in densities.items()})
     data, groups = alongside(data=data, groups=groups)
-    scores = {name: scores_of(density, data) for name, density in densities.items()}
+    scores: dict[str, Array] = {}
+    for name, density in densities.items():
+        model = models[name]
+        is_estimator = isinstance(model, DensityEstimator)  # which finds its columns by name
+        points = model.points_of(data) if is_estimator else density.space.to_chart(data)
+        scores[name] = _scores_at(density, points)
     return compare_scores(scores, settings, groups=groups)
 
 
@@ -310,7 +316,13 @@ def scores_of(
     density: Density, data: ArrayLike, told: Callable[[float], None] = lambda _: None
 ) -> Array:
     """Return log densities (N,) at data (N, k) in natural measure; `told` gets the share done."""
-    points = density.space.to_chart(data)
+    return _scores_at(density, density.space.to_chart(data), told)
+
+
+def _scores_at(
+    density: Density, points: torch.Tensor, told: Callable[[float], None] = lambda _: None
+) -> Array:
+    """Return log densities (N,) at chart points (N, d) in natural measure."""
     found: list[Sequence[float] | np.ndarray] = []
     with torch.no_grad():
         for start in range(0, len(points), BLOCK_ROWS):

@@ -37,6 +37,9 @@ class ComparisonSettings(Settings, group="Uncertainty"):
     """Tests by name of two data sets or more, such as watson-williams,energy, or all that there are on
     the space. They take the place of the general comparison of two data sets."""
 
+    divergence: bool = False
+    """Also measure how far apart two data sets are, by fits to half of each: some 20 s."""
+
     level: Annotated[float, Range(0.5, 0.999)] = 0.95
     """Level of the intervals and of the test."""
 

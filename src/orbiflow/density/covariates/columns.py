@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,13 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
+    Checked,
+    Role,
     as_numbers,
-    cycle_named,
-    doubts_of_number,
+    check_real,
+    check_turn,
     missing_among,
-    refuse_codes_of,
+    refuse_codes,
     word_of,
 )
 from orbiflow.density.spaces import Line
@@ -30,9 +32,6 @@ Values = NDArray[Any]
 
 MOST_WORDS = 1_000
 """The most words of a column."""
-
-CURE = "leave such rows out"
-"""What to do with codes for missing values."""
 
 SPREAD = 5.0
 """The feature of a real number is about its distance from the middle in deviations, this at most."""
@@ -58,16 +57,13 @@ class Covariate:
     words: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, name: str, cells: Values, period: float | None = None) -> Covariate:
-        """Return the covariate that suits cells (N,): real numbers, or words if they are text.
+    def of(cls, name: str, cells: Values, role: Role) -> Covariate:
+        """Return the covariate that cells (N,) of a role are.
 
-        Raises `OrbiflowError` for missing values, for one value alone and for too many words.
+        Raises `OrbiflowError` for missing values, values that contradict the role, one value alone and
+        too many words.
         """
-        if period is not None:
-            if not as_number(period, f"the period of {name!r}") > 0:
-                raise OrbiflowError(f"the period of {name!r} must be above 0, got {period}")
-            return cls(name, period=float(period))
-        if is_text(cells):
+        if role.kind == "word":
             words = tuple(np.unique(_text(name, cells)).tolist())
             if not 2 <= len(words) <= MOST_WORDS:
                 raise OrbiflowError(
@@ -76,15 +72,27 @@ class Covariate:
                 )
             return cls(name, words=words)
         numbers = _numbers(name, cells)
-        line = Line.of(numbers, repr(name))
+        column = _checked(name, cells)
+        if role.turn is not None:
+            check_turn(column, role.turn, role.kind)
+            return cls(name, period=role.turn)
+        check_real(column, role)
+        line = Line.of(numbers, repr(name), role)
         return cls(name, line=line, range=(float(numbers.min()), float(numbers.max())))
+
+    @property
+    def role(self) -> Role:
+        """What the column is."""
+        if self.words:
+            return Role("word")
+        return Role("cycle", period=self.period) if self.line is None else self.line.role
 
     @property
     def kind(self) -> str:
         """What it is, in words."""
         if self.words:
             return f"{len(self.words)} words"
-        return "real numbers" if self.period is None else f"cyclic, of period {self.period:g}"
+        return str(self.role)
 
     @property
     def width(self) -> int:
@@ -100,6 +108,7 @@ class Covariate:
             angle = 2 * math.pi * numbers / self.period
             return torch.stack([angle.cos(), angle.sin()], dim=1)
         assert self.line is not None
+        check_real(_checked(self.name, cells), self.role)
         return SPREAD * self.line.share(numbers)[:, None]
 
     def _known(self, words: NDArray[np.str_]) -> NDArray[np.intp]:
@@ -112,13 +121,15 @@ class Covariate:
             )
         return at
 
-    def refuse_codes(self, cells: Values, cure: str, *, is_new: bool) -> None:
-        """Refuse numbers that seem to stand for missing ones, also beside the fit's if they are new."""
-        if not self.words:
-            numbers = _numbers(self.name, cells)
-            if is_new and self.line is not None:
-                numbers = np.append(numbers, np.linspace(*self.range, 9))
-            refuse_codes_of(numbers[:, None], [self.name], [self.period], cure)
+    def check(self, cells: Values) -> None:
+        """Refuse new numbers that contradict what the column is, or stand apart from the fit's."""
+        if self.words:
+            return
+        column = _checked(self.name, cells)
+        if self.period is not None:
+            check_turn(column, self.period, "angle")
+        elif self.line is not None and self.line.kind == "linear":
+            refuse_codes(column, np.append(column.values, np.linspace(*self.range, 9)))
 
     def doubt(self, cells: Values) -> str | None:
         """Return what makes one doubt of cells: that the fit has seen nothing like them."""
@@ -144,32 +155,11 @@ class Covariates:
     columns: tuple[Covariate, ...] = field(default_factory=tuple[Covariate, ...])
 
     @classmethod
-    def of(
-        cls,
-        cells: Mapping[str, Values],
-        periods: Mapping[str, float | None],
-        turn: float | None = None,
-        cure: str = CURE,
-    ) -> Covariates:
-        """Return what suits columns of cells.
-
-        Args:
-            cells: The columns.
-            periods: Those of cyclic ones, and None of others. What is not named is cyclic if its name
-                says so and its values suit, such as hours of the day.
-            turn: That of the data, if they are angles.
-            cure: What to do with codes for missing values.
-        """
+    def of(cls, cells: Mapping[str, Values], roles: Mapping[str, Role]) -> Covariates:
+        """Return the covariates that columns of cells are, each of its role."""
         if not cells:
             raise OrbiflowError("given holds no column: name one or more that are known")
-        if unknown := [name for name in periods if name not in cells]:
-            raise OrbiflowError(f"cycles: no column {unknown[0]!r}; there are {', '.join(cells)}")
-        found: list[Covariate] = []
-        for name, own in cells.items():
-            period = periods[name] if name in periods else _period_named(name, own, turn)
-            found.append(Covariate.of(name, own, period))
-            found[-1].refuse_codes(own, cure, is_new=False)
-        return cls(tuple(found))
+        return cls(tuple(Covariate.of(name, own, roles[name]) for name, own in cells.items()))
 
     @property
     def names(self) -> list[str]:
@@ -197,27 +187,31 @@ class Covariates:
 
     def fit_doubts(self, cells: Mapping[str, Values]) -> list[str]:
         """Return what makes one doubt the cells of a fit."""
-        lines = [own.name for own in self.columns if own.line is not None]
+        own = [one for one in self.columns if one.line is not None]
         return [
-            d.text for name in lines for d in doubts_of_number(name, _numbers(name, cells[name]))
+            doubt
+            for one in own
+            for doubt in check_real(_checked(one.name, cells[one.name]), one.role)
         ]
 
-    def doubts(self, cells: Mapping[str, Values], cure: str = CURE) -> list[str]:
+    def doubts(self, cells: Mapping[str, Values]) -> list[str]:
         """Return what makes one doubt of cells that the fit has not seen.
 
-        Raises `SettingError` for codes for missing values; `cure` says what to do with them.
+        Raises `SettingError` for values that contradict what the columns are.
         """
         for own in self.columns:
-            own.refuse_codes(cells[own.name], cure, is_new=True)
+            own.check(cells[own.name])
         return [doubt for own in self.columns if (doubt := own.doubt(cells[own.name]))]
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return what makes them again, ready for JSON."""
-        kept = ("name", "period", "words")
-        return [
-            {key: v for key, v in asdict(own).items() if key in kept or own.line is not None}
-            for own in self.columns
-        ]
+        found: list[dict[str, Any]] = []
+        for own in self.columns:
+            entry = {"name": own.name, "period": own.period, "words": own.words}
+            if own.line is not None:
+                entry |= {"line": own.line.to_json(), "range": own.range}
+            found.append(entry)
+        return found
 
     @classmethod
     def from_json(cls, entries: Any) -> Covariates:
@@ -263,30 +257,14 @@ def _text(name: str, cells: Values) -> NDArray[np.str_]:
     return cells.astype(str)
 
 
-def _period_named(name: str, cells: Values, turn: float | None) -> float | None:
-    """Return the period of a column of numbers that its name says, if its values suit."""
-    if is_text(cells):
-        return None
-    numbers, cycle = _numbers(name, cells), cycle_named(name, turn)
-    if cycle is None:
-        return None
-    others = numbers[(numbers < cycle.least) | (numbers > cycle.most)]
-    if not len(others):
-        return cycle.period
-    if 2 * len(others) < len(numbers):
-        raise OrbiflowError(
-            f"{name!r} is the name of a cycle of {cycle.period:g}, and the column has {others[0]:g} "
-            f"({len(others)} such rows): leave these rows out, or say what it is: "
-            f"cycles={{{name!r}: {cycle.period:g}}} or None there, {name}:{cycle.period:g} or "
-            f"{name}:real on the command line"
-        )
-    return None
-
-
 def _numbers(name: str, cells: Values) -> Array:
     numbers = as_numbers(cells, repr(name))
     _refuse_missing(name, ~np.isfinite(numbers))
     return numbers
+
+
+def _checked(name: str, cells: Values) -> Checked:
+    return Checked(name, _numbers(name, cells), lambda row: f"row {row + 1}")
 
 
 def _refuse_missing(name: str, missing: NDArray[np.bool_]) -> None:

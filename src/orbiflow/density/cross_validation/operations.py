@@ -18,8 +18,8 @@ from orbiflow.density.cross_validation.settings import (
 )
 from orbiflow.density.fitting import ComponentSettings
 from orbiflow.density.run_folder import write_files
-from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
-from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.density.tables import RowSettings, SpaceSettings
+from orbiflow.errors import SettingError, literal
 from orbiflow.settings import Option
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def cross_validate(
     density: ComponentSettings = ComponentSettings(),
     out: Annotated[Path, Option("-o")] = Path("cv"),
     cv: CvSettings = CvSettings(),
-    rows: GroupedRowSettings = GroupedRowSettings(),
+    rows: RowSettings = RowSettings(),
     work: batch.WorkSettings = batch.WorkSettings(),
     *,
     on_event: runtime.Sink = runtime.ignore,
@@ -65,7 +65,7 @@ def fold(
     where: SpaceSettings,
     density: ComponentSettings = ComponentSettings(),
     out: Annotated[Path, Option("-o")] = Path("fold"),
-    rows: GroupedRowSettings = GroupedRowSettings(),
+    rows: RowSettings = RowSettings(),
     *,
     fold: int,
     held: str = "fold",
@@ -86,13 +86,12 @@ def fold(
     import numpy as np
 
     begin = time.perf_counter()
-    width = len(rows.columns or ()) or None
-    read = tables.read_rows(data, rows, on_event, width=width, group=rows.group)
-    out_of_fit = _held(data, read.table, fold, held, rows.header)
+    read = tables.read_rows(data, rows, on_event, where=where, given=(held,))
+    out_of_fit = _held(data, next(iter(read.given.values())), fold, held)
     fitted, unseen = read.only(~out_of_fit), read.only(out_of_fit)
     folder = runtime.ResultFolder(out, written_files)
     estimator = operations.fit_rows(fitted, where, density, rows, on_event, cancel)
-    scores = estimator.score_samples(unseen.table.values)
+    scores = estimator.score_samples(unseen.values)
     if not np.isfinite(scores).all():
         raise SettingError(
             f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other "
@@ -105,14 +104,14 @@ def fold(
         "fold": fold,
         "components": density.components,
         "rows": len(scores),
-        "fitted": len(fitted.table.values),
+        "fitted": len(fitted.values),
         "log_likelihood": mean,
-        "uniform": operations.uniform_score(estimator, unseen.table.values, unseen.weights),
+        "uniform": operations.uniform_score(estimator, unseen.values, unseen.weights),
         "report": estimator.report_.to_json(),
         "seconds": time.perf_counter() - begin,
     }
     report = json.dumps(document, allow_nan=False, indent=1)
-    pairs = zip(unseen.table.lines.tolist(), scores.tolist(), strict=True)
+    pairs = zip((unseen.numbers + 1).tolist(), scores.tolist(), strict=True)
     write_files(
         folder, {SCORES: batch.csv_bytes(["row", "log_prob"], pairs), REPORT: report}, on_event
     )
@@ -121,22 +120,16 @@ def fold(
     return runtime.Outcome({"folder": str(out), **{name: document[name] for name in names}})
 
 
-def _held(
-    data: Path, table: tables.Table, fold: int, name: str, header: bool | None
-) -> NDArray[Any]:
-    """Which rows (N,) are of the fold."""
+def _held(data: Path, folds: NDArray[Any], fold: int, name: str) -> NDArray[Any]:
+    """Return which rows (N,) are of the fold."""
     import numpy as np
 
-    column = tables.read_table(data, columns=[name], width=1, has_header=header, drop_missing=True)
-    if not np.isin(table.lines, column.lines).all():
-        raise OrbiflowError(f"{data}: some rows lack their fold in {column.columns[0]!r}")
-    folds = column.values[np.isin(column.lines, table.lines), 0]
     held = folds == fold
     if not held.any() or held.all():
         some = ", ".join(f"{one:g}" for one in np.unique(folds)[:20])
         raise SettingError(
             literal(f"{data}: {'all' if held.any() else 'none'} of its {len(held)} rows are of ")
             + f"{{fold}} {fold} by "
-            + literal(f"{column.columns[0]!r}; give one of {some}")
+            + literal(f"{name!r}; give one of {some}")
         )
     return held

@@ -29,7 +29,7 @@ from orbiflow.density.cross_validation.splits import (
 )
 from orbiflow.density.inference import uniform_logs
 from orbiflow.density.pictures import space_title
-from orbiflow.density.tables import TableRows, append_columns, columns_among, without_columns
+from orbiflow.density.tables import append_columns
 from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
 
@@ -90,7 +90,7 @@ class CvOverview:
             added[name] = split.fold.astype(np.float64)
         for name, column in zip(found.settings, means, strict=True):
             added[f"log_prob_{name}"] = column
-        return append_columns(self.splits[0].rows.table, data, added)
+        return append_columns(self.splits[0].rows, added)
 
     def _report(
         self, found: HeldOut, done: Sequence[tuple[Fit, batch.Entry]], waiting: int
@@ -103,16 +103,17 @@ class CvOverview:
             "version": __version__,
             "data": str(asked.data),
             "space": {"name": rows.space.name, "unit": rows.space.unit},
-            "columns": list(rows.table.columns),
+            "columns": list(rows.columns),
             "settings": {
                 **{name: getattr(cv, name) for name in ("folds", "times", "level", "bootstrap")},
-                **{name: getattr(asked.rows, name) for name in ("group", "missing", "weights")},
+                "missing": asked.rows.missing,
+                "columns": rows.declaration,
                 **{name: getattr(asked.density, name) for name in ("repeats", "seed")},
             },
             "components": asked.settings,
-            "rows": len(rows.table.values),
+            "rows": len(rows.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
-            "uniform": float(uniform_logs(rows.space, rows.table.values).mean()),
+            "uniform": float(uniform_logs(rows.space, rows.values).mean()),
             "fits": {
                 "all": len(self.fits),
                 "done": states.count("done"),
@@ -208,29 +209,30 @@ def run(
 
 def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     """Return a fit as batches take it, with all that decides its result besides the rows."""
-    width, own = len(split.rows.table.columns), asked.where.beside
-    weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
-    density, space = asked.density, asked.where.space
-    form = asked.where.rotation_form(without_columns(split.rows.table, own, asked.data).columns)
+    rows, density = split.rows, asked.density
+    width = len(rows.columns)
+    own = [name for name, role in zip(rows.columns, rows.roles, strict=True) if role is None]
+    columns = [
+        str(k) if role is None else f"{k}={role}" for k, role in enumerate(rows.roles, start=1)
+    ]
+    if rows.weights is not None:
+        width += 1
+        columns.append(f"{width}=weight")
+    if rows.labels is not None:
+        width += 1
+        # a flow alone has no components to choose
+        columns.append(f"{width}={'ignore' if fit.components == ('flow',) else 'group'}")
     given: dict[str, Any] = {
         "data": Path("rows.npy"),
-        "space": space,
+        "space": asked.where.space,
         "cell": asked.where.cell,
-        "linear": _numbers(split.rows, asked.where.linear) or None,
-        "period": tuple(
-            f"{_numbers(split.rows, [name])[0]}={period!r}"
-            for name, period in asked.where.periods.items()
-        )
-        or None,
+        "fractional": asked.where.fractional or None,
         "fold": fit.fold,
-        "columns": tuple(str(k + 1) for k in range(width)),
-        "held": str(width + weighted + grouped + 1),
-        "weights": str(width + 1) if weighted else None,
-        # a flow alone has no components to choose
-        "group": str(width + weighted + 1) if grouped and fit.components != ("flow",) else None,
+        "columns": tuple(columns),
+        "held": str(width + 1),
         "missing": asked.rows.kept_missing,
-        "unit": split.rows.unit,
-        "form": form,
+        "unit": rows.unit if own else None,
+        "form": asked.where.rotation_form(own),
         "crystal": asked.where.crystal,
         "specimen": asked.where.specimen,
         "passive": asked.where.passive or None,
@@ -240,12 +242,6 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     }
     call = runtime.find("density fold").call({k: v for k, v in given.items() if v is not None})
     return batch.Item(fit.key, fit.name, call, split.read)
-
-
-def _numbers(rows: TableRows, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the numbers, from 1, of columns, which are not named in a table of numbers."""
-    columns = rows.table.columns
-    return tuple(str(columns.index(name) + 1) for name in columns_among(columns, names))
 
 
 MOST_LISTED = 200
@@ -278,7 +274,7 @@ def cv_page(
         rows=rows,
         place=space_title(rows.space),
         groups=None if rows.labels is None else len(np.unique(rows.labels)),
-        uniform=float(uniform_logs(rows.space, rows.table.values).mean()),
+        uniform=float(uniform_logs(rows.space, rows.values).mean()),
         made=made,
         why=comparison,
         waiting=waiting,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from orbiflow.density import operations
 from orbiflow.density.fitting import COMPONENTS, KNOWN, ComponentSettings, DensitySettings
-from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
+from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import SettingError, literal
 from orbiflow.settings import DefaultText, Range, Repeated, Settings, as_whole
 
@@ -62,7 +62,7 @@ class CrossValidation:
     out: Path
     where: SpaceSettings
     density: ComponentSettings
-    rows: GroupedRowSettings
+    rows: RowSettings
     cv: CvSettings
 
     def __post_init__(self) -> None:

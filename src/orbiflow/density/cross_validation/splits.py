@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import io
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,12 @@ from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density import comparing, operations
 from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
+from orbiflow.density.data import TableRows
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_rows, uniform_logs
 from orbiflow.density.spaces import Space
-from orbiflow.density.tables import TableRows, read_rows, read_table
-from orbiflow.errors import DataWarning, InputFileError, OrbiflowError
+from orbiflow.density.tables import read_rows
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Note, Sink, one_blas_thread
 
 MOST_BYTES = 256 * 2**20
@@ -33,12 +33,11 @@ class CvRows(TableRows):
     """The rows of a table that count.
 
     - `together`: A label for each row, (N,); rows of one label are on one side of every split.
-    - `space`, `unit`: Those of the whole table, for its measure; no fit sees them.
+    - `space`: That of the whole table, for its measure; no fit sees it.
     """
 
-    together: NDArray[Any] | None
-    space: Space
-    unit: str | None
+    together: NDArray[Any] | None = None
+    space: Space = field(kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class Split:
 
     def read(self) -> bytes:
         """Return the bytes, made anew each time: many splits would be many tables."""
-        parts = [self.rows.table.values]
+        parts = [self.rows.values]
         if self.rows.weights is not None:
             parts.append(self.rows.weights[:, None])
         if self.rows.labels is not None:
@@ -96,44 +95,34 @@ class Fit:
 
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     """Return the rows of the table that count."""
-    where, group = asked.where, asked.rows.group
-    rows = read_rows(
-        asked.data,
-        asked.rows,
-        tell,
-        space=where.space,
-        width=where.width,
-        group=group,
-        beside=where.beside,
-    )
+    where = asked.where
+    rows = read_rows(asked.data, asked.rows, tell, where=where)
+    tell(Note(f"columns: {rows.declaration}"))
     if rows.weights is not None:
         weighed(torch.zeros(len(rows.weights), 1), rows.weights)  # refuses what is no weight
         rows = rows.only(rows.weights > 0)  # others count for nothing
-    table = rows.table
-    columns = operations.columns_asked(where, rows, tell)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)  # notes say the same, with names of columns
-        seeded = replace(columns, seed=asked.density.seed)
-        space = seeded.of(table.values, None).space
+    space = operations.columns_of(where, rows, asked.density.seed).of(rows)
     may_lack = asked.rows.missing == "marginalise"
-    counts, place = places(chart_of_rows(space, table.values, may_lack=may_lack))
+    counts, place = places(chart_of_rows(space, rows.values, may_lack=may_lack))
     if len(counts) <= LEAST_PLACES:
         raise OrbiflowError(
             f"{asked.data}: {len(counts)} different rows; a cross-validation needs more than the "
             f"{LEAST_PLACES} that a density needs"
         )
     together: NDArray[Any] | None = rows.labels
+    if together is None and len(np.unique(rows.numbers)) < len(rows.numbers):
+        together = rows.numbers  # rows that were counted are one
     if asked.density.repeats == "rounding" and together is None:
         together = place.numpy()
     elif asked.density.repeats == "rounding":
         tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
-    read = (rows.path, table, rows.weights, rows.group, rows.header)
-    return CvRows(*read, together, space, columns.unit)
+    own = {field.name: getattr(rows, field.name) for field in fields(rows)}
+    return CvRows(**own, together=together, space=space)
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:
     """Return the splits."""
-    count, folds, seed = len(rows.table.values), asked.cv.folds, asked.density.seed
+    count, folds, seed = len(rows.values), asked.cv.folds, asked.density.seed
     numbers = [
         comparing.cross_validation_folds(count, folds, together=rows.together, seed=seed, split=k)
         for k in range(asked.cv.times)
@@ -198,7 +187,7 @@ def held_out(
 ) -> HeldOut:
     """Return what is in the folders of the fits that are done."""
     rows = splits[0].rows
-    scores = np.full((len(settings), len(splits), len(rows.table.values)), np.nan)
+    scores = np.full((len(settings), len(splits), len(rows.values)), np.nan)
     for fit in fits:
         entry = entries.get(fit.key)
         if entry is None or entry.state != "done":
@@ -207,19 +196,24 @@ def held_out(
         found = _read(folder / entry.name / SCORES, held)
         scores[settings.index(fit.setting), fit.split - 1, held] = found
     if UNIFORM in settings:
-        scores[settings.index(UNIFORM)] = uniform_logs(rows.space, rows.table.values).numpy()
+        scores[settings.index(UNIFORM)] = uniform_logs(rows.space, rows.values).numpy()
     return HeldOut(tuple(settings), scores)
 
 
 def _read(path: Path, held: NDArray[np.int64]) -> Array:
     """Return the log densities of the rows of these numbers, from 0."""
-    table = read_table(path, columns=("row", "log_prob"), width=2)
-    if not np.array_equal(table.values[:, 0], held + 1):
+    try:
+        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise InputFileError(
+            f"cannot read {path} ({error}): delete its folder, and the same command fits it again"
+        ) from error
+    if table.shape[1:] != (2,) or not np.array_equal(table[:, 0], held + 1):
         raise OrbiflowError(
             f"{path} is not of the rows that were held out: delete its folder, and the same command "
             "fits it again"
         )
-    return table.values[:, 1]
+    return table[:, 1]
 
 
 @one_blas_thread()  # sums of several threads differ in their last digits

@@ -1,7 +1,8 @@
-"""What the name of a column says: a latitude, an angle, a unit, a count, or no angle at all."""
+"""What the name of a column says: its words, its unit, and which columns are a place together."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from itertools import product
@@ -14,17 +15,16 @@ UNITS = {
 }  # fmt: skip
 """Words for units of angles."""
 
-# fmt: off
 FOREIGN = {
-    "gon": "gon", "gons": "gon", "grads": "gon", "gradian": "gon", "gradians": "gon",
-    "arcmin": "arcminutes", "arcmins": "arcminutes", "arcminute": "arcminutes",
-    "arcminutes": "arcminutes", "arcsec": "arcseconds", "arcsecs": "arcseconds",
-    "arcsecond": "arcseconds", "arcseconds": "arcseconds", "mrad": "milliradians",
-    "mrads": "milliradians", "milliradian": "milliradians", "milliradians": "milliradians",
-    "mil": "mils, 6400 to a turn", "mils": "mils, 6400 to a turn", "cycles": "cycles",
+    **dict.fromkeys(("gon", "gons", "grads", "gradian", "gradians"), 400.0),
+    **dict.fromkeys(("arcmin", "arcmins", "arcminute", "arcminutes"), 21_600.0),
+    **dict.fromkeys(("arcsec", "arcsecs", "arcsecond", "arcseconds"), 1_296_000.0),
+    **dict.fromkeys(("mrad", "mrads", "milliradian", "milliradians"), 2000 * math.pi),
+    **dict.fromkeys(("mil", "mils"), 6400.0),
+    **dict.fromkeys(("cycles", "rev", "revs"), 1.0),
+    **dict.fromkeys(("hour", "hours", "hr", "hrs", "hms"), 24.0),
 }
-# fmt: on
-"""Such units by the words of names; "grad" is gon in English and degrees in German."""
+"""Other units by the words of names, and a turn in each: such a column is declared as a cycle."""
 
 _FORMATS = frozenset({"decimal", "dd", "wgs", "wgs84", "gps", "j2000", "2000", "icrs", "epoch"})
 """Words that say in which form a place is written, and not which place it is."""
@@ -82,48 +82,7 @@ FROM_POLE = frozenset(
 )
 """Words for the angle from the pole, which is 90 degrees less the latitude."""
 
-FROM_VERTICAL = frozenset({"tilt", "inc", "incl", "inclination", "incidence", "neigung"})
-"""Words for an angle that, beside an azimuth, is counted from the vertical as a rule."""
-
 HOURS = frozenset({"h", "hr", "hrs", "hour", "hours", "hms"})
-
-# fmt: off
-ANGLES = frozenset((
-    "phi", "psi", "chi", "omega", "theta", "alpha", "beta", "gamma", "delta", "epsilon", "zeta",
-    "angle", "angles", "winkel", "dihedral", "torsion", "phase", "argument", "tilt", "roll",
-    "pitch", "yaw", "direction", "dir", "wdir", "wd", "heading", "bearing", "course", "cog",
-    "aspect", "strike", "trend", "rotation", "twist", "richtung", "windrichtung",
-)) | AZIMUTHS
-# fmt: on
-"""Words for angles in general."""
-
-AXIAL = frozenset(
-    {"strike", "strikes", "orientation", "orientations", "axis", "axes", "axial", "fibre", "fibres"}
-    | {"fiber", "fibers", "lineation", "lineations", "lineament", "lineaments"}
-)
-"""Words for lines without an arrow, whose angles come back after half a turn."""
-
-# fmt: off
-OTHERS = frozenset((
-    "temp", "temperature", "temperatur", "length", "len", "distance", "dist", "radius", "mass",
-    "speed", "spd", "sknt", "windspeed", "velocity", "wspd", "ws", "gust", "pressure", "humidity",
-    "rain", "precipitation",
-    "depth", "height", "width", "size", "area", "volume", "resolution", "occupancy", "bfactor",
-    "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
-    "timestamp", "hour", "hours", "day", "weekday", "doy", "age", "probability", "pvalue",
-    "density", "log_prob", "hdr", "id", "ids", "idx", "index", "resid", "resi", "resseq", "resnum",
-    "residue", "serial", "chain", "draw", "iteration", "lp",
-))
-# fmt: on
-"""Words for quantities and numbers that do not come back to themselves after a turn."""
-
-# fmt: off
-COUNTS = frozenset((
-    "count", "counts", "n", "num", "nobs", "freq", "frequency", "frequencies", "weight", "weights",
-    "anzahl", "häufigkeit", "haeufigkeit", "gewicht", "effectif", "hits", "events",
-))
-# fmt: on
-"""Words for how often a row was seen, or how much it counts."""
 
 _TOKEN = re.compile(r"°|[A-Z]+(?![a-zß-ÿ])|[A-Z]?[^\W\d_A-Z]+|\d+")
 _RUN_TOGETHER = re.compile(r"(?<=[A-Z])(?=(?:deg|rad|hms|dms)$)")
@@ -151,73 +110,14 @@ def unit_named(name: str) -> str | None:
     return next((UNITS[word] for word in words_of(name) if word in UNITS), None)
 
 
-def foreign_unit(name: str) -> str | None:
-    """Return the unit that a name says and that is not read, or None.
+def foreign_unit(name: str) -> float | None:
+    """Return a turn in the unit that a name ends in, where that is none of `UNITS`, or None.
 
-    >>> foreign_unit("azimuth [gon]"), foreign_unit("phi_deg")
-    ('gon', None)
-    """
-    return next((FOREIGN[word] for word in words_of(name) if word in FOREIGN), None)
-
-
-def is_angle_named(name: str) -> bool:
-    """Return whether a name says that a column holds angles.
-
-    >>> is_angle_named("chi1"), is_angle_named("bond length"), is_angle_named("a")
-    (True, False, False)
-    """
-    words = set(words_of(name))
-    known = ANGLES | LATITUDES | LONGITUDES | set(UNITS)
-    return bool(words & known) or any(word.endswith(("angle", "winkel")) for word in words)
-
-
-CYCLES = {
-    "hour": (24.0, 0.0, 24.0), "hours": (24.0, 0.0, 24.0), "hr": (24.0, 0.0, 24.0),
-    "month": (12.0, 1.0, 12.0), "weekday": (7.0, 0.0, 7.0),
-    "doy": (365.25, 0.0, 366.0), "yday": (365.25, 0.0, 366.0), "dayofyear": (365.25, 0.0, 366.0),
-}  # fmt: skip
-"""Periods of columns by their names, and the least and the largest value that they then have."""
-
-
-class Cycle(NamedTuple):
-    """The period that a column has by its name, and the least and the largest value it then has."""
-
-    period: float
-    least: float
-    most: float
-
-
-def cycle_named(name: str, turn: float | None) -> Cycle | None:
-    """Return the cycle that a column has by its name; None if it says none.
-
-    `turn` is that of angles, if there are any.
-
-    >>> cycle_named("hour", None), cycle_named("temperature", 360.0)
-    (Cycle(period=24.0, least=0.0, most=24.0), None)
+    >>> foreign_unit("azimuth [gon]"), foreign_unit("ra_hours"), foreign_unit("hour")
+    (400.0, 24.0, None)
     """
     words = words_of(name)
-    if turn is not None and set(words) & ANGLES:
-        return Cycle(turn, -1.001 * turn, 1.001 * turn)
-    own = ("".join(words), *words)
-    return next((Cycle(*CYCLES[one]) for one in own if one in CYCLES), None)
-
-
-def is_other_quantity(name: str) -> bool:
-    """Return whether a name says that a column holds no angles but another quantity.
-
-    >>> is_other_quantity("bond length"), is_other_quantity("bond angle"), is_other_quantity("x")
-    (True, False, False)
-    """
-    return bool(OTHERS.intersection(words_of(name))) and not is_angle_named(name)
-
-
-def is_count_named(name: str) -> bool:
-    """Return whether a name says how often a row was seen, or how much it counts.
-
-    >>> is_count_named("count"), is_count_named("n"), is_count_named("county")
-    (True, True, False)
-    """
-    return bool(COUNTS.intersection(words_of(name))) and not is_angle_named(name)
+    return FOREIGN.get(words[-1]) if len(words) > 1 else None
 
 
 class Pair(NamedTuple):

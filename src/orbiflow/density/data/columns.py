@@ -8,9 +8,6 @@ from typing import NamedTuple
 
 from orbiflow.density.data.column_names import (
     FROM_POLE,
-    HOURS,
-    LATITUDES,
-    LONGITUDES,
     UNITS,
     foreign_unit,
     pairs_of,
@@ -30,14 +27,12 @@ class Arrangement(NamedTuple):
     """Columns, from 0, in the order that a space takes, and what they are.
 
     - `words`: What they are, as in "latitude and longitude".
-    - `is_sure`: Whether the names can hardly mean anything else.
     - `note`: What to keep in mind of such data.
     - `form`: How they write rotations, as `RotationSpace` names it.
     """
 
     columns: tuple[int, ...]
     words: str
-    is_sure: bool = True
     note: str = ""
     form: str = ""
 
@@ -72,38 +67,7 @@ def _directions(names: Sequence[str]) -> list[Arrangement]:
     if pairs:
         words = "latitude and longitude"
         return [Arrangement((own.north, own.east), words, note=own.family.note) for own in pairs]
-    if found := _lettered(names, ("xyz",), "unit vectors"):
-        return found
-    if found := _of_maps(names):
-        return found
-    return _half_known(names)
-
-
-def _of_maps(names: Sequence[str]) -> list[Arrangement]:
-    """Return columns whose names are short for a latitude and a longitude: y, x; b, l; I, D."""
-    split = [tuple(word for word in words_of(name) if word not in ("wgs", "84")) for name in names]
-    pairs = [
-        (north, east)
-        for first, second in (("y", "x"), ("b", "l"), ("i", "d"))
-        for north, own in enumerate(split)
-        for east, other in enumerate(split)
-        if first in own and tuple(second if word == first else word for word in own) == other
-    ]
-    return [Arrangement(pair, "latitude and longitude", is_sure=False) for pair in pairs]
-
-
-def _half_known(names: Sequence[str]) -> list[Arrangement]:
-    """Return two columns of which one name is known: the other is what is left."""
-    if len(names) != 2:
-        return []
-    norths, easts = (
-        [bool(side.intersection(words_of(name))) for name in names]
-        for side in (LATITUDES, LONGITUDES)
-    )
-    if sum(norths) + sum(easts) != 1:
-        return []
-    first = norths[0] or easts[1]
-    return [Arrangement((0, 1) if first else (1, 0), "latitude and longitude")]
+    return _lettered(names, ("xyz",), "unit vectors")
 
 
 def _stemmed(names: Sequence[str]) -> dict[str, dict[str, int]]:
@@ -230,7 +194,7 @@ takes latitude and longitude in the order Latitude (deg), Longitude (deg); give 
         return None
     best = found[0]
     right = [names[k] for k in best.columns]
-    if right != list(names) and best.is_sure:
+    if right != list(names):
         raise SettingError(
             literal(
                 f"the columns are {', '.join(names)}, and the {space} takes {best.words} in the order "
@@ -251,11 +215,11 @@ def _check_forms(space: str, names: Sequence[str]) -> None:
             if words & FROM_POLE:
                 wrong.append((name, "is the angle from the pole: give the latitude, 90 less it"))
             if (foreign := foreign_unit(name)) is not None:
-                wrong.append((name, f"is in {foreign}: convert it to degrees"))
+                wrong.append(
+                    (name, f"is in a unit of {foreign:g} to a turn: convert it to degrees")
+                )
             if unit_named(name) not in (None, "degrees"):
                 wrong.append((name, f"is in {unit_named(name)}: convert it to degrees"))
-            if words & HOURS:
-                wrong.append((name, "is in hours: convert it to degrees (15 for each hour)"))
     if space in DIRECTIONS and len(names) > 2 and (pairs := pairs_of(names)):
         pair = f"{names[pairs[0].north]},{names[pairs[0].east]}"
         wrong.append((", ".join(names), f"are too many columns: give '{pair}' alone"))

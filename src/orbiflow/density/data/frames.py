@@ -6,6 +6,7 @@ import importlib
 import math
 import numbers
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date, time, timedelta
 from decimal import Decimal
 from typing import Any, NamedTuple, cast
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.density.data.draws import columns_of_draws, has_draws, posterior_of
 from orbiflow.density.data.row_labels import cells_of, is_missing
-from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.errors import OrbiflowError
 from orbiflow.settings import described, is_a, is_tensor
 
 
@@ -56,25 +57,67 @@ def as_data(data: Any, what: str = "data") -> Data:
     return Data(values, tuple(cast("list[str]", names)) if named else None)
 
 
-def named_by(data: Data, columns: Sequence[str] | None) -> Data:
-    """Return data whose columns have the names of a call, if it gives some to an array.
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The columns of a data frame or of an array: a `Source`.
 
-    Raises:
-        SettingError: For names of a frame's columns, which have their own, and too many or few.
+    - `parts`: The columns' cells, each (N,).
+    - `is_array`: Whether it is an array, whose angles are radians unless declared.
     """
-    if columns is None:
-        return data
-    width = data.values.shape[-1] if data.values.ndim == 2 else 0
-    if data.names is not None:
-        raise SettingError(
-            literal(f"the data have the columns {', '.join(data.names)}: choose among them in ")
-            + "the data frame, and leave {columns} out, which names those of an array"
-        )
-    if isinstance(columns, str) or len(columns) != width:
-        raise SettingError(
-            f"{{columns}} must name the {width} columns of the data, got {columns!r}"
-        )
-    return Data(data.values, tuple(map(str, columns)))
+
+    names: tuple[str, ...]
+    is_named: bool
+    parts: tuple[Any, ...]
+    what: str = "data"
+    is_array: bool = False
+
+    @classmethod
+    def of(cls, data: Any, what: str = "data", names: Sequence[str] | None = None) -> Frame:
+        """Return the columns of an array (N, k), which may get names, or of a data frame.
+
+        Raises `OrbiflowError` for data that are neither.
+        """
+        columns = columns_of(data, what)
+        if columns is None:
+            values = as_numbers(data, what)
+            require_table(values)
+            called = tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
+            parts = tuple(values.T)
+            return cls(tuple(names or called), names is not None, parts, what, is_array=True)
+        own = tuple(str(name) for name, _ in columns)
+        named = all(is_a(name, str) for name, _ in columns)
+        if not named:
+            own = tuple(f"column{k}" for k in range(1, len(columns) + 1))
+        parts = tuple(np.asarray(cells_of(part)) for _, part in columns)
+        sizes = {part.shape for part in parts}
+        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
+            raise OrbiflowError(f"{what}: the columns must be of one length, got {sorted(sizes)}")
+        return cls(own, named, parts, what)
+
+    @property
+    def where(self) -> str:
+        """What messages begin with."""
+        return "" if self.what == "data" else f"{self.what}: "
+
+    def is_numeric(self, column: int) -> bool:
+        """Return whether a column is of numbers, by its type or by all of its cells."""
+        part = self.parts[column]
+        if part.dtype.kind != "O":
+            return part.dtype.kind in "fiu"
+        known = [cell for cell in part if not is_missing(cell)]
+        return bool(known) and all(is_a(c, numbers.Real) and not is_a(c, bool) for c in known)
+
+    def numbers(self, column: int) -> Array:
+        """Return a column (N,) as float64, missing values as NaN; refuse what holds no numbers."""
+        return as_numbers(self.parts[column], f"{self.what}: column {self.names[column]!r}")
+
+    def cells(self, column: int) -> NDArray[Any]:
+        """Return the cells (N,) of a column as they are."""
+        return self.parts[column]
+
+    def place(self, row: int) -> str:
+        """Return which row it is, from 1."""
+        return f"row {row + 1}"
 
 
 def columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:

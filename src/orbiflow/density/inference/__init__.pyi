@@ -8,9 +8,7 @@ from .angles import log_prob_observed as log_prob_observed
 from .angles import observed_rows as observed_rows
 from .angles import uniform_logs as uniform_logs
 from .doubts import data_doubts as data_doubts
-from .doubts import data_unit as data_unit
 from .doubts import given_doubts as given_doubts
-from .doubts import refuse_codes_beside as refuse_codes_beside
 from .fitted import FittedFigures as FittedFigures
 from .partial import conditional as conditional
 from .partial import marginal as marginal

@@ -32,6 +32,10 @@ LEAST_RESULTANT = 1e-9
 """Mean resultant length below which a circle has no mean direction."""
 
 
+WITHIN_TWO_SCALES = 2 / 8**0.5
+"""The share of a line, z / sqrt(4 + z^2), two scales from the centre: five deviations."""
+
+
 class Cumulative(NamedTuple):
     """The masses of a density of one column, from its start on.
 
@@ -112,6 +116,9 @@ class WithFigures(Distribution):
             row = torch.full((len(turns), space.dim), 0.25, dtype=torch.float64)
             row[:, axis] = turns
             values = torch.tensor(space.from_chart(row)[:, axis])
+            line = space.lines[axis]
+            if line is not None and line.kind != "linear":  # whose far ends are beyond all numbers
+                weights = weights * (line.share(values).abs() < WITHIN_TWO_SCALES)
             return space.turns(axis, (weights * values).sum() / weights.sum())
         angle = 2 * math.pi * turns
         mean = torch.atan2((weights * angle.sin()).sum(), (weights * angle.cos()).sum())

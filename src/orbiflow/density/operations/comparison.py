@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,19 +12,20 @@ from orbiflow import runtime
 from orbiflow.batch import csv_bytes
 from orbiflow.density import comparing, tables
 from orbiflow.density.comparing import ComparisonSettings
-from orbiflow.density.data import DIRECTIONS, Unit, arrangements, is_angular
+from orbiflow.density.data import Unit, asked_roles
 from orbiflow.density.operations.drawing import require_ending
-from orbiflow.density.operations.fitting import space_of
+from orbiflow.density.operations.fitting import columns_of
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import RotationForm, SpaceSettings, TableSettings
-from orbiflow.errors import DataWarning, OrbiflowError, SettingError, literal
+from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.settings import DefaultText, Option, Repeated
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
     from orbiflow.density.comparing import DataComparison, ModelComparison, SampleTests
+    from orbiflow.density.data import TableRows
     from orbiflow.density.models import Density
-    from orbiflow.density.tables import TableRows
+    from orbiflow.density.spaces import Space
 
 Columns = tuple[str, ...] | None
 
@@ -50,7 +50,6 @@ def compare(
     specimen: str | None = None,
     form: RotationForm | None = None,
     passive: bool = False,
-    group: str | None = None,
     by: str | None = None,
     out: Annotated[Path | None, Option("-o"), DefaultText("nothing is written")] = None,
     on_event: runtime.Sink = runtime.ignore,
@@ -71,8 +70,6 @@ def compare(
         specimen: Symmetry of their specimen.
         form: How columns of two data sets write rotations, as `fit` takes it.
         passive: Whether they are the inverse rotations.
-        group: Column that names what rows belong to (a protein, a station, an event): those of one are
-            not independent.
         by: Column that says which data set each row of one table belongs to, for tests by name.
         out: A .json or .csv for the result.
     """
@@ -88,7 +85,7 @@ def compare(
         _check_data(data, given, by)
     if out is not None:
         runtime.check_output_file(out, *models, *data)
-    read = _Reader(table, group, on_event, runtime.progress_events(on_event, cancel))
+    read = _Reader(table, on_event, runtime.progress_events(on_event, cancel))
     where = None if models else SpaceSettings(**given)
     with runtime.one_thread():
         if where is None:
@@ -145,86 +142,81 @@ def _refuse(wrong: Mapping[str, bool]) -> None:
 
 
 class _Reader(NamedTuple):
-    """How tables are read, the column of groups, who is told, and who hears of the progress.
-
-    - `beside`: Another column that is no data.
-    """
+    """How tables are read, who is told, and who hears of the progress."""
 
     settings: TableSettings
-    group: str | None
     tell: runtime.Sink
     progress: Callable[[float, str], None]
-    beside: str | None = None
 
-    def rows(
-        self,
-        data: Path,
-        columns: Columns,
-        tell: runtime.Sink,
-        where: SpaceSettings | None = None,
-        model_space: str | None = None,
-    ) -> TableRows:
-        """Return rows, without the column of groups if columns are not named."""
-        settings = self.settings.replace(columns=columns)
-        space: dict[str, Any] = {"group": self.group, "model_space": model_space}
-        space["given"] = () if self.beside is None else (self.beside,)
-        if where is not None:
-            space |= {"space": where.space, "width": where.width}
-        return tables.read_rows(data, settings, tell, **space)
+    def rows(self, data: Path, where: SpaceSettings, by: str | None = None) -> TableRows:
+        """Return rows of a data set, given a column that divides them."""
+        beside = () if by is None else (by,)
+        return tables.read_rows(data, self.settings, self.tell, where=where, given=beside)
 
 
 def _compare_models(
     data: Path, paths: Sequence[Path], read: _Reader, settings: ComparisonSettings
 ) -> ModelComparison:
-    from orbiflow.density.operations.saved import check_fits, model_at
+    from orbiflow.density.operations.saved import model_at, rows_of_model
 
     names = _names(paths)
     models = dict(zip(names, map(model_at, paths), strict=True))
     comparing.require_one_space({name: density.space for name, (density, _) in models.items()})
-    columns = _columns_of_models(data, {name: extra for name, (_, extra) in models.items()}, read)
-    found: dict[Columns, TableRows] = {}
+    columns = _columns_of_models({name: extra for name, (_, extra) in models.items()}, read)
+    found: dict[tuple[Columns, Columns], TableRows] = {}
     scores: dict[str, Array] = {}
     notes: list[str] = []
     for k, (name, (density, extra)) in enumerate(models.items()):
-        own = columns[name]
+        own = columns[name], tuple(extra.get("columns") or ())
         if own not in found:
             tell_once = runtime.ignore if found else read.tell
-            found[own] = read.rows(data, own, tell_once, model_space=density.space.name)
-            check_fits(data, found[own].table, density, extra, tell_once)
-        values = found[own].table.values
+            asked = read.settings.replace(columns=own[0])
+            found[own] = rows_of_model(data, asked, density, extra, tell_once)
+            if len(found) > 1 and own[0] is None and not found[own].source.is_named:
+                raise OrbiflowError(
+                    f"{data} does not name its columns, and the models have them in other orders: give "
+                    "it a header"
+                )
+        values = found[own].values
 
         def told(share: float, k: int = k) -> None:
             read.progress((k + share) / len(models), "scoring")
 
         scores[name] = comparing.scores_of(density, values, told)
         notes += _notes_on_known_rows(name, density, extra, values)
-    groups = next(iter(found.values())).labels
-    made = comparing.compare_scores(scores, settings, groups=groups)
+    rows = next(iter(found.values()))
+    made = comparing.compare_scores(scores, settings, groups=rows.labels, weights=rows.weights)
     return replace(made, notes=(*notes, *made.notes))
 
 
 def _compare_data(
     data: Sequence[Path], where: SpaceSettings, read: _Reader, settings: ComparisonSettings
 ) -> DataComparison:
+    found = _tables(data, where, read)
+    groups = _groups(found)
+    values = {name: rows.values for name, rows in found.items()}
+    space = _space_of(found, where)
+    return comparing.compare_samples(values, space, settings, groups=groups, progress=read.progress)
+
+
+def _groups(found: Mapping[str, TableRows]) -> dict[str, Any] | None:
+    """Return what the rows of data sets belong to, if columns say it."""
+    labels = {name: rows.labels for name, rows in found.items()}
+    if all(own is None for own in labels.values()):
+        return None
+    return dict(labels)
+
+
+def _space_of(found: Mapping[str, TableRows], where: SpaceSettings) -> Space:
+    """Return the space that suits the rows of all data sets."""
     import numpy as np
 
-    found = _tables(data, where, read)
-    groups = None
-    if read.group is not None:
-        groups = {name: np.asarray(rows.labels) for name, rows in found.items()}
-    values = {name: rows.table.values for name, rows in found.items()}
-    unit = _unit_of(found, where, read)
-    columns = next(iter(found.values())).table.columns
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)  # told already
-        return comparing.compare_samples(
-            values,
-            space_of(where, columns, unit),
-            settings,
-            unit=unit,
-            groups=groups,
-            progress=read.progress,
-        )
+    first = next(iter(found.values()))
+    values = np.concatenate([rows.values for rows in found.values()])
+    numbers = np.zeros(len(values), dtype=np.int64)
+    every = replace(first, numbers=numbers, values=values, weights=None, labels=None, given={})
+    columns = columns_of(where, every)
+    return columns.of(every)
 
 
 def _test_data(
@@ -236,72 +228,56 @@ def _test_data(
 ) -> SampleTests:
     import numpy as np
 
-    found = _tables(data, where, read if by is None else read._replace(group=by, beside=read.group))
-    values = {name: rows.table.values for name, rows in found.items()}
-    groups: dict[str, Any] | None = None
-    if read.group is not None:
-        header = read.settings.header
-        groups = {
-            name: tables.read_labels(rows.path, read.group, rows.table, has_header=header)
-            for name, rows in found.items()
-        }
+    from orbiflow.density.data import words_of_cells
+
+    found = _tables(data, where, read, by)
+    values = {name: rows.values for name, rows in found.items()}
+    groups = _groups(found)
+    columns, space = next(iter(found.values())).columns, _space_of(found, where)
     if by is not None:
         (rows,) = found.values()
-        labels = np.asarray(rows.labels)
+        labels = words_of_cells(next(iter(rows.given.values())))
         names = np.unique(labels).tolist()
         if not 2 <= len(names) <= MOST_SAMPLES:
             raise SettingError(
                 f"{{by}} must have 2 to {MOST_SAMPLES} values, one for each data set; "
                 f"{literal(by)} has {len(names)}"
             )
-        own = None if groups is None else next(iter(groups.values()))
+        values = {str(name): rows.values[labels == name] for name in names}
+        own = rows.labels
         groups = None if own is None else {str(name): own[labels == name] for name in names}
-        values = {str(name): rows.table.values[labels == name] for name in names}
-    unit = _unit_of(found, where, read)
-    columns = next(iter(found.values())).table.columns
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)  # told already
-        return comparing.named_tests(
-            values,
-            space_of(where, columns, unit),
-            settings,
-            unit=unit,
-            columns=columns,
-            groups=groups,
-        )
+    return comparing.named_tests(values, space, settings, columns=columns, groups=groups)
 
 
-def _tables(data: Sequence[Path], where: SpaceSettings, read: _Reader) -> dict[str, TableRows]:
-    """Return the rows of tables by the tables' names."""
-    columns = read.settings.columns
-    if columns is None and len(data) > 1:
-        columns = next(
-            (
-                c
-                for other in data[1:]
-                if (c := _common_columns((data[0], other), where.space, read))
-            ),
-            None,
-        )
-    return {
-        name: read.rows(path, columns, read.tell, where)
-        for name, path in zip(_names(data), data, strict=True)
+def _tables(
+    data: Sequence[Path], where: SpaceSettings, read: _Reader, by: str | None = None
+) -> dict[str, TableRows]:
+    """Return the rows of tables by the tables' names, whose columns must be the same."""
+    found = {
+        name: read.rows(path, where, by) for name, path in zip(_names(data), data, strict=True)
     }
-
-
-def _unit_of(found: Mapping[str, TableRows], where: SpaceSettings, read: _Reader) -> str | None:
-    """Return the unit of several tables' angles."""
-    import numpy as np
-
-    values = [rows.table.values for rows in found.values()]
-    every = next(iter(found.values())).table
-    if len({own.shape[1] for own in values}) == 1:
-        every = replace(every, values=np.concatenate(values))
-    unit = tables.angle_unit(where, every, read.tell)
-    form = where.rotation_form(every.columns)
-    if is_angular(where.space, every.values.shape[1], form):
-        return unit
-    return where.unit or ("degrees" if where.space in DIRECTIONS else None)
+    (first, one), *others = found.items()
+    if one.weights is not None:
+        raise SettingError(comparing.UNWEIGHTED)
+    for name, other in others:
+        if [str(role) for role in one.roles] != [str(role) for role in other.roles]:
+            raise SettingError(
+                literal(f"{first} has {one.declaration}, and {name} {other.declaration}: ")
+                + "specify with {columns} which to compare"
+            )
+        if one.source.is_named and other.source.is_named and one.columns != other.columns:
+            if sorted(one.columns) == sorted(other.columns):
+                order = [other.columns.index(column) for column in one.columns]
+                found[name] = replace(other, values=other.values[:, order], columns=one.columns)
+            elif where.space == "torus":
+                raise SettingError(
+                    literal(
+                        f"{first} has the columns {', '.join(one.columns)}, {name} "
+                        f"{', '.join(other.columns)}: "
+                    )
+                    + "specify with {columns} which to compare"
+                )
+    return found
 
 
 def _table(found: SampleTests) -> runtime.Table:
@@ -324,23 +300,27 @@ def _table(found: SampleTests) -> runtime.Table:
 
 
 def _columns_of_models(
-    data: Path, extras: Mapping[str, Mapping[str, Any]], read: _Reader
+    extras: Mapping[str, Mapping[str, Any]], read: _Reader
 ) -> dict[str, Columns]:
     """Return the table's columns in the order in which each model was fitted to them."""
-    from orbiflow.density.operations.saved import with_columns_of
-
     own = {name: tuple(extra.get("columns") or ()) for name, extra in extras.items()}
     (first, wanted), *others = own.items()
-    asked = read.settings.columns
-    if asked is not None:
+    roles = asked_roles(read.settings.columns)
+    asked = [str(name) for name, role in roles.items() if role is None or not role.is_side]
+    sides = [f"{name}={role}" for name, role in roles.items() if str(name) not in asked]
+    if asked:
         places = {name: k for k, name in enumerate(wanted)}
-        if len(places) != len(asked):
-            return dict.fromkeys(own, asked)
+        same = {name: sorted(other) == sorted(wanted) for name, other in own.items()}
         # by the order of the first; another model may have the same ones in another order
         return {
-            name: tuple(asked[places[column]] for column in other)
-            if sorted(other) == sorted(wanted)
-            else asked
+            name: (
+                *(
+                    (asked[places[column]] for column in other)
+                    if same[name] and len(places) == len(asked)
+                    else asked
+                ),
+                *sides,
+            )
             for name, other in own.items()
         }
     for name, other in others:
@@ -350,33 +330,7 @@ def _columns_of_models(
                 f"{literal(fitted)}: are they the same quantities? Then specify with {{columns}} which "
                 "columns they are"
             )
-    settings = with_columns_of(read.settings, data, dict(extras[first]), read.tell)
-    if settings.columns is not None:
-        return dict(own)
-    if len(set(own.values())) > 1:
-        raise OrbiflowError(
-            f"{data} does not name its columns, and the models have them in other orders: give it a "
-            "header"
-        )
-    return dict.fromkeys(own)
-
-
-def _common_columns(data: Sequence[Path], space: str, read: _Reader) -> Columns:
-    """Return the first table's columns if the second has them in another order, else None.
-
-    Where names say which columns the space takes, and in which order, each table is asked.
-    """
-    header = read.settings.header
-    one, other = (tables.column_names(path, has_header=header) for path in data)
-    if one is None or other is None or one == other:
-        return None
-    if all(len(arrangements(space, names)) == 1 for names in (one, other)):
-        return None
-    if sorted(n.casefold() for n in one) != sorted(n.casefold() for n in other):
-        held = f"{data[0]} has the columns {', '.join(one)}, {data[1]} {', '.join(other)}"
-        raise SettingError(f"{literal(held)}: specify with {{columns}} which to compare")
-    group = (read.group or "").strip().casefold()
-    return tuple(name for name in one if name.casefold() != group)
+    return dict.fromkeys(own, tuple(sides) or None)
 
 
 def _notes_on_known_rows(

@@ -2,177 +2,91 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from orbiflow import runtime
-from orbiflow.density import covariates, inference, tables
+from orbiflow.density import covariates, data, inference, tables
 from orbiflow.density.run_folder import CONDITIONAL
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from orbiflow.arrays import Array
-    from orbiflow.density.covariates import ConditionalDensity, ConditionalReport, Values
+    from orbiflow.density.covariates import (
+        ConditionalDensity,
+        ConditionalReport,
+        Covariates,
+        Values,
+    )
+    from orbiflow.density.data import Asked, TableRows
     from orbiflow.density.estimator import DensityEstimator
     from orbiflow.density.fitting import Progress
     from orbiflow.density.models import Density
-    from orbiflow.density.tables import RowSettings, TableRows
-
-KIND = re.compile(r"(?P<name>.+):(?P<kind>word|real|[0-9.]+)", re.IGNORECASE)
-"""How a column that is given says what it is: by a word, or its period."""
-
-MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
-"""Cells that hold no value."""
-
-MOST_NUMBERS_SHARE = 0.5
-"""The share of numbers among cells from which one doubts that a column holds words."""
+    from orbiflow.density.tables import RowSettings
 
 MOST_LISTED = 60
 """The most words of which a table is told."""
 
 
-class Given(NamedTuple):
-    """A column that is known: its name, and whether it is a "word", "real", a period, or None."""
-
-    name: str
-    kind: str | None
-
-
-def given_columns(wanted: Sequence[str], names: Sequence[str] | None) -> list[Given]:
-    """Return the columns that are given as NAME, NAME:word, NAME:real or NAME:24, a period.
-
-    >>> given_columns(["hour:24", "residue"], ["phi", "hour", "residue"])
-    [Given(name='hour', kind='24'), Given(name='residue', kind=None)]
-    """
-    found: list[Given] = []
-    for text in wanted:
-        match = KIND.fullmatch(text)
-        if match and (names is None or text.casefold() not in {own.casefold() for own in names}):
-            found.append(Given(match["name"], match["kind"].lower()))
-        else:
-            found.append(Given(text, None))
-    return found
-
-
-def asked_columns(given: Sequence[str], data: Path, reading: RowSettings) -> list[Given]:
+def asked_columns(given: Sequence[str], reading: RowSettings) -> Asked:
     """Return the columns of a table that are given to a fit, which must be one of whole rows."""
     if not given:
-        return []
+        return {}
     covariates.check_complete(reading.kept_missing)
-    return given_columns(given, tables.column_names(data, has_header=reading.header))
+    try:
+        return data.asked_roles(given)
+    except SettingError as error:
+        raise SettingError(error.template.replace("{columns}", "{given}")) from error
 
 
-class GivenCells(NamedTuple):
-    """The rows of a table, the cells (N,) of its columns that are given, and cyclic ones' periods."""
+def known_in(
+    rows: TableRows, asked: Asked, unit: str | None, tell: runtime.Sink
+) -> tuple[Covariates, str]:
+    """Return what is known of rows, and its declaration, before anything is fitted.
 
-    rows: TableRows
-    cells: dict[str, Values]
-    periods: dict[str, float | None]
-
-
-def read_given(rows: TableRows, given: Sequence[Given], reading: RowSettings) -> GivenCells:
-    """Return what is given of the rows of a table: numbers, or words where a cell is no number.
-
-    Rows that lack a value are left out if missing ones are.
+    `unit` is that of angles that name none.
     """
-    import numpy as np
-
-    dropped = reading.drop_missing or reading.missing == "drop"
-    cells: dict[str, Values] = {}
-    periods: dict[str, float | None] = {}
-    for name, kind in given:
-        if name.casefold() in {own.casefold() for own in [*rows.table.columns, *cells]}:
-            raise SettingError(
-                literal(f"{name!r}")
-                + " is among the columns of the density and {given}, or twice in "
-                "{given}; leave one out"
-            )
-        cells[name] = _cells(rows, name, kind, reading, dropped=dropped)
-        if kind is not None:
-            periods[name] = None if kind in ("word", "real") else float(kind)
-    if dropped and cells:
-        kept = np.logical_and.reduce([~_is_missing(own) for own in cells.values()])
-        rows = rows.only(kept)
-        cells = {name: own[kept] for name, own in cells.items()}
-    return GivenCells(rows, cells, periods)
-
-
-def _cells(
-    rows: TableRows, name: str, kind: str | None, reading: RowSettings, *, dropped: bool
-) -> Values:
-    """Return the cells (N,) of a column, as numbers if they are."""
-    import numpy as np
-
-    words = tables.read_labels(rows.path, name, rows.table, has_header=rows.header, empty=dropped)
-    missing = np.array([word.casefold() in MISSING for word in words])
-    if kind == "word" or (kind is None and tables.holds_words(rows.path, name)):
-        return words
-    numbers = np.full(len(words), np.nan)
-    is_number = missing.copy()
-    for row in np.flatnonzero(~missing):
-        text = tables.with_minus(words[row])
-        if rows.table.decimal == ",":
-            text = text.replace(".", "").replace(",", ".")
-        try:
-            numbers[row] = float(text)
-            is_number[row] = True
-        except ValueError:
-            continue
-    numbers[np.isin(numbers, reading.missing_codes)] = np.nan
-    if is_number.all():
-        return numbers
-    (line, word), *_ = zip(rows.table.lines[~is_number].tolist(), words[~is_number], strict=True)
-    if kind is not None or (is_number & ~missing).mean() > MOST_NUMBERS_SHARE:
-        raise InputFileError(
-            f"{rows.path}: column {name!r} has {str(word)!r} in line {line}, and numbers otherwise: "
-            f"correct it, or give {name}:word"
-        )
-    return words
-
-
-def _is_missing(cells: Values) -> NDArray[Any]:
-    import numpy as np
-
-    if cells.dtype.kind == "f":
-        return np.isnan(cells)
-    return np.array([word.casefold() in MISSING for word in cells])
+    roles = data.given_roles(list(rows.given), rows.given, asked, unit, where=rows.source.where)
+    try:
+        known = covariates.Covariates.of(rows.given, roles)
+        doubts = known.fit_doubts(rows.given)
+    except SettingError as error:
+        raise SettingError(error.template.replace("{columns}", "{given}")) from error
+    declared = ",".join(f"{name}={role}" for name, role in roles.items())
+    tell(runtime.Note(f"given: {declared}"))
+    for doubt in doubts:
+        tell(runtime.Note(f"WARNING: {doubt}"))
+    return known, declared
 
 
 def fit_given(
     estimator: DensityEstimator,
-    given: GivenCells,
-    turn: float | None,
+    rows: TableRows,
+    known: Covariates,
+    declared: str,
     tell: runtime.Sink,
     cancel: runtime.Cancel,
 ) -> tuple[dict[str, bytes], dict[str, Any]]:
-    """Return the file of the density where covariates are known, and what the report says of it.
-
-    `turn` is that of the data's angles.
-    """
-    rows = given.rows
-    known = covariates.Covariates.of(given.cells, given.periods, turn, tables.CURE)
-    for own in known.columns:
-        tell(runtime.Note(f"took {own.name} as {own.kind}"))
-    for doubt in known.fit_doubts(given.cells):
-        tell(runtime.Note(f"WARNING: {doubt}"))
+    """Return the file of the density where covariates are known, and what the report says of it."""
     density, report = covariates.fit_conditional(
         estimator.density_,
-        estimator.points_of(rows.table.values),
-        known.features(given.cells),
+        estimator.points_of(rows.values),
+        known.features(rows.given),
         known,
         estimator.settings(),
         weights=rows.weights,
         groups=rows.labels,
         progress=runtime.progress_events(tell, cancel),
     )
-    columns = list(rows.table.columns)
-    said: dict[str, Any] = {"covariates": known.to_json(), **report.to_json()}
+    columns, kept = list(rows.columns), [role and str(role) for role in rows.roles]
+    said: dict[str, Any] = {
+        "declaration": declared,
+        "covariates": known.to_json(),
+        **report.to_json(),
+    }
     words = {
-        own.name: _by_word(density, report, given, own.name, own.words)
+        own.name: _by_word(density, report, rows, own.name, own.words)
         for own in known.columns
         if own.words
     }
@@ -180,24 +94,24 @@ def fit_given(
         tell(_table(name, columns, lines))
     for text in report.words():
         tell(runtime.Note(text))
-    file = covariates.conditional_to_bytes(density, columns=columns)
+    file = covariates.conditional_to_bytes(density, columns=columns, roles=kept)
     return {CONDITIONAL: file}, {"given": {**said, "words": words}}
 
 
 def _by_word(
     density: ConditionalDensity,
     report: ConditionalReport,
-    given: GivenCells,
+    rows: TableRows,
     name: str,
     words: Sequence[str],
 ) -> dict[str, Any]:
     """Return rows, gain and, if nothing else is given, the mean of each column, for each word."""
     import numpy as np
 
-    cells = given.cells[name]
+    cells = data.words_of_cells(rows.given[name])
     at, gains = (own.numpy() for own in report.held)
     means = None
-    if len(given.cells) == 1 and _has_means(density):
+    if len(rows.given) == 1 and _has_means(density):
         x = density.covariates.features({name: np.array(words)})
         turns = density.mean_directions(x)
         means = density.space.from_chart(turns).tolist()
@@ -249,26 +163,34 @@ def conditional_in(folder: Path) -> tuple[ConditionalDensity, dict[str, Any]] | 
     return covariates.read_conditional(file) if folder.is_dir() and file.exists() else None
 
 
-def columns_asked(density: ConditionalDensity, given: Sequence[str]) -> list[Given] | None:
-    """Return the covariates of a density, if these are what is given; None if none of them is.
+def columns_asked(density: ConditionalDensity, given: Sequence[str]) -> list[str]:
+    """Return the covariates of a density, if these are what is given; none if none of them is.
 
-    Raises `SettingError` if some of them are, and others are not.
+    Raises `SettingError` if some of them are, and others are not, and for other roles than the fit's.
     """
     own = {one.name.casefold(): one for one in density.covariates.columns}
-    asked = [one.name.casefold() for one in given_columns(given, density.covariates.names)]
-    if not set(asked) & set(own):
-        return None
-    if set(asked) != set(own):
+    asked = {str(name).casefold(): role for name, role in data.asked_roles(given).items()}
+    if not asked.keys() & own.keys():
+        return []
+    if asked.keys() != own.keys():
         raise SettingError(
             "{given} must name all covariates of the fit, "
             + literal(", ".join(density.covariates.names))
         )
-    return [Given(one.name, "word" if one.words else "real") for one in density.covariates.columns]
+    for name, role in asked.items():
+        fitted = own[name].role
+        same_turn = role is not None and role.turn is not None and role.turn == fitted.turn
+        if role is not None and role != fitted and not same_turn:
+            raise SettingError(
+                f"{{given}}: {literal(own[name].name)} is declared as {role}, and in the fit it is "
+                f"{fitted}: convert it, or leave the role out"
+            )
+    return density.covariates.names
 
 
 def score_given(
     density: ConditionalDensity,
-    given: GivenCells,
+    rows: TableRows,
     measure: str,
     tell: runtime.Sink,
     progress: Progress,
@@ -277,14 +199,16 @@ def score_given(
     import numpy as np
 
     known = density.covariates
+    cells = dict(zip(known.names, rows.given.values(), strict=True))
     try:
-        x = known.features(given.cells)
+        x = known.features(cells)
+        doubts = known.doubts(cells)
     except OrbiflowError as error:
-        text = f"{given.rows.path}: {error}; leave such rows out, or score without what is given"
+        text = f"{rows.source.where}{error}; leave such rows out, or score without what is given"
         raise InputFileError(text) from error
-    for doubt in known.doubts(given.cells, tables.CURE):
+    for doubt in doubts:
         tell(runtime.Note(f"WARNING: {doubt}"))
-    points = inference.chart_of_rows(density.space, given.rows.table.values, may_lack=False)
+    points = inference.chart_of_rows(density.space, rows.values, may_lack=False)
     found: list[Array] = []
     for start in range(0, len(points), BLOCK_ROWS):
         part = slice(start, start + BLOCK_ROWS)
@@ -320,7 +244,7 @@ def values_of(
     names = density.covariates.names
     if unknown := sorted(set(texts) - {name.casefold() for name in names}):
         raise SettingError(
-            "{given}: " + literal(f"no covariate {unknown[0]!r}; there are {', '.join(names)}")
+            "{at}: " + literal(f"no covariate {unknown[0]!r}; there are {', '.join(names)}")
         )
     found: dict[str, Values] = {}
     for own in density.covariates.columns:
@@ -329,7 +253,7 @@ def values_of(
             continue
         if text is None:
             raise SettingError(
-                "{given} must say all that is known: " + literal(f"{own.name} is missing")
+                "{at} must say all that is known: " + literal(f"{own.name} is missing")
             )
         found[own.name] = np.array([text]) if own.words else np.array([number_of(own.name, text)])
     return found
@@ -340,14 +264,12 @@ def number_of(name: str, text: str) -> float:
     try:
         return float(tables.with_minus(text.strip()))
     except ValueError:
-        raise SettingError(
-            "{given}: " + literal(f"{name} must be a number, got {text!r}")
-        ) from None
+        raise SettingError("{at}: " + literal(f"{name} must be a number, got {text!r}")) from None
 
 
 def pair_of(text: str) -> tuple[str, str]:
     """Return the name and the value of a text such as temperature=295."""
     name, sign, value = text.rpartition("=")
     if not sign or not name.strip() or not value.strip():
-        raise SettingError(f"{{given}} must be values such as psi=-45, got {literal(repr(text))}")
+        raise SettingError(f"{{at}} must be values such as psi=-45, got {literal(repr(text))}")
     return name.strip(), value.strip()

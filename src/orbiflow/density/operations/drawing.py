@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from orbiflow import runtime
-from orbiflow.density import pictures, regions, spaces, tables
+from orbiflow.density import pictures, regions, spaces
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
 from orbiflow.density.run_folder import write_file
@@ -38,7 +38,7 @@ def plot(
     model: Model,
     out: Annotated[Path, Option("-o")] = Path("plots"),
     data: Path | None = None,
-    given: Annotated[tuple[str, ...], DefaultText("none")] = (),
+    at: Annotated[tuple[str, ...], DefaultText("none")] = (),
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
@@ -52,19 +52,14 @@ def plot(
         model: Folder that `fit` wrote.
         out: Folder for the pictures, made if need be; or a .pdf, which gets a page for each figure.
         data: Table to draw beside samples in samples.png, and as the dots of --dots.
-        given: The covariates of the fit, such as temperature=295,residue=GLY: the density where they
+        at: The covariates of the fit, such as temperature=295,residue=GLY: the density where they
             are.
     """
     if data is None and table.fields_given:
         name = min(table.fields_given)
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
-    from orbiflow.density.operations.saved import (
-        check_fits,
-        density_given,
-        names_of,
-        with_columns_of,
-    )
+    from orbiflow.density.operations.saved import density_given, names_of, rows_of_model
 
     single = pictures.is_one_file(out)
     if single and settings.format not in (None, "pdf"):
@@ -72,16 +67,13 @@ def plot(
     # pictures may stand beside their model
     check = runtime.check_output_file if single else runtime.check_outside_runs
     check(out, model, data, settings.coastlines)
-    density, extra = density_given(model, given, on_event)
+    density, extra = density_given(model, at, on_event)
     space = density.space
     if settings.names is None:
         settings = settings.replace(names=tuple(names_of(density, extra)))
     points = None
     if data is not None:
-        reading = with_columns_of(table, data, extra, on_event)
-        found = tables.read_rows(data, reading, on_event, model_space=space.name).table
-        check_fits(data, found, density, extra, on_event)
-        points = found.values
+        points = rows_of_model(data, table, density, extra, on_event).values
 
     told = runtime.progress_events(on_event, cancel)
     plotted = pictures.plot_density(density, out, settings, data=points, told=told)

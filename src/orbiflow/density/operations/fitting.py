@@ -12,28 +12,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 from orbiflow import runtime
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
-from orbiflow.density.data import is_angular
+from orbiflow.density.data import asked_roles
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_files, written_files
-from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
+from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError
 from orbiflow.settings import DefaultText, Hidden, Option
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
-    from orbiflow.density.data_space import DataColumns
+    from orbiflow.density.data import TableRows
     from orbiflow.density.estimator import DensityEstimator
     from orbiflow.density.fitting import ParametricFit
     from orbiflow.density.spaces import Space
-    from orbiflow.density.tables import TableRows
 
 MOST_SCORED = 20_000
 """Rows over which the mean log density is taken: up to here all of them, for a few hundredths of the
 fit's time at most; of 100,000 rows of six angles it would be two fifths."""
 
 REPORTED = (
-    "components", "repeats", "missing", "weights", "group", "max_frequency", "segments", "seed",
+    "components", "repeats", "missing", "max_frequency", "segments", "seed",
 )  # fmt: skip
 """Settings that the report repeats."""
 
@@ -43,7 +42,7 @@ def fit(
     data: Path,
     where: SpaceSettings,
     settings: DensitySettings = DensitySettings(),
-    reading: CountedRowSettings = CountedRowSettings(),
+    reading: RowSettings = RowSettings(),
     *,
     given: Annotated[tuple[str, ...], DefaultText("none")] = (),
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
@@ -57,43 +56,38 @@ def fit(
 
     Args:
         data: CSV, TSV, NPY or Parquet.
-        given: Covariates, such as temperature,hour,residue: the density where they are known, too.
-            Numbers, cyclic ones by their names or as hour:24, and words; level:word takes numbers for
-            words.
+        given: Columns on which the density may depend, and what they are, as for columns:
+            temperature=linear,hour=cycle:24,level=word. The density where they are known, too.
         out: Folder for the results, made if need be.
         picture: Also draw a small picture, thumbnail.png.
     """
     begin = time.perf_counter()
     _check(where, settings, reading)
     with runtime.one_thread():
-        known = covariates.asked_columns(given, data, reading)
+        asked = covariates.asked_columns(given, reading)
         rows = tables.read_rows(
-            data,
-            reading,
-            on_event,
-            space=where.space,
-            width=where.width,
-            group=reading.group,
-            beside=where.beside,
-            given=[own.name for own in known],
+            data, reading, on_event, where=where, given=[str(name) for name in asked]
         )
-        turn = turn_of(where, rows) if known else None
-        cells = covariates.read_given(rows, known, reading)
-        rows = cells.rows
-        values = rows.table.values
+        values = rows.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
+        on_event(runtime.Note(f"columns: {rows.declaration}"))
+        known = covariates.known_in(rows, asked, where.unit, on_event) if given else None
         estimator = fit_rows(rows, where, settings, reading, on_event, cancel)
-        asked = {**settings.values(), **reading.values()}
-        document = _document(estimator, rows, asked, settings.seed)
+        document = _document(
+            estimator, rows, {**settings.values(), **reading.values()}, settings.seed
+        )
         others: dict[str, bytes] = {}
-        if given:
-            others, said = covariates.fit_given(estimator, cells, turn, on_event, cancel)
+        if known is not None:
+            others, said = covariates.fit_given(estimator, rows, *known, on_event, cancel)
             document |= said
         document["seconds"] = time.perf_counter() - begin
         sketch = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()
         model = models.density_to_bytes(
-            estimator.density_, columns=list(rows.table.columns), fitted_rows=sketch
+            estimator.density_,
+            columns=list(rows.columns),
+            roles=[role and str(role) for role in rows.roles],
+            fitted_rows=sketch,
         )
         report = json.dumps(document, allow_nan=False, indent=1)
         files = {pictures.MODEL: model, pictures.REPORT: report, **others}
@@ -129,13 +123,6 @@ def parameter_table(found: ParametricFit) -> runtime.Table:
     )
 
 
-def turn_of(where: SpaceSettings, rows: TableRows) -> float | None:
-    """Return a whole turn in the unit of the angles of a torus, None of other data."""
-    if where.space != "torus":
-        return None
-    return spaces.whole_turn(tables.angle_unit(where, rows.table, runtime.ignore))
-
-
 def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> str | Space:
     """Return the space of columns, if settings tell it, otherwise its name: data tell the rest."""
     if (form := where.rotation_form(names)) is not None:
@@ -146,20 +133,10 @@ def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> st
     return spaces.make_space(where.space, cell=where.cell, fractional=where.fractional)
 
 
-def columns_asked(where: SpaceSettings, rows: TableRows, tell: runtime.Sink) -> DataColumns:
-    """Return what settings and names say of a table's columns."""
-    from orbiflow.density.data_space import DataColumns
-
-    table = rows.table
-    unit: str | None = tables.angle_unit(where, table, tell)
-    own = tables.without_columns(table, where.beside, rows.path).columns
-    unit = unit if is_angular(where.space, len(own), where.rotation_form(own)) else where.unit
-
-    def number(name: str) -> int:
-        return table.columns.index(tables.columns_among(table.columns, [name])[0])
-
-    periods: dict[str | int, float] = {number(name): value for name, value in where.periods.items()}
-    return DataColumns(space_of(where, own, unit), unit, [*map(number, where.linear)], periods)
+def columns_of(where: SpaceSettings, rows: TableRows, seed: int = 0) -> spaces.DataColumns:
+    """Return what settings and names say of the space of a table's rows."""
+    own = [name for name, role in zip(rows.columns, rows.roles, strict=True) if role is None]
+    return spaces.DataColumns(space_of(where, own, rows.unit), seed=seed)
 
 
 def fit_rows(
@@ -173,22 +150,20 @@ def fit_rows(
     """Fit a density to the rows of a table."""
     from orbiflow.density.estimator import DensityEstimator
 
-    values, labels = rows.table.values, rows.labels
-    columns = columns_asked(where, rows, tell)
     given: dict[str, Any] = {name: getattr(settings, name) for name in settings.fields_given}
-    given |= {"unit": columns.unit, "linear": columns.linear, "period": columns.period}
-    estimator = DensityEstimator(columns.space, missing=reading.kept_missing, **given)
+    estimator = DensityEstimator(
+        columns_of(where, rows).space, missing=reading.kept_missing, **given
+    )
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)  # notes say the same, with names of columns
-        how: dict[str, Any] = {"sample_weight": rows.weights, "groups": labels}
-        how |= {"columns": rows.table.columns, "progress": progress}
-        return estimator.fit(values, **how)
+        warnings.simplefilter("ignore", DataWarning)  # notes say the same
+        return estimator.fit(rows, progress=progress)
 
 
-def _check(where: SpaceSettings, settings: DensitySettings, reading: CountedRowSettings) -> None:
+def _check(where: SpaceSettings, settings: DensitySettings, reading: RowSettings) -> None:
     """Refuse rows that such a density cannot be fitted to, before they are read."""
-    settings.check_rows("refuse", None if reading.group is None else "group")
+    kinds = {role.kind for role in asked_roles(reading.columns).values() if role is not None}
+    settings.check_rows("refuse", "group" if "group" in kinds else None)
     if reading.missing == "marginalise":
         check_marginalised(where, settings)
 
@@ -216,12 +191,13 @@ def _document(
     weights = None if rows.weights is None else rows.weights[scored]
     return {
         "space": {"name": space.name, **space.settings()},
-        "columns": rows.table.columns,
+        "columns": rows.columns,
+        "declaration": rows.declaration,
         "settings": {name: asked[name] for name in REPORTED},
         "log_likelihood": {
-            "natural": _mean_score(estimator, rows.table.values[scored], weights),
+            "natural": _mean_score(estimator, rows.values[scored], weights),
             "natural_rows": len(scored),
-            "uniform": uniform_score(estimator, rows.table.values[scored], weights),
+            "uniform": uniform_score(estimator, rows.values[scored], weights),
             "square_train": -report.train_nll,
             "square_validation": -report.validation_nll,
         },
@@ -264,7 +240,7 @@ def batch(
     folder: Path,
     where: SpaceSettings,
     settings: DensitySettings = DensitySettings(),
-    reading: CountedRowSettings = CountedRowSettings(),
+    reading: RowSettings = RowSettings(),
     out: Annotated[Path, Option("-o")] = Path("batch"),
     work: WorkSettings = WorkSettings(),
     *,

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from orbiflow.arrays import Array
+    from orbiflow.density.data import TableRows
 
 Model = Annotated[Path, Option("--model", "-m")]
 Out = Annotated[Path, Option("--out", "-o")]
@@ -78,25 +79,20 @@ def score(
                 f"{{{name}}} requires complete rows; leave it out, or {{missing}} marginalise"
             )
 
-    from orbiflow.density.operations.saved import axes_of, check_fits, model_at, with_columns_of
+    from orbiflow.density.operations.saved import axes_of, model_at, rows_of_model
 
     runtime.check_output_file(out, data, model)
     with runtime.one_thread():
         density, extra = model_at(model)
         spaces.check_measure(settings.measure, density.space)
-        read = with_columns_of(reading, data, extra, on_event)
         where_known = covariates.conditional_in(model) if settings.given else None
-        asked = where_known and covariates.columns_asked(where_known[0], settings.given)
-        space, others = density.space.name, [own.name for own in asked or ()]
-        rows = tables.read_rows(data, read, on_event, model_space=space, given=others)
-        cells = covariates.read_given(rows, asked or (), reading)
-        rows = cells.rows
-        check_fits(data, rows.table, density, extra, on_event)
+        asked = covariates.columns_asked(where_known[0], settings.given) if where_known else []
+        rows = rows_of_model(data, reading, density, extra, on_event, asked)
         progress = runtime.progress_events(on_event, cancel)
-        names = [*rows.table.columns]
+        names = [*rows.columns]
         if where_known and asked:
             logs = covariates.score_given(
-                where_known[0], cells, settings.measure, on_event, progress
+                where_known[0], rows, settings.measure, on_event, progress
             )
             columns, over, notes = {"log_prob_given": logs}, f"{rows.whole.sum()} rows", []
             mean = mean_of_whole(logs, rows.weights, rows.whole)
@@ -106,15 +102,15 @@ def score(
                 raise SettingError("{given} names all columns: nothing is left to have a density")
             found = score_rows(density, rows, settings, progress, may_lack, known)
             columns, mean, over, notes = found
-    weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
+    weighted = "" if rows.weights is None else ", weighted"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
-    table = tables.append_columns(rows.table, data, columns)
+    table = tables.append_columns(rows, columns)
     notes += [
         f"{data} has a column {name} already: the new one is {free}"
-        for name, free in tables.renamed_columns(rows.table, columns).items()
+        for name, free in tables.renamed_columns(rows, columns).items()
     ]
     write_file(out, table, on_event, *notes, words)
-    return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": mean})
+    return runtime.Outcome({"file": str(out), "rows": len(rows.values), "mean": mean})
 
 
 BLOCK, BLOCK_GRADIENT = 2**18, 2**16
@@ -126,7 +122,7 @@ SCORED_SHARE = 0.3
 
 def score_rows(
     density: models.Density,
-    rows: tables.TableRows,
+    rows: TableRows,
     settings: ScoreSettings,
     progress: fitting.Progress,
     may_lack: bool,
@@ -141,7 +137,7 @@ def score_rows(
     """
     from orbiflow.density import inference
 
-    space, values = density.space, rows.table.values
+    space, values = density.space, rows.values
     points = inference.chart_of_rows(space, values, may_lack=may_lack)
     known = ~points.isnan()
     whole = known.all(dim=1).numpy()
@@ -149,7 +145,7 @@ def score_rows(
     notes: list[str] = []
     columns = {name: _log_densities(density, points, settings, progress)}
     if given:
-        given = inference.chosen_columns(space, given, len(rows.table.columns)).axes
+        given = inference.chosen_columns(space, given, len(rows.columns)).axes
         of_given = _log_densities(density, _only(points, given), settings, progress)
         columns, name = {"log_prob_given": columns[name] - of_given}, "log_prob_given"
     if settings.gradient:
@@ -194,19 +190,19 @@ def _log_densities(
 
 
 def _gradients(
-    density: models.Density, rows: tables.TableRows, progress: fitting.Progress
+    density: models.Density, rows: TableRows, progress: fitting.Progress
 ) -> dict[str, Array]:
     """Return the gradient of the log density, a column (N,) for each of the data's coordinates."""
     import numpy as np
 
-    values = rows.table.values
+    values = rows.values
     found: list[Array] = []
     for start in range(0, len(values), BLOCK_GRADIENT):
         part = values[start : start + BLOCK_GRADIENT]
         found.append(models.log_density_gradient(density, part)[1])
         share = (start + len(part)) / len(values)
         progress(SCORED_SHARE + (1 - SCORED_SHARE) * share, "finding gradients")
-    names = [f"log_prob_by_{name}" for name in rows.table.columns]
+    names = [f"log_prob_by_{name}" for name in rows.columns]
     return dict(zip(names, np.concatenate(found).T, strict=True))
 
 
@@ -244,7 +240,7 @@ def _missing_note(known: Tensor, name: str) -> str:
 class SampleSettings(Settings, group="Samples"):
     """How samples are drawn."""
 
-    given: Annotated[tuple[str, ...], DefaultText("none")] = ()
+    at: Annotated[tuple[str, ...], DefaultText("none")] = ()
     """The covariates of the fit, such as temperature=295,residue=GLY: samples where they are."""
 
     count: Annotated[int, Range(1, 100_000_000), Option("-n")] = 1000
@@ -277,7 +273,7 @@ def sample(
 
     runtime.check_output_file(out, model)
     with runtime.one_thread():
-        density, extra = density_given(model, settings.given, on_event)
+        density, extra = density_given(model, settings.at, on_event)
         generator = torch.Generator().manual_seed(settings.seed)
         data = density.space.from_chart(density.sample((settings.count,), generator))
     names = names_of(density, extra)
@@ -355,7 +351,7 @@ def conditional(
     settings: PartialSettings = PartialSettings(),
     *,
     model: Model,
-    given: tuple[str, ...],
+    at: tuple[str, ...],
     columns: Annotated[tuple[str, ...] | None, DefaultText("all")] = None,
     out: Out = Path("conditional"),
     on_event: runtime.Sink = runtime.ignore,
@@ -368,14 +364,14 @@ def conditional(
 
     Args:
         model: Folder that `orbiflow density fit` wrote.
-        given: What is known: covariates, such as temperature=295,residue=GLY, and angles in the
+        at: What is known: covariates, such as temperature=295,residue=GLY, and angles in the
             model's unit, such as psi=-45,chi1=60.
         columns: Of the other angles, those to keep.
         out: Folder of the new model, made if need be.
     """
-    if not given:
-        raise SettingError("{given} says nothing; give what is known, as in psi=-45")
-    for text in given:
+    if not at:
+        raise SettingError("{at} says nothing; give what is known, as in psi=-45")
+    for text in at:
         covariates.pair_of(text)
 
     from orbiflow.density import inference
@@ -383,7 +379,7 @@ def conditional(
 
     runtime.check_output_folder(out, model, what="model")
     with runtime.one_thread():
-        density, extra, left, x = saved.split_given(model, given, on_event)
+        density, extra, left, x = saved.split_given(model, at, on_event)
         pairs = [_angle(text) for text in left]
         names = saved.names_of(density, extra)
         if not pairs:
@@ -425,5 +421,5 @@ def _angle(text: str) -> tuple[str, float]:
         return name.strip(), float(tables.with_minus(value.strip()))
     except ValueError:
         raise SettingError(
-            f"{{given}} must be angles such as psi=-45, got {literal(repr(text))}"
+            f"{{at}} must be angles such as psi=-45, got {literal(repr(text))}"
         ) from None

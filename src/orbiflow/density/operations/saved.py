@@ -17,14 +17,14 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import check_form, doubts_of_other_columns
+from orbiflow.density.data import DIRECTIONS, TableError, TableRows, check_form, with_dip_directions
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.operations import covariates
 from orbiflow.density.regions import size_unit
 from orbiflow.density.run_folder import SAMPLES, write_files
 from orbiflow.density.spaces import RotationSpace, Space, Torus
-from orbiflow.density.tables import Table, TableError, TableSettings, column_names, listing, to_csv
+from orbiflow.density.tables import TableSettings, to_csv
 from orbiflow.errors import InputFileError, SettingError, literal
 from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
 
@@ -68,7 +68,7 @@ def density_given(path: Path, given: Sequence[str], tell: Sink) -> tuple[Density
     density, extra, left, _ = split_given(path, given, tell)
     if left:
         raise SettingError(
-            "{given}: "
+            "{at}: "
             + literal(f"{path} has no covariate {left[0].rpartition('=')[0]!r}")
             + "; `density conditional` fixes columns of the data"
         )
@@ -89,71 +89,40 @@ def names_of(density: Density, extra: dict[str, Any]) -> list[str]:
     return names if len(names) == len(density.space.columns) else list(density.space.columns)
 
 
-def with_columns_of(
-    settings: TableSettings, data: Path, extra: dict[str, Any], tell: Sink
-) -> TableSettings:
-    """Return the settings with the columns of the fit, where none were chosen.
+def rows_of_model(
+    data: Path,
+    settings: TableSettings,
+    density: Density,
+    extra: dict[str, Any],
+    tell: Sink,
+    given: Sequence[str] = (),
+) -> TableRows:
+    """Return the rows of a table that can be of a model, and warn of what is doubtful.
 
-    A file that names its columns must have those of the fit. All columns of a file without names are
-    taken, and the user is told.
+    The columns are those of the fit, where none were chosen.
     """
-    names: tuple[str, ...] = tuple(extra.get("columns") or ())
-    unnamed = all(re.fullmatch(r"column\d+", name) for name in names)
-    if settings.columns is not None or unnamed:
-        return settings
-    own = column_names(data, wanted=names, has_header=settings.header)
-    if own is None:
-        tell(Note(f"{data} has no header: its columns were taken for {', '.join(names)}"))
-        return settings
-    known = {name.casefold() for name in own}
-    asked = tables.columns_in(own, names)
-    missing = [name for name in asked if name.casefold() not in known]
-    if missing:
-        some = f"no {', '.join(missing)} among " if len(missing) < len(names) else ""
-        raise TableError(
-            literal(
-                f"{data}: the model was fitted to {', '.join(names)}, and the file has {some}"
-                f"{listing(own)}"
-            )
-            + ": specify with {columns} which they are, in this order"
-        )
-    return settings.replace(columns=names)
-
-
-def check_fits(
-    data: Path, table: Table, density: Density, extra: dict[str, Any], tell: Sink
-) -> None:
-    """Check that a table can be of a model, and warn of angles that seem to be in another unit."""
     space = density.space
-    wanted: list[str] = list(extra.get("columns") or space.columns)
-    if len(table.columns) not in space.widths:
-        count = len(table.columns)
-        raise TableError(
-            literal(
-                f"{data}: {count} column{'s' * (count != 1)} ({', '.join(table.columns)}) cannot be "
-                f"those of the model, which was fitted to {len(wanted)} ({', '.join(wanted)})"
-            )
-            + ": specify with {columns} which they are, in this order"
-        )
-    if list(table.columns) != wanted and sorted(table.columns) == sorted(wanted):
-        listed = literal(
-            f"{data}: the model was fitted to {', '.join(wanted)}, in this order; give "
-        )
-        raise TableError(listed + "{columns} " + literal(f"'{','.join(wanted)}'"))
-    if isinstance(space, RotationSpace):
-        try:
-            check_form(space.name, table.columns, space.form_of(len(table.columns)))
-        except SettingError as error:
-            raise TableError(literal(f"{data}: ") + error.template) from error
-    unit, own = table.unit, inference.data_unit(space, len(table.columns))
-    if unit is not None and own not in (None, unit):
-        text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"
-        raise TableError(literal(text))
-    doubts = inference.data_doubts(density, table.values, table.columns, tables.CURE)
-    if [name.casefold() for name in table.columns] != [name.casefold() for name in wanted]:
-        doubts += doubts_of_other_columns(space.data_name, table.values, table.columns, own)
+    names = tuple(extra.get("columns") or space.columns)
+    if len(names) not in space.widths:
+        names = space.columns
+    fitted = {"columns": names, "roles": [role and str(role) for role in space.roles(len(names))]}
+    rows = tables.read_rows(data, settings, tell, fitted=fitted, given=given)
+    if space.data_name in DIRECTIONS:
+        rows, note = with_dip_directions(rows)
+        if note is not None:
+            tell(Note(note))
+    own = [k for k, role in enumerate(space.roles(len(rows.columns))) if role is None]
+    try:
+        base = getattr(space, "base", space)
+        if isinstance(base, RotationSpace) and rows.source.is_named:
+            names = [rows.columns[k] for k in own]
+            check_form(space.data_name, names, base.form_of(len(names)))
+        doubts = inference.data_doubts(density, rows.values, rows.columns, rows.place)
+    except SettingError as error:
+        raise TableError(literal(f"{data}: ") + error.template) from error
     for doubt in doubts:
         tell(Note(f"WARNING: {data}: {doubt}"))
+    return rows
 
 
 PICTURE = "density.png"
@@ -213,8 +182,7 @@ def condition_of(
         both = [names[axis] for axis in kept if axis in axes]
         if both:
             raise SettingError(
-                literal(repr(both[0]))
-                + " is both among {columns} and {given}; name it in one of them"
+                literal(repr(both[0])) + " is both among {columns} and {at}; name it in one of them"
             )
     for doubt in inference.given_doubts(space, known, names):
         tell(Note(f"WARNING: {doubt}"))

@@ -14,12 +14,12 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.data import ROTATIONS
 from orbiflow.density.run_folder import write_file
-from orbiflow.density.tables import CountedRowSettings, SpaceSettings
+from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError, literal
 from orbiflow.settings import DefaultText, Ending, Option, Range, Settings, is_a
 
 if TYPE_CHECKING:
-    from orbiflow.density.tables import TableRows
+    from orbiflow.density.data import TableRows
 
 File = Annotated[Path | None, DefaultText("none")]
 
@@ -40,7 +40,7 @@ def summary(
     data: Path,
     where: SpaceSettings,
     settings: SummarySettings = SummarySettings(),
-    reading: CountedRowSettings = CountedRowSettings(),
+    reading: RowSettings = RowSettings(),
     *,
     out: Annotated[File, Option("-o"), Ending(".json", ".csv")] = None,
     picture: Annotated[File, Ending(".png", ".pdf", ".svg")] = None,
@@ -59,10 +59,15 @@ def summary(
     _check(where, reading, picture)
     for file in filter(None, (out, picture)):
         runtime.check_output_file(file, data)
-    rows = tables.read_rows(
-        data, reading, on_event, space=where.space, width=where.width, group=reading.group
-    )
-    unit = tables.angle_unit(where, rows.table, on_event)
+    rows = tables.read_rows(data, reading, on_event, where=where)
+    if wrong := [str(role) for role in rows.roles if role is not None and role.kind != "angle"]:
+        raise SettingError(
+            literal(
+                f"{data}: a summary is of angles in one unit, directions, axes and orientations, "
+            )
+            + f"and a column is {wrong[0]}: leave it out of {{columns}}"
+        )
+    unit = rows.unit or "degrees"
     found = _summarised(rows, where, unit, settings)
     cancel.check()
     for event in _tables(found, settings.level):
@@ -70,7 +75,7 @@ def summary(
     for note in _notes(found, rows):
         on_event(runtime.Note(note))
     document = {"kind": "summary", "space": where.space, "unit": unit, "level": settings.level}
-    document |= {"weights": reading.weights, "counts": reading.counts, "group": reading.group}
+    document |= {"declaration": rows.declaration}
     document |= found
     if out is not None:
         as_csv = out.suffix.lower() == ".csv"
@@ -93,17 +98,13 @@ def _csv(found: dict[str, Any]) -> bytes:
     return csv_bytes(list(rows[0]), [list(row.values()) for row in rows])
 
 
-def _check(where: SpaceSettings, reading: CountedRowSettings, picture: Path | None) -> None:
+def _check(where: SpaceSettings, reading: RowSettings, picture: Path | None) -> None:
     """Refuse what has no summary before the table is read."""
     if where.space not in ("torus", "sphere", "projective-plane", *ROTATIONS):
         raise SettingError(
             f"{{space}} must be torus, sphere, projective-plane, {', '.join(ROTATIONS)}: summaries are "
             f"of angles, directions, axes and orientations; got {literal(repr(where.space))}"
         )
-    for name in ("linear", "period"):
-        if getattr(where, name):
-            text = f"{{{name}}} is for densities: a summary is of columns of one unit; leave it out"
-            raise SettingError(text)
     if where.space != "torus":
         if reading.missing == "marginalise":
             raise SettingError("{missing} marginalise is for angles on a torus; use {missing} drop")
@@ -118,17 +119,17 @@ def _summarised(
     from orbiflow.density import orientations, summaries
     from orbiflow.density.operations.fitting import space_of
 
-    values, space = rows.table.values, where.space
+    values, space = rows.values, where.space
     how: dict[str, Any] = {
         "weights": rows.weights, "groups": rows.labels, "level": settings.level,
     }  # fmt: skip
     if space in ROTATIONS:
-        own: Any = space_of(where, rows.table.columns, unit)
+        own: Any = space_of(where, rows.columns, unit)
         return {"orientations": [asdict(orientations.summarize_orientations(own, values, **how))]}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
         if space == "torus":
-            made = summaries.summarize_angles(values, rows.table.columns, unit=unit, **how)
+            made = summaries.summarize_angles(values, columns=rows.columns, unit=unit, **how)
             names = ("columns", "correlations")
             return {n: [asdict(one) for one in part] for n, part in zip(names, made, strict=True)}
         name, summarise = {
@@ -233,7 +234,7 @@ def _roses(rows: TableRows, columns: list[dict[str, Any]], unit: str, file: Path
     from orbiflow.drawing import Sheet
 
     turn, roses = whole_turn(unit), list[pictures.Rose]()
-    for column, entry in zip(rows.table.values.T, columns, strict=True):
+    for column, entry in zip(rows.values.T, columns, strict=True):
         kept = np.isfinite(column)
         weights = None if rows.weights is None else rows.weights[kept]
         mean, spread = (

@@ -46,7 +46,7 @@ class TrendSettings(Settings, group="Trend"):
     levels: tuple[float, ...] = (0.5, 0.9)
     """What the intervals hold."""
 
-    given: Annotated[tuple[str, ...], DefaultText("numbers at their medians, each word")] = ()
+    at: Annotated[tuple[str, ...], DefaultText("numbers at their medians, each word")] = ()
     """The other covariates, such as temperature=295,residue=GLY."""
 
 
@@ -85,8 +85,8 @@ def trend(
         if found is not None and name is not None:
             density, extra = found
             drawn = _along_covariate(density, extra, of, name, settings, progress, on_event)
-        elif settings.given:
-            raise SettingError("{given} is for trends along a covariate of the fit; leave it out")
+        elif settings.at:
+            raise SettingError("{at} is for trends along a covariate of the fit; leave it out")
         else:
             drawn = _along_column(*model_at(model), of, along, settings, progress, on_event)
         picture = drawn.picture()
@@ -187,7 +187,7 @@ def _along_covariate(
     names = [str(name) for name in extra.get("columns") or torus.columns]
     (axis,) = axes_of([of], names, tell)
     column = density.covariates.column(along)
-    known, beside, panels = _others(density, along, settings.given, tell)
+    known, beside, panels = _others(density, along, settings.at, tell)
     values = (
         np.array(column.words)
         if column.words
@@ -222,14 +222,14 @@ def _others(
     pairs = [covariates.pair_of(text) for text in given]
     said = {name.casefold() for name, _ in pairs}
     if along.casefold() in said:
-        raise SettingError("{given} and {along} " + literal(f"both name {along!r}"))
+        raise SettingError("{at} and {along} " + literal(f"both name {along!r}"))
     apart, beside, panels = [along], "", ("",)
     for own in density.covariates.columns:
         if own.name == along or own.name.casefold() in said:
             continue
         if own.line is not None:
-            pairs.append((own.name, f"{own.line.centre:.6g}"))
-            tell(runtime.Note(f"{own.name} is held at its median, {own.line.centre:.6g}"))
+            pairs.append((own.name, f"{own.line.middle:.6g}"))
+            tell(runtime.Note(f"{own.name} is held at its median, {own.line.middle:.6g}"))
         elif own.words and not beside and len(own.words) <= MOST_PANELS:
             beside, panels = own.name, own.words
             apart.append(own.name)

@@ -95,9 +95,13 @@ def read_coastlines(path: Path) -> list[Array]:
 
 
 def _table(path: Path) -> list[Array]:
-    return [
-        _checked(path, line) for line in _parted(read_table(path, columns=None, width=2).values)
-    ]
+    table = read_table(path)
+    if len(table.names) != 2:
+        raise InputFileError(
+            f"{path} has {len(table.names)} columns: coastlines need a latitude and a longitude"
+        )
+    values = np.stack([table.numbers(0), table.numbers(1)], axis=1)
+    return [_checked(path, line) for line in _parted(values)]
 
 
 def _parted(values: Array) -> list[Array]:

@@ -171,7 +171,7 @@ class _ShownBeside:
         table = None if data is None else np.asarray(data, dtype=np.float64)
         every = range(space.chart_dim)
         base = marginal(density, every[: space.together])
-        own = settings.replace(names=names[: self.first], along=None, at=None)
+        own = settings.replace(names=names[: self.first], along=None, slices=None)
         self.base = _Shown(base, own, None if table is None else table[:, : self.first])
         beside = marginal(density, every[space.together :])
         other = PlotSettings(**{name: getattr(settings, name) for name in FOR_COLUMNS})
@@ -200,7 +200,7 @@ def _shown(
 ) -> _Shown | _ShownBeside:
     if isinstance(density.space, ProductSpace):
         return _ShownBeside(density, density.space, settings, data)
-    for name in ("along", "at"):
+    for name in ("along", "slices"):
         if getattr(settings, name) is not None:
             raise SettingError(f"{{{name}}} is of columns beside another space: leave it out")
     return _Shown(density, settings, data)

@@ -62,7 +62,7 @@ def along_of(density: Density, names: tuple[str, ...], settings: PlotSettings) -
         raise SettingError(f"{{along}} must be a column beside the {space.base.name}: {listed}")
     number = called.index(asked)
     period = space.beside.period_of(number)
-    values = settings.at
+    values = settings.slices
     if values is None and period:
         low = space.beside.first_turn(number)
         values = tuple(period * (low + (k + 0.5) / PANELS) for k in range(PANELS))

@@ -105,10 +105,10 @@ class PlotSettings(Settings, group="Figures"):
     along: Annotated[str | None, DefaultText("the first")] = None
     """Of a space beside other columns, the one along which a series of pictures is drawn."""
 
-    at: Annotated[
+    slices: Annotated[
         tuple[float, ...] | None, DefaultText("six: even ones of a period, else by equal masses")
     ] = None
-    """Values of that column."""
+    """Values of that column, of which each has a picture."""
 
     regions: Annotated[tuple[Mass, ...] | None, POINTS] = None
     """Masses such as 0.5,0.9: lines are drawn around the smallest regions that hold them."""

@@ -1,10 +1,12 @@
+from .checked import row_count as row_count
+from .data_columns import DataColumns as DataColumns
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
 from .frame import Frame as Frame
-from .mixed import Line as Line
+from .lines import Line as Line
+from .lines import turns_at as turns_at
 from .mixed import MixedTorus as MixedTorus
-from .mixed import turns_at as turns_at
 from .point_groups import rotation_group_name as rotation_group_name
 from .point_groups import rotations_of as rotations_of
 from .product import ProductSpace as ProductSpace
@@ -25,7 +27,6 @@ from .space import Space as Space
 from .space import by_sphere as by_sphere
 from .space import check_measure as check_measure
 from .space import make_space as make_space
-from .space import row_count as row_count
 from .space import space_for as space_for
 from .unit_vectors import Hypersphere as Hypersphere
 from .unit_vectors import ProjectiveSpace as ProjectiveSpace

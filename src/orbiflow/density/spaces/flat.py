@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import written_from_zero
-from orbiflow.density.spaces.space import Space, checked_table, named_group
+from orbiflow.density.data import Role, written_from_zero
+from orbiflow.density.spaces.checked import checked_table
+from orbiflow.density.spaces.space import Space, named_group
 from orbiflow.settings import as_choice, as_whole
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -48,6 +49,10 @@ class _AngleSpace(Space):
 
     def step_angle(self, step: float) -> float:
         return 2 * math.pi * step / self.period
+
+    def data_unit(self, width: int) -> str | None:
+        del width
+        return self.unit
 
     def settings(self) -> dict[str, Any]:
         return {"unit": self.unit}
@@ -83,6 +88,9 @@ class Torus(_AngleSpace):
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del seed
         return cls(data.shape[1], unit=unit, from_zero=written_from_zero(data, whole_turn(unit)))
+
+    def roles(self, width: int) -> tuple[Role | None, ...]:
+        return (Role("angle", str(self.unit)),) * width
 
     @property
     def volume(self) -> float:

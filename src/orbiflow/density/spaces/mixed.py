@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -12,67 +12,14 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import written_from_zero
+from orbiflow.density.data import Role, written_from_zero
+from orbiflow.density.spaces.checked import checked_table
 from orbiflow.density.spaces.flat import Torus, whole_turn
-from orbiflow.density.spaces.space import checked_table
+from orbiflow.density.spaces.lines import LEAST_REST, SCALES, Line, share_at, turns_at
 from orbiflow.errors import OrbiflowError
-from orbiflow.settings import as_array, as_number
+from orbiflow.settings import as_number
 
-SCALES = 2.5
-"""The scale of a line, in deviations of its data: what is normal is then nearly von Mises."""
-
-LEAST_REST = 1e-12
-"""The least 1 - v^2, with v = z / sqrt(4 + z^2): a million scales from the centre."""
-
-MIDDLE = 0.6827
-"""The share of normal data that lie within one deviation of the middle."""
-
-
-LARGE = 1e9
-"""Numbers from here on may differ by less than is seen beside them."""
-
-
-class Line(NamedTuple):
-    """A real column: the value at the middle of its circle, and that which is a quarter beyond."""
-
-    centre: float
-    scale: float
-
-    @classmethod
-    def checked(cls, own: Any) -> Line:
-        """Return a line of two numbers, the second above 0."""
-        values = as_array(own, "the centre and scale of a real column", (2,)).tolist()
-        if not (math.isfinite(values[0]) and 0 < values[1] < math.inf):
-            raise OrbiflowError(f"a real column needs a centre and a scale above 0, got {values}")
-        return cls(*values)
-
-    def share(self, values: Tensor) -> Tensor:
-        """Return v = z / sqrt(4 + z^2) of values in any shape, from -1 to 1, with z in scales."""
-        away = (values - self.centre) / self.scale
-        return away / (4 + away**2).sqrt()
-
-    @classmethod
-    def of(cls, values: Array, name: str) -> Line:
-        """Return the line that suits a column (N,) of data, by its quantiles."""
-        known = values[np.isfinite(values)]
-        low, middle, high = np.quantile(known, [(1 - MIDDLE) / 2, 0.5, (1 + MIDDLE) / 2])
-        spread = float(high - low) / 2 or float(known.std())
-        if not spread > 1e-12 * abs(float(middle)):
-            if abs(middle) < LARGE:
-                raise OrbiflowError(f"{name} has one value alone: leave it out")
-            raise OrbiflowError(
-                f"the differences of {name} are lost beside its size, {middle:.3g}: subtract its least "
-                "value first, or leave it out if it has one value alone"
-            )
-        return cls(float(middle), SCALES * spread)
-
-
-def turns_at(share: Tensor) -> Tensor:
-    """Return the turns of shares v of `Line.share`: Student's distribution function."""
-    return 0.5 + (3 * share - share**3) / 4
-
-
-Axis = Sequence[float] | float | None
+Axis = Sequence[Any] | float | None
 """A column: an angle (None), one with a period of its own, or the centre and scale of a real one."""
 
 
@@ -85,9 +32,8 @@ def _checked_axis(own: Any) -> Line | float | None:
     return period
 
 
-def _share(turns: Tensor) -> Tensor:
-    """Return v = z / sqrt(4 + z^2) for u = F(z) in [0, 1): the root of 3 v - v^3 = 2 (2 u - 1)."""
-    return 2 * ((2 * turns - 1).asin() / 3).sin()
+WIDE = 0.5
+"""Deviation of logarithms from which a column is too skew to be drawn over four on each side."""
 
 
 class MixedTorus(Torus):
@@ -95,13 +41,16 @@ class MixedTorus(Torus):
 
     A real column y becomes the point F((y - centre) / scale) of a circle, with F the distribution
     function of Student's t with four degrees of freedom, so that all that is there for tori is there
-    for it. Densities on the circle are densities on the line, exactly normalised over all reals: no
-    value is out of range. The circle's uniform distribution is that Student's t, whose tails are
-    heavy enough for most data and whose variance is finite; `measure="uniform"` compares with it.
+    for it. Of columns above 0 it is the logarithm that becomes so, of bounded ones the logarithm of
+    (y - low) / (high - y). Densities on the circle are densities on the line, exactly normalised over
+    all that the column can be: no value there is out of range, and no mass elsewhere. The circle's
+    uniform distribution is that Student's t, whose tails are heavy enough for most data and whose
+    variance is finite; `measure="uniform"` compares with it.
 
     Args:
-        axes: For each column None, if it is an angle, its period, such as 24 of hours, or the centre
-            and scale of a real one.
+        axes: For each column None, if it is an angle, its period, such as 24 of hours, or what a real
+            one is: its centre and scale, those of logarithms with "positive", (0.7, 2.0, "positive"),
+            or with "bounded" and two ends. See `Line`.
         unit: The unit of the angles, "radians", "degrees" or "turns".
         from_zero: Angles and periodic columns that are written from 0, as in `Torus`. Default: those
             that have a period of their own.
@@ -133,31 +82,29 @@ class MixedTorus(Torus):
 
     @classmethod
     def for_columns(
-        cls,
-        data: Array,
-        periods: Mapping[int, float | None],
-        names: Sequence[str],
-        *,
-        unit: str = "radians",
+        cls, data: Array, roles: Sequence[Role], names: Sequence[str], *, unit: str = "radians"
     ) -> Self:
-        """Return the space of data (N, k), of which columns have periods by their numbers.
+        """Return the space of data (N, k) of these roles: angles, axes, cycles and real numbers.
 
-        None is that of a real column; those without one are angles. Columns with periods are written
-        from 0 unless something in them is negative.
+        Columns with a period of their own are written from 0 unless something in them is negative.
         """
-
-        def axis(k: int) -> Axis:
-            own = periods.get(k)
-            return Line.of(data[:, k], names[k]) if k in periods and own is None else own
-
-        from_zero = [k for k in written_from_zero(data, whole_turn(unit)) if k not in periods]
-        from_zero += [k for k, own in periods.items() if own and not (data[:, k] < 0).any()]
-        return cls([axis(k) for k in range(data.shape[1])], unit=unit, from_zero=from_zero)
+        axes: list[Axis] = []
+        from_zero: list[int] = []
+        for k, (column, role) in enumerate(zip(data.T, roles, strict=True)):
+            is_angle = role.kind == "angle" and role.unit in (None, unit)
+            turn = whole_turn(unit) if is_angle else role.turn
+            if turn is None:
+                axes.append(Line.of(column, names[k], role))
+                continue
+            axes.append(None if is_angle else turn)
+            if written_from_zero(column[:, None], turn) if is_angle else not (column < 0).any():
+                from_zero.append(k)
+        return cls(axes, unit=unit, from_zero=from_zero)
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del data, unit, seed
-        raise OrbiflowError("name the real columns: on a torus give {linear}")
+        raise OrbiflowError("declare the columns: which are angles, and which are real")
 
     @property
     def is_surface(self) -> bool:
@@ -171,6 +118,18 @@ class MixedTorus(Torus):
     def data_name(self) -> str:
         return "torus"
 
+    def roles(self, width: int) -> tuple[Role | None, ...]:
+        del width
+        periods = map(self.period_of, range(self.dim))
+        return tuple(
+            Role("angle", str(self.unit))
+            if is_angle
+            else Role("cycle", period=period)
+            if line is None
+            else line.role
+            for line, is_angle, period in zip(self.lines, self.is_angle, periods, strict=True)
+        )
+
     @property
     def volume(self) -> float:
         """Infinite where a column is real."""
@@ -183,8 +142,14 @@ class MixedTorus(Torus):
     def _log_stretch(self, points: Tensor) -> Tensor:
         """Return the logarithms (..., R) of the derivatives of real columns by their turns."""
         turns = points[..., torch.as_tensor(self.is_real)]
-        rest = 1 - _share(turns - turns.detach().floor()) ** 2
-        return (8 / 3 * self._scale.to(points)).log() - 2.5 * rest.clamp_min(LEAST_REST).log()
+        turns = turns - turns.detach().floor()
+        rest = (1 - share_at(turns) ** 2).clamp_min(LEAST_REST)
+        found = (8 / 3 * self._scale.to(points)).log() - 2.5 * rest.log()
+        lines = [line for line in self.lines if line is not None]
+        if all(line.kind == "linear" for line in lines):
+            return found
+        slopes = [line.log_slope(line.along_turns(turns[..., k])) for k, line in enumerate(lines)]
+        return found + torch.stack(slopes, dim=-1)
 
     def log_density_factor(self, points: Tensor, measure: str) -> Tensor:
         none = torch.zeros_like(points[..., 0])
@@ -210,9 +175,8 @@ class MixedTorus(Torus):
         found = self._own_turns(points)
         for axis, own in enumerate(self.axes):
             if isinstance(own, Line):
-                share = _share(torch.tensor(found[..., axis])).numpy()
-                away = 2 * share / np.sqrt(np.maximum(1 - share**2, LEAST_REST))
-                found[..., axis] = own.centre + own.scale * away
+                along = own.along_turns(torch.tensor(found[..., axis]))
+                found[..., axis] = own.value_at(along).numpy()
             else:
                 found[..., axis] *= self.period_of(axis)
         return found
@@ -232,11 +196,18 @@ class MixedTorus(Torus):
         return 0.0 if self.is_real[axis] else super().first_turn(axis)
 
     def even_line(self, axis: int, count: int) -> Array:
-        """Return even values (count,) of a column; of a real one, over four deviations on each side."""
+        """Return even values (count,) of a column; of a real one, over four deviations on each side.
+
+        Of positive ones that spread over several powers of ten, over two above the middle.
+        """
         line = self.lines[axis]
         if line is None:
             return super().even_line(axis, count)
-        return line.centre + 4 * line.scale / SCALES * np.linspace(-1, 1, count)
+        deviation = line.scale / SCALES
+        above = 2 if line.kind == "positive" and deviation > WIDE else 4
+        ends = torch.tensor([line.centre - 4 * deviation, line.centre + above * deviation])
+        low, high = (float(end) for end in line.value_at(ends.double()))
+        return np.linspace(low, high, count)
 
     def of_axes(self, axes: Sequence[int]) -> Torus:
         kept = [self.axes[axis] for axis in axes]
@@ -246,9 +217,15 @@ class MixedTorus(Torus):
 
     def step_angle(self, step: float) -> float:
         lines = enumerate(self.lines)
-        sides = [self.period_of(k) if own is None else 8 / 3 * own.scale for k, own in lines]
+        sides = [self.period_of(k) if own is None else self._side(own) for k, own in lines]
         return 2 * math.pi * step / max(sides)
 
+    @staticmethod
+    def _side(line: Line) -> float:
+        """Return a turn of the line's circle, at the middle, in the column's unit."""
+        middle = torch.tensor(line.centre, dtype=torch.float64)
+        return 8 / 3 * line.scale * float(line.log_slope(middle).exp())
+
     def settings(self) -> dict[str, Any]:
-        axes = [list(own) if isinstance(own, Line) else own for own in self.axes]
+        axes = [own.to_json() if isinstance(own, Line) else own for own in self.axes]
         return {"axes": axes, "unit": self.unit, "from_zero": list(self.from_zero)}

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
+from orbiflow.density.data import Role
+from orbiflow.density.spaces.checked import checked_table
 from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.mixed import Axis, MixedTorus
-from orbiflow.density.spaces.space import CHART, Space, by_sphere, checked_table, make_space
+from orbiflow.density.spaces.space import CHART, Space, by_sphere, make_space
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_instance
 from orbiflow.symmetry import CrystallographicGroup
@@ -93,6 +95,13 @@ class ProductSpace(Space):
     @property
     def widths(self) -> tuple[int, ...]:
         return tuple(width + self.beside.dim for width in self.base.widths)
+
+    def roles(self, width: int) -> tuple[Role | None, ...]:
+        beside = self.beside.dim
+        return (*self.base.roles(width - beside), *self.beside.roles(beside))
+
+    def data_unit(self, width: int) -> str | None:
+        return self.base.data_unit(width - self.beside.dim)
 
     @property
     def volume(self) -> float:

@@ -14,8 +14,9 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import fraction_doubts
+from orbiflow.density.spaces.checked import checked_table
 from orbiflow.density.spaces.frame import frame_of
-from orbiflow.density.spaces.space import Space, checked_table
+from orbiflow.density.spaces.space import Space
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.settings import as_array
 from orbiflow.symmetry import (
@@ -158,7 +159,7 @@ class QuotientSpace(Space):
         """Warn if points (N, d) seem to be fractions of the cell and the space takes lengths."""
         sides = np.linalg.norm(self._given.lattice, axis=0)
         for doubt in fraction_doubts(data, sides.tolist()) if self._vectors is None else ():
-            warnings.warn(doubt.text, DataWarning, stacklevel=stacklevel)
+            warnings.warn(doubt, DataWarning, stacklevel=stacklevel)
 
     def step_angle(self, step: float) -> float:
         longest = (

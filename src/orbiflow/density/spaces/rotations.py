@@ -13,10 +13,11 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from orbiflow.arrays import Array
+from orbiflow.density.data import is_angular
+from orbiflow.density.spaces.checked import checked_table
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.point_groups import rotation_group_name, rotations_of
 from orbiflow.density.spaces.round import UNIT_TOLERANCE, refuse_rows, to_unit
-from orbiflow.density.spaces.space import checked_table
 from orbiflow.density.spaces.unit_vectors import UnitVectorSpace
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import as_choice
@@ -96,6 +97,9 @@ class RotationSpace(UnitVectorSpace):
             )
         self.columns = FORMS.get(form, ("angle1", "angle2", "angle3"))
         super().__init__(_products(self.crystal_rotations, self.specimen_rotations))
+
+    def data_unit(self, width: int) -> str | None:
+        return self.angle_unit if is_angular(self.name, width, self.form_of(width)) else None
 
     @property
     def crystal_rotations(self) -> Rotation:

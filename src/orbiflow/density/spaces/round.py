@@ -21,8 +21,9 @@ from scipy.special import elliprf
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import CODES, written_from_zero
-from orbiflow.density.spaces.space import Space, checked_table, named_group, row_count
+from orbiflow.density.data import is_code, written_from_zero
+from orbiflow.density.spaces.checked import checked_table, row_count
+from orbiflow.density.spaces.space import Space, named_group
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_choice, as_instance
 from orbiflow.typed_torch import linalg
@@ -166,7 +167,7 @@ def to_vectors(data: ArrayLike) -> Array:
 def _cause(value: float, otherwise: str) -> str:
     """Return what may have made a value that no angle has."""
     code = "is it a code for a missing value? Then leave such rows out"
-    return code if abs(value) in CODES else otherwise
+    return code if is_code(value) else otherwise
 
 
 def to_latlon(vectors: Array, *, from_zero: bool = False) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data
+from orbiflow.density.data import Role
 from orbiflow.density.spaces.frame import Frame, frame_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import as_choice, as_tensor, as_whole, is_a
@@ -279,6 +279,15 @@ class Space(ABC):
                 # lattice vectors first: where they are whole numbers no digit is lost
                 yield turned + (shift - (steps + steps.new_tensor(beside)) @ lattice) - start
 
+    def roles(self, width: int) -> tuple[Role | None, ...]:
+        """Return what each of so many columns of data is; None is a coordinate of the space."""
+        return (None,) * width
+
+    def data_unit(self, width: int) -> str | None:
+        """Return the unit of data of so many columns, None if they have none."""
+        del width
+        return None
+
     def distance(self, start: Tensor, end: Tensor) -> Tensor:
         """Return the geodesic distance (...,) in the flat metric of the chart, over group images."""
         return linalg.vector_norm(self.displacement(start, end), dim=-1)
@@ -474,27 +483,3 @@ def check_measure(measure: str, space: Space | None = None) -> None:
             f"{{measure}} square is for spaces that have one ({', '.join(SPACES)}), not for the "
             f"{space.name}: choose natural or uniform"
         )
-
-
-def row_count(count: int) -> str:
-    """Return how many rows are as wrong as the one that a message names, if there are others.
-
-    >>> row_count(1), row_count(3)
-    ('', ' (3 such rows)')
-    """
-    return f" ({count} such rows)" if count > 1 else ""
-
-
-def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
-    """Return data as a finite float64 array (N, k)."""
-    table = as_data(data, what).values
-    if table.ndim != 2 or table.shape[1] not in widths:
-        expected = " or ".join(f"(N, {k})" for k in widths)
-        raise OrbiflowError(f"{what}: expected an array {expected}, got shape {table.shape}")
-    bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
-    if len(bad):
-        raise OrbiflowError(
-            f"{what}: row {bad[0] + 1} has a missing or infinite value{row_count(len(bad))}: remove "
-            f"{'it' if len(bad) == 1 else 'them'} first"
-        )
-    return table

@@ -12,9 +12,10 @@ from scipy.special import gammaln
 from torch import Tensor
 
 from orbiflow.arrays import Array
+from orbiflow.density.spaces.checked import checked_table
 from orbiflow.density.spaces.flat import MAX_DIM
 from orbiflow.density.spaces.round import UNIT_TOLERANCE, to_unit
-from orbiflow.density.spaces.space import Space, checked_table
+from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_whole
 from orbiflow.symmetry import CrystallographicGroup

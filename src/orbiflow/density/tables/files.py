@@ -1,4 +1,4 @@
-"""Reading tables of any kind of file, and writing them."""
+"""Tables of any kind of file, and writing them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -14,107 +15,72 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.density.tables import text
-from orbiflow.density.tables.cells import Mark
-from orbiflow.density.tables.layout import is_utf16, layout_of, split_line, text_lines
-from orbiflow.density.tables.table import (
-    BLOCK,
+from orbiflow.arrays import Array
+from orbiflow.density.data import Source, TableError, TableRows, as_numbers, short
+from orbiflow.density.tables.lines import is_utf16
+from orbiflow.density.tables.text import (
     MAX_COLUMNS,
-    Reading,
-    Table,
-    check_count,
-    choose,
-    find,
-    finished,
-    quote,
+    MAX_ROWS,
+    TextTable,
+    append_to_text,
+    name_cell,
+    read_text,
 )
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, OrbiflowError, literal
 from orbiflow.settings import naming_extras
 
 MAX_BYTES = 2 * 2**30
 _MAGIC = {"npy": b"\x93NUMPY", "parquet": b"PAR1"}
 _TEXT = frozenset({".csv", ".tsv", ".txt"})
 
+MAX_NPY_HEADER = 10_000
+"""Characters of a header, which numpy parses with `ast.literal_eval`."""
+
 
 def read_table(
     path: str | Path,
     *,
-    columns: Sequence[str] | None,
-    width: int | None,
-    max_rows: int = 20_000_000,
     has_header: bool | None = None,
-    drop_missing: bool = False,
-    keep_missing: bool = False,
-    missing_codes: Sequence[float] = (),
-    decimal: Mark | None = None,
-) -> Table:
-    """Read columns of finite numbers from a text, `.npy` or Parquet file.
+    decimal: str | None = None,
+    codes: Sequence[str] = (),
+    wanted: Sequence[str] = (),
+) -> Source:
+    """Return the columns of a text, `.npy` or Parquet file; the options are those of `read_text`.
 
-    In text, cells are separated by tabs, semicolons, commas or whitespace, and a quoted cell may not
-    run over a line's end. Blank lines and lines that begin with # are skipped; the first other line is
-    a header if a cell in it is neither a number nor a missing value, or else the last of those above
-    it if it has a word for each column. Numbers may have a unit of angles, such as 70.3°, and compass
-    words are bearings in degrees. Decimal commas and parted
-    thousands are read where the numbers of the file tell which is which; `decimal` says so otherwise.
     `.npy` files hold a 2-dimensional array of numbers or a 1-dimensional structured one.
 
-    Columns are wanted in their order: each by its name (exactly, or else without regard to case), or by
-    its number from 1 as text ("3"). None takes all columns of numbers; `width` says how many there must
-    be. Rows that lack a value are refused, left out or kept with NaN; `missing_codes` are numbers that
-    stand for a missing value.
+    Raises `InputFileError` for a file that cannot be read.
     """
     path = Path(path)
-    read = {"text": text.read_text, "npy": read_npy, "parquet": read_parquet}[kind_of_file(path)]
-    how = (columns, width, max_rows, has_header, drop_missing, keep_missing, missing_codes, decimal)
-    return read(path, Reading(*how))
+    kind = kind_of_file(path)
+    if kind == "text":
+        return read_text(path, has_header=has_header, decimal=decimal, codes=codes, wanted=wanted)
+    return _read_npy(path) if kind == "npy" else _read_parquet(path)
 
 
-def append_columns(
-    table: Table, path_of_source: str | Path, columns: Mapping[str, ArrayLike]
-) -> bytes:
-    """Return the source file with more columns, as UTF-8 text that ends its lines with a newline.
+def append_columns(rows: TableRows, columns: Mapping[str, ArrayLike]) -> bytes:
+    """Return the file of rows with more columns (N,), as text.
 
-    Values are written with 10 significant digits. A text file keeps its delimiter, its other columns
-    and its comments, and loses its blank lines; it gets the new names only if it has a header. Rows
-    that were left out get an empty cell. From npy and Parquet files the table's columns are written,
+    A text file is kept as it is, see `append_to_text`; from others the columns of the rows are written,
     as CSV. A name that is taken gets a number: "density_2".
     """
     values = [np.asarray(column, dtype=np.float64) for column in columns.values()]
-    for column in values:
-        if column.shape != table.lines.shape:
-            raise ValueError(f"values must have shape {table.lines.shape}, not {column.shape}")
-    if table.delimiter is None:
-        names = _free_names(columns, table.columns)
-        return to_csv((*table.columns, *names), np.column_stack([table.values, *values]))
-    path, end, done, out = Path(path_of_source), table.delimiter, 0, bytearray()
-    lines = [*table.lines.tolist(), -1]
-    changed = InputFileError(f"{path}: the file changed after it was read; run this again")
-    for number, line, is_comment in text_lines(path):
-        if number == table.header_line:
-            cells = [_name_cell(name, end) for name in _free_names(columns, table.header or ())]
-            if is_comment and end not in line:  # of other marks than the rows
-                line, cells = " ".join([line, *cells]), []
-        elif is_comment:
-            cells = []
-        elif number in table.dropped:
-            cells = ["nan" if end == " " else ""] * len(values)
-        elif lines[done] == number:
-            numbers = (f"{column[done]:.10g}".replace(".", table.decimal) for column in values)
-            cells = [f'"{cell}"' if table.decimal == end else cell for cell in numbers]
-            done += 1
-        else:
-            raise changed
-        out += f"{end.join([line, *cells])}\n".encode()
-    if done < len(table.lines):
-        raise changed
-    return bytes(out)
+    source = rows.source
+    if isinstance(source, TextTable):
+        names = free_names(columns, source.names if source.is_named else ())
+        return append_to_text(source, dict(zip(names, values, strict=True)), rows.numbers)
+    names = free_names(columns, rows.columns)
+    return to_csv((*rows.columns, *names), np.column_stack([rows.values, *values]))
 
 
-def renamed_columns(table: Table, names: Iterable[str]) -> dict[str, str]:
+def renamed_columns(rows: TableRows, names: Iterable[str]) -> dict[str, str]:
     """Return what `append_columns` calls columns whose names the file has already."""
-    taken = table.columns if table.delimiter is None else table.header or ()
+    source = rows.source
+    taken = rows.columns
+    if isinstance(source, TextTable):
+        taken = source.names if source.is_named else ()
     wanted = list(names)
-    pairs = zip(wanted, _free_names(wanted, taken), strict=True)
+    pairs = zip(wanted, free_names(wanted, taken), strict=True)
     return {name: free for name, free in pairs if name != free}
 
 
@@ -127,28 +93,19 @@ def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     values = np.asarray(values, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != len(columns):
         raise ValueError(f"values must have shape (N, {len(columns)}), not {values.shape}")
-    out, head = io.BytesIO(), ",".join(_name_cell(name, ",") for name in columns)
+    out, head = io.BytesIO(), ",".join(name_cell(name, ",") for name in columns)
     np.savetxt(out, values, fmt="%.10g", delimiter=",", header=head, comments="", encoding="utf-8")
     return out.getvalue()
 
 
-def _free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
+def free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
+    """Return names with a number where they are taken."""
     found, used = list[str](), {name.casefold() for name in taken}
     for name in wanted:
         free = chain([name], (f"{name}_{i}" for i in count(2)))
         found.append(next(text for text in free if text.casefold() not in used))
         used.add(found[-1].casefold())
     return found
-
-
-def _name_cell(name: str, delimiter: str) -> str:
-    words = name.split()
-    if delimiter == " ":
-        return "_".join(words)
-    name = " ".join(words)
-    if name.startswith("#") or delimiter in name or '"' in name:
-        return '"' + name.replace('"', '""') + '"'
-    return name
 
 
 def kind_of_file(path: Path) -> str:
@@ -181,82 +138,87 @@ def kind_of_file(path: Path) -> str:
     return "text"
 
 
-def column_names(
-    path: str | Path, *, wanted: Sequence[str] | None = None, has_header: bool | None = None
-) -> tuple[str, ...] | None:
-    """Return the names of all columns of a file, or None; `wanted` help to tell a header from a row."""
-    path = Path(path)
-    kind = kind_of_file(path)
-    if kind == "text":
-        return layout_of(path, wanted, has_header).header
-    return _npy_header(path)[1].names if kind == "npy" else _parquet_names(path)
+@dataclass(frozen=True, eq=False)
+class BinaryTable:
+    """The columns of an `.npy` or Parquet file: a `Source`.
 
-
-def read_labels(
-    path: str | Path,
-    column: str,
-    table: Table,
-    *,
-    has_header: bool | None = None,
-    empty: bool = False,
-) -> NDArray[np.str_]:
-    """Return the cells (N,) of a file's column, numbers or not, for the rows of its table.
-
-    Cells may be missing if `empty`: then they are empty.
+    - `columns`: The cells (N,) of each column.
+    - `is_array`: Whether it is an array without names, whose angles are radians.
     """
-    path = Path(path)
-    kind = kind_of_file(path)
-    found: dict[int, str] = {}
-    if kind == "npy":
-        numbers = read_table(path, columns=[column], width=1, keep_missing=True)
-        cells = ["" if cell != cell else str(cell) for cell in numbers.values[:, 0].tolist()]
-        found = dict(zip(numbers.lines.tolist(), cells, strict=True))
-    elif kind == "parquet":
-        names = _parquet_names(path)
-        with _parquet(path) as file:
-            batches = file.iter_batches(BLOCK, columns=[names[find(path, names, column)]])
-            cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
-        found = {k: "" if c is None else str(c).strip() for k, c in enumerate(cells, start=1)}
-    else:
-        layout = layout_of(path, [column], has_header)
-        index = find(path, layout.names, column)
-        for number, line, is_comment in text_lines(path):
-            cells = [] if is_comment else split_line(path, number, line, layout.delimiter)
-            found[number] = cells[index].strip() if index < len(cells) else ""
-    missing = [line for line in table.lines.tolist() if not found.get(line)]
-    if missing and not empty:
-        raise InputFileError(
-            f"{path}: {len(missing)} rows have no {column!r}, the first in line {missing[0]}; fill "
-            "it in"
+
+    path: Path
+    names: tuple[str, ...]
+    is_named: bool
+    columns: Sequence[NDArray[Any]]
+
+    @property
+    def is_array(self) -> bool:
+        """Whether it is an array without names."""
+        return not self.is_named
+
+    @property
+    def where(self) -> str:
+        """What messages begin with."""
+        return f"{self.path}: "
+
+    def place(self, row: int) -> str:
+        """Return which row it is, from 1."""
+        return f"row {row + 1}"
+
+    def is_numeric(self, column: int) -> bool:
+        """Return whether a column is of numbers."""
+        if isinstance(self.columns, ParquetColumns):
+            return self.columns.is_numeric(column)
+        return self.columns[column].dtype.kind in "fiu"
+
+    def numbers(self, column: int) -> Array:
+        """Return a column (N,), NaN where values are missing; refuse what holds no numbers."""
+        cells = self.columns[column]
+        if cells.dtype.kind in "fiu":
+            with np.errstate(over="ignore"):
+                return cells.astype(np.float64)
+        if cells.dtype.kind == "O":
+            try:
+                return as_numbers(cells, f"{self.path}: column {self.names[column]!r}")
+            except OrbiflowError as error:
+                raise TableError(
+                    literal(str(error)) + "; correct it, or choose another with {columns}"
+                ) from error
+        raise TableError(
+            literal(
+                f"{self.path}: column {self.names[column]!r} holds {cells.dtype}, not numbers; "
+            )
+            + "choose another with {columns}"
         )
-    return np.array([found.get(line, "") for line in table.lines.tolist()])
+
+    def cells(self, column: int) -> NDArray[Any]:
+        """Return the cells (N,) of a column."""
+        return self.columns[column]
 
 
-MAX_NPY_HEADER = 10_000
-"""Characters of a header, which numpy parses with `ast.literal_eval`."""
+def _check_size(path: Path, rows: int, columns: int) -> None:
+    for number, most, what in ((rows, MAX_ROWS, "rows"), (columns, MAX_COLUMNS, "columns")):
+        if number > most:
+            raise InputFileError(
+                f"{path}: more than {most} {what}, the most that is read; save a part of the table"
+            )
 
 
-def read_npy(path: Path, reading: Reading) -> Table:
-    """Read a table from an `.npy` file."""
+def _read_npy(path: Path) -> BinaryTable:
+    """Return the table in an `.npy` file, whose header is checked before anything is read."""
     shape, dtype = _npy_header(path)
-    check_count(path, shape[0], reading.max_rows, "rows")
     fields = dtype.names
     width = shape[1] if fields is None else len(fields)
-    check_count(path, width, MAX_COLUMNS, "columns")
+    _check_size(path, shape[0], width)
     names = fields or tuple(f"column{i}" for i in range(1, width + 1))
-    types = [dtype] * width if fields is None else [dtype[name] for name in fields]
-    numeric = [kind.kind in "fiu" for kind in types]
-    picked, notes = choose(path, names, numeric, reading, types)
     try:
         data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
-        with np.errstate(over="ignore"):
-            parts = [data[names[i]] if fields is not None else data[:, i] for i in picked]
-            values = np.stack([part.astype(np.float64) for part in parts], axis=1)
+        parts = [np.array(data[name] if fields else data[:, i]) for i, name in enumerate(names)]
     except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
         raise _damaged(path, exc) from exc
-    lines = np.arange(1, len(values) + 1, dtype=np.int64)
-    table = Table(values, tuple(names[i] for i in picked), lines, tuple(notes))
-    return finished(path, table, reading)
+    if not len(parts) or not len(parts[0]):
+        raise InputFileError(f"{path}: holds no rows of numbers; export it again")
+    return BinaryTable(path, names, fields is not None, tuple(parts))
 
 
 def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
@@ -276,7 +238,7 @@ def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
         )
     if len(shape) != (1 if dtype.names is not None else 2) or min(shape) < 0:
         raise InputFileError(
-            f"{path}: an array of shape {quote(str(shape))} and type {quote(str(dtype))}; save "
+            f"{path}: an array of shape {short(str(shape))} and type {short(str(dtype))}; save "
             "one of shape (N, k), or (N,) with named fields"
         )
     if math.prod(shape) * dtype.itemsize > left:
@@ -301,56 +263,60 @@ def _parquet(path: Path) -> Generator[Any]:
         raise _damaged(path, exc) from exc
 
 
-def _parquet_names(path: Path) -> tuple[str, ...]:
-    with _parquet(path) as file:
-        return tuple(file.schema_arrow.names)
+class ParquetColumns(Sequence[NDArray[Any]]):
+    """The columns of a Parquet file, each read when it is asked for."""
 
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.kinds = importlib.import_module("pyarrow").types
+        with _parquet(path) as file:
+            _check_size(path, file.metadata.num_rows, len(file.schema_arrow.names))
+            self.schema: Any = file.schema_arrow
+            # Parquet has categories of words alone, pandas notes others
+            noted: Any = self.schema.pandas_metadata or {"columns": []}
+        self.words = {
+            own["field_name"] for own in noted["columns"] if own["pandas_type"] == "categorical"
+        }
+        self._read: dict[int, NDArray[Any]] = {}
 
-def read_parquet(path: Path, reading: Reading) -> Table:
-    """Read a table from a Parquet file."""
-    with _parquet(path) as file:
-        check_count(path, file.metadata.num_rows, reading.max_rows, "rows")
-        schema = file.schema_arrow
-        check_count(path, len(schema.names), MAX_COLUMNS, "columns")
-        kinds = importlib.import_module("pyarrow").types
-        tests = kinds.is_integer, kinds.is_floating, kinds.is_decimal
-        numeric = [any(test(kind) for test in tests) for kind in schema.types]
-        picked, notes = choose(path, schema.names, numeric, reading, schema.types)
-        names = tuple(schema.names[i] for i in picked)
-        for name in names:  # Parquet columns are read by name alone
-            find(path, schema.names, name)
-        blocks = [np.empty((0, len(names)))]
-        for batch in file.iter_batches(BLOCK, columns=list(names)):
-            cast = [batch.column(name).cast("float64", safe=False) for name in names]
-            blocks.append(np.stack([c.to_numpy(zero_copy_only=False) for c in cast], axis=1))
-    values = np.concatenate(blocks)
-    lines = np.arange(1, len(values) + 1, dtype=np.int64)
-    return finished(path, Table(values, names, lines, tuple(notes)), reading)
+    def __len__(self) -> int:
+        return len(self.schema.names)
 
+    def is_numeric(self, column: int) -> bool:
+        """Return whether a column is of numbers by its type."""
+        kind = self.schema.types[column]
+        tests = self.kinds.is_integer, self.kinds.is_floating, self.kinds.is_decimal
+        return self.schema.names[column] not in self.words and any(test(kind) for test in tests)
 
-def holds_words(path: str | Path, column: str) -> bool:
-    """Return whether a column of a file is words by its type, whatever is in its cells.
+    def __getitem__(self, column: Any) -> Any:
+        if column not in self._read:
+            self._read[column] = self._column(column)
+        return self._read[column]
 
-    Raises `InputFileError` for times.
-    """
-    if kind_of_file(path := Path(path)) != "parquet":
-        return False
-    with _parquet(path) as file:
-        schema = file.schema_arrow
-        number = find(path, schema.names, column)
-        types, kind = importlib.import_module("pyarrow").types, schema.types[number]
-        if types.is_temporal(kind):
+    def _column(self, column: int) -> NDArray[Any]:
+        name, kind = self.schema.names[column], self.schema.types[column]
+        if self.kinds.is_temporal(kind):
             raise InputFileError(
-                f"{path}: column {quote(column)} holds times ({kind}); save numbers, such as hours "
-                "since a first moment"
+                f"{self.path}: column {short(name)!r} holds times ({kind}); save numbers, such as "
+                "hours since a first moment"
             )
-        if not any(test(kind) for test in (types.is_integer, types.is_floating, types.is_decimal)):
-            return True
-        # Parquet has categories of words alone, pandas notes others
-        noted: Any = schema.pandas_metadata or {"columns": []}
-        own = {one["field_name"]: one["pandas_type"] for one in noted["columns"]}
-        return own.get(schema.names[number]) == "categorical"
+        if self.schema.names.count(name) > 1:  # which Parquet cannot tell apart
+            raise InputFileError(f"{self.path}: two columns are called {short(name)!r}; rename one")
+        with _parquet(self.path) as file:
+            chunk = file.read(columns=[name]).column(0)
+            if self.is_numeric(column):
+                return chunk.cast("float64", safe=False).to_numpy()
+            return np.array([*(None if c is None else str(c) for c in chunk.to_pylist()), None])[
+                :-1
+            ]
+
+
+def _read_parquet(path: Path) -> BinaryTable:
+    """Return the table in a Parquet file."""
+    with naming_extras(f"{path}: reading Parquet"):
+        columns = ParquetColumns(path)
+    return BinaryTable(path, tuple(columns.schema.names), True, columns)
 
 
 def _damaged(path: Path, exc: Exception) -> InputFileError:
-    return InputFileError(f"{path}: damaged or of an unknown kind ({quote(str(exc))}); save again")
+    return InputFileError(f"{path}: damaged or of an unknown kind ({short(str(exc))}); save again")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
@@ -58,15 +57,9 @@ class SpaceSettings(Settings, group="Density"):
     )
     """The data are fractions of the cell's vectors, as in CIF, and not lengths along x, y and z."""
 
-    linear: Annotated[tuple[str, ...], DefaultText("none")] = ()
-    """Columns that are real numbers, such as length,temperature: of a torus or beside another space."""
-
-    period: Annotated[tuple[str, ...], DefaultText("none")] = ()
-    """Columns with periods of their own, likewise, such as hour=24,day=365.25; of axes in degrees,
-    180."""
-
-    unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
-    """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
+    unit: Annotated[Unit | None, DefaultText("what the columns say")] = None
+    """Unit of angles whose columns name none. On the sphere, degrees says that small ones are no
+    radians."""
 
     crystal: Annotated[str | None, DefaultText("that of the space, or none")] = None
     """Symmetry of the crystals whose orientations a rotation-space has: a point group or Laue class
@@ -88,24 +81,9 @@ class SpaceSettings(Settings, group="Density"):
         """Check that there is such a space, and that only angles have a unit."""
         if self.cell is not None and self.space in SPACES:
             raise SettingError(f"{{cell}} applies to groups, not to the {self.space}")
-        if twice := {name for name in self.beside if self.beside.count(name) > 1}:
-            text = (
-                f"{literal(min(twice))} is named twice in {{linear}} and {{period}}: name it once"
-            )
-            raise SettingError(text)
         self._check_rotations()
         _ = self.width  # which makes the group
         check_unit(self.space, self.unit)
-
-    @property
-    def periods(self) -> dict[str, float]:
-        """The periods of columns that have their own, by name."""
-        return dict(map(_period, self.period))
-
-    @property
-    def beside(self) -> tuple[str, ...]:
-        """The columns that are real or have a period of their own."""
-        return (*self.linear, *self.periods)
 
     def _check_rotations(self) -> None:
         """Check that what is of rotations is asked of rotations, and that there are such symmetries."""
@@ -150,20 +128,6 @@ class SpaceSettings(Settings, group="Density"):
         return group_of(self.space, self.cell).dim
 
 
-def _period(text: str) -> tuple[str, float]:
-    name, _, number = text.rpartition("=")
-    try:
-        value = float(number)
-    except ValueError:
-        value = math.nan
-    if not name.strip() or not 0 < value < math.inf:
-        raise SettingError(
-            f"{{period}} must hold columns with numbers above 0, such as hour=24, got "
-            f"{literal(repr(text))}"
-        )
-    return name.strip(), value
-
-
 def group_of(space: str, cell: tuple[float, ...] | None) -> CrystallographicGroup:
     """Return the group whose quotient a space is."""
     from orbiflow.symmetry import group_by_name, is_group_name
@@ -179,8 +143,10 @@ def group_of(space: str, cell: tuple[float, ...] | None) -> CrystallographicGrou
 class TableSettings(Settings, group="Reading the table"):
     """Which columns and rows of a table are read."""
 
-    columns: Annotated[tuple[str, ...] | None, DefaultText("what the space takes")] = None
-    """Names or numbers of the columns, such as lat,lon."""
+    columns: Annotated[tuple[str, ...] | None, DefaultText("what their names say")] = None
+    """Columns, by name or number, and what they are: dir=angle:degrees,speed=positive. A role is
+    angle:UNIT, axial:UNIT, cycle:PERIOD, linear, positive, bounded:LOW:HIGH, weight, count, group or
+    ignore; docs/columns.md has the roles of names. Those of a space are named in its order: lat,lon."""
 
     header: Annotated[bool | None, DefaultText("found automatically")] = None
     """Whether the table's first line names the columns."""
@@ -192,22 +158,19 @@ class TableSettings(Settings, group="Reading the table"):
     drop_missing: bool = False
     """Leave out rows that lack a value."""
 
-    missing_codes: Annotated[tuple[float, ...], DefaultText("none")] = ()
-    """Numbers that stand for missing values, such as 999,-99."""
+    missing_codes: Annotated[tuple[str, ...], DefaultText("none")] = ()
+    """What stands for missing values in any column, such as 999,-99,VRB."""
 
-    decimal: Annotated[Literal[".", ","] | None, DefaultText("found automatically")] = None
-    """Mark before the decimals of a text file; the other one then parts thousands."""
+    decimal: Annotated[Literal[".", ","], DefaultText(".")] = "."
+    """Mark before the decimals of a text file."""
 
 
 class RowSettings(TableSettings, group="Reading the table"):
-    """Which columns and rows of a table are read, and how much each row counts."""
+    """Which columns and rows of a table are read, and what is done with rows that lack a value."""
 
     missing: Literal["refuse", "drop", "marginalise"] = "refuse"
     """What is done with rows that lack a value. With marginalise, on tori, they count by the angles
     that they have."""
-
-    weights: str | None = None
-    """Column, by name or number, that says how much each row counts; only ratios matter."""
 
     @property
     def kept_missing(self) -> Literal["refuse", "marginalise"]:
@@ -220,22 +183,6 @@ class RowSettings(TableSettings, group="Reading the table"):
             raise SettingError(
                 "{drop_missing} leaves out the rows that {missing} marginalise would use; give one"
             )
-
-
-class GroupedRowSettings(RowSettings, group="Reading the table"):
-    """Which columns and rows of a table are read, how much each counts, and which belong together."""
-
-    group: str | None = None
-    """Column that names what rows belong to (a protein, a station, an event): those of one are not
-    independent."""
-
-
-class CountedRowSettings(GroupedRowSettings, group="Reading the table"):
-    """Which columns and rows of a table are read, how often each was seen, and how much each counts."""
-
-    counts: str | None = None
-    """Column, by name or number, that says how many rows were seen that are alike, as in a table of
-    bins. Each row is taken so often."""
 
 
 def check_table_name(out: Path) -> None:

@@ -2,7 +2,7 @@
 
 import { aside, button, h, icon, panel, put, row, soft, stack, trying, unique } from "../dom.js";
 import { bytes } from "../words.js";
-import { count, figure, SEEMS, shape, spaceOf, SPACES, UNITS } from "./words.js";
+import { count, figure, roleWords, shape, spaceOf, SPACES, UNITS } from "./words.js";
 
 const ENDINGS = ".csv,.tsv,.txt,.npy";
 
@@ -73,12 +73,17 @@ export function chooseTable(page, examples) {
 
 /** The first rows of a table. */
 function firstRows(table) {
-  const head = table.columns.map(({ name, seems, missing }) =>
+  const head = table.columns.map(({ name, role, missing }) =>
     h(
       "th",
       { scope: "col" },
       name,
-      h("span", { class: "soft small" }, SEEMS[seems], missing > 0 && `, ${count(missing)} empty`),
+      h(
+        "span",
+        { class: "soft small" },
+        roleWords(role),
+        missing > 0 && `, ${count(missing)} empty`,
+      ),
     )
   );
   const cell = (value) => h("td", value === null ? "" : figure(value, 6));
@@ -109,7 +114,9 @@ export function chooseSpace(table, start, last) {
   const says = h("p", { class: "soft", role: "status" });
   const settings = () => ({
     space: chosen.space,
-    columns: chosen.columns,
+    columns: chosen.space === "torus"
+      ? chosen.columns.map((name) => `${name}=angle:${chosen.unit}`)
+      : chosen.columns,
     ...(spaceOf(chosen.space)?.angular ? { unit: chosen.unit } : {}),
   });
 
@@ -167,8 +174,9 @@ export function chooseSpace(table, start, last) {
     order.textContent = number > 1 ? `In this order: ${chosen.columns.join(", ")}.` : "";
     const id = unique("unit");
     if (space?.angular) {
-      const first = table.columns.find((column) => column.name === chosen.columns[0]);
-      chosen.unit ??= ["degrees", "radians"].includes(first?.seems) ? first.seems : "degrees";
+      const role = table.columns.find(({ name }) => name === chosen.columns[0])?.role ?? "";
+      const said = role.split(":")[1];
+      chosen.unit ??= UNITS.some(([value]) => value === said) ? said : "degrees";
       const box = h("select", {
         id,
         onchange: () => {
@@ -208,8 +216,6 @@ export function chooseSpace(table, start, last) {
         }. Rows with an empty cell are left out.`,
       ),
       firstRows(table),
-      table.notes.length > 0 &&
-        aside(`Read so: ${table.notes.join("; ")}.`),
     ),
     panel("Where they live", !last && why, spaces, columns, units, row(go, says)),
   );

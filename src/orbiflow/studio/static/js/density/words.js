@@ -57,13 +57,15 @@ export function shape(space, count) {
   }[space];
 }
 
-export const SEEMS = {
-  degrees: "angle, in degrees",
-  radians: "angle, in radians",
-  latitude: "latitude",
-  longitude: "longitude",
-  count: "counts the rows",
-  number: "number",
+/** A role in words. @param {string} role */
+export const roleWords = (role) => {
+  const [kind, value] = role.split(":");
+  return {
+    angle: `angle, in ${value}`,
+    axial: `line without an arrow, in ${value}`,
+    cycle: `comes back after ${value}`,
+    ignore: "counts the rows",
+  }[kind] ?? "number";
 };
 
 export const UNITS = [["degrees", "Degrees (360 all round)"], [

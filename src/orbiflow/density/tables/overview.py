@@ -1,0 +1,75 @@
+"""What a page shows of a table before anything is fitted: its columns, and what they seem to be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from orbiflow.density.data import (
+    Source,
+    TableError,
+    chosen_arrangement,
+    listing,
+    pairs_of,
+    proposed_role,
+    words_of,
+)
+from orbiflow.errors import SettingError
+
+AXES = frozenset(["pole", "poles", "axis", "axes", "axial"])
+"""Words in names of columns that are lines without an arrow."""
+
+MOST_ANGLES = 7
+"""Angles that are chosen ahead: of more, a fit takes long."""
+
+
+def table_overview(table: Source, most: int) -> dict[str, Any]:
+    """Return what is seen of the first columns of numbers of a table, and where its rows may live.
+
+    Each has a "name", its "role", to be confirmed by who knows, the number of "missing" values, and
+    its least and largest value, "low" and "high". The "guess" says a "space", "columns" and "why".
+
+    Raises `TableError` if there is no column of numbers.
+    """
+    numbers = [k for k in range(len(table.names)) if table.is_numeric(k)][:most]
+    if not numbers:
+        raise TableError(f"there is no column of numbers among {listing(table.names)}")
+    columns: list[dict[str, Any]] = []
+    for k in numbers:
+        values = table.numbers(k)
+        if (rows := np.flatnonzero(np.isinf(values))).size:
+            raise TableError(f"{table.place(int(rows[0]))} of {table.names[k]!r} is infinite")
+        known = values[np.isfinite(values)]
+        ends = (float(known.min()), float(known.max())) if len(known) else (None, None)
+        role = proposed_role(table.names[k], values)
+        columns.append(
+            {"name": table.names[k], "role": role, "missing": len(values) - len(known)}
+            | {"low": ends[0], "high": ends[1]}
+        )
+    return {"columns": columns, "guess": _guess(columns)}
+
+
+def _guess(columns: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return where the rows may live."""
+    names = [column["name"] for column in columns]
+    angles = [c["name"] for c in columns if c["role"].startswith("angle")]
+    for space, own, why in (
+        ("sphere", names, "these columns say a direction"),
+        ("klein-bottle", angles, "so small picture patches lie on the Klein bottle"),
+    ):
+        try:
+            found = chosen_arrangement(space, own)
+        except SettingError:  # several may be meant
+            continue
+        if found is None or (space == "klein-bottle" and len(own) > 2):
+            continue
+        taken = [own[k] for k in found.columns]
+        pair = next(iter(pairs_of(taken)), None)
+        axial = pair is not None and pair.family.is_axial
+        if space == "sphere" and (axial or AXES & set(words_of(" ".join(taken)))):
+            space, why = "projective-plane", "a line has two ends, which mean the same"
+        return {"space": space, "columns": taken, "why": why}
+    if angles:
+        return {"space": "torus", "columns": angles[:MOST_ANGLES], "why": "these seem to be angles"}
+    return {"space": None, "columns": [], "why": "no column looks like an angle or a direction"}

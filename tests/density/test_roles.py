@@ -1,0 +1,233 @@
+"""Columns are what is declared, or what their names say; other columns are asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.density import DensityEstimator, Role, UndeclaredError
+from orbiflow.density.data import asked_roles, proposed_role, role_named
+from orbiflow.density.tables import RowSettings, SpaceSettings, read_rows
+from orbiflow.errors import SettingError
+from orbiflow.runtime import ignore
+from refusals import refused
+
+pandas = pytest.importorskip("pandas")
+UNITS = st.sampled_from(["degrees", "radians", "turns"])
+WORDS = st.one_of(
+    st.builds("{}:{}".format, st.sampled_from(["angle", "axial"]), UNITS),
+    st.builds("cycle:{:.15g}".format, st.floats(1e-3, 1e6)),
+    st.builds("bounded:{:.15g}:{:.15g}".format, st.floats(-1e3, 0), st.floats(1e-3, 1e3)),
+    st.sampled_from(["linear", "positive", "word", "weight", "count", "group", "ignore", "angle"]),
+)
+
+
+@given(WORDS)
+def test_a_role_is_its_word(word: str) -> None:
+    role = Role.of(word)
+    assert str(role) == word
+    assert Role.of(str(role)) == role
+    assert role.is_round + role.is_real + role.is_side == (role.kind != "word")
+
+
+OTHER_WORDS = """angel angle:grad cycle cycle:0 cycle:-1 cycle:nan cycle:inf bounded:0 bounded:1:0
+bounded:0:inf positive:0 linear:1 angle:degrees:2"""
+
+
+@pytest.mark.parametrize("word", OTHER_WORDS.split())
+def test_other_words_are_refused(word: str) -> None:
+    with refused("columns", repr(word), kind=SettingError):
+        asked_roles({"x": word})
+
+
+@given(st.dictionaries(st.sampled_from(["dir", "wind speed", "Größe", "a"]), st.none() | WORDS))
+def test_text_and_mapping_say_the_same(roles: dict[str, str | None]) -> None:
+    text = ",".join(name if role is None else f"{name}={role}" for name, role in roles.items())
+    asked = asked_roles(roles)
+    assert asked == (asked_roles(text) if text else {})
+    assert asked == asked_roles([word for word in text.split(",") if word])
+
+
+def test_a_column_is_named_once() -> None:
+    for wrong in ("a,a", ["a", "a=linear"], 3, [None]):
+        with refused("columns", kind=SettingError):
+            asked_roles(wrong)
+
+
+@pytest.mark.parametrize(
+    ("name", "role"),
+    [
+        ("phi", "angle"), ("phi_deg", "angle:degrees"), ("Wind Dir (deg)", "angle:degrees"),
+        ("x_rad", "angle:radians"), ("hour", "cycle:24"), ("month", "cycle:12"), ("id", "ignore"),
+        ("dayOfYear", "cycle:365.25"), ("speed", None), ("ra_hours", None), ("azimuth [gon]", None),
+        ("temperature", None), ("radius", None), ("phase", "angle"), ("county", None),
+    ],
+)  # fmt: skip
+def test_names_have_roles(name: str, role: str | None) -> None:
+    found = role_named(name)
+    assert (None if found is None else str(found)) == role
+
+
+RNG = np.random.default_rng(0)
+TURN = RNG.vonmises(0.4, 1.0, 60)
+DEGREES = np.degrees(TURN)
+SPEED = RNG.lognormal(1, 1.5, 60)
+LAT, LON = RNG.normal(48, 3, 60), RNG.normal(10, 5, 60)
+CODED = np.where(np.arange(60) % 20 == 3, 999.0, DEGREES % 360)
+
+# tables of people's kinds, the space, and what their columns are once the printed words are pasted
+TABLES: dict[str, tuple[dict[str, Any], str, str]] = {
+    "wind in degrees": ({"dir": DEGREES % 360, "speed": SPEED}, "torus",
+                        "dir=angle:degrees,speed=positive"),
+    "a duration of a ride": ({"weekday": RNG.integers(0, 7, 60), "minutes": 40 * SPEED}, "torus",
+                             "weekday=cycle:7,minutes=positive"),
+    "wind in tens": ({"dir": (DEGREES % 360 / 10).round()}, "torus", "dir=cycle:36"),
+    "phases": ({"phase": TURN / 2 / np.pi % 1}, "torus", "phase=angle:turns"),
+    "radians": ({"phi": TURN, "psi": TURN[::-1]}, "torus", "phi=angle:radians,psi=angle:radians"),
+    "protein": ({"residue": ["GLY"] * 60, "phi": DEGREES, "psi": DEGREES[::-1]}, "torus",
+                "phi=angle:degrees,psi=angle:degrees"),
+    "units in names": ({"phi_deg": DEGREES, "chi_rad": TURN}, "torus",
+                       "phi_deg=angle:degrees,chi_rad=angle:radians"),
+    "hours": ({"hour": RNG.uniform(0, 24, 60)}, "torus", "hour=cycle:24"),
+    "hours and counts": ({"hour": np.arange(24.0), "n": RNG.integers(1, 9, 24)}, "torus",
+                         "hour=cycle:24,n=count"),
+    "months and rain": ({"month": RNG.integers(1, 13, 60), "rain": SPEED - SPEED.min()}, "torus",
+                        "month=cycle:12,rain=linear"),
+    "weighted": ({"theta_deg": DEGREES, "weight": SPEED}, "torus",
+                 "theta_deg=angle:degrees,weight=weight"),
+    "numbered": ({"id": np.arange(60), "heading": DEGREES}, "torus", "heading=angle:degrees"),
+    "numbered without a name": ({"record": np.arange(1, 61), "heading": DEGREES}, "torus",
+                                "heading=angle:degrees,record=ignore"),
+    "gon": ({"az_gon": DEGREES / 0.9 % 400}, "torus", "az_gon=cycle:400"),
+    "right ascension in hours": ({"ra_hours": DEGREES % 360 / 15}, "torus", "ra_hours=cycle:24"),
+    "axes": ({"fibre orientation": DEGREES % 180}, "torus", "fibre orientation=axial:degrees"),
+    "strange names": ({"a": DEGREES, "b": DEGREES % 360}, "torus",
+                      "a=angle:degrees,b=angle:degrees"),
+    "strange radians": ({"a": TURN % (2 * np.pi)}, "torus", "a=angle:radians"),
+    "a temperature beside": ({"phi": DEGREES, "temperature": LON}, "torus",
+                             "phi=angle:degrees,temperature=positive"),
+    "vectors of wind": ({"u": LON, "v": -LON, "dir_deg": DEGREES}, "torus",
+                        "dir_deg=angle:degrees,u=linear,v=linear"),
+    "sines": ({"sin_phi": np.sin(TURN), "phi_deg": DEGREES}, "torus",
+              "sin_phi=ignore,phi_deg=angle:degrees"),
+    "tides": ({"phase_deg": DEGREES, "height": LON}, "torus",
+              "phase_deg=angle:degrees,height=positive"),
+    "places": ({"lon": LON, "lat": LAT, "depth": SPEED}, "sphere", "lat,lon"),
+    "places in other words": ({"decimalLatitude": LAT, "decimalLongitude": LON}, "sphere",
+                              "decimalLatitude,decimalLongitude"),
+    "stars": ({"RA": LON % 360, "DEC": LAT}, "sphere", "DEC,RA"),
+    "vectors": ({"t": LAT, "x": np.cos(TURN), "y": np.sin(TURN), "z": 0 * TURN}, "sphere",
+                "x,y,z"),
+    "no names of places": ({"p": LAT, "q": LON}, "sphere", "p,q"),
+    "poles": ({"trend": LON % 360, "plunge": LAT}, "projective-plane", "plunge,trend"),
+    "planes": ({"strike": LON % 360, "dip": LAT}, "projective-plane", "dip,dip_direction"),
+    "patches": ({"phi": TURN, "theta": TURN[::-1]}, "klein-bottle", "theta,phi"),
+    "patches in degrees": ({"theta_deg": DEGREES, "phi_deg": DEGREES[::-1]}, "klein-bottle",
+                           "theta_deg,phi_deg"),
+    "Euler angles": ({"phi1": DEGREES, "Phi": LAT, "phi2": LON}, "rotation-space",
+                     "phi1,Phi,phi2"),
+    "quaternions": ({"w": np.cos(TURN), "x": np.sin(TURN), "y": 0 * TURN, "z": 0 * TURN},
+                    "rotation-space", "x,y,z,w"),
+    "a cell": ({"x": LON, "y": LAT}, "p4m", "x,y"),
+}  # fmt: skip
+
+
+def pasted(data: Any, space: str) -> tuple[str, str]:
+    """The declaration of a fit once what is asked for was answered with the printed words."""
+    columns = unit = None
+    for _ in range(3):
+        estimator = DensityEstimator(space, columns=columns, unit=unit)
+        try:
+            rows = estimator._columns().read(data)
+        except UndeclaredError as error:
+            if error.proposal.count("=angle") and space not in ("torus",):
+                unit = error.proposal.rpartition(":")[2]
+            else:
+                columns = error.proposal
+        else:
+            sides = {k: str(r) for k, r in asked_roles(columns).items() if r and r.is_side}
+            return ",".join([rows.declaration, *(f"{k}={r}" for k, r in sides.items())]), str(unit)
+    raise AssertionError(columns)
+
+
+@pytest.mark.filterwarnings("ignore::orbiflow.errors.DataWarning")
+@pytest.mark.parametrize("case", TABLES)
+def test_tables_are_right_or_asked_for(case: str, tmp_path: Path) -> None:
+    columns, space, wanted = TABLES[case]
+    frame = pandas.DataFrame(columns)
+    found, unit = pasted(frame, space)
+    assert sorted(found.split(",")) == sorted(wanted.split(","))
+    path = tmp_path / "table.csv"
+    frame.to_csv(path, index=False)
+    said: Any = {} if unit == "None" else {"unit": unit}
+    where = SpaceSettings(space=space, **said)
+    reading = RowSettings()
+    for _ in range(2):
+        try:
+            rows = read_rows(path, reading, ignore, where=where)
+            break
+        except UndeclaredError as error:
+            reading = RowSettings(columns=tuple(error.proposal.split(",")))
+    else:
+        raise AssertionError(case)
+    sides = {f"{k}={r}" for k, r in asked_roles(reading.columns).items() if r and r.is_side}
+    assert {*rows.declaration.split(","), *sides} == set(found.split(","))
+
+
+REFUSED: dict[str, tuple[dict[str, Any], str, str, str]] = {
+    "a code among angles": ({"dir": CODED}, "torus", "dir=angle:degrees", "999"),
+    "360 for unknown": ({"phi": np.append(DEGREES, 360.0)}, "torus", "phi=angle:degrees", "360"),
+    "degrees as radians": ({"phi": DEGREES}, "torus", "phi=angle:radians", "turn"),
+    "an hour that is none": ({"hour": [*range(24), 99.0]}, "torus", "hour", "99"),
+    "an hour before midnight": ({"hour": [*range(24), -1.0]}, "torus", "hour", "-1"),
+    "no rain": ({"rain": [0.0, 1.0, 2.5]}, "torus", "rain=positive", "mass"),
+    "a share of two": ({"share": [0.1, 0.4, 2.0]}, "torus", "share=bounded:0:1", "2"),
+    "words": ({"phi": ["a", "b", "c"]}, "torus", "phi=angle:degrees", "phi"),
+    "a latitude beyond": ({"lat": [*LAT, 95.0], "lon": [*LON, 0.0]}, "sphere", "lat,lon", "95"),
+    "radians for places": ({"lat": TURN / 2, "lon": np.linspace(-3.1, 3.1, 60)}, "sphere",
+                           "lat,lon", "radians"),
+    "the wrong order": ({"lon": LON, "lat": LAT}, "sphere", "lon,lat", "lat,lon"),
+    "radians by name": ({"lat_rad": TURN / 4, "lon_rad": TURN}, "sphere", "lat_rad,lon_rad",
+                        "radians"),
+    "a strange number": ({"phi_deg": DEGREES, "p": [*LON[:59], 9999.0]}, "torus",
+                         "phi_deg,p=linear", "9999"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_values_that_contradict_what_is_declared_are_refused(case: str, tmp_path: Path) -> None:
+    columns, space, declared, about = REFUSED[case]
+    frame = pandas.DataFrame(columns)
+    with refused(about):
+        DensityEstimator(space, columns=declared).fit(frame)
+    frame.to_csv(tmp_path / "table.csv", index=False)
+    reading = RowSettings(columns=tuple(declared.split(",")))
+    with refused(about, "table.csv"):
+        read_rows(tmp_path / "table.csv", reading, ignore, where=SpaceSettings(space=space))
+
+
+def test_weights_and_groups_are_columns() -> None:
+    table = {"dir": DEGREES, "speed": SPEED, "n": RNG.integers(1, 4, 60), "site": ["a", "b"] * 30}
+    frame = pandas.DataFrame(table)
+    how: dict[str, Any] = {"components": "mixture", "seed": 0}
+    declared = "speed=positive,dir=angle:degrees,n=weight,site=group"
+    fit = DensityEstimator(columns=declared, **how).fit(frame)
+    assert list(fit.feature_names_in_) == ["speed", "dir"]
+    apart = DensityEstimator(columns="speed=positive,dir=angle:degrees", **how)
+    apart.fit(frame[["speed", "dir"]], sample_weight=table["n"], groups=table["site"])
+    np.testing.assert_array_equal(fit.score_samples(frame), apart.score_samples(frame))
+    with refused("weight"):
+        DensityEstimator(columns=declared, **how).fit(frame, sample_weight=table["n"])
+
+
+@given(st.floats(0.05, 3.0), st.integers(0, 2**31))
+def test_a_proposal_is_a_role(scale: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for name in ("phi", "speed", "x", "id", "hour", "count", "lat", "phi_deg", "az_gon"):
+        values = rng.normal(0, 10**scale, 20)
+        assert str(Role.of(proposed_role(name, values))) == proposed_role(name, values)
