@@ -211,7 +211,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     """Return a fit as batches take it, with all that decides its result besides the rows."""
     rows, density = split.rows, asked.density
     width = len(rows.columns)
-    own = [name for name, role in zip(rows.columns, rows.roles, strict=True) if role is None]
+    own = rows.own_names
     columns = [
         str(k) if role is None else f"{k}={role}" for k, role in enumerate(rows.roles, start=1)
     ]

@@ -89,6 +89,11 @@ class Checked(NamedTuple):
     values: Array
     place: Callable[[int], str]
 
+    @property
+    def known(self) -> Array:
+        """The finite values."""
+        return self.values[np.isfinite(self.values)]
+
     def row_of(self, value: float) -> str:
         """Return in words where a value is first, and how often it is there."""
         rows = np.flatnonzero(self.values == value)
@@ -101,7 +106,7 @@ def check_turn(column: Checked, turn: float, what: str, *, are_new: bool = False
 
     New ones, of a density that is known, may be two turns away: its intervals may reach over a turn.
     """
-    known = column.values[np.isfinite(column.values)]
+    known = column.known
     if not len(known):
         return
     low, high = float(known.min()), float(known.max())
@@ -137,7 +142,7 @@ def _missing(values: Sequence[float]) -> str:
 
 def check_real(column: Checked, role: Role) -> list[str]:
     """Refuse real numbers that a column cannot have, and return what makes one doubt others."""
-    known = column.values[np.isfinite(column.values)]
+    known = column.known
     if not len(known):
         return []
     low, high = float(known.min()), float(known.max())
@@ -178,7 +183,7 @@ def refuse_codes(column: Checked, beside: Array) -> None:
 
 def doubts_of_ends(column: Checked) -> list[str]:
     """Return doubts about a value at an end that stands apart, or repeats among fractions."""
-    distinct, counts = np.unique(column.values[np.isfinite(column.values)], return_counts=True)
+    distinct, counts = np.unique(column.known, return_counts=True)
     found: list[str] = []
     if len(distinct) < 2:
         return found
@@ -244,13 +249,13 @@ def check_values(
             check_turn(columns[k], TURNS[unit or "radians"], "angle", are_new=are_new)
     elif space not in (*VECTORS, *ROTATIONS):  # points of a quotient
         for k in own:
-            refuse_codes(columns[k], columns[k].values[np.isfinite(columns[k].values)])
+            refuse_codes(columns[k], columns[k].known)
     return doubts
 
 
 def _doubts_of_two(column: Checked) -> list[str]:
     """Return a doubt about real numbers of two values alone, which a word has."""
-    distinct = np.unique(column.values[np.isfinite(column.values)])
+    distinct = np.unique(column.known)
     if len(distinct) != 2:
         return []
     return [
@@ -262,7 +267,7 @@ def _doubts_of_two(column: Checked) -> list[str]:
 
 def _check_places(lat: Checked, lon: Checked, *, space: str, unit: str | None) -> list[str]:
     """Refuse places that there are not, and what fills radians or hours; return doubts."""
-    known = lat.values[np.isfinite(lat.values)]
+    known = lat.known
     far = float(known[np.abs(known).argmax()]) if len(known) else 0.0
     if abs(far) > 90 * (1 + TURN_TOLERANCE):
         raise SettingError(

@@ -96,8 +96,13 @@ def choose(
 
 def _is_named_data(source: Source, column: int) -> bool:
     """Return whether a column is data by its name: cells that are no numbers are then at fault."""
-    role = role_named(source.names[column]) if source.is_named else None
+    role = _named(source, column)
     return role is not None and not role.is_side
+
+
+def _named(source: Source, column: int) -> Role | None:
+    """Return the role that a column's name says, if the columns have names."""
+    return role_named(source.names[column]) if source.is_named else None
 
 
 @dataclass(frozen=True)
@@ -132,9 +137,7 @@ class _Table:
 
     def _role(self, column: int, role: Role | None) -> Role | None:
         """Return what a column is: as declared, by its name, or an angle of an array; or None."""
-        name = self.source.names[column]
-        if role is None and self.source.is_named:
-            role = role_named(name)
+        role = role or _named(self.source, column)
         if role is None and (self.source.is_array or not self.source.is_named):
             role = Role("angle")
         if role is not None and role.kind == "ignore":
@@ -142,7 +145,7 @@ class _Table:
         return role and role.with_unit(self.unit or ("radians" if self.source.is_array else None))
 
     def _is_ignored(self, column: int) -> bool:
-        role = role_named(self.source.names[column]) if self.source.is_named else None
+        role = _named(self.source, column)
         return role is not None and role.kind == "ignore"
 
     def _left_out(self, columns: Iterable[int]) -> list[str]:
@@ -172,7 +175,7 @@ class _Table:
         return Chosen((*own, *beside), roles, unit, notes=tuple(notes))
 
     def _is_cycle(self, column: int) -> bool:
-        role = role_named(self.source.names[column]) if self.source.is_named else None
+        role = _named(self.source, column)
         return role is not None and role.kind == "cycle"
 
     def _by_names(self, free: Sequence[int]) -> tuple[list[int], list[str]]:

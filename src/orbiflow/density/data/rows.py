@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.checks import Checked
 from orbiflow.density.data.declaration import Chosen
 from orbiflow.density.data.roles import Role
 from orbiflow.density.data.row_labels import missing_among, word_of
@@ -76,6 +75,16 @@ class TableRows:
         return found if found.any() else np.ones_like(found)
 
     @property
+    def own(self) -> list[int]:
+        """Which columns, from 0, are coordinates of the space."""
+        return [k for k, role in enumerate(self.roles) if role is None]
+
+    @property
+    def own_names(self) -> list[str]:
+        """The names of the columns that are coordinates of the space."""
+        return [self.columns[k] for k in self.own]
+
+    @property
     def declaration(self) -> str:
         """What the columns were taken for, as it may be declared."""
         words = [
@@ -102,13 +111,6 @@ class TableRows:
     def place(self, row: int) -> str:
         """Return where a row, from 0, is in the table."""
         return self.source.place(int(self.numbers[row]))
-
-    def checked(self) -> list[Checked]:
-        """Return the columns to be checked."""
-        return [
-            Checked(name, column, self.place)
-            for name, column in zip(self.columns, self.values.T, strict=True)
-        ]
 
 
 def rows_of(

@@ -29,11 +29,10 @@ def dip_directions(strikes: Array) -> Array:
 
 def with_dip_directions(rows: TableRows) -> tuple[TableRows, str | None]:
     """Return rows whose strike beside a dip became the direction of dip, and a note if so."""
-    own = [k for k, role in enumerate(rows.roles) if role is None]
-    strike = strike_beside_dip([rows.columns[k] for k in own])
+    strike = strike_beside_dip(rows.own_names)
     if strike is None:
         return rows, None
-    column = own[strike]
+    column = rows.own[strike]
     values = rows.values.copy()
     values[:, column] = dip_directions(values[:, column])
     columns = (*rows.columns[:column], DIP_DIRECTION, *rows.columns[column + 1 :])

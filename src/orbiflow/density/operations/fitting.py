@@ -135,7 +135,7 @@ def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> st
 
 def columns_of(where: SpaceSettings, rows: TableRows, seed: int = 0) -> spaces.DataColumns:
     """Return what settings and names say of the space of a table's rows."""
-    own = [name for name, role in zip(rows.columns, rows.roles, strict=True) if role is None]
+    own = rows.own_names
     return spaces.DataColumns(space_of(where, own, rows.unit), seed=seed)
 
 

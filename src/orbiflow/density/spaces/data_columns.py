@@ -152,7 +152,7 @@ class DataColumns:
         """Return how rotations are written."""
         own = self.space if isinstance(self.space, Space) else None
         base = own.base if isinstance(own, ProductSpace) else own
-        names = [name for name, role in zip(rows.columns, rows.roles, strict=True) if role is None]
+        names = rows.own_names
         named = rows.source.is_named
         if isinstance(base, RotationSpace):
             form = base.form_of(len(names))
@@ -168,7 +168,7 @@ class DataColumns:
         """Return the space of rows that `read` has checked, or that were read from a file."""
         if isinstance(self.space, MixedTorus | ProductSpace | Torus):
             return self.space
-        own = [k for k, role in enumerate(rows.roles) if role is None]
+        own = rows.own
         if self.name == "torus":
             return torus_of(
                 rows.values, [role for role in rows.roles if role], rows.columns, rows.unit

@@ -110,10 +110,7 @@ def _checked(
     The user is also told in which setting a space group is, and of a cell that was not given: data of
     another size would be folded into it.
     """
-    space, columns = (
-        where.space,
-        [name for name, role in zip(rows.columns, rows.roles, strict=True) if role is None],
-    )
+    space, columns = where.space, rows.own_names
     form = where.rotation_form(columns) if columns else None
     require_unit(source, space, chosen, form)
     if space in DIRECTIONS:
