@@ -55,8 +55,12 @@ class Known(NamedTuple):
     def fitted(self, data: Data) -> DensityEstimator:
         """What `density fit` makes of rows."""
         unit = "radians" if self.space == "torus" else None
-        columns = {"linear": self.real, "period": dict(self.period)}
-        return DensityEstimator(self.space, unit=unit, **columns).fit(data)
+        roles = dict.fromkeys(self.real, "linear")
+        roles |= {k: f"cycle:{period}" for k, period in self.period.items()}
+        columns = [
+            f"{k + 1}={roles[k]}" if k in roles else f"{k + 1}" for k in range(data.shape[1])
+        ]
+        return DensityEstimator(self.space, columns=",".join(columns), unit=unit).fit(data)
 
 
 def _cylinder(count: int, rng: np.random.Generator) -> Data:
