@@ -114,7 +114,9 @@ def part_of(name: str, split: int) -> Part:
 
 def space_of(part: Part) -> Space:
     """The space, as the library has it."""
-    return make_space(part.space, **({"dim": part.train.shape[1]} if part.space == "torus" else {}))
+    return make_space(
+        part.space, **({"axes": part.train.shape[1]} if part.space == "torus" else {})
+    )
 
 
 def unit_shift(part: Part, space: Space) -> float:

@@ -22,7 +22,7 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     done = orbiflow("density", "fit", "rows.csv", *how, "--components", "kernels", "-o", "fit")
     assert done.status == 0, done.err
     report = json.loads(Path("fit/report.json").read_text())
-    assert report["space"]["name"] == "mixed"
+    assert report["space"]["name"] == "torus"
     assert report["log_likelihood"]["natural"] > report["log_likelihood"]["uniform"] > -30
     assert orbiflow("density", "score", "rows.csv", "-m", "fit", "-o", "s.csv").status == 0
     done = orbiflow("density", "conditional", "-m", "fit", "--at", "length=1.51", "-o", "part")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from cli.conftest import Outcome, call_main
-from orbiflow.density import ConditionalEstimator, DensityEstimator, MixedTorus
+from orbiflow.density import ConditionalEstimator, DensityEstimator
 from orbiflow.density.inference import shortest_intervals
 from orbiflow.density.models import AdaptiveKernels, Density, Mixture, UniformDensity
 from orbiflow.density.spaces import Space, Torus
@@ -65,7 +65,7 @@ def test_two_peaks_have_two_arcs_that_are_the_shortest_together() -> None:
 
 
 def test_a_real_column_has_the_shortest_interval_of_its_values() -> None:
-    space = MixedTorus([(10.0, 2.0)])
+    space = Torus([(10.0, 2.0)])
     density = UniformDensity(space)  # Student's t with four degrees of freedom
     for mass in (0.001, 0.5, 0.9, 0.999, 0.99999):
         ((low, high),) = shortest_intervals(density, mass)

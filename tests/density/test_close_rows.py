@@ -121,7 +121,7 @@ def test_equal_rows_are_those_that_are_equal() -> None:
     rng = np.random.default_rng(3)
     for wide in (1e-7, 1e-8, 1e-9):
         rows = np.unique((-1.3 + wide * rng.normal(size=(300, 1))).round(12), axis=0)
-        assert len(places(make_space("torus", dim=1).to_chart(rows))[0]) == len(rows)
+        assert len(places(make_space("torus", axes=1).to_chart(rows))[0]) == len(rows)
     sphere = make_space("sphere")
     pairs = np.array([[10.0, 20.0], [10.0, 380.0 - 360], [10.0, -340.0], [10.0, 20.0000001]])
     assert len(places(sphere.to_chart(pairs))[0]) == 2
@@ -154,7 +154,7 @@ def test_gradients_of_close_rows() -> None:
 def test_ordinary_rows_ask_for_no_more() -> None:
     rng = np.random.default_rng(6)
     for dim, rows in ((1, 20_000), (2, 5_000)):
-        space = make_space("torus", dim=dim)
+        space = make_space("torus", axes=dim)
         points = space.to_chart(rng.vonmises(0.0, 5.0, (rows, dim)))
         assert narrowest_for(space, points) == (NARROWEST, False)
     space = make_space("torus")

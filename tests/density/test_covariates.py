@@ -120,7 +120,7 @@ def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
 def test_each_density_is_normalised_and_what_it_is_at_its_covariates(
     seed: int, value: float, hour: float
 ) -> None:
-    for space, dims in ((make_space("torus", dim=1), 1), (make_space("klein-bottle"), 2)):
+    for space, dims in ((make_space("torus", axes=1), 1), (make_space("klein-bottle"), 2)):
         density = random_density(seed, space, dims)
         cells = {"x": np.array([value]), "hour": np.array([hour]), "kind": np.array(["b"])}
         cells = {name: cells[name] for name in density.covariates.names}
@@ -198,7 +198,7 @@ def test_intervals_hold_the_shares_that_they_say() -> None:
 
 def test_a_file_makes_the_same_density_again(fit: ConditionalEstimator, tmp_path: Path) -> None:
     for number, density in enumerate((
-        fit.conditional_density_, random_density(5, make_space("torus", dim=1), 1)
+        fit.conditional_density_, random_density(5, make_space("torus", axes=1), 1)
     )):  # fmt: skip
         path = tmp_path / f"{number}.safetensors"
         path.write_bytes(conditional_to_bytes(density, columns=["phi"]))

@@ -9,13 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from orbiflow.density import (
-    AdaptiveKernels,
-    DensityEstimator,
-    MixedTorus,
-    UniformDensity,
-    make_space,
-)
+from orbiflow.density import AdaptiveKernels, DensityEstimator, Torus, UniformDensity, make_space
 from refusals import refused
 
 ONE = torch.ones(1, dtype=torch.float64)
@@ -23,7 +17,7 @@ ONE = torch.ones(1, dtype=torch.float64)
 
 def von_mises(turns: float, kappa: float) -> AdaptiveKernels:
     """A von Mises distribution of one angle."""
-    space = make_space("torus", dim=1)
+    space = make_space("torus", axes=1)
     return AdaptiveKernels(space, torch.tensor([[turns]]).double(), kappa * ONE[:, None], ONE)
 
 
@@ -108,7 +102,7 @@ def test_directions_have_a_mean_and_axes_have_none() -> None:
     with refused("marginal"):
         UniformDensity(make_space("torus")).cdf(torch.zeros(1, 2))
     with refused("compared"):
-        fit.density_.divergence(UniformDensity(MixedTorus([None, (0, 1)])))
+        fit.density_.divergence(UniformDensity(Torus([None, (0, 1)])))
     with refused("0", "1"):
         von_mises(0.1, 2.0).icdf(torch.tensor([1.5]))
 

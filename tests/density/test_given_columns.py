@@ -213,7 +213,7 @@ def test_arguments_are_used_or_refused() -> None:
     for call in (model.fit, model.score):
         with refused("None", kind=SettingError):
             call(PAIRS, np.ones(ROWS))
-    torus = make_space("torus", dim=2, unit="degrees")
+    torus = make_space("torus", axes=2, unit="degrees")
     with refused("columns", kind=SettingError):
         fit_parametric(torus, torus.to_chart(PAIRS), "von-mises", columns=["phi"])
 

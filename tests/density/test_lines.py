@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from orbiflow.density import DensityEstimator, MixedTorus, Role
+from orbiflow.density import DensityEstimator, Role, Torus
 from orbiflow.density.spaces import Line
 from refusals import refused
 
@@ -30,8 +30,8 @@ TRUE: dict[str, tuple[Any, float]] = {
 
 @given(LINES, st.lists(st.floats(0.02, 0.98), min_size=1, max_size=9))
 def test_turns_and_values_are_inverse(line: Line, shares: list[float]) -> None:
-    space = MixedTorus([line.to_json()])
-    assert space.lines == (line,)
+    space = Torus([line.to_json()])
+    assert space.axes == (line,)
     turns = torch.tensor(shares, dtype=torch.float64)[:, None]
     values = space.from_chart(turns)
     torch.testing.assert_close(space.to_chart(values), turns, rtol=0, atol=1e-9)
@@ -67,4 +67,4 @@ def test_densities_are_near_the_truth_and_end_where_columns_do(role: str) -> Non
 )
 def test_lines_that_there_are_not(wrong: list[Any]) -> None:
     with refused():
-        MixedTorus([wrong])
+        Torus([wrong])

@@ -16,7 +16,6 @@ from scipy import stats
 from orbiflow.density import (
     Density,
     DensityEstimator,
-    MixedTorus,
     Role,
     Torus,
     UniformDensity,
@@ -52,7 +51,7 @@ def fit_fixture() -> DensityEstimator:
 def test_data_come_back_and_areas_are_those_of_the_map(
     centre: float, scale: float, rows: list[tuple[float, float]]
 ) -> None:
-    space = MixedTorus([None, (centre, scale)])
+    space = Torus([None, (centre, scale)])
     data = np.array([[angle, centre + scale * z] for angle, z in rows])
     points = space.to_chart(data)
     again = space.from_chart(points)
@@ -66,7 +65,7 @@ def test_data_come_back_and_areas_are_those_of_the_map(
 
 
 def test_the_uniform_density_is_students_t() -> None:
-    space = MixedTorus([(3.0, 0.5)])
+    space = Torus([(3.0, 0.5)])
     at = np.linspace(-2, 8, 50)
     found = UniformDensity(space).log_prob(space.to_chart(at[:, None]), measure="natural")
     np.testing.assert_allclose(found.numpy(), stats.t.logpdf(at, 4, 3.0, 0.5), rtol=1e-7)
@@ -97,7 +96,7 @@ def test_a_conditional_is_a_ratio(fit: DensityEstimator) -> None:
     at = np.column_stack([np.full(9, 40.0), lengths])
     ratio = fit.score_samples(at) - fit.marginal(0).score_samples([[40.0]])
     found = fit.conditional({0: 40.0})
-    assert isinstance(found.space_, MixedTorus)
+    assert not found.space_.is_of_angles
     np.testing.assert_allclose(found.score_samples(lengths), ratio, atol=2e-3)
     assert isinstance(fit.conditional({1: 1.5}).space_, Torus)
     mean = found.sample(4000, random_state=0).mean()
@@ -160,10 +159,10 @@ def test_files_give_the_same_density_back(fit: DensityEstimator, tmp_path: Path)
 def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     data = np.column_stack([rng.vonmises(0, 2, (300, 4)), rng.normal(size=300)])
-    space = MixedTorus.for_columns(data, [Role("angle")] * 4 + [Role("linear")], "abcde")
+    space = Torus.for_columns(data, [Role("angle")] * 4 + [Role("linear")], "abcde")
     whole = DensityEstimator(space, components="chains").fit(data).density_
     for part in (marginal(whole, [1, 2, 4]), conditional(whole, {0: 0.1})):
-        assert isinstance(part.space, MixedTorus)
+        assert not part.space.is_of_angles
         points = part.space.to_chart(np.full((3, part.space.dim), 0.3))
         again = back(part, tmp_path)
         assert torch.allclose(again.log_prob(points), part.log_prob(points))
@@ -202,9 +201,9 @@ def test_a_column_of_one_value_and_lines_that_are_none() -> None:
     wrongs: list[Any] = [[(1.0, 0.0)], [(np.nan, 1.0)], [(1.0,)], ["ab"]]
     for wrong in wrongs:
         with pytest.raises(OrbiflowError):
-            MixedTorus(wrong)
+            Torus(wrong)
     with refused("2", "3", kind=SettingError):
-        DensityEstimator(MixedTorus([None, (0, 1)])).fit(np.ones((50, 3)))
+        DensityEstimator(Torus([None, (0, 1)])).fit(np.ones((50, 3)))
 
 
 def test_radians_in_the_place_of_degrees_are_doubted() -> None:

@@ -16,10 +16,10 @@ from scipy import stats
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
-    MixedTorus,
     Mixture,
     ProductSpace,
     Space,
+    Torus,
     UniformDensity,
     density_to_bytes,
     make_space,
@@ -219,7 +219,7 @@ def test_columns_beside_come_last_or_have_names() -> None:
     assert fit.marginal("depth").mean().shape == (1,)
     with refused("period", "0"):
         ProductSpace(make_space("sphere"), [-1.0])
-    with refused("MixedTorus"):
+    with refused("torus"):
         ProductSpace(make_space("torus"), [24.0])
     with refused("period"):
         ProductSpace(make_space("sphere"), [None])
@@ -228,7 +228,7 @@ def test_columns_beside_come_last_or_have_names() -> None:
 @given(st.floats(0.1, 1e4), seeds)
 def test_a_period_of_its_own_is_a_unit(period: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    space, radians = MixedTorus([period]), MixedTorus([None])
+    space, radians = Torus([period]), Torus([None])
     values = rng.uniform(-2 * period, 2 * period, (20, 1))
     back = space.from_chart(space.to_chart(values))
     assert ((back >= 0) & (back < period)).all()

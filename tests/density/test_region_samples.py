@@ -67,7 +67,7 @@ def test_the_number_that_a_message_names_is_enough() -> None:
 
 
 def test_far_out_the_mass_and_the_interval_are_right() -> None:
-    space = make_space("torus", dim=1)
+    space = make_space("torus", axes=1)
     kernels = AdaptiveKernels(
         space,
         torch.tensor([[0.5]]).double(),

@@ -183,7 +183,7 @@ def test_polygons_hold_what_the_region_holds_and_edges_are_glued(name: str) -> N
 
 
 def test_islands_between_the_nodes_are_found() -> None:
-    space = make_space("torus", dim=2, unit="degrees")
+    space = make_space("torus", axes=2, unit="degrees")
     rng = np.random.default_rng(3)
     specks = rng.uniform(-180, 180, (40, 2))
     wide = np.concatenate([specks, [[0.0, 0.0]]])

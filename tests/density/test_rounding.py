@@ -87,9 +87,9 @@ def test_steps_are_found(name: str, step: float) -> None:
 def test_steps_that_do_not_divide_the_circle() -> None:
     angles = np.random.default_rng(3).vonmises(1.0, 1.0, (3000, 1))
     for turned in (angles, angles % (2 * np.pi)):
-        space = make_space("torus", dim=1)
+        space = make_space("torus", axes=1)
         assert repeats_of(space, space.to_chart(turned.round(1))).spread == pytest.approx((0.1,))
-    space = make_space("torus", dim=1, unit="degrees")
+    space = make_space("torus", axes=1, unit="degrees")
     middles = np.floor(np.degrees(angles) / 5) * 5 + 2.5
     assert repeats_of(space, space.to_chart(middles)).spread == pytest.approx((5.0,))
 
@@ -166,7 +166,7 @@ def test_directions_that_were_rounded_twice(parts: int, unit: str, digits: int) 
         2 * np.pi
     )
     rows = np.round(rounded(angles / (2 * np.pi), 1 / parts) * turn, digits)
-    space = make_space("torus", dim=1, unit=unit)
+    space = make_space("torus", axes=1, unit=unit)
     found = repeats_of(space, space.to_chart(rows[:, None]))
     assert found.is_rounding
     assert found.spread == pytest.approx([turn / parts])
@@ -183,7 +183,7 @@ def test_places_that_lie_on_a_coarse_grid_by_chance_are_places() -> None:
     rng = np.random.default_rng(0)
     few = rng.choice(360, 60, replace=False)
     rows = rng.choice(few, 2000).astype(float)
-    space = make_space("torus", dim=1, unit="degrees")
+    space = make_space("torus", axes=1, unit="degrees")
     assert not any(repeats_of(space, space.to_chart(rows[:, None])).spread)
 
 
@@ -205,7 +205,7 @@ def test_some_values_rounded_more_coarsely_have_no_spikes(
 ) -> None:
     rng = np.random.default_rng(7)
     rows = mixed(rng, np.degrees(rng.vonmises(1.0, 0.5, (2000, dim))), coarse, fine, share)
-    space = make_space("torus", dim=dim, unit="degrees")
+    space = make_space("torus", axes=dim, unit="degrees")
     found = repeats_of(space, space.to_chart(rows))
     for heap in found.heaps:
         assert heap is not None
@@ -222,7 +222,7 @@ def test_some_values_rounded_more_coarsely_have_no_spikes(
 def test_usual_values_are_no_heaps() -> None:
     """Calm winds, states, crowded hours, stations of mixed precision and narrow peaks."""
     rng = np.random.default_rng(8)
-    line = make_space("torus", dim=1, unit="degrees")
+    line = make_space("torus", axes=1, unit="degrees")
     plane, sphere = make_space("torus", unit="degrees"), make_space("sphere")
     calm = np.where(rng.random(2000) < 0.3, 0.0, rng.uniform(0, 360, 2000).round())
     narrow = np.where(rng.random(2000) < 0.3, rng.normal(100, 1, 2000), rng.uniform(0, 360, 2000))
@@ -256,7 +256,7 @@ def test_some_points_of_the_compass_are_enough(step: float, values: int) -> None
     rows = rounded(rng.normal(160, 1.1 * step, 600), step)
     rows = rows[abs(rows - 160) < step * values / 2, None] % 360
     assert len(np.unique(rows)) == values
-    torus = make_space("torus", unit="degrees", dim=1)
+    torus = make_space("torus", unit="degrees", axes=1)
     found = repeats_of(torus, torus.to_chart(rows))
     assert found.spread == (step,)
     assert found.is_rounding
@@ -271,5 +271,5 @@ def test_some_points_of_the_compass_are_enough(step: float, values: int) -> None
 )  # fmt: skip
 def test_states_are_no_points_of_the_compass(states: list[float]) -> None:
     rows = np.random.default_rng(0).choice(np.array(states, dtype=float), (600, 1))
-    torus = make_space("torus", unit="degrees", dim=1)
+    torus = make_space("torus", unit="degrees", axes=1)
     assert not repeats_of(torus, torus.to_chart(rows)).can_be_undone

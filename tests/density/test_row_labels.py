@@ -45,7 +45,7 @@ SCORES = {
     "a": pandas.Series(MODEL.score_samples(ANGLES), NAMES),
     "b": pandas.Series(OTHER.score_samples(ANGLES), NAMES),
 }
-TORUS = make_space("torus", dim=2, unit="degrees")
+TORUS = make_space("torus", axes=2, unit="degrees")
 POINTS = pandas.DataFrame(TORUS.to_chart(ANGLES).numpy(), NAMES)
 
 

@@ -139,7 +139,7 @@ def test_groups_written_alike_share_a_basis():
 def test_spaces_are_equal_by_their_settings():
     assert make_space("torus") == make_space("torus")
     assert hash(make_space("torus")) == hash(make_space("torus"))
-    assert make_space("torus") != make_space("torus", dim=3)
+    assert make_space("torus") != make_space("torus", axes=3)
     assert make_space("torus") != make_space("torus", unit="degrees")
     assert make_space("sphere") != make_space("projective-plane")
     turn = np.eye(3)

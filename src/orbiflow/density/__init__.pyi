@@ -80,7 +80,6 @@ from .run_folder import CONDITIONAL as CONDITIONAL
 from .run_folder import written_files as written_files
 from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
-from .spaces.mixed import MixedTorus as MixedTorus
 from .spaces.product import ProductSpace as ProductSpace
 from .spaces.quotient import QuotientSpace as QuotientSpace
 from .spaces.rotations import CubicOrientations as CubicOrientations

@@ -34,7 +34,7 @@ from orbiflow.density.data import (
 from orbiflow.density.estimator import DensityEstimator, RandomState, seed_of
 from orbiflow.density.fitting import Progress, mean_of, weighed
 from orbiflow.density.inference import Trend, axes_named, trend_of
-from orbiflow.density.spaces import MixedTorus, Torus, check_measure
+from orbiflow.density.spaces import Torus, check_measure
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.settings import as_whole, described, is_a
 
@@ -304,7 +304,7 @@ class AngleRegressor(ConditionalEstimator):
         return 1 - left / all_of_it if all_of_it else 0.0
 
     def _period(self) -> float:
-        if not isinstance(self.space_, Torus) or isinstance(self.space_, MixedTorus):
+        if not (isinstance(self.space_, Torus) and self.space_.is_of_angles):
             raise OrbiflowError("a regression of angles is for a torus without real columns")
         return self.space_.period
 

@@ -133,7 +133,7 @@ def test_masses_that_cannot_be_drawn(tmp_path: Any) -> None:
     ):
         with refused(*said.split()):
             PlotSettings(regions=masses)
-    space = make_space("torus", dim=3)
+    space = make_space("torus", axes=3)
     flat = FlowDensity(space, identity_flow(space))
     with refused("regions"):
         plot_density(flat, tmp_path / "out", PlotSettings(regions=(0.5,)))

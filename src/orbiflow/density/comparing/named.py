@@ -19,7 +19,7 @@ from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.comparing.statistics import Found, Labels
 from orbiflow.density.fitting import highest_log_likelihood
 from orbiflow.density.models import images_of
-from orbiflow.density.spaces import DataColumns, MixedTorus, Space, Torus
+from orbiflow.density.spaces import DataColumns, Space
 from orbiflow.errors import OrbiflowError, SettingError, literal
 
 MIN_SAMPLE = 5
@@ -355,7 +355,7 @@ def _vectors(
     space: Space, points: torch.Tensor, columns: tuple[str, ...]
 ) -> tuple[dict[str, Array], Array, str]:
     """Return the unit vectors (N, p) of each column, what distances are taken of, and what they are."""
-    if isinstance(space, Torus) and not isinstance(space, MixedTorus):
+    if space.is_of_angles:
         angles = 2 * math.pi * points.numpy()
         sides = {
             name: np.stack([np.cos(column), np.sin(column)], axis=1)

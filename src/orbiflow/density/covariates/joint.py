@@ -20,7 +20,7 @@ from orbiflow.density.models import (
     density_parts,
     mixture_of,
 )
-from orbiflow.density.spaces import MixedTorus, Space, Torus, turns_at
+from orbiflow.density.spaces import Space, Torus, turns_at
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
 
@@ -34,7 +34,7 @@ BLOCK_ROWS = 2**12
 class JointDensity(Part):
     """p(y, x) / p(x) of a density of data on a torus and of covariates, each of them a circle, too.
 
-    A real covariate is a circle that closes at infinity, as in `MixedTorus`.
+    A real covariate is a circle that closes at infinity, as one of the torus.
 
     Args:
         space: The torus of the data.
@@ -102,10 +102,7 @@ def is_joint_possible(space: Space, number: Tensor) -> bool:
 
 def joint_torus(space: Torus, covariates: int) -> Torus:
     """Return the torus of a torus' columns and as many circles more."""
-    if isinstance(space, MixedTorus):
-        axes = [*space.axes, *[None] * covariates]
-        return MixedTorus(axes, unit=str(space.unit), from_zero=space.from_zero)
-    return Torus(space.dim + covariates, unit=str(space.unit), from_zero=space.from_zero)
+    return Torus([*space.axes, *[None] * covariates], unit=str(space.unit))
 
 
 def covariate_turns(x: Tensor, number: Tensor) -> Tensor:

@@ -39,7 +39,7 @@ from orbiflow.density.fitting.rows import (
     weights_note,
 )
 from orbiflow.density.models import AdaptiveKernels, Density, images_of, moments
-from orbiflow.density.spaces import MixedTorus, RotationSpace, Space, Torus
+from orbiflow.density.spaces import RotationSpace, Space, Torus
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.typed_torch import linalg
 
@@ -75,7 +75,7 @@ def families_of(space: Space) -> tuple[str, ...]:
     >>> families_of(make_space("rotation-space"))
     ('bingham', 'angular-central-gaussian', 'watson', 'matrix-fisher')
     """
-    if isinstance(space, Torus) and not isinstance(space, MixedTorus):
+    if space.is_of_angles:
         return (ANGLES, SINE) if space.dim == 2 else (ANGLES,)
     try:
         images = images_of(space)
@@ -224,7 +224,9 @@ def _factors(
         angles = 2 * math.pi * points[:, axis]
         vectors = torch.stack([angles.cos(), angles.sin()], dim=1)
         write = partial(_written_angle, space, axis, 2 * axis * (name == SINE))
-        writing = Writing(write, (column,), (space.period_of(axis),), (math.inf,), str(space.unit))
+        writing = Writing(
+            write, (column,), (space.axes[axis].period,), (math.inf,), str(space.unit)
+        )
         found.append((column, vectors, (writing,)))
     if name == SINE:
         _, vectors, writings = zip(*found, strict=True)

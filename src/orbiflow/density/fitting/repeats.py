@@ -233,7 +233,7 @@ def spread_evenly(
     chance = torch.rand(len(points), dtype=torch.float64, generator=generator).numpy()
     noise = torch.rand(len(points), len(turns), dtype=torch.float64, generator=generator) - 0.5
     noise *= torch.as_tensor(found.steps_at(data, turns, chance))
-    if type(space) is Torus:
+    if isinstance(space, Torus) and space.is_of_angles:
         return space.project(points + noise / space.period)
     data += noise.numpy()
     if space.is_round:
@@ -255,6 +255,6 @@ def _turn(space: Space, number: int) -> float:
     """Return the period of a column of the data, 0 if it has none."""
     if space.is_round:
         return 360.0 * (number == 1)
-    if isinstance(space, Torus):
-        return space.period_of(number)
+    if space.axes:
+        return space.axes[number].period
     return 0.0 if space.unit in (None, "units") else whole_turn(str(space.unit))

@@ -12,7 +12,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models import kernel_peaks
-from orbiflow.density.spaces import MixedTorus, Space, by_sphere
+from orbiflow.density.spaces import Space, by_sphere
 
 MOST_ROWS, MOST_ASKED, MOST_ENTRIES = 4_000, 400, 20_000_000
 """The most rows with kernels, those at which they are judged, and entries of the table of both."""
@@ -32,9 +32,9 @@ def width_groups(space: Space) -> list[int]:
     if space.parts:
         base, beside = (len(part.spheres) for part in space.parts)
         return [0] * base + [1 + k for k in range(beside)]
-    if isinstance(space, MixedTorus):
-        own = np.cumsum(~space.is_angle)
-        return np.where(space.is_angle, 0, own).tolist()
+    if space.axes:
+        is_angle = np.array([axis.is_angle for axis in space.axes])
+        return np.where(is_angle, 0, np.cumsum(~is_angle)).tolist()
     return [0] * len(space.spheres)
 
 

@@ -126,7 +126,7 @@ def given_named(
         found |= enumerate(listed(space.parts[0].cover([whole])[0]))
     for axis, value in zip(alone, values[len(whole) :], strict=True):
         number = torch.tensor(value, dtype=torch.float64)
-        found[axis] = float(lines_of(space).turns(axis - space.together, number))
+        found[axis] = float(lines_of(space).axes[axis - space.together].turns(number))
     return found
 
 
@@ -182,7 +182,7 @@ def chart_of_rows(space: Space, data: ArrayLike, *, may_lack: bool) -> Tensor:
         return space.to_chart(data)
     torus = check_torus(space, "densities of rows that lack angles")
     rows = observed_rows(data, "data", torus)
-    turns = [torus.turns(axis, column) for axis, column in enumerate(rows.mT)]
+    turns = [axis.turns(column) for axis, column in zip(torus.axes, rows.mT, strict=True)]
     return torus.project(torch.stack(turns, dim=1))
 
 

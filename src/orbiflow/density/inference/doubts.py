@@ -20,7 +20,7 @@ from orbiflow.density.data import (
 )
 from orbiflow.density.inference.angles import at_observed
 from orbiflow.density.models import Density
-from orbiflow.density.spaces import MixedTorus, Space, Torus
+from orbiflow.density.spaces import Line, Space, Torus
 from orbiflow.errors import OrbiflowError
 
 FEW_ROWS = 10
@@ -77,12 +77,10 @@ def _check_beside_middle(
     space: Space, values: Array, names: Sequence[str], place: Callable[[int], str]
 ) -> None:
     """Refuse real numbers far from the middle of the fit's, as codes for missing values are."""
-    beside = space if isinstance(space, MixedTorus) else getattr(space, "beside", None)
-    if not isinstance(beside, MixedTorus):
-        return
-    first = values.shape[1] - beside.dim
-    for axis, line in enumerate(beside.lines):
-        if line is None or line.kind != "linear":
+    lines = space.parts[-1].axes if space.parts else space.axes
+    first = values.shape[1] - len(lines)
+    for axis, line in enumerate(lines):
+        if not isinstance(line, Line) or line.kind != "linear":
             continue
         known = line.centre + 2 * line.scale * np.linspace(-1, 1, KNOWN)
         column = Checked(str(names[first + axis]), values[:, first + axis], place)

@@ -83,7 +83,7 @@ def marginal(
     >>> rng = np.random.default_rng(0)
     >>> fit = DensityEstimator("torus", components="kernels").fit(rng.vonmises(0, 4, (60, 2)))
     >>> marginal(fit.density_, [0]).space
-    Torus(dim=1, unit='radians')
+    Torus(axes=1, unit='radians')
     """
     space = as_instance(density, Density, "density").space
     split = Split(space.chart_dim, kept_axes(axes, space.chart_dim))

@@ -51,7 +51,8 @@ def shortest_intervals(density: Density, mass: float) -> Array:
     mass = as_number(mass, "mass", *MASSES)
     own = density.cumulative()
     torus = check_torus(density.space, "intervals")
-    period, start = torus.period_of(0), own.start
+    (axis,), start = torus.axes, own.start
+    period = axis.period
     even = torch.linspace(0, 1, PIECES + 1, dtype=torch.float64)
     even = even if period else even[1:-1]  # where log densities are minus infinity
     # more of them where the mass is, as a bump may be narrower than a piece
@@ -65,7 +66,7 @@ def shortest_intervals(density: Density, mass: float) -> Array:
     heights, between = logs(turns), logs((turns[1:] + turns[:-1]) / 2)
     if period and float(heights.max() - heights.min()) < FLAT_NATS:
         sides = np.array([[(1 - mass) / 2, (1 + mass) / 2]])
-        return _written(torus.first_turn(0), start + sides, period)
+        return _written(axis.first_turn, start + sides, period)
     order = between.argsort(descending=True)
     held = own.masses(turns).diff()[order].cumsum(0)
     place, last, reach = int(torch.searchsorted(held, mass)), len(order) - 1, NEAR
@@ -91,7 +92,7 @@ def shortest_intervals(density: Density, mass: float) -> Array:
         level = brentq(excess, near(reach), near(-reach), xtol=1e-9)
     pairs = _above(min(level, float(heights.max())), turns, heights, logs, bool(period))
     if period:
-        return _written(torus.first_turn(0), start + pairs, period)
+        return _written(axis.first_turn, start + pairs, period)
     return torus.from_chart(torch.tensor(pairs.reshape(-1, 1) + start)).reshape(-1, 2)
 
 

@@ -79,7 +79,7 @@ def trend(
     values, masses = _checked(at, levels)
     if of == along:
         raise OrbiflowError("a trend is of one column along another one")
-    turns = torus.turns(along, torch.tensor(values))[:, None]
+    turns = torus.axes[along].turns(torch.tensor(values))[:, None]
     own, alone = torus.of_axes([of]), turns.new_full((len(turns), torus.dim), torch.nan)
     alone[:, along] = turns[:, 0]
     logs = at_observed(density, alone, measure="natural")
@@ -158,14 +158,15 @@ def _about_mean(space: Torus, weights: Tensor, masses: Sequence[float]) -> tuple
     """
     turns = cells()[:, 0]
     tails = np.array([[(1 - m) / 2 for m in masses], [(1 + m) / 2 for m in masses]])
-    period = space.period_of(0)
+    (axis,) = space.axes
+    period = axis.period
     if not period:
         values = space.from_chart(turns[:, None])[:, 0]
         below = np.cumsum(weights.numpy()) - weights.numpy() / 2
         return float(weights.numpy() @ values), np.interp(tails, below, values)
     angle = 2 * np.pi * turns
     mean = float(torch.atan2(weights @ angle.sin(), weights @ angle.cos())) / (2 * np.pi)
-    mean += mean < space.first_turn(0)
+    mean += mean < axis.first_turn
     away = ((turns - mean + 0.5) % 1 - 0.5).numpy()
     order = np.argsort(away)
     mass = weights.numpy()[order]

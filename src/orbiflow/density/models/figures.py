@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.distributions import Distribution, kl
 
-from orbiflow.density.spaces import CHART, MixedTorus, Space
+from orbiflow.density.spaces import CHART, Line, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_tensor, as_whole
 from orbiflow.typed_torch import linalg
@@ -112,14 +112,14 @@ class WithFigures(Distribution):
         """Return the mean of one column of a torus in turns."""
         turns, weights = self._masses(axis)
         space = self.space
-        if isinstance(space, MixedTorus) and space.is_real[axis]:
+        line = space.axes[axis]
+        if isinstance(line, Line):
             row = torch.full((len(turns), space.dim), 0.25, dtype=torch.float64)
             row[:, axis] = turns
             values = torch.tensor(space.from_chart(row)[:, axis])
-            line = space.lines[axis]
-            if line is not None and line.kind != "linear":  # whose far ends are beyond all numbers
+            if line.kind != "linear":  # whose far ends are beyond all numbers
                 weights = weights * (line.share(values).abs() < WITHIN_TWO_SCALES)
-            return space.turns(axis, (weights * values).sum() / weights.sum())
+            return line.turns((weights * values).sum() / weights.sum())
         angle = 2 * math.pi * turns
         mean = torch.atan2((weights * angle.sin()).sum(), (weights * angle.cos()).sum())
         return mean / (2 * math.pi) % 1
@@ -230,7 +230,7 @@ class WithFigures(Distribution):
 
     def _start(self) -> float:
         """Return the turn at which the only column starts."""
-        if isinstance(self.space, MixedTorus) and bool(self.space.is_real[0]):
+        if self.space.axes[0].is_real:
             return 0.0
         turns, weights = _nodes(FIRST_CELLS)
         masses, angle = weights * self.log_prob(turns[:, None]).exp(), 2 * math.pi * turns
@@ -270,8 +270,7 @@ class WithFigures(Distribution):
         centre and scale.
         """
         here, there = self.space, other.space
-        lines = isinstance(here, MixedTorus) and isinstance(there, MixedTorus)
-        if here != there and not (lines and _same_columns(here, there)):
+        if here != there and not _same_columns(here, there):
             raise OrbiflowError(f"densities on {here} and {there} cannot be compared")
         draws = self._draws(as_whole(count, "count", 2), generator)
         at = draws if here == there else there.to_chart(here.from_chart(draws))
@@ -282,10 +281,9 @@ class WithFigures(Distribution):
 
 
 def _same_columns(one: Space, other: Space) -> bool:
-    """Return whether the same columns are real, and angles in one unit."""
-    if not (isinstance(one, MixedTorus) and isinstance(other, MixedTorus)):
-        return False
-    return one.unit == other.unit and one.is_real.tolist() == other.is_real.tolist()
+    """Return whether both are tori whose angles have one unit, and whose other circles one period."""
+    periods = [[axis.period for axis in space.axes] for space in (one, other)]
+    return bool(one.axes) and one.unit == other.unit and periods[0] == periods[1]
 
 
 def _nodes(cells: int) -> tuple[Tensor, Tensor]:

@@ -13,7 +13,7 @@ from torch import Tensor
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
 from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.spaces import MixedTorus, ProductSpace, Space, Torus
+from orbiflow.density.spaces import ProductSpace, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
 from orbiflow.settings import as_instance, as_tensor
@@ -34,7 +34,7 @@ class Mixture(Density, kind="mixture"):
     >>> space, one = make_space("torus"), torch.ones(1)
     >>> kernel = AdaptiveKernels(space, torch.tensor([[0.5, 0.5]]), torch.tensor([[4.0, 9.0]]), one)
     >>> Mixture([kernel, UniformDensity(space)], [0.75, 0.25])
-    Mixture(Torus(dim=2, unit='radians'), kernels 75.0%, uniform 25.0%)
+    Mixture(Torus(axes=2, unit='radians'), kernels 75.0%, uniform 25.0%)
     """
 
     def __init__(self, components: Sequence[Density], weights: Any) -> None:
@@ -318,9 +318,7 @@ class PartialDensity(Density, kind="partial"):
         ):
             raise OrbiflowError(f"parts {kept!r} and {given!r} of {dim!r} angles")
         unit, lines = str(space.settings().get("unit")), header.get("axes")
-        whole_space: Space = (
-            Torus(dim, unit=unit) if lines is None else MixedTorus(lines, unit=unit)
-        )
+        whole_space: Space = Torus(dim if lines is None else lines, unit=unit)
         if "space" in header:
             whole_space = ProductSpace(**header["space"])
         if whole_space.chart_dim != dim or whole_space.of_axes(axes[: space.chart_dim]) != space:

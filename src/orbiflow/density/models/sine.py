@@ -11,7 +11,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.spaces import MixedTorus, Space, Torus
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_tensor
 from orbiflow.typed_torch import special
@@ -70,7 +70,7 @@ class VonMisesSine(Density, kind="von-mises-sine"):
         super().__init__(space)
         given = [as_tensor(means, "means").detach(), as_tensor(shape, "shape").detach()]
         self.means, self.shape = (one.double() for one in given)
-        if not isinstance(space, Torus) or isinstance(space, MixedTorus) or space.dim != 2:
+        if not space.is_of_angles or space.dim != 2:
             raise OrbiflowError("a density with sines is for a torus of two angles")
         finite = all(bool(one.isfinite().all()) for one in (self.means, self.shape))
         if self.means.shape != (2,) or self.shape.shape != (3,) or not finite:

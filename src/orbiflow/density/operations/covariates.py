@@ -130,9 +130,7 @@ def _by_word(
 
 def _has_means(density: ConditionalDensity) -> bool:
     """Return whether the data are angles."""
-    from orbiflow.density.spaces import MixedTorus, Torus
-
-    return isinstance(density.space, Torus) and not isinstance(density.space, MixedTorus)
+    return density.space.is_of_angles
 
 
 def _table(column: str, names: Sequence[str], said: Mapping[str, Any]) -> runtime.Table:

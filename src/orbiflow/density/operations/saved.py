@@ -273,7 +273,7 @@ def _words(density: Density, names: list[str], out: Path) -> str:
 def _table(density: Density, space: Torus) -> Array:
     """Return angles from minus half a turn on, and the density in their unit: (N, d + 1)."""
     count = TABLE_ROWS[space.dim]
-    lines = [space.even_line(axis, count) for axis in range(space.dim)]
+    lines = [axis.even(count) for axis in space.axes]
     data = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, space.dim)
     with torch.no_grad():
         logs = density.log_prob(space.to_chart(data), measure="natural")

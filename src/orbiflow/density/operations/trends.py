@@ -181,7 +181,7 @@ def _along_covariate(
 
     from orbiflow.density import inference
     from orbiflow.density.operations.saved import axes_of
-    from orbiflow.density.spaces import MixedTorus
+    from orbiflow.density.spaces import Torus
 
     torus = inference.check_torus(density.space, "trends")
     names = [str(name) for name in extra.get("columns") or torus.columns]
@@ -209,9 +209,7 @@ def _along_covariate(
 
         at = np.arange(float(len(values))) if column.words else values
         trends[word] = inference.trend_of(densities(), axis, at, levels=settings.levels)
-    own = torus.axes[axis] if isinstance(torus, MixedTorus) else None
-    kept = [0] if axis in torus.from_zero else []
-    space = MixedTorus([own, (0.0, 1.0)], unit=str(torus.unit), from_zero=kept)
+    space = Torus([torus.axes[axis], (0.0, 1.0)], unit=str(torus.unit))
     return _Drawn(trends, (names[axis], along), space, column.words, beside)
 
 
@@ -260,8 +258,8 @@ def _values(density: models.Density, axis: int, settings: TrendSettings) -> Arra
     from orbiflow.density import inference
 
     space = inference.check_torus(density.space, "trends")
-    period = space.period_of(axis)
-    low = space.first_turn(axis) * period
+    period = space.axes[axis].period
+    low = space.axes[axis].first_turn * period
     high = low + period
     if not period:
         alone = inference.marginal(density, [axis])

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, Pixel, midpoints
-from orbiflow.density.spaces import MixedTorus, Space
+from orbiflow.density.spaces import Space
 
 COLOURS = "viridis"
 
@@ -166,7 +166,7 @@ def measure_label(space: Space, measure: str, power: int = 0) -> str:
         return f"density, {times}times that of the uniform distribution"
     if measure == "square":
         return f"density, {times}per area of the canonical square"
-    if isinstance(space, MixedTorus):
+    if space.axes and not space.is_of_angles:
         return f"density, {times}per unit of each column"
     unit = (space.unit or "steradian").removesuffix("s")
     raised = {1: "", 2: "²", 3: "³"}.get(space.dim, "ᵈ") if space.unit else ""

@@ -11,14 +11,14 @@ import textwrap
 import unicodedata
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from torch import Tensor, tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.pictures.colours import Shade, bar_ticks, minor_places
-from orbiflow.density.spaces import MixedTorus, Space, Torus, whole_turn
+from orbiflow.density.spaces import Space, whole_turn
 from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError, SettingError
 
@@ -50,7 +50,7 @@ class View(NamedTuple):
         found = points + tensor(self.low, dtype=points.dtype)
         for axis, (least, most) in real_spans(self.space).items():
             values = least + points[:, axis] * (most - least)
-            found[:, axis] = cast(MixedTorus, self.space).turns(axis, values)
+            found[:, axis] = self.space.axes[axis].turns(values)
         return found
 
     def places(self, points: Tensor) -> Array:
@@ -73,23 +73,19 @@ class View(NamedTuple):
         spans = real_spans(self.space)
         if not spans:
             return self.space.volume
-        periods = map(cast(MixedTorus, self.space).period_of, range(self.space.dim))
         sides = [most - least for least, most in spans.values()]
-        return math.prod([*sides, *filter(None, periods)])
+        return math.prod([*sides, *(axis.period for axis in self.space.axes if axis.period)])
 
 
 def real_spans(space: Space) -> dict[int, tuple[float, float]]:
     """Return the values between which a window shows each real column, by its number."""
-    if not isinstance(space, MixedTorus):
-        return {}
-    lines = {axis: space.even_line(axis, 2) for axis in np.flatnonzero(space.is_real).tolist()}
-    return {axis: (float(ends[0]), float(ends[1])) for axis, ends in lines.items()}
+    lines = {k: axis.even(2) for k, axis in enumerate(space.axes) if axis.is_real}
+    return {k: (float(ends[0]), float(ends[1])) for k, ends in lines.items()}
 
 
 def _own_axes(space: Space) -> list[int]:
     """Return the numbers of columns with periods of their own, and of real ones."""
-    axes = space.axes if isinstance(space, MixedTorus) else ()
-    return [axis for axis, own in enumerate(axes) if own is not None]
+    return [k for k, axis in enumerate(space.axes) if not axis.is_angle]
 
 
 def chart_points(space: Space, points: Tensor) -> Tensor:
@@ -112,8 +108,7 @@ def view_of(
                 f"{{center}} applies to the torus and to maps, not to the {space.name}"
             )
         return View(space, names, np.zeros(space.dim))
-    torus = cast(Torus, space)
-    first = np.array([torus.first_turn(axis) for axis in range(space.dim)])
+    first = np.array([axis.first_turn for axis in space.axes])
     turn = whole_turn(space.unit or "")
     turns = first + 0.5 if center is None else np.array(center, dtype=float) / turn
     if turns.shape != (space.dim,) or not np.isfinite(turns).all():
@@ -208,7 +203,7 @@ def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
     if span := real_spans(view.space).get(axis):
         return axis_label(view, axis), *_ticks(*span)
     if axis in _own_axes(view.space):
-        period = cast(MixedTorus, view.space).period_of(axis)
+        period = view.space.axes[axis].period
         if len(f"{period / 4:g}") > QUARTER_LETTERS:
             low = float(view.low[axis])
             return axis_label(view, axis), *_ticks(low * period, (low + 1) * period)
@@ -232,7 +227,7 @@ def turn_text(space: Space, axis: int, turns: float) -> str:
     """Return a value of a periodic column as text: an angle in its unit, or a number."""
     if axis not in _own_axes(space):
         return angle_text(turns, space.unit)
-    text = f"{turns * cast(MixedTorus, space).period_of(axis):g}"
+    text = f"{turns * space.axes[axis].period:g}"
     return text.replace("-", "\N{MINUS SIGN}")
 
 

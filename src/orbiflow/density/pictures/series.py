@@ -61,10 +61,11 @@ def along_of(density: Density, names: tuple[str, ...], settings: PlotSettings) -
         listed = literal(", ".join(names[first:]))
         raise SettingError(f"{{along}} must be a column beside the {space.base.name}: {listed}")
     number = called.index(asked)
-    period = space.beside.period_of(number)
+    axis = space.beside.axes[number]
+    period = axis.period
     values = settings.slices
     if values is None and period:
-        low = space.beside.first_turn(number)
+        low = axis.first_turn
         values = tuple(period * (low + (k + 0.5) / PANELS) for k in range(PANELS))
     elif values is None:
         alone = marginal(density, chosen_columns(space, [first + number], len(names)).axes)
@@ -98,7 +99,7 @@ def series_picture(
     pixels = ground.pixels(PIXELS[ground.outline is not None])
     parts: list[Density] = []
     for value in along.values:
-        turns = space.beside.turns(axis - len(base), torch.tensor(value, dtype=torch.float64))
+        turns = space.beside.axes[axis - len(base)].turns(torch.tensor(value).double())
         parts.append(conditional(density, {axis: float(turns)}, base))
     tables = [density_over(part, pixels.points, settings.measure, pixels.side) for part in parts]
     areas = None if pixels.areas is None else pixels.areas[pixels.within]

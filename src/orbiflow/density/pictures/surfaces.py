@@ -22,7 +22,7 @@ from orbiflow.density.models import Density
 from orbiflow.density.pictures import colours, frames
 from orbiflow.density.pictures.grounds import SMALLER, thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.spaces import RoundSpace, Space, Torus, to_vectors
+from orbiflow.density.spaces import RoundSpace, Space, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_whole
@@ -382,8 +382,8 @@ def _labels(view: frames.View) -> list[dict[str, Any]]:
         places = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
     else:
         turns = (0, 0.125, 0.25, 0.375)
-        if isinstance(space, Torus):
-            turns = (0, 0.25, 0.5, 0.75 if 0 in space.from_zero else -0.25)
+        if space.is_torus:
+            turns = (0, 0.25, 0.5, 0.75 if space.axes[0].from_zero else -0.25)
         texts = [
             f"{frames.cut(view.names[0], frames.MAX_NAME)} {frames.angle_text(t, space.unit)}"
             for t in turns

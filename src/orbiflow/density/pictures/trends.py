@@ -86,7 +86,8 @@ def trend_picture(
 
 def _draw(axes: Axes, found: Trend, space: Torus, sheet: Sheet, words: Sequence[str]) -> None:
     """Draw a trend in its panel."""
-    turns = space.period_of(0)
+    value, along = space.axes
+    turns = value.period
     # a line that goes around goes on beyond the panel, and comes in again as its next copy
     mean = np.unwrap(found.mean, period=turns) if turns and not words else found.mean
     copies = math.ceil(np.abs(mean).max() / turns) + 1 if turns else 0
@@ -109,7 +110,7 @@ def _draw(axes: Axes, found: Trend, space: Torus, sheet: Sheet, words: Sequence[
             axes.plot(found.at, mean + shift, color=LINE, linewidth=pen, zorder=3)
     margin = 0.5 if words else 0.0
     axes.set_xlim(float(found.at.min()) - margin, float(found.at.max()) + margin)
-    around = space.period_of(1)
+    around = along.period
     if words:
         turned = 90 if sum(map(len, words)) > MOST_LETTERS else 0
         axes.set_xticks(found.at, [frames.cut(word, 12) for word in words], rotation=turned)
@@ -119,7 +120,7 @@ def _draw(axes: Axes, found: Trend, space: Torus, sheet: Sheet, words: Sequence[
         texts = [frames.turn_text(space, 1, k / 4) for k in quarters]
         axes.set_xticks([k / 4 * around for k in quarters], texts)
     if turns:
-        ticks = [space.first_turn(0) + k / 4 for k in range(5)]
+        ticks = [value.first_turn + k / 4 for k in range(5)]
         axes.set_ylim(ticks[0] * turns, ticks[-1] * turns)
         texts = [frames.turn_text(space, 0, turn) for turn in ticks]
         axes.set_yticks([turn * turns for turn in ticks], texts)

@@ -19,7 +19,7 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
 from orbiflow.density.regions.grid import Block, filled, refined, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
-from orbiflow.density.spaces import MixedTorus, RoundSpace, Space, Torus, to_vectors, whole_turn
+from orbiflow.density.spaces import RoundSpace, Space, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import unique
@@ -295,8 +295,8 @@ def _round(space: RoundSpace) -> Window:
 
 def _flat(space: Space) -> Window:
     period = whole_turn(str(space.unit))
-    if isinstance(space, Torus):
-        low = np.array([space.first_turn(axis) * period for axis in range(2)])
+    if space.axes:
+        low = np.array([axis.first_turn * period for axis in space.axes])
         high, edges = low + period, "opposite edges are one"
     else:
         low, high = np.array([0.0, -period / 4]), np.array([period / 2, 3 * period / 4])
@@ -417,7 +417,7 @@ def size_unit(space: Space) -> str:
     """
     if space.is_round:
         return "steradians" if space.dim == 2 else f"radians^{space.dim} of the unit sphere"
-    if isinstance(space, MixedTorus):
+    if space.axes and not space.is_of_angles:
         return "units of each column" if space.dim > 1 else "units"
     if space.parts:
         return f"{size_unit(space.parts[0])} times {size_unit(space.parts[1])}"

@@ -16,7 +16,7 @@ from orbiflow.density.comparing import density_of, scores_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import AdaptiveKernels, Density, UniformDensity
 from orbiflow.density.regions.settings import MAX_SAMPLES, MIN_SAMPLES, SAMPLES, samples_for
-from orbiflow.density.spaces import MixedTorus, whole_turn
+from orbiflow.density.spaces import whole_turn
 from orbiflow.errors import SettingError
 from orbiflow.runtime import one_thread
 from orbiflow.settings import as_number, as_whole
@@ -182,7 +182,9 @@ def smoothed(density: Density, width: float, generator: torch.Generator) -> Adap
         generator: Source of the samples.
     """
     space = density.space
-    if not space.is_round and (space.unit in (None, "units") or isinstance(space, MixedTorus)):
+    if not space.is_round and (
+        space.unit in (None, "units") or any(not axis.is_angle for axis in space.axes)
+    ):
         raise SettingError(f"{{smooth}} is for angles and directions, not for the {space.name}")
     turn = 360.0 if space.is_round else whole_turn(str(space.unit))
     least = turn / (2 * math.pi) * MAX_CONCENTRATION**-0.5

@@ -1,12 +1,12 @@
+from .axes import Circle as Circle
+from .axes import Line as Line
+from .axes import turns_at as turns_at
+from .axes import whole_turn as whole_turn
 from .checked import row_count as row_count
 from .data_columns import DataColumns as DataColumns
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
-from .flat import whole_turn as whole_turn
 from .frame import Frame as Frame
-from .lines import Line as Line
-from .lines import turns_at as turns_at
-from .mixed import MixedTorus as MixedTorus
 from .point_groups import rotation_group_name as rotation_group_name
 from .point_groups import rotations_of as rotations_of
 from .product import ProductSpace as ProductSpace

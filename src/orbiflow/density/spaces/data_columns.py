@@ -34,7 +34,6 @@ from orbiflow.density.data import (
     with_dip_directions,
 )
 from orbiflow.density.spaces.flat import Torus
-from orbiflow.density.spaces.mixed import MixedTorus
 from orbiflow.density.spaces.product import ProductSpace
 from orbiflow.density.spaces.quotient import QuotientSpace
 from orbiflow.density.spaces.rotations import RotationSpace
@@ -166,7 +165,7 @@ class DataColumns:
 
     def of(self, rows: TableRows) -> Space:
         """Return the space of rows that `read` has checked, or that were read from a file."""
-        if isinstance(self.space, MixedTorus | ProductSpace | Torus):
+        if isinstance(self.space, ProductSpace | Torus):
             return self.space
         own = rows.own
         if self.name == "torus":
@@ -189,14 +188,7 @@ class DataColumns:
         if not sides:
             return base
         names = rows.columns[len(own) :]
-        beside = MixedTorus.for_columns(rows.values[:, len(own) :], sides, names)
-        if beside.is_angle.any():
-            turns = [role.turn for role in sides]
-            axes = [
-                turn if own is None else own for own, turn in zip(beside.axes, turns, strict=True)
-            ]
-            beside = MixedTorus(axes, from_zero=beside.from_zero)
-        return ProductSpace(base, beside.axes, from_zero=beside.from_zero)
+        return ProductSpace(base, Torus.for_columns(rows.values[:, len(own) :], sides, names).axes)
 
 
 def torus_of(values: Array, roles: Sequence[Role], names: Sequence[str], unit: str | None) -> Torus:
@@ -204,4 +196,4 @@ def torus_of(values: Array, roles: Sequence[Role], names: Sequence[str], unit: s
     unit = unit or "radians"
     if all(role.kind == "angle" and role.unit in (None, unit) for role in roles):
         return Torus.for_data(values, unit=unit)
-    return MixedTorus.for_columns(values, roles, names, unit=unit)
+    return Torus.for_columns(values, roles, names, unit=unit)

@@ -12,9 +12,9 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import Role
+from orbiflow.density.spaces.axes import Circle
 from orbiflow.density.spaces.checked import checked_table
 from orbiflow.density.spaces.flat import Torus
-from orbiflow.density.spaces.mixed import Axis, MixedTorus
 from orbiflow.density.spaces.space import CHART, Space, by_sphere, make_space
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_instance
@@ -31,9 +31,9 @@ class ProductSpace(Space):
     kernels and mixtures, whose marginal and conditional densities have a closed form.
 
     Args:
-        base: A space that is no torus (for which there is `MixedTorus`), or its settings and "name".
-        axes: The other columns, as in `MixedTorus`: periods, or centres and scales of real ones.
-        from_zero: Those of `axes` that are written from 0, as in `MixedTorus`.
+        base: A space that is no torus (a torus has such columns itself), or its settings and "name".
+        axes: The other columns, as of `Torus`: periods, or centres and scales of real ones.
+        from_zero: Those of `axes` that are written from 0, as of `Torus`.
 
     >>> from orbiflow.density.spaces import Sphere
     >>> space = ProductSpace(Sphere(), [(10.0, 5.0), 24.0])
@@ -47,7 +47,7 @@ class ProductSpace(Space):
     def __init__(
         self,
         base: Space | Mapping[str, Any],
-        axes: Sequence[Axis],
+        axes: Sequence[Any],
         *,
         from_zero: Sequence[int] | None = None,
     ) -> None:
@@ -56,11 +56,10 @@ class ProductSpace(Space):
             base = make_space(str(own.pop("name", None)), **own)
         self.base = as_instance(base, Space, "base", "see `make_space`")
         if isinstance(base, Torus | ProductSpace):
-            raise OrbiflowError(
-                f"the base of a product is no {base.name}: take a MixedTorus of all"
-            )
-        self.beside = MixedTorus(axes, from_zero=from_zero)
-        if self.beside.is_angle.any():
+            raise OrbiflowError(f"the base of a product is no {base.name}: take a torus of all")
+        beside = [axis._replace(unit="") if isinstance(axis, Circle) else axis for axis in axes]
+        self.beside = Torus(beside, from_zero=from_zero)
+        if any(axis.is_angle for axis in self.beside.axes):
             raise OrbiflowError(
                 "each column beside a space needs a period, or a centre and a scale"
             )
@@ -219,7 +218,7 @@ class ProductSpace(Space):
         if not own:
             return self.beside.of_axes(others)
         kept = [self.beside.axes[axis] for axis in others]
-        return ProductSpace(self.base, kept, from_zero=self.beside.from_zero_of(others))
+        return ProductSpace(self.base, kept)
 
     def factors_of(self, axes: Sequence[int]) -> list[int]:
         shift = len(self.base.spheres) - self.base.chart_dim
@@ -229,4 +228,5 @@ class ProductSpace(Space):
     def settings(self) -> dict[str, Any]:
         base = {"name": self.base.name, **self.base.settings()}
         beside = self.beside.settings()
-        return {"base": base, "axes": beside["axes"], "from_zero": beside["from_zero"]}
+        del beside["unit"]
+        return {"base": base, **beside}

@@ -14,8 +14,8 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import is_angular
+from orbiflow.density.spaces.axes import whole_turn
 from orbiflow.density.spaces.checked import checked_table
-from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.point_groups import rotation_group_name, rotations_of
 from orbiflow.density.spaces.round import UNIT_TOLERANCE, refuse_rows, to_unit
 from orbiflow.density.spaces.unit_vectors import UnitVectorSpace

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import Role
+from orbiflow.density.spaces.axes import Axis
 from orbiflow.density.spaces.frame import Frame, frame_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import as_choice, as_tensor, as_whole, is_a
@@ -78,6 +79,7 @@ class Space(ABC):
     - `has_square`: Whether the domain is the unit cube, with the site (1/2, ..., 1/2).
     - `has_chart`: Whether chart points are in R^d. On spheres of any dimension they are unit vectors
       (`UnitVectorSpace`).
+    - `axes`: The circles and lines of a torus, otherwise none.
     - `parts`: The spaces of a product, otherwise none.
 
     Spaces of the same class, settings and group are equal.
@@ -91,6 +93,7 @@ class Space(ABC):
     is_round: ClassVar[bool] = False
     has_square: ClassVar[bool] = False
     has_chart: ClassVar[bool] = True
+    axes: tuple[Axis, ...] = ()
     parts: tuple[Space, ...] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -133,6 +136,11 @@ class Space(ABC):
     def is_surface(self) -> bool:
         """Whether the square, its edges glued, is a surface that can be turned and flowed on."""
         return self.is_planar
+
+    @property
+    def is_of_angles(self) -> bool:
+        """Whether it is a torus whose columns are all angles."""
+        return False
 
     @property
     def dimensions(self) -> str:
@@ -440,8 +448,8 @@ def make_space(name: str, **options: Any) -> Space:
 
     The name may also be that of a group (`orbiflow.symmetry.group_by_name`), with its `cell`.
 
-    >>> make_space("torus", dim=2, unit="degrees")
-    Torus(dim=2, unit='degrees')
+    >>> make_space("torus", axes=2, unit="degrees")
+    Torus(axes=2, unit='degrees')
     >>> make_space("hantzsche-wendt").dim
     3
     """
