@@ -18,7 +18,7 @@ ONE = torch.ones(1, dtype=torch.float64)
 def von_mises(turns: float, kappa: float) -> AdaptiveKernels:
     """A von Mises distribution of one angle."""
     space = make_space("torus", axes=1)
-    return AdaptiveKernels(space, torch.tensor([[turns]]).double(), kappa * ONE[:, None], ONE)
+    return AdaptiveKernels(space, turns * ONE[None], kappa * ONE[:, None], ONE)
 
 
 @pytest.fixture(scope="module", name="pair")
@@ -33,10 +33,10 @@ def test_masses_of_a_von_mises_distribution(turns: float, kappa: float, at: floa
     density = von_mises(turns, kappa)
     away = 2 * np.pi * ((at - turns + 0.5) % 1 - 0.5)  # the circle is cut opposite the mean
     true = stats.vonmises.cdf(away, kappa)
-    found = density.cdf(torch.tensor([[at]]).double())
+    found = density.cdf(at * ONE[None])
     assert float(found[0]) == pytest.approx(true, abs=1e-7)
     back = float(density.icdf(found)[0, 0])
-    again = float(density.cdf(torch.tensor([[back]]).double())[0])
+    again = float(density.cdf(back * ONE[None])[0])
     assert (again - true + 0.5) % 1 - 0.5 == pytest.approx(0, abs=1e-7)  # both ends are one place
     apart = (float(density.mean[0]) - turns + 0.5) % 1 - 0.5
     assert abs(apart) < 1e-6

@@ -42,6 +42,10 @@ def test_turns_and_values_are_inverse(line: Line, shares: list[float]) -> None:
     np.testing.assert_allclose(np.log(slope[:, 0]), space.log_area(turns), atol=1e-4)
 
 
+def test_even_values_of_large_numbers_keep_their_digits() -> None:
+    assert np.ptp(Line(1.7e9, 2.5).even(9)) == pytest.approx(8)
+
+
 @pytest.mark.parametrize("role", TRUE)
 def test_densities_are_near_the_truth_and_end_where_columns_do(role: str) -> None:
     true, bound = TRUE[role]

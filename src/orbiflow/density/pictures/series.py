@@ -99,7 +99,7 @@ def series_picture(
     pixels = ground.pixels(PIXELS[ground.outline is not None])
     parts: list[Density] = []
     for value in along.values:
-        turns = space.beside.axes[axis - len(base)].turns(torch.tensor(value).double())
+        turns = space.beside.axes[axis - len(base)].turns(torch.tensor(value, dtype=torch.float64))
         parts.append(conditional(density, {axis: float(turns)}, base))
     tables = [density_over(part, pixels.points, settings.measure, pixels.side) for part in parts]
     areas = None if pixels.areas is None else pixels.areas[pixels.within]

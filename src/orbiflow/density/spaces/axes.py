@@ -200,8 +200,8 @@ class Line(NamedTuple):
         """
         deviation = self.scale / SCALES
         above = 2 if self.kind == "positive" and deviation > WIDE else 4
-        ends = torch.tensor([self.centre - 4 * deviation, self.centre + above * deviation])
-        low, high = (float(end) for end in self.value_at(ends.double()))
+        ends = [self.centre - 4 * deviation, self.centre + above * deviation]
+        low, high = self.value_at(torch.tensor(ends, dtype=torch.float64)).tolist()
         return np.linspace(low, high, count)
 
     def along(self, values: Tensor) -> Tensor:
