@@ -201,7 +201,7 @@ class Line(NamedTuple):
         deviation = self.scale / SCALES
         above = 2 if self.kind == "positive" and deviation > WIDE else 4
         ends = [self.centre - 4 * deviation, self.centre + above * deviation]
-        low, high = self.value_at(torch.tensor(ends, dtype=torch.float64)).tolist()
+        low, high = map(float, self.value_at(torch.tensor(ends, dtype=torch.float64)))
         return np.linspace(low, high, count)
 
     def along(self, values: Tensor) -> Tensor:
