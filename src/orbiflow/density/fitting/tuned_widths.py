@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import torch
@@ -20,8 +21,14 @@ MOST_ROWS, MOST_ASKED, MOST_ENTRIES = 4_000, 400, 20_000_000
 STARTS = (3.0, 6.0)
 """Logarithms of the concentrations at which the search begins."""
 
-STEPS = 150
+STEPS = 30
 """Steps of the search for each start, at most."""
+
+LEAST_CONCENTRATION, OUT_OF_REACH = 1e-2, 1e9
+"""The least concentration, and a squared distance at which no kernel has any mass."""
+
+DIFFERENCE = 1e-4
+"""Step, in logarithms of concentrations, by which slopes of kernels' peaks are found."""
 
 
 def width_groups(space: Space) -> list[int]:
@@ -45,30 +52,44 @@ def tuned_concentrations(space: Space, rows: Rows, narrowest: float) -> Tensor |
     for which there is a ladder.
     """
     groups = width_groups(space)
-    used = sorted(set(groups))
-    if len(used) < 2:
+    groups = np.unique(groups, return_inverse=True)[1].tolist()  # from 0, without gaps
+    if max(groups) == 0:
         return None
-    points = rows.points[:MOST_ROWS]
-    images = by_sphere(space.features(points), len(groups))
-    entries = images.shape[0] * len(points) * len(groups)
-    count = min(len(points), max(20, min(MOST_ASKED, MOST_ENTRIES // entries)))
-    asked = images[0, :count]
-    away = torch.stack([((own[None] - asked[:, None]) ** 2).sum(dim=2) / 2 for own in images])
-    own = torch.arange(count)
-    away[:, own, own] = math.inf
-    where = [used.index(group) for group in groups]
+    away, where = _distances(space, rows.points[:MOST_ROWS], len(groups)), torch.tensor(groups)
+    bounds = math.log(LEAST_CONCENTRATION), math.log(narrowest)
+    count = len(set(groups))
 
-    def loss(logs: Array) -> float:
-        kappa = torch.tensor(np.exp(logs))[where].clamp(1e-2, narrowest)
-        table = -(away @ kappa)
-        likely = table.logsumexp(dim=(0, 2)).clamp_min(-1e4).mean() + kernel_peaks(
-            space, kappa[None]
-        )
-        return -float(likely)
+    def loss(logs: Array) -> tuple[float, Array]:
+        kappa = torch.tensor(np.exp(logs))[where]
+        table = away @ -kappa.float()
+        top = table.amax(dim=1, keepdim=True)
+        shares = table.sub_(top).exp_()
+        total = shares.sum(dim=1, keepdim=True)
+        likely = float((total.log() + top).double().mean())
+        # by each concentration's logarithm: of the sums, and of the peaks by differences
+        slopes = -kappa * ((shares / total).flatten() @ away.flatten(0, 1)).double() / len(away)
+        steps = torch.cat([torch.zeros(1, count), torch.eye(count), -torch.eye(count)]).double()
+        peaks = kernel_peaks(space, kappa * (DIFFERENCE * steps[:, where]).exp()).numpy()
+        gradient = np.bincount(groups, slopes.numpy(), count)
+        gradient += (peaks[1 : 1 + count] - peaks[1 + count :]) / (2 * DIFFERENCE)
+        return -likely - float(peaks[0]), -gradient
 
-    found = [
-        minimize(loss, np.full(len(used), start), method="Nelder-Mead", options={"maxiter": STEPS})
-        for start in STARTS
-    ]
+    starts = (np.full(count, start).clip(*bounds) for start in STARTS)
+    how: dict[str, Any] = {"jac": True, "method": "L-BFGS-B", "bounds": [bounds] * count}
+    found = [minimize(loss, start, options={"maxiter": STEPS}, **how) for start in starts]
     best = min(found, key=lambda one: float(one.fun))
-    return torch.tensor(np.exp(best.x))[where].clamp(1e-2, narrowest)
+    return torch.tensor(np.exp(best.x))[where]
+
+
+def _distances(space: Space, points: Tensor, spheres: int) -> Tensor:
+    """Return halves of squared distances (n, E N, F), on each sphere, from points to others' images.
+
+    They are those of a few points; the points themselves are out of reach.
+    """
+    images = by_sphere(space.features(points), spheres)
+    entries = images.shape[0] * len(points) * spheres
+    count = min(len(points), max(20, min(MOST_ASKED, MOST_ENTRIES // entries)))
+    asked, row = images[0, :count], torch.arange(count)
+    away = torch.stack([((asked[:, None] - image) ** 2).sum(dim=2) / 2 for image in images], dim=1)
+    away[row, :, row] = OUT_OF_REACH
+    return away.flatten(1, 2).float()
