@@ -56,16 +56,16 @@ TOPICS = {
         "highest_density_region DensityLevels outlines "
     ),
     "Comparing densities, and data": (
-        "compare_models compare_scores compare_samples named_tests ComparisonSettings cross_validate "
-        "cross_validation_folds summarize_angles summarize_directions summarize_axes "
-        "summarize_orientations "
+        "compare_models compare_scores compare_samples named_tests ComparisonSettings "
+        "DataComparisonSettings NamedTestSettings cross_validate cross_validation_folds "
+        "summarize_angles summarize_directions summarize_axes summarize_orientations "
     ),
     "Figures": (
         "Sheet PlotSettings plot_density density_picture flow_picture samples_picture "
         "corner_picture pdf_pages "
     ),
     "Running, saving and loading": (
-        "load save open_project CallProcess find Cancel Progress Note Finished "
+        "load save to_json open_project CallProcess find Cancel Progress Note Finished "
     ),
     "Errors and warnings": (
         "OrbiflowError SettingError InputFileError OutputError CertificationError DataWarning "

@@ -7,6 +7,8 @@ from .density.comparing.paired import compare_models as compare_models
 from .density.comparing.paired import compare_scores as compare_scores
 from .density.comparing.resampling import cross_validation_folds as cross_validation_folds
 from .density.comparing.settings import ComparisonSettings as ComparisonSettings
+from .density.comparing.settings import DataComparisonSettings as DataComparisonSettings
+from .density.comparing.settings import NamedTestSettings as NamedTestSettings
 from .density.conditional_estimator import AngleRegressor as AngleRegressor
 from .density.conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .density.cross_validation.operations import cross_validate as cross_validate
@@ -59,6 +61,7 @@ from .flows.storage import save_flow as save_flow
 from .loading import load as load
 from .loading import save as save
 from .runtime.call_process import CallProcess as CallProcess
+from .runtime.codec import to_json as to_json
 from .runtime.events import Cancel as Cancel
 from .runtime.events import Finished as Finished
 from .runtime.events import Note as Note

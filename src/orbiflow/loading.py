@@ -13,15 +13,23 @@ from orbiflow.density import (
     REPORT,
     ConditionalEstimator,
     DensityEstimator,
+    FitReport,
     conditional_to_bytes,
     density_to_bytes,
     read_conditional,
     read_density,
-    report_from_json,
     written_files,
 )
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
-from orbiflow.runtime import ResultFolder, is_list, read_json, write_atomic, write_json
+from orbiflow.runtime import (
+    ResultFolder,
+    from_json,
+    is_list,
+    read_json,
+    to_json,
+    write_atomic,
+    write_json,
+)
 from orbiflow.settings import as_path
 from orbiflow.solids import SOLID, SOLIDS, EscherSolid, read_run, read_solid
 from orbiflow.tiles import (
@@ -157,7 +165,7 @@ def _save_estimator(estimator: DensityEstimator, path: Path) -> Path:
     document: dict[str, Any] = {
         "space": {"name": space.name, **space.settings()},
         "columns": columns,
-        "report": {"error": estimator.density_.error} if report is None else report.to_json(),
+        "report": {"error": estimator.density_.error} if report is None else to_json(report),
     }
     if report is not None:
         document["settings"] = {name: getattr(estimator, name) for name in _SETTINGS}
@@ -180,7 +188,7 @@ def _estimator(path: Path) -> DensityEstimator:
     document = read_json(beside, "a report") if file.name == MODEL and beside.is_file() else {}
     try:
         if "settings" in document:  # a marginal or a conditional was not fitted
-            report = report_from_json(document["report"])
+            report = from_json(FitReport, document["report"], "report")
             given = dict(document["settings"])
             settings = {name: given[name] for name in _SETTINGS}
         if unit := density.space.settings().get("unit"):

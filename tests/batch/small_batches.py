@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orbiflow.batch import Answer, Executor, Parcel, dask_cluster, executors
+from orbiflow.batch import Executor, Parcel, WorkerReply, dask_cluster, executors
 from orbiflow.batch import parcels as parcels_module
 from orbiflow.batch.parcels import carry_out
 from orbiflow.runtime import Call, Cancel, Event, Failed, Finished, Sink, find
@@ -60,7 +60,7 @@ class Here(Executor):
         parcels: Iterable[Parcel],
         tell: Sink,  # noqa: ARG002
         cancel: Cancel,
-    ) -> Generator[Answer, None, None]:
+    ) -> Generator[WorkerReply, None, None]:
         for parcel in parcels:
             if cancel.cancelled:
                 return
@@ -69,7 +69,7 @@ class Here(Executor):
             if "shown_out" in order["call"]:
                 order["call"]["shown_out"] = "out"  # for all tests, so that pages are the same
             found = _carried_out(json.dumps(order), parcel.data, parcels_module.MOST_WRITTEN)
-            yield Answer.from_worker(parcel.key, *found)
+            yield WorkerReply.from_worker(parcel.key, *found)
 
 
 @cache
@@ -142,6 +142,6 @@ def endless(_header: str, _data: bytes) -> tuple[str, dict[str, bytes]]:
     return "", {}
 
 
-def state_of(answer: Answer) -> str:
+def state_of(answer: WorkerReply) -> str:
     """In a word."""
     return answer.end.failure if isinstance(answer.end, Failed) else answer.end.state

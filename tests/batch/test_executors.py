@@ -29,10 +29,10 @@ from batch.small_batches import (
 )
 from orbiflow import __version__
 from orbiflow.batch import (
-    Answer,
     Executor,
     LocalProcesses,
     Parcel,
+    WorkerReply,
     dask_cluster,
     executors,
     parcels,
@@ -92,7 +92,7 @@ def parcels_of(*data: bytes) -> list[Parcel]:
 
 def answers(
     executor: Executor, sent: list[Parcel], events: list[Event] | None = None
-) -> dict[str, Answer]:
+) -> dict[str, WorkerReply]:
     tell = [].append if events is None else events.append
     with executor:
         return {answer.key: answer for answer in executor.answers(sent, tell, Cancel())}
@@ -228,7 +228,7 @@ def test_another_version_on_the_workers(monkeypatch: pytest.MonkeyPatch, cluster
     header = late.header().replace(f'"version": "{__version__}"', '"version": "999"')
     text, files = carry_out(header, late.data, Cancel())
     assert not files
-    end = Answer.from_worker("late", text, files).end
+    end = WorkerReply.from_worker("late", text, files).end
     assert isinstance(end, Failed)
     names(end.message, __version__, 999)
 
@@ -259,12 +259,12 @@ def test_what_could_not_connect_is_closed() -> None:
 def test_an_answer_cannot_write_elsewhere(name: str) -> None:
     text = '{"kind": "finished", "state": "done", "summary": {}}'
     with refused(repr(name)):
-        Answer.from_worker("key", text, {name: b""})
+        WorkerReply.from_worker("key", text, {name: b""})
 
 
 def test_an_answer_without_an_end() -> None:
     with refused():
-        Answer.from_worker("key", '{"kind": "note", "text": ""}', {})
+        WorkerReply.from_worker("key", '{"kind": "note", "text": ""}', {})
 
 
 @given(st.binary(max_size=200))
@@ -272,7 +272,7 @@ def test_whatever_the_bytes_are_there_is_an_answer(data: bytes) -> None:
     one = Parcel(
         "key", find("escherize").call({"image": "a.svg"}), "out", {"image": ("a.svg", data)}
     )
-    answer = Answer.from_worker("key", *carry_out(one.header(), one.data, Cancel()))
+    answer = WorkerReply.from_worker("key", *carry_out(one.header(), one.data, Cancel()))
     assert isinstance(answer.end, Failed)
     assert answer.end.failure == "mistake"
     assert "orbiflow-" not in answer.end.message  # the folder that it was in
@@ -299,6 +299,6 @@ def test_a_cancelled_parcel_says_so() -> None:
     cancel = Cancel()
     cancel.cancel()
     (one,) = boot_parcels(1)
-    answer = Answer.from_worker("key", *carry_out(one.header(), one.data, cancel))
+    answer = WorkerReply.from_worker("key", *carry_out(one.header(), one.data, cancel))
     assert isinstance(answer.end, Finished)
     assert answer.end.state == "cancelled"

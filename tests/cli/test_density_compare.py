@@ -115,24 +115,13 @@ def test_rows_that_a_model_was_fitted_to_are_known(folder: Path, orbiflow: Any) 
 
 def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
     flipped = write(folder / "b.csv", "psi,phi", angles(5, rows=60)[:, ::-1])
-    how = (
-        "--space",
-        "torus",
-        "--unit",
-        "degrees",
-        "--permutations",
-        99,
-        "--divergence",
-        "--bootstrap",
-        200,
-    )
-    done = orbiflow("density", "compare", "-d", folder / "good.csv", "-d", flipped, *how[:-3])
+    compare = ("density", "compare-data", "--space", "torus", "--unit", "degrees")
+    compare = (*compare, "--permutations", 99, "-d", folder / "good.csv", "-d")
+    done = orbiflow(*compare, flipped)
     assert done.status == 0, done.err
     out = folder / "d.csv"
-    done = orbiflow(
-        "density", "compare", "-d", folder / "good.csv", "-d", folder / "poor.csv", *how, "--out",
-        out,
-    )  # fmt: skip
+    how = ("--divergence", "--bootstrap", 200, "--out", out)
+    done = orbiflow(*compare, folder / "poor.csv", *how)
     names(done.out, "good", "poor")
     rows = {row["figure"]: row for row in table_of(out)}
     assert float(rows["p"]["value"]) == pytest.approx(0.01)
@@ -144,7 +133,7 @@ def test_groups_of_data_sets_are_no_columns_of_theirs(folder: Path, orbiflow: An
     for name, seed in (("x", 1), ("y", 2)):
         write(folder / f"{name}.csv", "station,phi,psi", angles(seed)[:18], labels)
     done = orbiflow(
-        "density", "compare", "-d", folder / "x.csv", "-d", folder / "y.csv",
+        "density", "compare-data", "-d", folder / "x.csv", "-d", folder / "y.csv",
         "--columns", "station=group", "--space", "torus", "--unit", "degrees",
         "--permutations", 49, "--out", folder / "xy.json",
     )  # fmt: skip
@@ -259,18 +248,18 @@ PAIR = ("compare", "-m", "good", "-m", "poor", "-d", "held.csv")
 MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
     "no group": ((*PAIR, "--columns", "who=group"), "who"),
     "weight": (
-        (*("compare", "-d", "good.csv", "-d", "odd.csv", "--space", "torus"), "--columns",
+        (*("compare-data", "-d", "good.csv", "-d", "odd.csv", "--space", "torus"), "--columns",
          "phi=angle:degrees,2=weight"),
         "--columns weight",
     ),
     "no file": ((*PAIR[:-1], "none.csv"), "none"),
     "no model": (("compare", "-m", "good", "-m", "nope", "-d", "held.csv"), "nope"),
     "other columns": (
-        ("compare", "-d", "good.csv", "-d", "odd.csv", "--space", "torus", "--unit", "degrees"),
+        ("compare-data", "-d", "good.csv", "-d", "odd.csv", "--space", "torus", "--unit", "degrees"),
         "good phi, psi odd phi, chi --columns",
     ),
     "no unit": (
-        ("compare", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"),
+        ("compare-data", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"),
         "phi=angle:degrees,psi=angle:degrees",
     ),
     "place": (("region", "-m", "good", "-o", "none/r.json"), "none"),
@@ -290,7 +279,7 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
     places = np.random.default_rng(0).uniform(0, 10, (80, 2))
     one = write(tmp_path / "one.csv", "x,y", places[:40])
     other = write(tmp_path / "other.csv", "x,y", places[40:])
-    command = ("density", "compare", "-d", one, "-d", other, "--permutations", 19, "--space")
+    command = ("density", "compare-data", "-d", one, "-d", other, "--permutations", 19, "--space")
     done = orbiflow(*command, "4*2", "--cell", "10,10")
     assert done.status == 0, done.err
     assert "no cell was given" not in done.out

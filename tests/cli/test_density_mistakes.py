@@ -58,8 +58,8 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
         ),
         ("plot -m model3 --regions 0.5", "--regions 3"),
         ("plot -m model2 --data gaps.csv", "--drop-missing"),
-        ("compare -d places.csv -d beyond.csv --space sphere", "beyond 95 90 lat 30"),
-        ("compare -d two.csv -d gaps.csv --space torus --unit radians", "--drop-missing"),
+        ("compare-data -d places.csv -d beyond.csv --space sphere", "beyond 95 90 lat 30"),
+        ("compare-data -d two.csv -d gaps.csv --space torus --unit radians", "--drop-missing"),
     ],
 )
 def test_mistakes(words: str, about: str, folder: Path, orbiflow) -> None:
@@ -67,7 +67,7 @@ def test_mistakes(words: str, about: str, folder: Path, orbiflow) -> None:
         str(folder / word) if (folder / word).exists() else word for word in words.split()
     )
     before = sorted(folder.rglob("*"))
-    out = () if command == "compare" else ("--out", folder / "out")
+    out = () if command == "compare-data" else ("--out", folder / "out")
     done = orbiflow("density", command, *options, *out)
     assert done.status == 2, done.out
     names(done.err, *about.split())

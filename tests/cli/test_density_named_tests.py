@@ -1,4 +1,4 @@
-"""`density compare --tests` and `--by`: tests by name of several tables, or of parts of one."""
+"""`density test`: tests by name of several tables, or of parts of one."""
 
 import csv
 import json
@@ -31,7 +31,7 @@ FEW = ("--permutations", "99")
 @pytest.mark.usefixtures("folder")
 def test_tables_and_parts_of_one_give_the_same(orbiflow) -> None:
     tables = ("-d", "a.csv", "-d", "b.csv", "-d", "c.csv")
-    done = orbiflow("density", "compare", *tables, *HOW, *FEW, "--out", "t.json")
+    done = orbiflow("density", "test", *tables, *HOW, *FEW, "--out", "t.json")
     assert done.status == 0, done.err
     found = json.loads(Path("t.json").read_text())
     by_name = {(one["name"], one["column"]): one for one in found["tests"]}
@@ -40,7 +40,7 @@ def test_tables_and_parts_of_one_give_the_same(orbiflow) -> None:
     assert ("kuiper", "phi") not in by_name  # it is of two samples
     names(done.out, "watson-williams", "Fisher, 1993")
     done = orbiflow(
-        "density", "compare", "-d", "all.csv", "--by", "kind", *HOW, *FEW, "--out", "u.json"
+        "density", "test", "-d", "all.csv", "--by", "kind", *HOW, *FEW, "--out", "u.json"
     )
     assert done.status == 0, done.err
     assert json.loads(Path("u.json").read_text())["tests"] == found["tests"]
@@ -48,7 +48,7 @@ def test_tables_and_parts_of_one_give_the_same(orbiflow) -> None:
 
 @pytest.mark.usefixtures("folder")
 def test_some_tests_of_two_tables_as_csv(orbiflow) -> None:
-    call = ("density", "compare", "-d", "a.csv", "-d", "b.csv", *HOW, *FEW)
+    call = ("density", "test", "-d", "a.csv", "-d", "b.csv", *HOW, *FEW)
     done = orbiflow(*call, "--tests", "kuiper,common-median", "--out", "t.csv")
     assert done.status == 0, done.err
     rows = list(csv.DictReader(Path("t.csv").read_text().splitlines()))
@@ -67,14 +67,14 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
     for kind in "ab":
         own = [lines[0], *(line for line in lines if line.startswith(kind))]
         Path(f"{kind}.csv").write_text("\n".join(own))
-    how = (*HOW, "--permutations", "199", "--tests", "all", "--columns")
+    how = (*HOW, "--permutations", "199", "--columns")
     found = {}
     for name, options in {
         "rows": ("phi", "-d", "nests.csv", "--by", "kind"),
         "groups": ("phi,nest=group", "-d", "nests.csv", "--by", "kind"),
         "files": ("phi,nest=group", "-d", "a.csv", "-d", "b.csv"),
     }.items():
-        done = orbiflow("density", "compare", *how, *options, "--out", f"{name}.json")
+        done = orbiflow("density", "test", *how, *options, "--out", f"{name}.json")
         assert done.status == 0, done.err
         found[name] = json.loads(Path(f"{name}.json").read_text())["tests"]
     assert min(one["p"] for one in found["rows"]) < 0.01
@@ -85,7 +85,7 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
     )
     assert [one["p"] for one in found["files"]] == [one["p"] for one in found["groups"]]
     names(done.out, 24)
-    done = orbiflow("density", "compare", *how, "phi,nest=group", "-d", "a.csv", "-d", "nests.csv")
+    done = orbiflow("density", "test", *how, "phi,nest=group", "-d", "a.csv", "-d", "nests.csv")
     names(done.err, "a and nests")
 
 
@@ -99,11 +99,10 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
         (("-d", "all.csv", *HOW, "--by", "phi"), "--by 2 50"),
         (("-d", "all.csv", *HOW, "--by", "name"), "name"),
         (("-d", "all.csv", *HOW, "--by", "kind", "--columns", "kind=group"), "1"),
-        (("-d", "all.csv", "--by", "kind"), "--space"),
         (("-d", "a.csv", *HOW), "--data"),
     ],
 )
 def test_mistakes(options: tuple[str, ...], about: str, orbiflow) -> None:
-    done = orbiflow("density", "compare", *options)
+    done = orbiflow("density", "test", *options)
     assert done.status == 2
     names(done.err, *about.split())

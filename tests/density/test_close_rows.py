@@ -68,8 +68,8 @@ def test_regions_of_a_town_are_outlined(apart: float, wide: float) -> None:
     fit = DensityEstimator("sphere", components=("kernels",)).fit(rows)
     levels = DensityLevels(fit, samples=8000)
     (outline,) = outlines(levels, [levels.highest(0.6)])
-    assert outline.mass == pytest.approx(0.6, abs=0.03)
-    assert outline.size == pytest.approx(outline.region.size, rel=0.1)
+    assert outline.polygons_mass == pytest.approx(0.6, abs=0.03)
+    assert outline.polygons_size == pytest.approx(outline.size, rel=0.1)
     assert not outline.notes
     west, south, east, north = np.radians(outline.shape.bounds) * EARTH
     assert (north - south) < 6 * wide

@@ -19,6 +19,7 @@ from orbiflow.density import (
     make_space,
 )
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
+from orbiflow.runtime import to_json
 from refusals import refused
 
 seeds = st.integers(0, 2**31)
@@ -145,7 +146,7 @@ def test_the_best_is_named_only_if_it_beats_all() -> None:
     assert clear.best == "a"
     assert clear.verdict == "a is better than d and c"
     assert [s.name for s in clear.scores] == ["a", "d", "c"]
-    assert json.loads(json.dumps(clear.to_json(), allow_nan=False))["best"] == "a"
+    assert json.loads(json.dumps(to_json(clear), allow_nan=False))["best"] == "a"
 
 
 def test_equal_models_and_a_single_row_of_difference() -> None:
@@ -159,7 +160,7 @@ def test_equal_models_and_a_single_row_of_difference() -> None:
     one[7] += 100
     found = compare_scores({"a": one, "b": base})
     assert found.best is None
-    json.dumps(found.to_json(), allow_nan=False)
+    json.dumps(to_json(found), allow_nan=False)
     always = compare_scores({"a": base + 0.25, "b": base})
     assert always.best == "a"
 

@@ -9,9 +9,10 @@ import pytest
 
 from orbiflow.density import (
     AngleRegressor,
-    ComparisonSettings,
     ConditionalEstimator,
+    DataComparisonSettings,
     DensityEstimator,
+    NamedTestSettings,
     RotationSpace,
     compare_models,
     compare_samples,
@@ -80,9 +81,12 @@ def sampled(weights: Any, groups: Any) -> Any:
     del weights
     other = pandas.Series([f"o{k}" for k in groups], groups.index)
     samples, labels = {"a": ANGLES[["phi"]], "b": ANGLES[["psi"]]}, {"a": groups, "b": other}
-    quick = ComparisonSettings(permutations=99)
-    how: Any = {"unit": "degrees", "groups": labels, "settings": quick}
-    return compare_samples(samples, **how), named_tests(samples, **how)
+    samples["b"] = samples["b"].set_axis(["phi"], axis=1)
+    how: Any = {"unit": "degrees", "groups": labels}
+    return (
+        compare_samples(samples, settings=DataComparisonSettings(permutations=99), **how),
+        named_tests(samples, settings=NamedTestSettings(permutations=99), **how),
+    )
 
 
 CALLS = [summarized, fitted, fitted_in_the_chart, compared, sampled]

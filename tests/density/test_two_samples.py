@@ -12,8 +12,9 @@ import torch
 from scipy.stats import binom, vonmises
 
 from orbiflow.density import (
-    ComparisonSettings,
+    DataComparisonSettings,
     DensityEstimator,
+    NamedTestSettings,
     Sphere,
     compare_models,
     compare_samples,
@@ -22,6 +23,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.comparing import RowSketch, mmd_test
 from orbiflow.density.comparing.resampling import Groups, chosen_rows
+from orbiflow.runtime import from_json, to_json
 from refusals import refused
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -164,7 +166,7 @@ def test_divergences_are_near_those_of_the_densities() -> None:
     other = rng.vonmises([0.0, shift], kappa, (rows, 2))
     found = compare_samples(
         {"a": one, "b": other},
-        settings=ComparisonSettings(permutations=99, bootstrap=300, divergence=True),
+        settings=DataComparisonSettings(permutations=99, bootstrap=300, divergence=True),
     ).divergence
     assert found is not None
     t = (np.arange(4000) + 0.5) / 4000 * 2 * math.pi - math.pi
@@ -184,7 +186,7 @@ def test_data_far_apart_and_few_rows() -> None:
     rng = np.random.default_rng(1)
     far = compare_samples(
         {"a": rng.vonmises(0, 50, (60, 2)), "b": rng.vonmises(3, 50, (60, 2))},
-        settings=ComparisonSettings(bootstrap=100, divergence=True),
+        settings=DataComparisonSettings(bootstrap=100, divergence=True),
     )
     assert far.differ
     assert far.divergence is not None
@@ -192,13 +194,15 @@ def test_data_far_apart_and_few_rows() -> None:
     assert far.divergence.accuracy.value > 0.98
     few = compare_samples(
         {"a": rng.vonmises(0, 1, (8, 2)), "b": rng.vonmises(0, 1, (9, 2))},
-        settings=ComparisonSettings(divergence=True),
+        settings=DataComparisonSettings(divergence=True),
     )
     assert few.divergence is None
     assert any("not estimated" in note for note in few.notes)
-    assert json.loads(json.dumps(few.to_json(), allow_nan=False))["divergence"] is None
+    assert json.loads(json.dumps(to_json(few), allow_nan=False))["divergence"] is None
     same = rng.vonmises(0, 1, (30, 2))
-    alike = compare_samples({"a": same, "b": same}, settings=ComparisonSettings(permutations=99))
+    alike = compare_samples(
+        {"a": same, "b": same}, settings=DataComparisonSettings(permutations=99)
+    )
     assert (alike.differ, alike.divergence, alike.notes) == (False, None, ())  # nobody asked
 
 
@@ -214,7 +218,7 @@ def test_data_far_apart_and_few_rows() -> None:
         (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1], "b": [2]}), "rows 20"),
         (
             lambda a: compare_samples(
-                {"a": a, "b": a}, settings=ComparisonSettings(permutations=3)
+                {"a": a, "b": a}, settings=DataComparisonSettings(permutations=3)
             ),
             "permutations",
         ),
@@ -238,13 +242,28 @@ def test_what_columns_declare_of_rows_counts(test: Any) -> None:
     }
     angles = {name: own[:, :1] for name, own in rows.items()}
     labels = {name: own[:, 1] for name, own in rows.items()}
-    how = {"settings": ComparisonSettings(permutations=99)}
+    kind = DataComparisonSettings if test is compare_samples else NamedTestSettings
+    how = {"settings": kind(permutations=99)}
     declared = test(rows, columns="phi=angle,nest=group", **how)
     assert declared == test(angles, columns="phi=angle", groups=labels, **how)
     with refused("group", "groups"):
         test(rows, columns="phi=angle,nest=group", groups=labels)
     with refused("weight", "ignore"):
         test(rows, columns="phi=angle,nest=weight")
+
+
+@pytest.mark.parametrize("test", [compare_samples, named_tests])
+def test_columns_of_data_sets_are_found_by_name(test: Any) -> None:
+    pandas = pytest.importorskip("pandas")
+    rng = np.random.default_rng(0)
+    first, second = (
+        pandas.DataFrame(rng.vonmises([0, 2], 4, (30, 2)), columns=["phi_rad", "psi_rad"])
+        for _ in "ab"
+    )
+    mixed = second[["psi_rad", "phi_rad"]]
+    assert test({"a": first, "b": second}) == test({"a": first, "b": mixed})
+    with refused("a{}", "b", "psi_rad", "chi_rad", "columns"):
+        test({"a{}": first, "b": second.rename(columns={"psi_rad": "chi_rad"})})
 
 
 def test_models_find_columns_of_frames_by_name() -> None:
@@ -263,7 +282,7 @@ def test_models_find_columns_of_frames_by_name() -> None:
 def test_rows_are_known_again_however_they_are_written(name: str) -> None:
     rng = np.random.default_rng(0)
     space, data = make_space(name), rng.uniform(-1, 1, (5000, 2)).round(4)
-    sketch = RowSketch.from_json(json.loads(json.dumps(RowSketch.of(space, data).to_json())))
+    sketch = from_json(RowSketch, json.loads(json.dumps(to_json(RowSketch.of(space, data)))))
     new = rng.uniform(-1, 1, (3000, 2))
     known, looked_up = sketch.known(space, np.concatenate([data[:1000], new]))
     assert 0.3 * 4000 < looked_up < 0.5 * 4000
@@ -282,7 +301,6 @@ def test_directions_are_known_in_another_form_and_frame() -> None:
     other = Sphere(form="vector", rotation=turn)
     vectors = Sphere(form="vector").from_chart(Sphere().to_chart(data))
     assert sketch.known(other, vectors)[0] >= 0.99 * 500
-    with refused("sketch"):
-        RowSketch.from_json({"rows": 3, "whole": True, "hashes": [3, 2]})
-    with refused("sketch"):
-        RowSketch.from_json([])
+    for hashes in ([3, 2], [], [-1], [2**53], [0.5]):
+        with refused("hashes"):
+            from_json(RowSketch, {"rows": 3, "whole": True, "hashes": hashes})

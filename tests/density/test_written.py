@@ -113,7 +113,7 @@ def test_regions_are_written_as_the_data_and_geojson_as_its_standard_says(
         low, _, high, _ = one.shape.bounds
         first = 0 if from_zero else -180
         assert first <= low < high <= first + 360
-        assert one.mass == pytest.approx(0.9, abs=0.02)
+        assert one.polygons_mass == pytest.approx(0.9, abs=0.02)
         found.append([one, geometry(to_geojson([one])["features"][0]["geometry"])])
     (_, known), (one, shape) = found
     assert shape.is_valid

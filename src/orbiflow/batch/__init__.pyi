@@ -7,10 +7,9 @@ from .folder import Entry as Entry
 from .folder import Kind as Kind
 from .folder import Matrix as Matrix
 from .folder import Summary as Summary
-from .folder import csv_bytes as csv_bytes
-from .parcels import Answer as Answer
 from .parcels import Executor as Executor
 from .parcels import Parcel as Parcel
+from .parcels import WorkerReply as WorkerReply
 from .work import PAIRED as PAIRED
 from .work import Item as Item
 from .work import run_files as run_files

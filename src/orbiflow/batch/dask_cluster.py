@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any, Self, TypeAlias
 
 from orbiflow import __version__
-from orbiflow.batch.parcels import Answer, Executor, Parcel, carry_out
+from orbiflow.batch.parcels import Executor, Parcel, WorkerReply, carry_out
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Note, Polled, Sink, one_thread
 from orbiflow.settings import naming_extras
@@ -89,7 +89,7 @@ class DaskCluster(Executor):
 
     def answers(
         self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
-    ) -> Generator[Answer, None, None]:
+    ) -> Generator[WorkerReply, None, None]:
         """Yield an answer for each parcel; no more are out than the workers have threads."""
         out = _Out(self._working(), self.address, tell)
         waiting, suspects = iter(parcels), list[Parcel]()
@@ -115,14 +115,14 @@ class DaskCluster(Executor):
         finally:
             out.recall()
 
-    def _answer(self, one: _Sent, alone: bool) -> Answer | None:
+    def _answer(self, one: _Sent, alone: bool) -> WorkerReply | None:
         """The answer that came, or None for a parcel that is only suspected of killing workers."""
         from distributed import KilledWorker
 
         try:
             result = one.result.result()
         except KilledWorker as error:
-            died = Answer.died(one.parcel.key, error.allowed_failures + 1)
+            died = WorkerReply.died(one.parcel.key, error.allowed_failures + 1)
             return died if alone else None
         except (OSError, concurrent.futures.CancelledError) as error:
             raise OrbiflowError(
@@ -135,7 +135,7 @@ class DaskCluster(Executor):
                 "same orbiflow installed there?"
             ) from error
         one.future.release()
-        return Answer.from_worker(one.parcel.key, *result)
+        return WorkerReply.from_worker(one.parcel.key, *result)
 
     def _check_workers(self, client: Client) -> None:
         try:

@@ -8,7 +8,7 @@ from contextlib import closing
 from importlib import import_module
 from typing import Annotated, Any
 
-from orbiflow.batch.parcels import Answer, Executor, Parcel, carry_out
+from orbiflow.batch.parcels import Executor, Parcel, WorkerReply, carry_out
 from orbiflow.errors import SettingError
 from orbiflow.runtime import Cancel, Note, Sink, process_context, work
 from orbiflow.settings import DefaultText, NotWith, Range, Settings
@@ -54,7 +54,7 @@ class LocalProcesses(Executor):
 
     def answers(
         self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
-    ) -> Generator[Answer, None, None]:
+    ) -> Generator[WorkerReply, None, None]:
         keys: list[str] = []
 
         def orders() -> Iterator[tuple[str, bytes]]:
@@ -75,9 +75,9 @@ class LocalProcesses(Executor):
                     tell(
                         Note(f"{MAX_DEATHS} processes died of {keys[news.index]}; the others go on")
                     )
-                    yield Answer.died(keys[news.index], MAX_DEATHS)
+                    yield WorkerReply.died(keys[news.index], MAX_DEATHS)
                 elif news.done:
-                    yield Answer.from_worker(keys[news.index], *news.value)
+                    yield WorkerReply.from_worker(keys[news.index], *news.value)
 
 
 def executor_for(settings: WorkSettings, count: int, preload: Sequence[str]) -> Executor:

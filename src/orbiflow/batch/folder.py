@@ -7,12 +7,11 @@ again. A line that was cut short is ignored.
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
@@ -24,6 +23,7 @@ from orbiflow.errors import OrbiflowError, OutputError, system_errors
 from orbiflow.runtime import (
     LITTER,
     ResultFolder,
+    csv_bytes,
     is_object,
     make_folder,
     stays_inside,
@@ -217,13 +217,6 @@ class ContactSheet:
         )
         table = csv_bytes(heads, (list(_row(entry, names)) for entry in entries))
         return {TABLE: table, PAGE: page.encode("utf-8", "replace")}
-
-
-def csv_bytes(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
-    """Return a CSV as UTF-8."""
-    text = io.StringIO(newline="")
-    csv.writer(text, lineterminator="\n").writerows([heads, *rows])
-    return text.getvalue().encode("utf-8", "replace")
 
 
 def _row(entry: Entry, names: Sequence[str]) -> Iterator[Any]:

@@ -63,7 +63,7 @@ class Parcel:
 
 
 @dataclass(frozen=True)
-class Answer:
+class WorkerReply:
     """What came of a parcel.
 
     - `key`: The parcel's key.
@@ -76,7 +76,7 @@ class Answer:
     files: Mapping[str, bytes]
 
     @classmethod
-    def from_worker(cls, key: str, text: str, files: Mapping[str, bytes]) -> Answer:
+    def from_worker(cls, key: str, text: str, files: Mapping[str, bytes]) -> WorkerReply:
         """Return the answer that a worker gave in `carry_out`.
 
         Raises `OrbiflowError` if it is none, or has a file that would be written elsewhere.
@@ -90,7 +90,7 @@ class Answer:
         return cls(key, end, files)
 
     @classmethod
-    def died(cls, key: str, times: int) -> Answer:
+    def died(cls, key: str, times: int) -> WorkerReply:
         """Return the answer of a parcel that killed so many workers."""
         message = (
             f"{times} workers died while they were at it: was memory short? A simpler file may do"
@@ -119,7 +119,7 @@ class Executor(ABC):
     @abstractmethod
     def answers(
         self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
-    ) -> Generator[Answer, None, None]:
+    ) -> Generator[WorkerReply, None, None]:
         """Yield an answer for each parcel, as they come, in this thread.
 
         If a worker dies, another does its work again. A parcel that several workers die of is answered
@@ -139,7 +139,7 @@ def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, 
     """Run a parcel's call in this thread, in a folder that is removed afterwards.
 
     Returns:
-        The last event as text, and files, for `Answer.from_worker`. Whatever fails is in the event.
+        The last event as text, and files, for `WorkerReply.from_worker`. What fails is in the event.
     """
     temporary = tempfile.TemporaryDirectory(prefix="orbiflow-", ignore_cleanup_errors=True)
     with temporary as folder, one_core():

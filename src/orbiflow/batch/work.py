@@ -19,7 +19,7 @@ from typing import Any
 from orbiflow import __version__
 from orbiflow.batch.executors import WorkSettings, executor_for
 from orbiflow.batch.folder import PAGE, RESERVED, TABLE, BatchFolder, ContactSheet, Entry, Kind
-from orbiflow.batch.parcels import Answer, Parcel
+from orbiflow.batch.parcels import Parcel, WorkerReply
 from orbiflow.errors import (
     Advice,
     InputFileError,
@@ -368,7 +368,7 @@ class _Batch:
             self.at_work[item.key] = item, code_of(parcel.data)
             yield parcel
 
-    def _keep(self, answer: Answer) -> None:
+    def _keep(self, answer: WorkerReply) -> None:
         entry = _entry(answer, *self.at_work.pop(answer.key), self.kind)
         if entry is None:
             return
@@ -391,7 +391,7 @@ class _Batch:
         self.tell(Progress(finished / self.count, what))
 
 
-def _entry(answer: Answer, item: Item, code: str, kind: Kind) -> Entry | None:
+def _entry(answer: WorkerReply, item: Item, code: str, kind: Kind) -> Entry | None:
     """What the journal says of an answer, None of what was interrupted."""
     end = answer.end
     known = (item.key, item.name, code, item.settings(kind), __version__)

@@ -11,6 +11,8 @@ from .comparing.paired import compare_models as compare_models
 from .comparing.paired import compare_scores as compare_scores
 from .comparing.resampling import cross_validation_folds as cross_validation_folds
 from .comparing.settings import ComparisonSettings as ComparisonSettings
+from .comparing.settings import DataComparisonSettings as DataComparisonSettings
+from .comparing.settings import NamedTestSettings as NamedTestSettings
 from .conditional_estimator import AngleRegressor as AngleRegressor
 from .conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .covariates.files import conditional_to_bytes as conditional_to_bytes
@@ -27,7 +29,6 @@ from .fitting.parametric import fit_parametric as fit_parametric
 from .fitting.repeats import places as places
 from .fitting.report import FitReport as FitReport
 from .fitting.report import Progress as Progress
-from .fitting.report import report_from_json as report_from_json
 from .fitting.rows import weighed as weighed
 from .fitting.settings import ComponentSettings as ComponentSettings
 from .fitting.settings import DensitySettings as DensitySettings
@@ -69,7 +70,7 @@ from .pictures.plots import plot_density as plot_density
 from .pictures.settings import PlotSettings as PlotSettings
 from .pictures.surfaces import density_page as density_page
 from .pictures.surfaces import surface_data as surface_data
-from .regions.boundaries import Outline as Outline
+from .regions.boundaries import RegionOutline as RegionOutline
 from .regions.boundaries import outlines as outlines
 from .regions.levels import DensityLevels as DensityLevels
 from .regions.levels import DensityRegion as DensityRegion

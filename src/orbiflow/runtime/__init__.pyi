@@ -1,4 +1,10 @@
+from .answers import Answer as Answer
+from .answers import csv_bytes as csv_bytes
+from .answers import emit as emit
+from .answers import p_in_words as p_in_words
 from .call_process import CallProcess as CallProcess
+from .codec import from_json as from_json
+from .codec import to_json as to_json
 from .events import NEVER as NEVER
 from .events import Cancel as Cancel
 from .events import Cancelled as Cancelled

@@ -19,6 +19,8 @@ OPERATIONS = {
     "density trend": "orbiflow.density.operations.trends:trend",
     "density plot": "orbiflow.density.operations.drawing:plot",
     "density compare": "orbiflow.density.operations.comparison:compare",
+    "density compare-data": "orbiflow.density.operations.comparison:compare_data",
+    "density test": "orbiflow.density.operations.comparison:sample_tests",
     "density region": "orbiflow.density.operations.drawing:region",
     "density cv": "orbiflow.density.cross_validation.operations:cross_validate",
     "density batch": "orbiflow.density.operations.fitting:batch",

@@ -1,4 +1,3 @@
-from .data_sets import UNWEIGHTED as UNWEIGHTED
 from .data_sets import DataComparison as DataComparison
 from .data_sets import Divergence as Divergence
 from .data_sets import compare_samples as compare_samples
@@ -17,3 +16,5 @@ from .paired import scores_of as scores_of
 from .resampling import cross_validation_folds as cross_validation_folds
 from .resampling import mmd_test as mmd_test
 from .settings import ComparisonSettings as ComparisonSettings
+from .settings import DataComparisonSettings as DataComparisonSettings
+from .settings import NamedTestSettings as NamedTestSettings

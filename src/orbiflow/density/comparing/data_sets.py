@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import torch
@@ -16,11 +16,12 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
-from orbiflow.density.comparing.settings import ComparisonSettings
+from orbiflow.density.comparing.settings import ComparisonSettings, DataComparisonSettings
 from orbiflow.density.data import TableRows, alongside, cells_of, group_numbers
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import DataColumns, Space
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError, literal
+from orbiflow.runtime import Answer
 from orbiflow.settings import is_a
 
 T = TypeVar("T")
@@ -33,7 +34,7 @@ UNWEIGHTED = (
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ResampledFigure:
     """A value, its standard error and the bootstrap interval."""
 
     value: float
@@ -56,23 +57,25 @@ class Divergence:
     - `first_to_second`, `second_to_first`: Estimates of the Kullback-Leibler divergences in nats.
     """
 
-    accuracy: Estimate
-    jensen_shannon: Estimate
-    first_to_second: Estimate
-    second_to_first: Estimate
+    accuracy: ResampledFigure
+    jensen_shannon: ResampledFigure
+    first_to_second: ResampledFigure
+    second_to_first: ResampledFigure
 
 
 @dataclass(frozen=True)
-class DataComparison:
+class DataComparison(Answer):
     """Two data sets on one space.
 
     - `names`, `rows`: Names and numbers of rows of both.
     - `groups`: Number of groups of both together, None if rows are independent.
     - `test`: The test whether they come from one density. `level`: Its level.
-    - `divergence`: How far apart they are, None if they have too few rows.
+    - `divergence`: How far apart they are, None if nobody asked or they have too few rows.
     - `resamples`, `seed`: The settings of the intervals.
     - `notes`: What the user should know, in words.
     """
+
+    kind = "data"
 
     names: tuple[str, str]
     rows: tuple[int, int]
@@ -92,36 +95,35 @@ class DataComparison:
     @property
     def verdict(self) -> str:
         """The result in words."""
-        one, other = self.names
+        first, second = self.names
         if self.differ:
-            return f"{one} and {other} come from different densities (p {self.test.p:.2g})"
-        return (
-            f"the data cannot tell the densities of {one} and {other} apart (p {self.test.p:.2g})"
-        )
+            return f"{first} and {second} come from different densities (p {self.test.p:.2g})"
+        return f"the data cannot tell the densities of {first} and {second} apart (p {self.test.p:.2g})"
+
+    def table(self) -> list[dict[str, Any]]:
+        """Return a row for p and for each measure of how far apart they are."""
+        p = {"value": self.test.p, "error": None, "low": None, "high": None}
+        figures = {"p": p} | (asdict(self.divergence) if self.divergence else {})
+        return [{"figure": name, **figure} for name, figure in figures.items()]
 
     def words(self) -> list[str]:
-        """Return the result in lines of text."""
-        found, names = self.divergence, self.names
+        """Return the result and its notes in lines of text."""
         lines = [self.verdict]
-        if found is not None:
+        if (apart := self.divergence) is not None:
             lines += [
-                f"shown one row, an observer names its data set in {found.accuracy.value:.1%} of cases "
-                f"({found.accuracy.low:.1%} to {found.accuracy.high:.1%}; 50% is chance)",
-                f"Jensen-Shannon divergence at least {found.jensen_shannon} nats of 0.6931",
-                f"Kullback-Leibler divergence, estimated: {names[0]} from {names[1]} "
-                f"{found.first_to_second}, the other way {found.second_to_first} nats",
+                f"shown one row, an observer names its data set in {apart.accuracy.value:.1%} of cases "
+                f"({apart.accuracy.low:.1%} to {apart.accuracy.high:.1%}; 50% is chance)",
+                f"Jensen-Shannon divergence at least {apart.jensen_shannon} nats of 0.6931",
+                f"Kullback-Leibler divergence, estimated: {self.names[0]} from {self.names[1]} "
+                f"{apart.first_to_second}, the other way {apart.second_to_first} nats",
             ]
-        return lines
-
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`."""
-        return {"kind": "data", **asdict(self), "differ": self.differ, "verdict": self.verdict}
+        return [*lines, *self.notes]
 
 
 def compare_samples(
-    samples: Mapping[str, ArrayLike],
+    samples: Mapping[str, ArrayLike | TableRows],
     space: str | Space = "torus",
-    settings: ComparisonSettings | None = None,
+    settings: DataComparisonSettings | None = None,
     *,
     columns: Any = None,
     unit: str | None = None,
@@ -151,20 +153,19 @@ def compare_samples(
     >>> compare_samples({"a": one, "b": other}).differ
     True
     """
-    settings = settings or ComparisonSettings()
-    seed = settings.seed
+    settings = settings or DataComparisonSettings()
     if not is_a(samples, Mapping) or len(samples) != 2:
         raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
-    known = DataColumns(space, unit, columns, seed)
-    own, names, _, both, groups = sample_points(samples, known, groups)
-    sizes, points = (len(both[0]), len(both[1])), torch.cat(both)
-    first = np.arange(len(points)) < sizes[0]
-    members = Groups.of(None if groups is None else labels_of(groups, samples, sizes), len(points))
+    both = Samples.of(samples, DataColumns(space, unit, columns, settings.seed), groups)
+    points, first = torch.cat(both.points), both.labels == 0
+    members = Groups.of(both.groups, len(points))
     members.require()
     notes = members.notes()
     progress(0.0, "permuting")
-    drawn: dict[str, Any] = {"permutations": settings.permutations, "level": settings.level}
-    test = mmd_test(own, points, first, members, **drawn, seed=seed)
+    test = mmd_test(
+        both.space, points, first, members,
+        permutations=settings.permutations, level=settings.level, seed=settings.seed,
+    )  # fmt: skip
     if not test.exact:
         notes.append("p is approximate, as groups have different numbers of rows in the data sets")
     if test.rows < len(points):
@@ -173,69 +174,100 @@ def compare_samples(
     if settings.divergence:
         try:
             told: Progress = lambda share, what: progress(0.3 + 0.7 * share, what)  # noqa: E731
-            divergence = cross_fitted(own, points, first, members, settings, told)
+            divergence = cross_fitted(both.space, points, first, members, settings, told)
         except OrbiflowError as error:
             notes.append(f"how far apart they are was not estimated: {error}")
-    groups_in_all = members.count if members.given else None
-    found = (sizes, groups_in_all, test, divergence, settings.level, settings.bootstrap, seed)
-    return DataComparison((names[0], names[1]), *found, tuple(notes))
+    return DataComparison(
+        (both.names[0], both.names[1]),
+        (len(both.points[0]), len(both.points[1])),
+        members.count if members.given else None,
+        test,
+        divergence,
+        settings.level,
+        settings.bootstrap,
+        settings.seed,
+        tuple(notes),
+    )
 
 
-def sample_points(
-    samples: Mapping[str, ArrayLike], columns: DataColumns, groups: Mapping[str, ArrayLike] | None
-) -> tuple[Space, list[str], tuple[str, ...], list[Tensor], Mapping[str, ArrayLike] | None]:
-    """Return the space of data sets, their names, those of their columns, chart points and groups.
+class Samples(NamedTuple):
+    """Data sets on one space.
 
-    The groups are those given, or those of a column that is declared as such. Raises `OrbiflowError` if
-    there are not two data sets or more by their names, with the same columns, and for weights.
+    - `names`: The names of the data sets, `columns`: those of their columns.
+    - `points`: The chart points (n, d) of each.
+    - `groups`: What each row (N,) of all of them belongs to, None if rows are independent.
     """
-    if not is_a(samples, Mapping) or len(samples) < 2:
-        raise OrbiflowError(
-            "give two data sets or more by their names, such as {'before': a, 'after': b}"
-        )
-    names = list(samples)
 
-    def read(table: Any) -> TableRows:
-        return columns.read(table, stacklevel=7)
+    space: Space
+    names: list[str]
+    columns: tuple[str, ...]
+    points: list[Tensor]
+    groups: NDArray[np.str_] | None
 
-    found = [_named(own, read, table) for own, table in samples.items()]
-    first = found[0]
-    if first.weights is not None:
-        raise SettingError(UNWEIGHTED)
-    if first.labels is not None:
-        if groups is not None:
+    @property
+    def labels(self) -> NDArray[np.int64]:
+        """The number (N,), from 0, of each row's data set."""
+        return np.repeat(np.arange(len(self.points)), [len(each) for each in self.points])
+
+    @classmethod
+    def of(
+        cls,
+        samples: Mapping[str, ArrayLike | TableRows],
+        columns: DataColumns,
+        groups: Mapping[str, ArrayLike] | None,
+    ) -> Samples:
+        """Return data sets by their names, which must have the same columns, in any order.
+
+        The groups are those given, or those of a column that is declared as such. Raises
+        `OrbiflowError` for one data set alone, other columns, and weights.
+        """
+        if not is_a(samples, Mapping) or len(samples) < 2:
             raise OrbiflowError(
-                "a column is declared as group, and groups are given: leave one out"
+                "give two data sets or more by their names, such as {'before': a, 'after': b}"
             )
-        pairs = zip(names, found, strict=True)
-        groups = {name: rows.labels for name, rows in pairs if rows.labels is not None}
-    for k, other in enumerate(found):
-        if other.values.shape[1] != first.values.shape[1]:
-            widths = " and ".join(str(rows.values.shape[1]) for rows in found)
-            raise OrbiflowError(f"the data sets have {widths} columns: give all in one form")
-        if list(map(str, other.roles)) != list(map(str, first.roles)):
-            raise OrbiflowError(
-                f"{names[0]} has {first.declaration}, and {names[k]} {other.declaration}: declare the "
-                "same columns"
-            )
-        same = sorted(first.columns) == sorted(other.columns) and other.source.is_named
-        if same and first.columns != other.columns:
-            order = [other.columns.index(column) for column in first.columns]
-            found[k] = replace(other, values=other.values[:, order], columns=first.columns)
-    values = np.concatenate([rows.values for rows in found])
-    every = replace(first, numbers=np.zeros(len(values), dtype=np.int64), values=values)
-    try:
-        known = columns.of(every)
-    except OrbiflowError:
-        # the number of a row in both tables together would lead nowhere
-        for name, rows in zip(names, found, strict=True):
-            _named(name, columns.of, rows)
-        raise
-    points = [
-        _named(own, known.to_chart, rows.values) for own, rows in zip(names, found, strict=True)
-    ]
-    called = first.columns if first.source.is_named else known.columns
-    return known, names, called, points, groups
+
+        def read(table: Any) -> TableRows:
+            return table if isinstance(table, TableRows) else columns.read(table, stacklevel=7)
+
+        tables = {name: _named(name, read, table) for name, table in samples.items()}
+        labels = _labels(groups, samples, tables)
+        first_name, first = next(iter(tables.items()))
+        if first.weights is not None:
+            raise SettingError(UNWEIGHTED)
+        for name, table in tables.items():
+            tables[name] = _arranged(table, first, (first_name, name))
+        values = np.concatenate([table.values for table in tables.values()])
+        numbers = np.zeros(len(values), dtype=np.int64)
+        every = replace(first, numbers=numbers, values=values, weights=None, labels=None, given={})
+        try:
+            space = columns.of(every)
+        except OrbiflowError:
+            # the number of a row in all tables together would lead nowhere
+            for name, table in tables.items():
+                _named(name, columns.of, table)
+            raise
+        points = [_named(name, space.to_chart, table.values) for name, table in tables.items()]
+        called = first.columns if first.source.is_named else space.columns
+        return cls(space, list(tables), called, points, labels)
+
+
+def _arranged(table: TableRows, first: TableRows, names: tuple[str, str]) -> TableRows:
+    """Return rows with their columns in the order of those of the first data set."""
+
+    def refusal(columns: str, others: str) -> SettingError:
+        words = literal(f"{names[0]} has {columns}, and {names[1]} {others}: ")
+        return SettingError(words + "specify with {columns} which to compare")
+
+    if list(map(str, table.roles)) != list(map(str, first.roles)):
+        raise refusal(first.declaration, table.declaration)
+    if not (table.source.is_named and first.source.is_named) or table.columns == first.columns:
+        return table
+    if sorted(table.columns) == sorted(first.columns):
+        order = [table.columns.index(column) for column in first.columns]
+        return replace(table, values=table.values[:, order], columns=first.columns)
+    if not first.own:  # columns of a torus are what their names say
+        raise refusal(", ".join(first.columns), ", ".join(table.columns))
+    return table
 
 
 def _named(name: str, call: Callable[[Any], T], table: Any) -> T:
@@ -248,19 +280,26 @@ def _named(name: str, call: Callable[[Any], T], table: Any) -> T:
         raise OrbiflowError(f"{name}: {error}") from error
 
 
-def labels_of(
-    groups: Mapping[str, ArrayLike], samples: Mapping[str, ArrayLike], sizes: Sequence[int]
-) -> NDArray[np.str_]:
+def _labels(
+    groups: Mapping[str, ArrayLike] | None,
+    samples: Mapping[str, Any],
+    tables: Mapping[str, TableRows],
+) -> NDArray[np.str_] | None:
     """Return the labels (N,) of the rows of several data sets, one after the other."""
+    labels = {name: table.labels for name, table in tables.items() if table.labels is not None}
+    if labels and groups is not None:
+        raise OrbiflowError("a column is declared as group, and groups are given: leave one out")
+    if groups is None:
+        return np.concatenate(list(labels.values())) if labels else None
     if not is_a(groups, Mapping) or set(groups) != set(samples):
         raise OrbiflowError(f"groups must have labels for {' and '.join(samples)}, by these names")
-    found: list[NDArray[np.str_]] = []
-    for (name, sample), rows in zip(samples.items(), sizes, strict=True):
-        _, labels = alongside(**{name: sample, "groups": groups[name]})
-        own = np.asarray(cells_of(labels))
-        group_numbers(own, rows, f"groups of {name}")  # which checks them
-        found.append(own.astype(str))
-    return np.concatenate(found)
+    parts: list[NDArray[np.str_]] = []
+    for name, sample in samples.items():
+        _, beside = alongside(**{name: sample, "groups": groups[name]})
+        cells = np.asarray(cells_of(beside))
+        group_numbers(cells, len(tables[name].values), f"groups of {name}")  # which checks them
+        parts.append(cells.astype(str))
+    return np.concatenate(parts)
 
 
 def cross_fitted(
@@ -283,18 +322,18 @@ def cross_fitted(
     seed, level = settings.seed, settings.level
     half = np.random.default_rng(seed).permutation(groups.count)[groups.index] % 2
     ratio = _held_out_ratio(space, points, first, half, seed, progress)
-    own = np.where(first, ratio, -ratio)
+    odds = np.where(first, ratio, -ratio)
     counts: tuple[float, float] = first.sum(), (~first).sum()
     weights = np.where(first, 1 / counts[0], 1 / counts[1])
-    tempered = np.empty(len(own))
+    tempered = np.empty(len(odds))
     for number in (0, 1):
-        tempered[half == number] = own[half == number] * _trust(own, weights * (half != number))
+        tempered[half == number] = odds[half == number] * _trust(odds, weights * (half != number))
     shares = np.stack(
         [
-            np.ones(len(own)),
-            (own > 0) + (own == 0) / 2,
+            np.ones(len(odds)),
+            (odds > 0) + (odds == 0) / 2,
             math.log(2) - np.logaddexp(0.0, -tempered),
-            own,
+            odds,
         ],
         axis=1,
     )
@@ -303,10 +342,10 @@ def cross_fitted(
     )
     drawn = resampled_sums(table, settings.bootstrap, np.random.default_rng(seed))
     drawn = drawn[(drawn[:, 0] > 0) & (drawn[:, 4] > 0)]
-    found, spread = _figures(table.sum(axis=0)[None])[0], _figures(drawn)
+    figures, spread = _figures(table.sum(axis=0)[None])[0], _figures(drawn)
     ends = np.quantile(spread, [(1 - level) / 2, (1 + level) / 2], axis=0)
-    figures = np.stack([found, spread.std(axis=0), *ends], axis=1).tolist()
-    return Divergence(*(Estimate(*row) for row in figures))
+    rows = np.stack([figures, spread.std(axis=0), *ends], axis=1).tolist()
+    return Divergence(*(ResampledFigure(*row) for row in rows))
 
 
 def _figures(sums: Array) -> Array:
@@ -341,11 +380,11 @@ def _held_out_ratio(
     return ratio
 
 
-def _trust(own: Array, weights: Array) -> float:
+def _trust(odds: Array, weights: Array) -> float:
     """Return the factor of log odds with which they score best: few rows make them too bold."""
 
     def loss(trust: float) -> float:
-        return float((weights * np.logaddexp(0.0, -trust * own)).sum())
+        return float((weights * np.logaddexp(0.0, -trust * odds)).sum())
 
-    found: Any = minimize_scalar(loss, bounds=(0.0, 2.0), method="bounded")
-    return float(found.x)
+    best: Any = minimize_scalar(loss, bounds=(0.0, 2.0), method="bounded")
+    return float(best.x)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ HASH_BITS = 53
 """Bits of a hash: such whole numbers are exact for every reader of JSON."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class RowSketch:
     """The smallest hashes of a table's different rows.
 
@@ -40,37 +40,28 @@ class RowSketch:
     """
 
     rows: int
-    hashes: NDArray[np.uint64]
+    hashes: tuple[int, ...]
     whole: bool
+
+    def __post_init__(self) -> None:
+        ends = (-1, *self.hashes, 2**HASH_BITS)
+        ordered = all(map(operator.lt, ends, ends[1:]))
+        if not ordered or not 0 < len(self.hashes) <= MAX_HASHES:
+            raise OrbiflowError(f"a sketch has 1 to {MAX_HASHES} hashes of rows in order")
 
     @classmethod
     def of(cls, space: Space, data: ArrayLike) -> RowSketch:
         """Return the sketch of data (N, k) in the space's own units."""
-        found = np.unique(row_hashes(space, data))
-        return cls(len(np.asarray(data)), found[:MAX_HASHES], len(found) <= MAX_HASHES)
+        hashes = np.unique(row_hashes(space, data))
+        kept = tuple(hashes[:MAX_HASHES].tolist())
+        return cls(len(np.asarray(data)), kept, len(hashes) <= MAX_HASHES)
 
     def known(self, space: Space, data: ArrayLike) -> tuple[int, int]:
         """Return how many of the rows that can be looked up were fitted, and how many can be."""
-        found = row_hashes(space, data)
+        hashes = row_hashes(space, data)
         if not self.whole:
-            found = found[found <= self.hashes[-1]]
-        return int(np.isin(found, self.hashes).sum()), len(found)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`."""
-        return {"rows": self.rows, "whole": self.whole, "hashes": self.hashes.tolist()}
-
-    @classmethod
-    def from_json(cls, document: Any) -> RowSketch:
-        """Return the sketch that `to_json` wrote."""
-        try:
-            hashes = np.array(document["hashes"], dtype=np.uint64)
-            ordered = hashes.ndim == 1 and bool((hashes[1:] > hashes[:-1]).all())
-            if not ordered or not 0 < len(hashes) <= MAX_HASHES:
-                raise ValueError("hashes out of order")
-            return cls(int(document["rows"]), hashes, bool(document["whole"]))
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise OrbiflowError(f"not a sketch of rows: {error}") from error
+            hashes = hashes[hashes <= self.hashes[-1]]
+        return int(np.isin(hashes, np.array(self.hashes, dtype=np.uint64)).sum()), len(hashes)
 
 
 def row_hashes(space: Space, data: ArrayLike) -> NDArray[np.uint64]:
@@ -87,10 +78,10 @@ def row_hashes(space: Space, data: ArrayLike) -> NDArray[np.uint64]:
     elif len(images) > 1:  # an axis has two ends
         first = np.argmax(cells != 0, axis=1)
         cells *= np.sign(cells[np.arange(len(cells)), first])[:, None]
-    found = np.zeros(len(cells), dtype=np.uint64)
+    hashes = np.zeros(len(cells), dtype=np.uint64)
     for column in cells.T:
-        found = _mixed(found + np.uint64(0x9E3779B97F4A7C15) + column.astype(np.uint64))
-    return found >> np.uint64(64 - HASH_BITS)
+        hashes = _mixed(hashes + np.uint64(0x9E3779B97F4A7C15) + column.astype(np.uint64))
+    return hashes >> np.uint64(64 - HASH_BITS)
 
 
 def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:

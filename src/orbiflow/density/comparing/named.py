@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import statistics
-from orbiflow.density.comparing.data_sets import labels_of, sample_points
+from orbiflow.density.comparing.data_sets import Samples
 from orbiflow.density.comparing.resampling import MAX_ROWS
-from orbiflow.density.comparing.settings import ComparisonSettings
-from orbiflow.density.comparing.statistics import Found, Labels
+from orbiflow.density.comparing.settings import NamedTestSettings
+from orbiflow.density.comparing.statistics import Labels, TestStatistic
+from orbiflow.density.data import TableRows
 from orbiflow.density.fitting import highest_log_likelihood
 from orbiflow.density.models import images_of
 from orbiflow.density.spaces import DataColumns, Space
 from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.runtime import Answer, Event, Table, p_in_words
 
 MIN_SAMPLE = 5
 """Rows that each sample must have."""
@@ -58,7 +60,7 @@ class NamedTest:
 
 
 @dataclass(frozen=True)
-class SampleTests:
+class SampleTests(Answer):
     """Tests by name of several samples.
 
     - `names`, `rows`: The samples, and how many rows each has. `tests`: The results.
@@ -72,30 +74,47 @@ class SampleTests:
     seed: int
     notes: tuple[str, ...] = ()
 
+    kind = "tests"
+
     def __getitem__(self, name: str) -> NamedTest:
         """Return the first test of a name, such as "watson-williams"."""
-        for one in self.tests:
-            if one.name == name:
-                return one
-        raise KeyError(f"{name}; there are {', '.join(one.name for one in self.tests)}")
+        for test in self.tests:
+            if test.name == name:
+                return test
+        raise KeyError(f"{name}; there are {', '.join(test.name for test in self.tests)}")
 
-    def words(self) -> list[str]:
-        """Return what the tests are about, in lines of text."""
-        own = ", ".join(
-            f"{name} ({rows} rows)" for name, rows in zip(self.names, self.rows, strict=True)
+    def table(self) -> list[dict[str, Any]]:
+        """Return a row for each test."""
+        rows = map(asdict, self.tests)
+        return [{**row, "degrees": " ".join(f"{k:g}" for k in row["degrees"])} for row in rows]
+
+    def words(self) -> list[str | Event]:
+        """Return the tests, what they are about, and the notes."""
+        samples = zip(self.names, self.rows, strict=True)
+        listed = ", ".join(f"{name} ({rows} rows)" for name, rows in samples)
+        lines: list[str | Event] = [self._shown(), f"samples: {listed}"]
+        for test in {test.name: test for test in self.tests}.values():
+            lines.append(f"{test.name}: {test.hypothesis}; {test.assumes} ({test.reference})")
+        for test in self.tests:
+            if test.doubt:
+                where = f" of {test.column}" if test.column else ""
+                lines.append(f"{test.name}{where}: p may be wrong, {test.doubt}")
+        return [*lines, *self.notes]
+
+    def _shown(self) -> Table:
+        heads = ("test", "column", "statistic", "df", "p", "by")
+        rows = tuple(
+            (
+                test.name,
+                test.column or "all",
+                f"{test.statistic:.5g}",
+                ", ".join(f"{degrees:g}" for degrees in test.degrees) or "-",
+                p_in_words(test.p),
+                test.by,
+            )
+            for test in self.tests
         )
-        lines = [f"samples: {own}"]
-        for one in {one.name: one for one in self.tests}.values():
-            lines.append(f"{one.name}: {one.hypothesis}; {one.assumes} ({one.reference})")
-        for one in self.tests:
-            if one.doubt:
-                where = f" of {one.column}" if one.column else ""
-                lines.append(f"{one.name}{where}: p may be wrong, {one.doubt}")
-        return lines
-
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`."""
-        return {"kind": "tests", **asdict(self)}
+        return Table("Tests by name", heads, rows)
 
 
 def _sure(_vectors: Array, _labels: Labels) -> str:
@@ -118,7 +137,7 @@ class _Kind:
     assumes: str
     reference: str
     only: str = ""
-    test: Callable[[Array, Labels], Found] | None = None
+    test: Callable[[Array, Labels], TestStatistic] | None = None
     statistic: Callable[[Array, Labels], Array] | None = None
     two: bool = False
     slow: bool = False
@@ -131,21 +150,23 @@ class _Kind:
         vectors: Array,
         labels: Labels,
         groups: Labels | None,
-        settings: ComparisonSettings,
+        settings: NamedTestSettings,
     ) -> NamedTest:
         """Make the test; of rows in groups (N,) by permutations of these."""
         doubt = self.doubt(vectors, labels) if groups is None else _unlike(labels, groups)
         if groups is None and self.test is not None:
-            found = self.test(vectors, labels)
+            result = self.test(vectors, labels)
         else:
             kept = _some_of_each(labels, settings.seed)
-            found = statistics.permuted(
+            result = statistics.permuted(
                 *(self._of_each, vectors[kept], labels[kept], settings.permutations, settings.seed),
                 None if groups is None else groups[kept],
             )
         assumes = self.assumes if groups is None else "assumes that groups are independent"
         words = (self.hypothesis, assumes, self.reference, doubt)
-        return NamedTest(name, column, found.statistic, found.degrees, found.p, found.by, *words)
+        return NamedTest(
+            name, column, result.statistic, result.degrees, result.p, result.by, *words
+        )
 
     def _of_each(self, vectors: Array, table: Labels) -> Array:
         """Return the statistic (B,) of each column of a table (N, B) of samples."""
@@ -162,21 +183,21 @@ def _some_of_each(labels: Labels, seed: int) -> Labels:
     rng, sizes = np.random.default_rng(seed), np.bincount(labels)
     fair = np.round(MAX_ROWS * sizes / len(labels)).astype(int)
     wanted = np.maximum(fair, np.minimum(sizes, MAX_ROWS // (2 * len(sizes))))
-    found = [
+    kept = [
         rng.choice(np.flatnonzero(labels == k), count, replace=False)
         for k, count in enumerate(wanted)
     ]
-    return np.sort(np.concatenate(found))
+    return np.sort(np.concatenate(kept))
 
 
-def _ratio_of_likelihoods(vectors: Array, labels: Labels) -> Found:
+def _ratio_of_likelihoods(vectors: Array, labels: Labels) -> TestStatistic:
     """Test of equal parameters of a Bingham density, by the ratio of likelihoods."""
     every, free = highest_log_likelihood("bingham", torch.tensor(vectors))
     samples = range(int(labels.max()) + 1)
-    own = [
+    each = [
         highest_log_likelihood("bingham", torch.tensor(vectors[labels == k]))[0] for k in samples
     ]
-    return statistics.chi_square(2 * (sum(own) - every), free * (len(own) - 1))
+    return statistics.chi_square(2 * (sum(each) - every), free * (len(each) - 1))
 
 
 def _smallest(labels: Labels) -> int:
@@ -194,8 +215,8 @@ def _small(least: int) -> Callable[[Array, Labels], str]:
 def _unlike(labels: Labels, groups: Labels) -> str:
     """Say if groups of some samples are larger: such must not change places (see `compare_samples`)."""
     sizes = [
-        float(own.sum() / np.count_nonzero(own))
-        for own in (np.bincount(groups[labels == k]) for k in range(int(labels.max()) + 1))
+        float(counts.sum() / np.count_nonzero(counts))
+        for counts in (np.bincount(groups[labels == k]) for k in range(int(labels.max()) + 1))
     ]
     low, high = min(sizes), max(sizes)
     if high < MOST_UNLIKE * low:
@@ -263,9 +284,9 @@ KINDS = {
 
 
 def named_tests(
-    samples: Mapping[str, ArrayLike],
+    samples: Mapping[str, ArrayLike | TableRows],
     space: str | Space = "torus",
-    settings: ComparisonSettings | None = None,
+    settings: NamedTestSettings | None = None,
     *,
     columns: Any = None,
     unit: str | None = None,
@@ -295,43 +316,34 @@ def named_tests(
     >>> found["watson-williams"].p < 0.001
     True
     """
-    settings = settings or ComparisonSettings()
-    known = DataColumns(space, unit, columns, settings.seed)
-    own, names, called, points, groups = sample_points(samples, known, groups)
-    sizes = tuple(map(len, points))
+    settings = settings or NamedTestSettings()
+    data = Samples.of(samples, DataColumns(space, unit, columns, settings.seed), groups)
+    labels, sizes = data.labels, tuple(map(len, data.points))
     if min(sizes) < MIN_SAMPLE:
-        few = names[sizes.index(min(sizes))]
+        few = data.names[sizes.index(min(sizes))]
         raise OrbiflowError(
             f"{few} has {min(sizes)} rows: each sample must have {MIN_SAMPLE} or more"
         )
-    labels = np.repeat(np.arange(len(sizes)), sizes)
-    members = None if groups is None else _members(groups, samples, labels)
-    sides, every, there = _vectors(own, torch.cat(points), tuple(called))
-    asked = _asked(settings, there, own, len(sizes), members is not None)
-    found: list[NamedTest] = []
-    for name in asked:
-        kind = KINDS[name]
+    members = None if data.groups is None else _members(data.groups, data.names, labels)
+    sides, every, there = _vectors(data.space, torch.cat(data.points), data.columns)
+    tests: list[NamedTest] = []
+    for name in _asked(settings, there, data.space, len(sizes), members is not None):
         for column, vectors in {"": every}.items() if name == "energy" else sides.items():
-            found.append(kind.result(name, column, vectors, labels, members, settings))
+            tests.append(KINDS[name].result(name, column, vectors, labels, members, settings))
     notes = ["each p is that of one test alone: settle which one counts before you look"]
     if members is not None:
         notes.append(f"each p is from permutations of {int(members.max()) + 1} whole groups")
-    if sum(sizes) > MAX_ROWS and any(one.by == "permutation" for one in found):
+    if sum(sizes) > MAX_ROWS and any(test.by == "permutation" for test in tests):
         notes.append(
             f"tests by permutations look at some {MAX_ROWS} of {sum(sizes)} rows, drawn at random"
         )
-    return SampleTests(
-        tuple(names), sizes, tuple(found), settings.permutations, settings.seed, tuple(notes)
-    )
+    permutations, seed = settings.permutations, settings.seed
+    return SampleTests(tuple(data.names), sizes, tuple(tests), permutations, seed, tuple(notes))
 
 
-def _members(
-    groups: Mapping[str, ArrayLike], samples: Mapping[str, ArrayLike], labels: Labels
-) -> Labels:
+def _members(groups: NDArray[np.str_], names: Sequence[str], labels: Labels) -> Labels:
     """Return the group (N,) of each row, from 0; refuse those in several samples, and few."""
-    names = list(samples)
-    own = labels_of(groups, samples, tuple(np.bincount(labels).tolist()))
-    words, members = np.unique(own, return_inverse=True)
+    words, members = np.unique(groups, return_inverse=True)
     pairs: Labels = np.unique(np.stack([members.reshape(-1), labels], axis=1), axis=0)
     count, each = np.bincount(pairs[:, 0]), np.bincount(pairs[:, 1])
     if count.max() > 1:
@@ -339,8 +351,7 @@ def _members(
         both = [names[int(sample)] for sample in pairs[pairs[:, 0] == twice, 1]]
         raise SettingError(
             literal(f"the group {words[twice]} has rows in {' and '.join(both)}: ")
-            + "tests by name are of samples without common groups; compare two data sets without "
-            "{tests}"
+            + "tests by name are of samples without common groups: compare two data sets instead"
         )
     few = int(each.min())
     if few < MIN_SAMPLE:
@@ -366,7 +377,7 @@ def _vectors(
         images = images_of(space)
     except OrbiflowError:
         raise OrbiflowError(
-            f"there are no tests by name on the {space.name}: compare two data sets without {{tests}}"
+            f"there are no tests by name on the {space.name}: compare two data sets instead"
         ) from None
     vectors = space.features(points)[0].numpy()
     if images == 1:
@@ -377,24 +388,24 @@ def _vectors(
 
 
 def _asked(
-    settings: ComparisonSettings, there: str, space: Space, samples: int, grouped: bool
+    settings: NamedTestSettings, there: str, space: Space, samples: int, grouped: bool
 ) -> list[str]:
     """Return the tests that can be made, of those asked for."""
-    known = {
+    possible = {
         name: kind
         for name, kind in KINDS.items()
         if kind.only in ("", there) or (kind.only == "means" and there == "circles")
     }
-    if settings.tests is None or "all" in settings.tests:
-        some = {name: kind for name, kind in known.items() if not (grouped and kind.slow)}
+    if settings.tests is None:
+        some = {name: kind for name, kind in possible.items() if not (grouped and kind.slow)}
         return [name for name, kind in some.items() if samples == 2 or not kind.two]
     for name in settings.tests:
-        if name not in known:
+        if name not in possible:
             raise SettingError(
-                f"{{tests}}: there is no {name} on the {space.name}, but {', '.join(known)}"
+                f"{{tests}}: there is no {name} on the {space.name}, but {', '.join(possible)}"
             )
-        if known[name].slow and grouped:
+        if possible[name].slow and grouped:
             raise SettingError(f"{{tests}}: {name} is of independent rows: leave {{group}} out")
-        if known[name].two and samples > 2:
+        if possible[name].two and samples > 2:
             raise SettingError(f"{{tests}}: {name} is of two samples, there are {samples}")
-    return [name for name in known if name in settings.tests]
+    return [name for name in possible if name in settings.tests]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Answer
 from orbiflow.settings import as_array, as_instance, is_a
 
 BLOCK_ROWS = 65_536
@@ -64,7 +65,7 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class ModelComparison:
+class ModelComparison(Answer):
     """Several models at the same held-out rows.
 
     - `scores`: Their scores, best first. `differences`: Those of all pairs, the better mean first.
@@ -73,6 +74,8 @@ class ModelComparison:
     - `best`: The model that is better than all others, None if the rows cannot tell.
     - `notes`: What the user should know, in words.
     """
+
+    kind = "models"
 
     scores: tuple[ModelScore, ...]
     differences: tuple[Difference, ...]
@@ -84,10 +87,6 @@ class ModelComparison:
     best: str | None
     notes: tuple[str, ...] = ()
 
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`."""
-        return {"kind": "models", **asdict(self), "verdict": self.verdict}
-
     @property
     def verdict(self) -> str:
         """Which model is best, in words."""
@@ -97,8 +96,12 @@ class ModelComparison:
         open_ = [d.second for d in self.differences if d.first == top and d.better is None]
         return f"the rows cannot tell {_listed([top, *open_])} apart"
 
+    def table(self) -> list[dict[str, Any]]:
+        """Return a row for each difference."""
+        return [asdict(difference) for difference in self.differences]
+
     def words(self) -> list[str]:
-        """Return the result in lines of text."""
+        """Return the result and its notes in lines of text."""
         unit = "rows" if self.groups is None else f"rows in {self.groups} groups"
         return [
             f"mean log density at {self.rows} {unit}, in nats:",
@@ -106,6 +109,7 @@ class ModelComparison:
             f"differences, with intervals that hold all at once at {self.level:.1%}:",
             *(f"  {difference}" for difference in self.differences),
             self.verdict,
+            *self.notes,
         ]
 
 
@@ -137,8 +141,8 @@ def compare_scores(
 
     >>> rng = np.random.default_rng(0)
     >>> base = rng.normal(size=500)
-    >>> found = compare_scores({"a": base, "b": base - 0.2 + 0.5 * rng.normal(size=500)})
-    >>> found.best, found.differences[0].error < 0.03
+    >>> comparison = compare_scores({"a": base, "b": base - 0.2 + 0.5 * rng.normal(size=500)})
+    >>> comparison.best, comparison.differences[0].error < 0.03
     ('a', True)
     """
     settings = settings or ComparisonSettings()
@@ -156,7 +160,7 @@ def compare_scores(
     mean, error = _means(rows, members, counts)
     largest = _largest_t(rows - mean, members, counts, settings)
     reach = float(np.quantile(largest, settings.level, method="higher"))
-    found: list[Difference] = []
+    differences: list[Difference] = []
     for k, (i, j) in enumerate(pairs):
         low, high = mean[k] - reach * error[k], mean[k] + reach * error[k]
         t = _ratio(abs(mean[k]), error[k])
@@ -164,16 +168,18 @@ def compare_scores(
         share = float(np.average((rows[:, k] > 0) + (rows[:, k] == 0) / 2, weights=counts))
         figures = map(float, (mean[k], error[k], low, high, p, share))
         better = names[i] if low > 0 else None
-        found.append(Difference(names[i], names[j], *figures, better=better))
-    beaten = {d.second for d in found if d.first == names[0] and d.better is not None}
+        differences.append(Difference(names[i], names[j], *figures, better=better))
+    beaten = {d.second for d in differences if d.first == names[0] and d.better is not None}
     same = [
-        f"{d.first} and {d.second} are equal at every row" for d in found if d.mean == d.error == 0
+        f"{d.first} and {d.second} are equal at every row"
+        for d in differences
+        if d.mean == d.error == 0
     ]
     best = names[0] if len(beaten) == len(names) - 1 else None
     scored = zip(names, means.tolist(), errors.tolist(), strict=True)
     return ModelComparison(
         tuple(ModelScore(*score) for score in scored),
-        tuple(found),
+        tuple(differences),
         len(table),
         members.count if members.given else None,
         *(settings.level, settings.bootstrap, settings.seed),
@@ -197,10 +203,10 @@ def _row_weights(weights: ArrayLike | None, rows: int) -> Array:
     """Return weights (N,) of mean 1."""
     if weights is None:
         return np.ones(rows)
-    found = as_array(weights, "weights", ("N",))
-    if len(found) != rows or not (found > 0).all():
+    values = as_array(weights, "weights", ("N",))
+    if len(values) != rows or not (values > 0).all():
         raise OrbiflowError(f"weights must be {rows} numbers above 0, one a row")
-    return found / found.mean()
+    return values / values.mean()
 
 
 def _means(table: Array, groups: Groups, weights: Array) -> tuple[Array, Array]:
@@ -293,21 +299,21 @@ def density_of(model: Density | DensityEstimator, name: str = "the model") -> De
 
 def require_one_space(spaces: Mapping[str, Space]) -> None:
     """Check that log densities on all spaces are with respect to one measure."""
-    (first, one), *others = spaces.items()
+    (first, wanted), *others = spaces.items()
     for name, other in others:
-        areas = [space.volume if space.is_round else 0.0 for space in (one, other)]
-        if (one.name, one.dim, areas[0]) != (other.name, other.dim, areas[1]):
+        areas = [space.volume if space.is_round else 0.0 for space in (wanted, other)]
+        if (wanted.name, wanted.dim, areas[0]) != (other.name, other.dim, areas[1]):
             titles = [
                 f"torus of {space.dim} angles" if space.is_torus else space.name
-                for space in (one, other)
+                for space in (wanted, other)
             ]
             raise OrbiflowError(
                 f"{first} is on the {titles[0]}, {name} on the {titles[1]}: their densities have no "
                 "common measure; compare models of one space"
             )
-        if one.unit != other.unit:
+        if wanted.unit != other.unit:
             raise OrbiflowError(
-                f"{first} has angles in {one.unit}, {name} in {other.unit}: their densities are in "
+                f"{first} has angles in {wanted.unit}, {name} in {other.unit}: their densities are in "
                 "different units; fit both with one unit"
             )
 
@@ -323,11 +329,11 @@ def _scores_at(
     density: Density, points: torch.Tensor, told: Callable[[float], None] = lambda _: None
 ) -> Array:
     """Return log densities (N,) at chart points (N, d) in natural measure."""
-    found: list[Sequence[float] | np.ndarray] = []
+    parts: list[np.ndarray] = []
     with torch.no_grad():
         for start in range(0, len(points), BLOCK_ROWS):
             told(start / len(points))
-            found.append(
+            parts.append(
                 density.log_prob(points[start : start + BLOCK_ROWS], measure="natural").numpy()
             )
-    return np.concatenate(found) if found else np.zeros(0)
+    return np.concatenate(parts) if parts else np.zeros(0)

@@ -8,16 +8,16 @@ from orbiflow.settings import DefaultText, Parsed, Range, Settings
 
 TestName = Literal[
     "watson-williams", "common-mean", "common-median", "common-concentration",
-    "mardia-watson-wheeler", "watson-u2", "kuiper", "bingham", "energy", "all",
+    "mardia-watson-wheeler", "watson-u2", "kuiper", "bingham", "energy",
 ]  # fmt: skip
 
 
-def test_names(text: str) -> tuple[str, ...]:
+def names_of_tests(text: str) -> tuple[str, ...]:
     """Return the tests that a text names, such as "watson-williams,energy"."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-test_names.__test__ = False  # pyright: ignore[reportFunctionMemberAccess]
+Permutations = Annotated[int, Range(19, 100_000)]
 
 
 class ComparisonSettings(Settings, group="Uncertainty"):
@@ -26,22 +26,35 @@ class ComparisonSettings(Settings, group="Uncertainty"):
     bootstrap: Annotated[int, Range(100, 1_000_000)] = 2000
     """Number of bootstrap resamples of rows or groups."""
 
-    permutations: Annotated[int, Range(19, 100_000)] = 999
-    """Number of permutations in tests of data sets; the least p is 1 / (permutations + 1)."""
+    level: Annotated[float, Range(0.5, 0.999)] = 0.95
+    """Level of the intervals and of the test."""
+
+    seed: Annotated[int, Range(0, 2**63 - 1)] = 0
+    """Seed of all that is drawn: the same seed gives the same result."""
+
+
+class DataComparisonSettings(ComparisonSettings, group="Uncertainty"):
+    """How two data sets are compared, and how uncertain that is."""
+
+    permutations: Permutations = 999
+    """Number of permutations in the test; the least p is 1 / (permutations + 1)."""
+
+    divergence: bool = False
+    """Also measure how far apart the data sets are, by fits to half of each: some 20 s."""
+
+
+class NamedTestSettings(Settings, group="Tests"):
+    """Which tests are made, and from how many permutations."""
 
     tests: Annotated[
         tuple[TestName, ...] | None,
-        Parsed(test_names, "names such as watson-williams,energy, or all"),
-        DefaultText("all of three data sets or more, none of two"),
+        Parsed(names_of_tests, "names such as watson-williams,energy"),
+        DefaultText("all that there are on the space"),
     ] = None
-    """Tests by name of two data sets or more, such as watson-williams,energy, or all that there are on
-    the space. They take the place of the general comparison of two data sets."""
+    """Tests by name, such as watson-williams,energy."""
 
-    divergence: bool = False
-    """Also measure how far apart two data sets are, by fits to half of each: some 20 s."""
-
-    level: Annotated[float, Range(0.5, 0.999)] = 0.95
-    """Level of the intervals and of the test."""
+    permutations: Permutations = 999
+    """Number of permutations; the least p is 1 / (permutations + 1)."""
 
     seed: Annotated[int, Range(0, 2**63 - 1)] = 0
     """Seed of all that is drawn: the same seed gives the same result."""

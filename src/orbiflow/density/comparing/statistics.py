@@ -32,8 +32,10 @@ TIED = 1e-12
 """Turns by which angles that count as equal may differ."""
 
 
-class Found(NamedTuple):
+class TestStatistic(NamedTuple):
     """A statistic, its degrees of freedom, the distribution that p is from, and p."""
+
+    __test__ = False  # pytest would take it for a test
 
     statistic: float
     degrees: tuple[float, ...]
@@ -41,14 +43,14 @@ class Found(NamedTuple):
     p: float
 
 
-def _f_test(statistic: float, above: float, below: float) -> Found:
+def _f_test(statistic: float, above: float, below: float) -> TestStatistic:
     p: Any = special.fdtrc(above, below, max(0.0, statistic))
-    return Found(statistic, (above, below), "F", float(p))
+    return TestStatistic(statistic, (above, below), "F", float(p))
 
 
-def chi_square(statistic: float, degrees: int) -> Found:
+def chi_square(statistic: float, degrees: int) -> TestStatistic:
     """Return a statistic with its p by the chi-square distribution."""
-    return Found(
+    return TestStatistic(
         statistic, (degrees,), "chi-square", float(special.chdtrc(degrees, max(0.0, statistic)))
     )
 
@@ -62,7 +64,7 @@ def _sums(values: Array, labels: Labels) -> Array:
     return np.stack([np.bincount(labels, column) for column in values.T], axis=1)
 
 
-def watson_williams(vectors: Array, labels: Labels) -> Found:
+def watson_williams(vectors: Array, labels: Labels) -> TestStatistic:
     """Test of equal mean directions of von Mises-Fisher samples of one concentration.
 
     The F test of Watson and Williams (1956), on the circle with the factor 1 + 3 / (8 k) of Stephens
@@ -81,7 +83,7 @@ def watson_williams(vectors: Array, labels: Labels) -> Found:
     )
 
 
-def common_mean(vectors: Array, labels: Labels) -> Found:
+def common_mean(vectors: Array, labels: Labels) -> TestStatistic:
     """Test of equal mean directions of large samples, whatever their densities.
 
     Each sample's mean direction has its own circular standard error (Watson, Statistics on spheres,
@@ -98,7 +100,7 @@ def common_mean(vectors: Array, labels: Labels) -> Found:
     return chi_square(2 * (float(weights.sum()) - total), (width - 1) * (len(sizes) - 1))
 
 
-def common_concentration(vectors: Array, labels: Labels) -> Found:
+def common_concentration(vectors: Array, labels: Labels) -> TestStatistic:
     """Test of equal concentrations: an analysis of variance of the sines of deviations.
 
     Fisher (1993), chapter 5, for angles; on spheres of the lengths across the mean alike.
@@ -107,21 +109,21 @@ def common_concentration(vectors: Array, labels: Labels) -> Found:
     means = sums / np.linalg.norm(sums, axis=1, keepdims=True)
     along = (vectors * means[labels]).sum(axis=1)
     sines = np.sqrt(np.maximum(0.0, 1 - along**2))
-    own = np.bincount(labels, sines) / sizes
+    means = np.bincount(labels, sines) / sizes
     samples, count = len(sizes), len(sines)
-    between = float(sizes @ (own - sines.mean()) ** 2) / (samples - 1)
-    rest = float(((sines - own[labels]) ** 2).sum()) / (count - samples)
+    between = float(sizes @ (means - sines.mean()) ** 2) / (samples - 1)
+    rest = float(((sines - means[labels]) ** 2).sum()) / (count - samples)
     return _f_test(between / rest, samples - 1, count - samples)
 
 
-def common_median(vectors: Array, labels: Labels) -> Found:
+def common_median(vectors: Array, labels: Labels) -> TestStatistic:
     """Test of equal median directions of angles, whatever their densities (Fisher, 1993)."""
     turns = _turns(vectors)
     side = (turns - median_direction(turns) + 0.5) % 1.0 < 0.5
     sizes, below = _sizes(labels), np.bincount(labels, side)
     count, lower = len(turns), float(side.sum())
     if lower in (0, count):
-        return Found(0.0, (len(sizes) - 1,), "chi-square", 1.0)
+        return TestStatistic(0.0, (len(sizes) - 1,), "chi-square", 1.0)
     rest = lower * (count - lower)
     statistic = count**2 / rest * float((below**2 / sizes).sum()) - count * lower / (count - lower)
     return chi_square(statistic, len(sizes) - 1)
@@ -160,26 +162,26 @@ def median_direction(turns: Array) -> float:
 def _steps(turns: Array, table: Labels) -> tuple[Array, Array, Array]:
     """Return the difference (N, B) of two empirical distributions at each row, and both sizes (B,)."""
     order = np.argsort(turns, kind="stable")
-    x, own = turns[order], table[order]
+    x, samples = turns[order], table[order]
     last = np.searchsorted(x, x + TIED, side="right") - 1  # those that are equal step together
-    first = own == 0
-    one, other = first.sum(axis=0).astype(float), (~first).sum(axis=0).astype(float)
-    steps: Array = np.cumsum(first / one - ~first / other, axis=0)[last]
-    return steps, one, other
+    first = samples == 0
+    sizes = first.sum(axis=0).astype(float), (~first).sum(axis=0).astype(float)
+    steps: Array = np.cumsum(first / sizes[0] - ~first / sizes[1], axis=0)[last]
+    return steps, *sizes
 
 
 def watson_u2(vectors: Array, table: Labels) -> Array:
     """Return Watson's U^2 (B,) of two samples of angles (Watson, 1962; with ties as Zar has them)."""
-    steps, one, other = _steps(_turns(vectors), table)
-    count = one + other
+    steps, n, m = _steps(_turns(vectors), table)
+    count = n + m
     squares = (steps**2).sum(axis=0) - steps.sum(axis=0) ** 2 / count
-    return one * other / count**2 * squares
+    return n * m / count**2 * squares
 
 
 def kuiper(vectors: Array, table: Labels) -> Array:
     """Return Kuiper's statistic (B,) of two samples of angles, times sqrt(n m / (n + m))."""
-    steps, one, other = _steps(_turns(vectors), table)
-    return np.sqrt(one * other / (one + other)) * (steps.max(axis=0) - steps.min(axis=0))
+    steps, n, m = _steps(_turns(vectors), table)
+    return np.sqrt(n * m / (n + m)) * (steps.max(axis=0) - steps.min(axis=0))
 
 
 def mardia_watson_wheeler(vectors: Array, table: Labels) -> Array:
@@ -190,11 +192,11 @@ def mardia_watson_wheeler(vectors: Array, table: Labels) -> Array:
     high = np.searchsorted(x, turns + TIED, side="right")
     scores = 2 * np.pi * (low + high + 1) / 2 / len(turns)
     waves = np.stack([np.cos(scores), np.sin(scores)])
-    found = np.zeros(table.shape[1])
+    statistic = np.zeros(table.shape[1])
     for sample in range(int(table[:, 0].max()) + 1):
-        own = (table == sample).astype(np.float64)
-        found += 2 * ((waves @ own) ** 2).sum(axis=0) / own.sum(axis=0)
-    return found
+        inside = (table == sample).astype(np.float64)
+        statistic += 2 * ((waves @ inside) ** 2).sum(axis=0) / inside.sum(axis=0)
+    return statistic
 
 
 def energy(vectors: Array, table: Labels) -> Array:
@@ -206,8 +208,8 @@ def energy(vectors: Array, table: Labels) -> Array:
     count, samples = len(vectors), int(table[:, 0].max()) + 1
     within = np.zeros(table.shape[1])
     for sample in range(samples):
-        own = (table == sample).astype(np.float64)
-        within += ((distances @ own) * own).sum(axis=0) / (2 * own.sum(axis=0))
+        inside = (table == sample).astype(np.float64)
+        within += ((distances @ inside) * inside).sum(axis=0) / (2 * inside.sum(axis=0))
     total = float(distances.sum()) / (2 * count)
     return (total - within) / (samples - 1) / np.maximum(within / (count - samples), 1e-300)
 
@@ -219,7 +221,7 @@ def permuted(
     permutations: int,
     seed: int,
     groups: Labels | None = None,
-) -> Found:
+) -> TestStatistic:
     """Return a statistic with its p among random permutations of the samples.
 
     Rows of one of `groups` (N,), which all are of one sample, stay together.
@@ -228,13 +230,13 @@ def permuted(
     if groups is None:
         groups = np.arange(len(labels))
     _, first, member = np.unique(groups, return_index=True, return_inverse=True)
-    member, own = member.reshape(-1), labels[first]
+    member, samples = member.reshape(-1), labels[first]
     blocks = [statistic(vectors, labels[:, None])]
     size = max(1, BLOCK_ENTRIES // len(labels))
     for start in range(0, permutations, size):
         count = min(size, permutations - start)
-        table = np.stack([rng.permutation(own) for _ in range(count)], axis=1)
+        table = np.stack([rng.permutation(samples) for _ in range(count)], axis=1)
         blocks.append(statistic(vectors, table[member]))
-    found = np.concatenate(blocks)
-    p = float((found >= found[0] * (1 - 1e-12) - 1e-15).mean())
-    return Found(float(found[0]), (), "permutation", p)
+    values = np.concatenate(blocks)
+    p = float((values >= values[0] * (1 - 1e-12) - 1e-15).mean())
+    return TestStatistic(float(values[0]), (), "permutation", p)

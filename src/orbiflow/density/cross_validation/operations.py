@@ -107,13 +107,13 @@ def fold(
         "fitted": len(fitted.values),
         "log_likelihood": mean,
         "uniform": operations.uniform_score(estimator, unseen.values, unseen.weights),
-        "report": estimator.report_.to_json(),
+        "report": runtime.to_json(estimator.report_),
         "seconds": time.perf_counter() - begin,
     }
     report = json.dumps(document, allow_nan=False, indent=1)
     pairs = zip((unseen.numbers + 1).tolist(), scores.tolist(), strict=True)
     write_files(
-        folder, {SCORES: batch.csv_bytes(["row", "log_prob"], pairs), REPORT: report}, on_event
+        folder, {SCORES: runtime.csv_bytes(["row", "log_prob"], pairs), REPORT: report}, on_event
     )
     on_event(runtime.Note(f"mean log density {mean:.4f} nats at {len(scores)} rows held out"))
     names = ("rows", "fitted", "log_likelihood", "seconds")

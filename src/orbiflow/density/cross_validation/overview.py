@@ -120,7 +120,7 @@ class CvOverview:
                 "failed": states.count("failed"),
                 "left": waiting,
             },
-            "comparison": None if isinstance(comparison, str) else comparison.to_json(),
+            "comparison": None if isinstance(comparison, str) else runtime.to_json(comparison),
             "why_no_comparison": comparison if isinstance(comparison, str) else None,
             "folds": self._spreads(found),
         }
@@ -148,7 +148,7 @@ def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
         folder = "" if entry.state == "failed" else entry.name
         rows.append([fit.split, fit.fold, fit.setting, entry.state, *figures, seconds])
         rows[-1] += [entry.reason, folder]
-    return batch.csv_bytes(heads, rows)
+    return runtime.csv_bytes(heads, rows)
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
@@ -195,13 +195,13 @@ def run(
         )
     found = overview.comparison
     failed = isinstance(found, str)
-    for text in [f"no comparison: {found}"] if failed else [*found.words(), *found.notes]:
+    for text in [f"no comparison: {found}"] if failed else found.words():
         tell(runtime.Note(text))
     summary = {
         "folder": str(out),
         **{key: str(out / name) for key, name in files.items()},
         "fits": len(fits),
-        "comparison": None if failed else found.to_json(),
+        "comparison": None if failed else runtime.to_json(found),
         "seconds": time.perf_counter() - begin,
     }
     return counts.outcome(len(fits), out / TABLE, out / PAGE, summary, tell)

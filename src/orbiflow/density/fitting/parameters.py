@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+
+from orbiflow.runtime import p_in_words
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,11 @@ class ParametricFit:
 
     def __getitem__(self, name: str) -> Parameter:
         """Return the parameter of a name, such as "concentration"."""
-        for one in self.parameters:
-            if one.name == name:
-                return one
-        raise KeyError(f"{name}; there are {', '.join(one.name for one in self.parameters)}")
-
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`."""
-        return asdict(self)
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        names = ", ".join(parameter.name for parameter in self.parameters)
+        raise KeyError(f"{name}; there are {names}")
 
     def words(self) -> list[str]:
         """Return what is not in the table of parameters, in lines of text."""
@@ -83,21 +80,10 @@ class ParametricFit:
             size = "the rows cannot tell it" if angle is None else f"half angle {angle:.4g} degrees"
             lines.append(f"cone of {100 * self.level:g} % about {name}: {size}")
         if self.goodness is not None:
-            found = self.goodness
-            verdict = "the rows suit it" if found.p > 0.05 else "the rows do not suit it"
-            p = f"{found.p:.2g}" if found.p > 1e-300 else "< 1e-300"
+            test = self.goodness
+            verdict = "the rows suit it" if test.p > 0.05 else "the rows do not suit it"
             lines.append(
-                f"smooth test of the family: {found.statistic:.4g} with {found.degrees} degrees of "
-                f"freedom, p {p} by {found.by}: {verdict}"
+                f"smooth test of the family: {test.statistic:.4g} with {test.degrees} degrees of "
+                f"freedom, p {p_in_words(test.p)} by {test.by}: {verdict}"
             )
         return [*lines, *self.notes]
-
-
-def parametric_fit_from(document: Mapping[str, Any]) -> ParametricFit:
-    """Return a parametric fit from the object that `ParametricFit.to_json` returns."""
-    values: dict[str, Any] = dict(document)
-    values["parameters"] = tuple(Parameter(**entry) for entry in values["parameters"])
-    values["notes"] = tuple(values["notes"])
-    if values["goodness"] is not None:
-        values["goodness"] = Goodness(**values["goodness"])
-    return ParametricFit(**values)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import torch
@@ -12,9 +11,8 @@ from torch import Tensor
 
 from orbiflow.density.fitting.held_out import LEAST_PLACES
 from orbiflow.density.fitting.likelihood import Refinement
-from orbiflow.density.fitting.parameters import ParametricFit, parametric_fit_from
+from orbiflow.density.fitting.parameters import ParametricFit
 from orbiflow.density.fitting.repeats import Repeats, places
-from orbiflow.density.fitting.rounding import Heap
 from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
@@ -108,47 +106,6 @@ class FitReport:
     effective: float | None = None
     parametric: ParametricFit | None = None
     notes: tuple[str, ...] = field(default=())
-
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`; infinite figures are None."""
-        document = asdict(self)
-        for stage in document["stages"]:
-            for name in ("train", "validation"):
-                stage[name] = [round(v, 6) if math.isfinite(v) else None for v in stage[name]]
-        return document
-
-
-def report_from_json(document: Mapping[str, Any]) -> FitReport:
-    """A report from the object that `FitReport.to_json` returns."""
-    try:
-        values: dict[str, Any] = dict(document) | {"notes": tuple(document["notes"])}
-        stages = tuple(
-            Refinement(**stage | {k: _figures(stage[k]) for k in ("train", "validation")})
-            for stage in values.pop("stages")
-        )
-        components = tuple(ComponentEvidence(**entry) for entry in values.pop("components"))
-        repeats, parametric = values.pop("repeats"), values.pop("parametric", None)
-        return FitReport(
-            stages=stages,
-            components=components,
-            repeats=None if repeats is None else _repeats_from(repeats),
-            parametric=None if parametric is None else parametric_fit_from(parametric),
-            **values,
-        )
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise OrbiflowError(f"not the report of a fit: {error}") from error
-
-
-def _repeats_from(document: Mapping[str, Any]) -> Repeats:
-    values: dict[str, Any] = dict(document)
-    for name in ("spread", "columns"):
-        values[name] = tuple(values[name])
-    values["heaps"] = tuple(heap and Heap(*heap) for heap in values["heaps"])
-    return Repeats(**values)
-
-
-def _figures(values: list[float | None]) -> tuple[float, ...]:
-    return tuple(math.inf if value is None else value for value in values)
 
 
 def own_points(space: Space, points: Any) -> Tensor:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,23 +10,16 @@ from orbiflow import runtime
 from orbiflow.density import pictures, regions, spaces
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
-from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import TableSettings
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.settings import DefaultText, Option
+from orbiflow.settings import DefaultText, Ending, Option
 
 if TYPE_CHECKING:
-    from orbiflow.density.regions import DensityRegion, Outline
+    from orbiflow.density.regions import DensityRegion
     from orbiflow.density.spaces import Space
 
 Model = Annotated[Path, Option("-m")]
 """The parameter of a fitted density."""
-
-
-def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
-    """Check that a file's name ends in one of these."""
-    if out is not None and out.suffix.lower() not in endings:
-        raise SettingError(f"{{out}} must end in {', '.join(endings)}, got {out.name!r}")
 
 
 @runtime.operation("density plot")
@@ -111,7 +103,7 @@ def region(
     settings: RegionSettings = RegionSettings(),
     *,
     model: Model,
-    out: Annotated[Path, Option("-o")] = Path("regions.json"),
+    out: Annotated[Path, Option("-o"), Ending(".geojson", ".json", ".csv")] = Path("regions.json"),
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
@@ -124,8 +116,6 @@ def region(
         model: Folder that `fit` wrote.
         out: File for the regions: .geojson (of directions and axes), .json or .csv.
     """
-    require_ending(out, (".geojson", ".json", ".csv"))
-
     from orbiflow.density.operations.saved import model_at
 
     runtime.check_output_file(out, model)
@@ -143,22 +133,15 @@ def region(
         )
         found = [levels.highest(mass) for mass in settings.masses]
         found += [levels.above(level) for level in settings.level or ()]
-        drawn: list[Outline] = []
+        shown: Sequence[DensityRegion] = found
         if space.is_surface:
-            drawn = regions.outlines(
+            shown = regions.outlines(
                 levels, found, budget=settings.budget, seed=settings.seed, min_mass=settings.min_mass,
                 told=lambda share, what: progress(0.1 + 0.9 * share, what),
             )  # fmt: skip
-    if kind == ".geojson":
-        text = json.dumps(regions.to_geojson(drawn), allow_nan=False)
-    elif kind == ".csv":
-        text = regions.outlines_csv(drawn)
-    else:
-        document = regions.regions_document(found, drawn, samples=samples, seed=settings.seed)
-        text = json.dumps(document, allow_nan=False)
-    cancel.check()
-    write_file(out, text, on_event, *_region_notes(found, drawn), f"written to {out}")
-    return runtime.Outcome({"file": str(out), "regions": [one.to_json() for one in found]})
+    answer = regions.DensityRegions.of(shown, samples, settings.seed)
+    runtime.emit(answer, on_event, cancel, out)
+    return runtime.Outcome({"file": str(out), "regions": runtime.to_json(found)})
 
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
@@ -174,56 +157,3 @@ def _require_format(out: Path, kind: str, space: Space) -> None:
             f"{space.dimensions}: write .json, and use `orbiflow density score --region` for the rows "
             "inside"
         )
-
-
-def _region_notes(found: list[DensityRegion], drawn: list[Outline]) -> list[str]:
-    """Return what the user should know of regions, whose outlines may not have been drawn."""
-    space = found[0].density.space
-    if drawn:
-        return [note for one in drawn for note in (_described(one.region, one), *one.notes)]
-    return [
-        f"outlines are drawn in two dimensions, this {space.name} has {space.dimensions}: there are "
-        "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
-        "inside it is",
-        *(_described(one, None) for one in found),
-    ]
-
-
-def _described(found: DensityRegion, outline: Outline | None) -> str:
-    drawn, polygons = outline or found, ""
-    if outline is not None:
-        count = len(outline.shape.geoms)
-        polygons = f"; {_counted(count, 'polygon')}, which {'holds' if count == 1 else 'hold'} "
-        polygons += _with_error(outline.mass, outline.error)
-    share = "" if drawn.fraction is None else f", {_percentage(drawn.fraction)} of the space"
-    of = "log density" if found.smooth is None else "smoothed log density"
-    return (
-        f"mass {_with_error(found.held, found.error)}: {of} of at least "
-        f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
-        f"{drawn.size:.6g} {regions.size_unit(found.density.space)}{share}{polygons}"
-    )
-
-
-def _with_error(value: float, error: float) -> str:
-    """Return a number and its standard error, in two digits of the error, at least four decimals.
-
-    >>> _with_error(0.5, 0.00354), _with_error(0.9999, 0.00001)
-    ('0.5000 ± 0.0035', '0.999900 ± 0.000010')
-    """
-    decimals = 4 if error <= 0 else max(4, 1 - math.floor(math.log10(error)))
-    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
-
-
-def _percentage(share: float) -> str:
-    """Return a share in percent, in two decimals or, where these would say nothing, two digits.
-
-    >>> _percentage(0.0218), _percentage(0.0000123), _percentage(0.0)
-    ('2.18%', '0.0012%', '0.00%')
-    """
-    percents = 100 * share
-    decimals = 1 - math.floor(math.log10(percents)) if 0 < percents < 0.1 else 2
-    return f"{percents:.{decimals}f}%"
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'s' * (count != 1)}"

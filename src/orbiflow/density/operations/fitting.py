@@ -82,12 +82,12 @@ def fit(
             others, said = covariates.fit_given(estimator, rows, *known, on_event, cancel)
             document |= said
         document["seconds"] = time.perf_counter() - begin
-        sketch = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()
+        sketch = comparing.RowSketch.of(estimator.space_, values[rows.whole])
         model = models.density_to_bytes(
             estimator.density_,
             columns=list(rows.columns),
             roles=[role and str(role) for role in rows.roles],
-            fitted_rows=sketch,
+            fitted_rows=runtime.to_json(sketch),
         )
         report = json.dumps(document, allow_nan=False, indent=1)
         files = {pictures.MODEL: model, pictures.REPORT: report, **others}
@@ -201,7 +201,7 @@ def _document(
             "square_train": -report.train_nll,
             "square_validation": -report.validation_nll,
         },
-        "report": report.to_json(),
+        "report": runtime.to_json(report),
     }
 
 

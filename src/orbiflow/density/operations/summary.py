@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import warnings
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
-from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.data import ROTATIONS
-from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError, literal
 from orbiflow.settings import DefaultText, Ending, Option, Range, Settings, is_a
 
 if TYPE_CHECKING:
     from orbiflow.density.data import TableRows
+    from orbiflow.density.orientations import OrientationSummary
+    from orbiflow.density.summaries import AngleSummary, AxisSummary, Correlation, DirectionSummary
 
 File = Annotated[Path | None, DefaultText("none")]
 
@@ -67,35 +66,10 @@ def summary(
             )
             + f"and a column is {wrong[0]}: leave it out of {{columns}}"
         )
-    unit = rows.unit or "degrees"
-    found = _summarised(rows, where, unit, settings)
-    cancel.check()
-    for event in _tables(found, settings.level):
-        on_event(event)
-    for note in _notes(found, rows):
-        on_event(runtime.Note(note))
-    document = {"kind": "summary", "space": where.space, "unit": unit, "level": settings.level}
-    document |= {"declaration": rows.declaration}
-    document |= found
-    if out is not None:
-        as_csv = out.suffix.lower() == ".csv"
-        text = _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
-        write_file(out, text, on_event, f"written to {out}")
-    if picture is not None:
-        write_file(picture, _roses(rows, found["columns"], unit, picture), on_event)
-    return runtime.Outcome({"file": None if out is None else str(out), **document})
-
-
-def _csv(found: dict[str, Any]) -> bytes:
-    """Return the figures of columns, directions or axes, a row each; correlations are in the JSON."""
-    rows: list[dict[str, Any]] = []
-    for entry in next(iter(found.values())):
-        flat: dict[str, Any] = {}
-        for key, value in entry.items():
-            several = is_a(value, tuple)
-            flat |= {f"{key}_{k}": v for k, v in enumerate(value, 1)} if several else {key: value}
-        rows.append(flat)
-    return csv_bytes(list(rows[0]), [list(row.values()) for row in rows])
+    answer = _summarised(rows, where, settings.level)
+    runtime.emit(answer, on_event, cancel, out, picture)
+    file = None if out is None else str(out)
+    return runtime.Outcome({"file": file, **runtime.to_json(answer)})
 
 
 def _check(where: SpaceSettings, reading: RowSettings, picture: Path | None) -> None:
@@ -112,32 +86,38 @@ def _check(where: SpaceSettings, reading: RowSettings, picture: Path | None) -> 
             raise SettingError("{picture} is for angles on a torus: `density plot` draws maps")
 
 
-def _summarised(
-    rows: TableRows, where: SpaceSettings, unit: str, settings: SummarySettings
-) -> dict[str, Any]:
-    """Return the summaries of rows as JSON has them."""
+def _summarised(rows: TableRows, where: SpaceSettings, level: float) -> Summary:
     from orbiflow.density import orientations, summaries
     from orbiflow.density.operations.fitting import space_of
 
-    values, space = rows.values, where.space
-    how: dict[str, Any] = {
-        "weights": rows.weights, "groups": rows.labels, "level": settings.level,
-    }  # fmt: skip
-    if space in ROTATIONS:
-        own: Any = space_of(where, rows.columns, unit)
-        return {"orientations": [asdict(orientations.summarize_orientations(own, values, **how))]}
+    values, unit = rows.values, rows.unit or "degrees"
+    how: dict[str, Any] = {"weights": rows.weights, "groups": rows.labels, "level": level}
+    about: dict[str, Any] = {"space": where.space, "unit": unit, "level": level}
+    about |= {"declaration": rows.declaration, "data": rows}
+    if where.space in ROTATIONS:
+        space: Any = space_of(where, rows.columns, unit)
+        entry = orientations.summarize_orientations(space, values, **how)
+        return Summary(**about, orientations=(entry,))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
-        if space == "torus":
-            made = summaries.summarize_angles(values, columns=rows.columns, unit=unit, **how)
-            names = ("columns", "correlations")
-            return {n: [asdict(one) for one in part] for n, part in zip(names, made, strict=True)}
-        name, summarise = {
-            "sphere": ("directions", summaries.summarize_directions),
-            "projective-plane": ("axes", summaries.summarize_axes),
-        }[space]
-        return {name: [asdict(summarise(values, unit="degrees", **how))]}
+        if where.space == "sphere":
+            entry = summaries.summarize_directions(values, unit="degrees", **how)
+            return Summary(**about, directions=(entry,))
+        if where.space == "projective-plane":
+            return Summary(**about, axes=(summaries.summarize_axes(values, unit="degrees", **how),))
+        columns, pairs = summaries.summarize_angles(values, columns=rows.columns, unit=unit, **how)
+    return Summary(**about, columns=tuple(columns), correlations=tuple(pairs))
 
+
+HEADINGS = {
+    "half_width": "± ({sure})", "pairs": "Fisher-Lee", "sine": "Jammalamadaka-SenGupta",
+    "sine_p": "p", "rayleigh_p": "Rayleigh p", "kuiper_p": "Kuiper p", "watson_p": "Watson p",
+    "rao_p": "Rao p", "bingham_p": "Bingham p", "name": "column",
+    "cone": "cone ({sure}), degrees", "fisher_cone": "Fisher's cone ({sure}), degrees",
+    "k": "k = (n - 1)/(n - R)", "spread": "mean misorientation, degrees",
+    "half": "half of the rows within, degrees",
+}  # fmt: skip
+"""What figures are called in tables, where that is not their name; `sure` is the level."""
 
 TABLES = {
     "Angles": ("name", "rows", "mean", "half_width", "resultant", "concentration", "deviation"),
@@ -147,34 +127,112 @@ TABLES = {
 """The figures in each table of angles."""
 
 
-def _tables(found: dict[str, Any], level: float) -> list[runtime.Table]:
-    """Return the figures as tables, of directions and axes a line for each."""
-    sure = f"{100 * level:g} %"
-    words: dict[str, str] = {
-        "half_width": f"± ({sure})", "deviation": "deviation", "pairs": "Fisher-Lee",
-        "sine": "Jammalamadaka-SenGupta", "sine_p": "p", "rayleigh_p": "Rayleigh p",
-        "kuiper_p": "Kuiper p", "watson_p": "Watson p", "rao_p": "Rao p",
-        "bingham_p": "Bingham p", "name": "column",
-        "cone": f"cone ({sure}), degrees", "fisher_cone": f"Fisher's cone ({sure}), degrees",
-        "k": "k = (n - 1)/(n - R)", "spread": "mean misorientation, degrees",
-        "half": "half of the rows within, degrees",
-    }  # fmt: skip
-    if "columns" not in found:
-        (name, (entry,)), *_ = found.items()
-        lines = tuple(
-            (str(words.get(key, key)), _shown(key, value)) for key, value in entry.items()
-        )
-        return [runtime.Table(name.capitalize(), ("figure", "value"), lines)]
-    of = dict(zip(TABLES, (found["columns"], found["columns"], found["correlations"]), strict=True))
-    return [
-        runtime.Table(
-            title,
-            tuple(str(words.get(key, key)) for key in keys),
-            tuple(tuple(_shown(key, entry[key]) for key in keys) for entry in of[title]),
-        )
-        for title, keys in TABLES.items()
-        if of[title]
-    ]
+@dataclass(frozen=True)
+class Summary(runtime.Answer):
+    """Figures of a table of angles, or of directions, axes or orientations.
+
+    - `space`, `unit`, `declaration`: What the columns were taken for.
+    - `level`: Level of the intervals and cones.
+    - `data`: The rows.
+    """
+
+    kind = "summary"
+
+    space: str
+    unit: str
+    level: float
+    declaration: str
+    data: TableRows = field(repr=False)
+    columns: tuple[AngleSummary, ...] = ()
+    correlations: tuple[Correlation, ...] = ()
+    directions: tuple[DirectionSummary, ...] = ()
+    axes: tuple[AxisSummary, ...] = ()
+    orientations: tuple[OrientationSummary, ...] = ()
+
+    def table(self) -> list[dict[str, Any]]:
+        """Return the figures of columns, directions, axes or orientations, a row each."""
+        rows: list[dict[str, Any]] = []
+        for entry in self.columns or self.directions or self.axes or self.orientations:
+            row: dict[str, Any] = {}
+            for key, value in asdict(entry).items():
+                several = is_a(value, tuple)
+                row |= (
+                    {f"{key}_{k}": v for k, v in enumerate(value, 1)} if several else {key: value}
+                )
+            rows.append(row)
+        return rows
+
+    def words(self) -> Iterator[str | runtime.Event]:
+        """Yield the figures as tables, of directions and axes a line for each, and notes."""
+        sure = f"{100 * self.level:g} %"
+
+        def heading(key: str) -> str:
+            return HEADINGS.get(key, key).format(sure=sure)
+
+        for title, keys in TABLES.items() if self.columns else ():
+            entries = self.correlations if title == "Circular correlations" else self.columns
+            if entries:
+                rows = tuple(tuple(_shown(k, getattr(e, k)) for k in keys) for e in entries)
+                yield runtime.Table(title, tuple(map(heading, keys)), rows)
+        for name in ("directions", "axes", "orientations"):
+            for entry in getattr(self, name):
+                lines = tuple((heading(k), _shown(k, v)) for k, v in asdict(entry).items())
+                yield runtime.Table(name.capitalize(), ("figure", "value"), lines)
+        yield from self._notes()
+
+    def _notes(self) -> Iterator[str]:
+        """Yield what to keep in mind."""
+        from orbiflow.density.summaries import MIN_ROWS
+
+        labels, weights = self.data.labels, self.data.weights
+        entries = self.columns or self.directions or self.axes or self.orientations
+        units, what = min(entry.rows for entry in entries), "rows"
+        if labels is not None:
+            units, what = len(set(labels.tolist())), "groups"
+            yield f"intervals and tests count {units} groups, whose rows are not independent"
+        if labels is not None or weights is not None:
+            yield "tests that are known for independent rows of equal weight alone are left out"
+        if units < MIN_ROWS:
+            yield f"intervals are rough with fewer than {MIN_ROWS} {what}, there are {units}"
+        peaks = [entry for entry in self.columns if entry.rows > 1]
+        if constant := [entry.name for entry in peaks if entry.concentration is None]:
+            yield f"all rows have the same value of {', '.join(constant)}"
+        for entry in self.orientations:
+            if entry.half > WIDE_DEGREES:
+                yield (
+                    f"half of the rows are {entry.half:.0f} degrees and more from the mean, which says "
+                    "little: `density fit` finds several orientations"
+                )
+        if undetermined := [entry.name for entry in self.columns if entry.half_width is None]:
+            yield (
+                f"the mean direction of {', '.join(undetermined)} cannot be told; of the correlations, "
+                "Fisher and Lee's needs none"
+            )
+
+    def picture(self, form: str) -> bytes:
+        """Return a picture of a rose for each column."""
+        import numpy as np
+
+        from orbiflow.density import pictures
+        from orbiflow.density.data import written_from_zero
+        from orbiflow.density.spaces import whole_turn
+        from orbiflow.drawing import Sheet
+
+        turn, roses, weights = whole_turn(self.unit), list[pictures.Rose](), self.data.weights
+        for values, entry in zip(self.data.values.T, self.columns, strict=True):
+            kept = np.isfinite(values)
+            shares = None if weights is None else weights[kept]
+            mean, spread = (
+                None if value is None else value / turn for value in (entry.mean, entry.half_width)
+            )
+            turns = values[kept] / turn
+            first = 0.0 if written_from_zero(turns[:, None], 1.0) else -0.5
+            place = (mean, entry.resultant, spread)
+            roses.append(pictures.Rose(entry.name, turns, shares, None, place, first))
+        sheet_form: Any = form
+        sheet = Sheet.screen() if form == "png" else Sheet.column("double", sheet_form)
+        words = "The line is the mean direction, as long as the resultant, and the arc its interval"
+        return pictures.roses_picture(roses, self.unit, words, sheet).file()
 
 
 def _shown(key: str, value: Any) -> str:
@@ -190,61 +248,5 @@ def _shown(key: str, value: Any) -> str:
     if is_a(value, Sequence):
         return ", ".join(_shown(key, part) for part in value)
     if key.endswith("_p"):
-        return f"{value:.2g}" if value > 1e-300 else "< 1e-300"
+        return runtime.p_in_words(value)
     return str(value) if isinstance(value, int) else f"{value:.4g}"
-
-
-def _notes(found: dict[str, Any], rows: TableRows) -> list[str]:
-    """Return what to keep in mind."""
-    from orbiflow.density.summaries import MIN_ROWS
-
-    entries, notes = next(iter(found.values())), list[str]()
-    units, what = min(entry["rows"] for entry in entries), "rows"
-    if rows.labels is not None:
-        units, what = len(set(rows.labels.tolist())), "groups"
-        notes.append(f"intervals and tests count {units} groups, whose rows are not independent")
-    if rows.labels is not None or rows.weights is not None:
-        notes.append("tests that are known for independent rows of equal weight alone are left out")
-    if units < MIN_ROWS:
-        notes.append(f"intervals are rough with fewer than {MIN_ROWS} {what}, there are {units}")
-    peaks = [one for one in entries if "name" in one and one["rows"] > 1]
-    if constant := [one["name"] for one in peaks if one["concentration"] is None]:
-        notes.append(f"all rows have the same value of {', '.join(constant)}")
-    if (half := entries[0].get("half", 0.0)) > WIDE_DEGREES:
-        notes.append(
-            f"half of the rows are {half:.0f} degrees and more from the mean, which says little: "
-            "`density fit` finds several orientations"
-        )
-    undetermined = [entry["name"] for entry in entries if entry.get("half_width", 0) is None]
-    if undetermined:
-        notes.append(
-            f"the mean direction of {', '.join(undetermined)} cannot be told; of the correlations, "
-            "Fisher and Lee's needs none"
-        )
-    return notes
-
-
-def _roses(rows: TableRows, columns: list[dict[str, Any]], unit: str, file: Path) -> bytes:
-    """Return a picture of a rose for each column."""
-    import numpy as np
-
-    from orbiflow.density import pictures
-    from orbiflow.density.data import written_from_zero
-    from orbiflow.density.spaces import whole_turn
-    from orbiflow.drawing import Sheet
-
-    turn, roses = whole_turn(unit), list[pictures.Rose]()
-    for column, entry in zip(rows.values.T, columns, strict=True):
-        kept = np.isfinite(column)
-        weights = None if rows.weights is None else rows.weights[kept]
-        mean, spread = (
-            None if entry[key] is None else entry[key] / turn for key in ("mean", "half_width")
-        )
-        place = (mean, entry["resultant"], spread)
-        turns = column[kept] / turn
-        first = 0.0 if written_from_zero(turns[:, None], 1.0) else -0.5
-        roses.append(pictures.Rose(entry["name"], turns, weights, None, place, first))
-    form: Any = file.suffix.lower()[1:]
-    sheet = Sheet.screen() if form == "png" else Sheet.column("double", form)
-    words = "The line is the mean direction, as long as the resultant, and the arc its interval"
-    return pictures.roses_picture(roses, unit, words, sheet).file()

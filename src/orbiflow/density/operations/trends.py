@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from orbiflow import runtime
-from orbiflow.batch import csv_bytes
 from orbiflow.density import models
 from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_file
@@ -134,7 +133,7 @@ class _Drawn(NamedTuple):
                 if found.log_density is not None:
                     cells.append(float(found.log_density[k]))
                 lines.append([f"{own:.10g}" if is_a(own, float) else own for own in cells])
-        return csv_bytes(heads, lines)
+        return runtime.csv_bytes(heads, lines)
 
     def picture(self) -> Picture:
         """Return the picture of all of them."""

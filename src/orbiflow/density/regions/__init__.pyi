@@ -1,12 +1,11 @@
-from .boundaries import Outline as Outline
+from .boundaries import RegionOutline as RegionOutline
 from .boundaries import outlines as outlines
-from .boundaries import outlines_csv as outlines_csv
-from .boundaries import regions_document as regions_document
-from .boundaries import size_unit as size_unit
-from .boundaries import to_geojson as to_geojson
 from .levels import DensityLevels as DensityLevels
 from .levels import DensityRegion as DensityRegion
 from .levels import highest_density_region as highest_density_region
+from .report import DensityRegions as DensityRegions
+from .report import size_unit as size_unit
+from .report import to_geojson as to_geojson
 from .settings import Mass as Mass
 from .settings import RegionSettings as RegionSettings
 from .settings import SampleCount as SampleCount

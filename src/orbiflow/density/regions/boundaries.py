@@ -1,21 +1,19 @@
-"""The boundaries of regions in two dimensions: polygons in a window, as GeoJSON, CSV and JSON."""
+"""The boundaries of regions in two dimensions: polygons in a window."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 import shapely
 import torch
 from numpy.typing import NDArray
-from shapely import affinity
 from shapely.geometry.polygon import orient
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
 from orbiflow.density.regions.grid import Block, filled, refined, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
@@ -46,51 +44,40 @@ SIMPLIFIED = 0.03
 """Distance from the line, in cells, of vertices that may be left out."""
 
 
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """A region's boundary.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RegionOutline(DensityRegion):
+    """A region with its boundary.
 
-    - `region`: The region. `window`: The window in which it is drawn.
+    - `window`: The window in which it is drawn.
     - `shape`: Polygons in the window's units, outer rings counter-clockwise, cut at the window's edges.
-    - `size`: Area of the polygons in natural measure.
-    - `mass`, `error`: Share of new samples that lie inside the polygons, and its standard error.
-    - `off`: Root mean square of the log density at the vertices, less the threshold, in nats.
+    - `polygons_size`: Area of the polygons in natural measure.
+    - `polygons_mass`, `polygons_mass_error`: Share of new samples that lie inside the polygons, and its
+      standard error.
+    - `vertices_off`: Root mean square of the log density at the vertices, less the threshold, in nats.
     - `notes`: What the user should know, in words.
     """
 
-    region: DensityRegion
-    window: Window
-    shape: shapely.MultiPolygon
-    size: float
-    mass: float
-    error: float
-    off: float
+    window: Window = field(repr=False)
+    shape: shapely.MultiPolygon = field(repr=False)
+    polygons_size: float
+    polygons_mass: float
+    polygons_mass_error: float
+    vertices_off: float
     notes: tuple[str, ...] = ()
 
     @property
-    def fraction(self) -> float:
-        """The share of the space's natural measure."""
-        return self.size / self.region.density.space.volume
+    def polygons_fraction(self) -> float:
+        """The polygons' share of the space's natural measure."""
+        return self.polygons_size / self.density.space.volume
 
-    def rings(self) -> list[list[Array]]:
-        """Return for each polygon its outer ring (n, 2), closed, and then its holes."""
-        return _rings(self.shape)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`."""
-        return {
-            **self.region.to_json(),
-            "polygons": [[ring.tolist() for ring in rings] for rings in self.rings()],
-            "polygons_size": self.size,
-            "polygons_fraction": self.fraction,
-            "polygons_mass": self.mass,
-            "polygons_mass_error": self.error,
-            "vertices_off": self.off,
-            "notes": list(self.notes),
-        }
+    @property
+    def polygons(self) -> list[list[Array]]:
+        """For each polygon its outer ring (n, 2), closed, and then its holes."""
+        return rings_of(self.shape)
 
 
-def _rings(shape: shapely.MultiPolygon) -> list[list[Array]]:
+def rings_of(shape: shapely.MultiPolygon) -> list[list[Array]]:
+    """Return for each polygon its outer ring (n, 2), closed, and then its holes."""
     return [
         [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
         for part in shape.geoms
@@ -107,7 +94,7 @@ def outlines(
     seed: int = 0,
     min_mass: float | None = None,
     told: Callable[[float, str], None] = lambda _share, _what: None,
-) -> list[Outline]:
+) -> list[RegionOutline]:
     """Return the boundaries of regions of one density of two dimensions.
 
     A grid is made finer three times where a threshold is crossed. Samples on the other side of a
@@ -137,7 +124,7 @@ def outlines(
     spent += len(peaks)
     generator = torch.Generator().manual_seed(seed + 1)
     fresh = window.from_chart(levels.density.sample((CHECKED,), generator).double())
-    found: list[Outline] = []
+    drawn: list[RegionOutline] = []
     for number, region in enumerate(regions):
         told(min(0.9, spent / budget), "drawing outlines")
         shape, off = filled(grid, region.log_prob, function)
@@ -151,9 +138,19 @@ def outlines(
         if held[1]:
             islands = f"island{'s' * (held[1] > 1)} of less than {min_mass:g} of the mass"
             notes += (f"left out {held[1]} {islands}, which held {held[0] - inside:.4f} in all",)
-        size = window.area(shape)
-        found.append(Outline(region, window, shape, size, inside, error, off, notes))
-    return found
+        drawn.append(
+            RegionOutline(
+                **{entry.name: getattr(region, entry.name) for entry in fields(DensityRegion)},
+                window=window,
+                shape=shape,
+                polygons_size=window.area(shape),
+                polygons_mass=inside,
+                polygons_mass_error=error,
+                vertices_off=off,
+                notes=notes,
+            )
+        )
+    return drawn
 
 
 def _large(
@@ -207,14 +204,14 @@ def _peaks(density: Density) -> Tensor:
     return places[chosen[:MAX_PEAKS]]
 
 
-def _parts(shapes: Any) -> list[shapely.Polygon]:
+def parts_of(shapes: Any) -> list[shapely.Polygon]:
     """Return the polygons of which shapes consist."""
     parts = shapely.get_parts(shapes).tolist()
     return [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 0]
 
 
 def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.MultiPolygon:
-    simple = [shapely.simplify(p, SIMPLIFIED * min(step, np.sqrt(p.area))) for p in _parts(shape)]
+    simple = [shapely.simplify(p, SIMPLIFIED * min(step, np.sqrt(p.area))) for p in parts_of(shape)]
     kept = [orient(p) for p in simple if p.is_valid and p.area > 0]
     if longest < np.inf:
         kept = [shapely.segmentize(p, longest) for p in kept]
@@ -315,110 +312,3 @@ def _steradians(polygon: shapely.Polygon) -> float:
         mean = np.sin(lat[:-1] + half) * np.sinc(half / np.pi)
         areas.append(abs(float((mean * np.diff(lon)).sum())))
     return areas[0] - sum(areas[1:])
-
-
-DIGITS = 7
-"""Digits after the point of degrees in GeoJSON: a centimetre on the ground."""
-
-
-def _about_greenwich(outline: Outline) -> shapely.MultiPolygon:
-    """Return polygons of longitudes from -180 to 180, cut at the antimeridian and nowhere else."""
-    if outline.window.low[0] < 0:
-        return outline.shape
-    halves = [
-        affinity.translate(part, -2 * west)
-        for west in (0.0, 180.0)
-        for part in _parts(
-            shapely.intersection(list(outline.shape.geoms), shapely.box(west, -90, west + 180, 90))
-        )
-    ]
-    whole = shapely.union_all(halves, grid_size=10.0**-DIGITS)
-    return shapely.MultiPolygon([orient(part) for part in _parts(whole)])
-
-
-def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
-    """Return a FeatureCollection with a MultiPolygon for each region, for `json.dumps`.
-
-    Coordinates are longitude and latitude in degrees, outer rings counter-clockwise (RFC 7946, 3.1.6);
-    polygons are cut at the antimeridian (3.1.9), and one that holds a pole runs along the edge of the
-    map there. Sides are straight in longitude and latitude (3.1.1). Axes are drawn at their northern
-    ends.
-
-    The properties of each are `mass` (asked for, or null), `smooth` (degrees of arc, or null), `held`
-    and `held_error` (from samples of the density), `log_prob` (the threshold, nats per steradian) and
-    its interval of 95 %, `area` in steradians, `fraction` of the space,
-    `polygons_mass` and `polygons_mass_error` (from new samples inside the polygons).
-    """
-    features: list[dict[str, Any]] = []
-    for outline in outlines:
-        region = outline.region
-        if not outline.window.on_globe:
-            raise OrbiflowError(
-                "GeoJSON is for places on a globe, not for points of the "
-                f"{region.density.space.name}: write .json or .csv"
-            )
-        names = ("mass", "smooth", "held", "log_prob", "log_prob_low", "log_prob_high")
-        properties = {
-            **{name: getattr(region, name) for name in names},
-            "held_error": region.error,
-            "area": outline.size,
-            "fraction": outline.fraction,
-            "polygons_mass": outline.mass,
-            "polygons_mass_error": outline.error,
-        }
-        parts = _rings(_about_greenwich(outline))
-        rings = [[np.round(ring, DIGITS).tolist() for ring in part] for part in parts]
-        geometry = {"type": "MultiPolygon", "coordinates": rings}
-        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
-    return {"type": "FeatureCollection", "features": features}
-
-
-def outlines_csv(outlines: Sequence[Outline]) -> bytes:
-    """Return CSV text with a row for each vertex of the outlines of one density's regions."""
-    heads = ["region", "mass", "log_prob", "polygon", "ring", *outlines[0].window.names]
-    rows: list[list[Any]] = []
-    for number, outline in enumerate(outlines, 1):
-        mass = "" if outline.region.mass is None else f"{outline.region.mass:g}"
-        level = f"{outline.region.log_prob:.10g}"
-        for polygon, rings in enumerate(outline.rings(), 1):
-            for ring, points in enumerate(rings):
-                for x, y in points:
-                    rows.append([number, mass, level, polygon, ring, f"{x:.10g}", f"{y:.10g}"])
-    return csv_bytes(heads, rows)
-
-
-def regions_document(
-    regions: Sequence[DensityRegion], outlines: Sequence[Outline], *, samples: int, seed: int
-) -> dict[str, Any]:
-    """Return one density's regions, with their outlines if there are any, for `json.dumps`."""
-    space = regions[0].density.space
-    frame: dict[str, Any] = {}
-    if outlines:
-        window = outlines[0].window
-        corners = [window.low.tolist(), window.high.tolist()]
-        frame = {"axes": list(window.names), "window": corners, "edges": window.edges}
-    return {
-        "kind": "regions",
-        "space": {"name": space.name, **space.settings()},
-        "size_unit": size_unit(space),
-        "samples": samples,
-        "seed": seed,
-        **frame,
-        "regions": [one.to_json() for one in outlines or regions],
-    }
-
-
-def size_unit(space: Space) -> str:
-    """Return the unit of sizes in a space's natural measure.
-
-    >>> from orbiflow.density import Torus
-    >>> size_unit(Torus(2, unit="degrees"))
-    'degrees^2'
-    """
-    if space.is_round:
-        return "steradians" if space.dim == 2 else f"radians^{space.dim} of the unit sphere"
-    if space.axes and not space.is_of_angles:
-        return "units of each column" if space.dim > 1 else "units"
-    if space.parts:
-        return f"{size_unit(space.parts[0])} times {size_unit(space.parts[1])}"
-    return str(space.unit) if space.dim == 1 else f"{space.unit}^{space.dim}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from orbiflow.density.models import AdaptiveKernels, Density, UniformDensity
 from orbiflow.density.regions.settings import MAX_SAMPLES, MIN_SAMPLES, SAMPLES, samples_for
 from orbiflow.density.spaces import whole_turn
 from orbiflow.errors import SettingError
-from orbiflow.runtime import one_thread
+from orbiflow.runtime import Answer, one_thread
 from orbiflow.settings import as_number, as_whole
 
 SAMPLES_PER_EVEN_POINT = 4
@@ -35,7 +35,7 @@ SIGMAS_95 = 1.96
 
 
 @dataclass(frozen=True, eq=False)
-class DensityRegion:
+class DensityRegion(Answer):
     """A region in which a density is at least `exp(log_prob)`, in natural measure.
 
     - `mass`: The mass that was asked for, None for a region above a level.
@@ -48,7 +48,9 @@ class DensityRegion:
       and `held` is the mass of the density itself.
     """
 
-    density: Density
+    kind = "region"
+
+    density: Density = field(repr=False)
     mass: float | None
     held: float
     error: float
@@ -68,11 +70,6 @@ class DensityRegion:
     def contains(self, data: ArrayLike) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Return whether data (N, k), in the space's own units, lie inside: (N,)."""
         return scores_of(self.density, data) >= self.log_prob
-
-    def to_json(self) -> dict[str, Any]:
-        """Return an object for `json.dumps`."""
-        names = [field.name for field in fields(self) if field.name != "density"]
-        return {name: getattr(self, name) for name in (*names, "fraction")}
 
 
 class DensityLevels:
