@@ -114,7 +114,7 @@ def test_beside_independent_angles_and_refusals() -> None:
     assert together["dependence"].low is not None
     assert together["dependence"].low > 0
     with refused("von-mises"):
-        fit_parametric(make_space("torus", dim=3), torch.rand(20, 3), "von-mises-sine")
+        fit_parametric(make_space("torus", axes=3), torch.rand(20, 3), "von-mises-sine")
     with refused("torus", "angles"):
         VonMisesSine(make_space("sphere"), numbers(0, 0), numbers(1, 1, 0))
     with refused("three", "parameters"):
