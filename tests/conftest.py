@@ -2,6 +2,7 @@
 
 import gc
 import os
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +13,10 @@ from hypothesis import HealthCheck, register_random, settings
 from bent_tiles import bent_tile_fixture, equivariant_fixture  # noqa: F401
 from small_searches import small_searches_fixture  # noqa: F401
 from studio.browser import chromium
+
+# Docker images often forbid compiled files: then each process of a test compiles the package anew
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 torch.set_num_threads(1)
 torch.set_warn_always(True)  # a warning must not depend on which test comes first

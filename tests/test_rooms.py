@@ -97,8 +97,8 @@ PAST_DOORS = {
     "tiles/search/test_carried.py: tiles.silhouette.bending": "the most points of a map",
     "tiles/search/test_two_figures.py: tiles.motion.kinds": "every frame, not the file",
     "tiles/silhouette/test_sampling.py: tiles.search.co_deformation": "bodies sampled for it",
-    "tiles/exporting/test_lengths.py: settings.kinds": "how lengths are read, not which settings",
-    "tiles/exporting/test_lengths.py: settings.units": "how lengths are read, not which settings",
+    "tiles/exporting/test_export_settings.py: settings.kinds": "how lengths are read",
+    "tiles/exporting/test_export_settings.py: settings.units": "how lengths are read",
     "test_without_extras.py: settings.extras": "what is said where an extra is missing",
     "density/cross_validation/test_cross_validation.py: batch.parcels": "a worker's part, here",
     "density/pictures/test_plots.py: density.operations.drawing": "the operation that draws",
@@ -141,6 +141,12 @@ def door(package: str) -> dict[str, str]:
     return offered
 
 
+@cache
+def all_imports() -> list[Import]:
+    """Of all files: read when a test asks, as every worker collects this file."""
+    return [line for path in MODULES.values() for line in imports(path)]
+
+
 def imports(path: Path) -> Iterator[Import]:
     tree = ast.parse(path.read_text("utf-8"))
     typing = set(for_type_checkers(tree))
@@ -165,9 +171,6 @@ def door_or_module(source: str, name: str) -> str:
     return door(source).get(name, source) if source in PACKAGES else source
 
 
-ALL = [found for path in MODULES.values() for found in imports(path)]
-
-
 @cache
 def room(module: str) -> str:
     """The longest room that holds a module; "" for a file at the top, which all share."""
@@ -183,14 +186,14 @@ def test_every_folder_is_in_a_room() -> None:
 @pytest.mark.parametrize("name", ["", *ROOMS])
 def test_a_room_imports_only_rooms_before_it(name: str) -> None:
     allowed = {"", *ROOMS[: ROOMS.index(name) + 1]} if name else {""}
-    for found in ALL:
+    for found in all_imports():
         own = dotted(found.file)
         if room(own) == name and own not in ("orbiflow", "orbiflow.__main__"):
             assert room(found.module) in allowed, str(found)
 
 
 def test_the_wings_do_not_know_each_other() -> None:
-    for found in ALL:
+    for found in all_imports():
         wings = (
             {dotted(found.file).split(".")[1:2][0], found.module.split(".")[1:2][0]}
             if found.module != "orbiflow" and dotted(found.file) != "orbiflow"
@@ -202,7 +205,7 @@ def test_the_wings_do_not_know_each_other() -> None:
 def test_no_circles() -> None:
     """Imports in functions count as those at the start of a file do, imports for types do not."""
     graph: dict[str, set[str]] = {}
-    for found in ALL:
+    for found in all_imports():
         own = dotted(found.file)
         if not found.for_types and found.module not in (own, *PACKAGES):
             graph.setdefault(own, set()).add(found.module)
@@ -214,7 +217,7 @@ def test_no_circles() -> None:
 
 def test_imports_go_through_doors() -> None:
     past: list[str] = []
-    for found in ALL:
+    for found in all_imports():
         here = dotted(found.file)
         own = (here if here in PACKAGES else here.rpartition(".")[0]).split(".")
         if own[1:2] == ["cli"]:
@@ -268,6 +271,6 @@ def test_doors_offer_what_is_there() -> None:
 
 
 def test_private_names_stay_in_their_file() -> None:
-    for found in ALL:
+    for found in all_imports():
         parts = (*found.source.split("."), found.name)
         assert not any(p.startswith("_") and not p.startswith("__") for p in parts), str(found)
