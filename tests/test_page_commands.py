@@ -29,7 +29,7 @@ from shell_lines import ROOT, Line
 from small_pairs import FEW as FEW_PAIRS
 from small_pairs import small_pairs
 from small_searches import FEW, small_searches
-from solids.known_bodies import creature
+from solids.known_solids import creature
 from solids.small_fills import small_fills
 from test_shell_lines import LINES
 

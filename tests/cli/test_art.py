@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from artworks import EYE, size_of, squirrel, write_run
+from artworks import size_of, squirrel, write_run
 from orbiflow.tiles import Target
 from refusals import names
 
@@ -38,24 +37,6 @@ def test_a_picture(result: Path, picture: Path, tmp_path: Path, orbiflow) -> Non
     with Image.open(out) as made:
         assert made.info["dpi"] == pytest.approx((300, 300), abs=0.1)
         assert (np.asarray(made) == (0xC0, 0x20, 0x40)).all()
-
-
-def test_engraving_with_an_eye_as_svg(result: Path, tmp_path: Path, orbiflow) -> None:
-    out = tmp_path / "tiles.svg"
-    eye = f"{EYE[0]},{EYE[1]},20"
-    outcome = orbiflow("art", result, "--engrave", "--eye", eye, *SMALL, "-o", out)
-    assert outcome.status == 0, outcome.err
-    assert "currentColor" in out.read_text()
-
-
-def test_a_repeat_says_its_size(result: Path, tmp_path: Path, orbiflow) -> None:
-    out = tmp_path / "cell.png"
-    options = ("--repeat", "basic", "--tile-size", "30px", "--colour", "aspect", "--palette", "sea")
-    outcome = orbiflow("art", result, *options, "-o", out)
-    assert outcome.status == 0, outcome.err
-    with Image.open(out) as image:
-        width, height = image.size
-    names(outcome.out, width, height)
 
 
 def test_the_default_name(result: Path, tmp_path: Path, orbiflow, monkeypatch) -> None:
@@ -88,23 +69,6 @@ def test_other_endings(out: str, result: Path, tmp_path: Path, orbiflow) -> None
     outcome = orbiflow("art", result, "-o", tmp_path / out)
     assert outcome.status == 2
     names(outcome.err, "--out", ".html", ".pdf", ".png", ".svg", out)
-
-
-DOCS = (Path(__file__).parents[2] / "docs" / "artwork.md").read_text(encoding="utf-8")
-
-
-def test_the_snippet_of_the_documentation(tmp_path: Path, monkeypatch) -> None:
-    (snippet,) = re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL)
-    monkeypatch.chdir(tmp_path)
-    write_run(tmp_path / "out" / "barbet", "IH5")
-    low, high = squirrel("IH5").covered[:2]
-    box = " ".join(str(value) for value in (*low, *(high - low)))
-    (tmp_path / "examples" / "artwork").mkdir(parents=True)
-    drawing = f'<svg viewBox="{box}"><circle cx="{EYE[0]}" cy="{EYE[1]}" r="20"/></svg>'
-    (tmp_path / "examples" / "artwork" / "barbet.svg").write_text(drawing)
-    names: dict[str, Any] = {}
-    exec(compile(snippet, "artwork.md", "exec"), names)
-    assert names["pixels"].shape == (600, 900, 3)
 
 
 def test_the_example_lies_over_its_silhouette() -> None:

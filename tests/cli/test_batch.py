@@ -29,24 +29,6 @@ TESTS = str(Path(__file__).parents[1])
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-@pytest.mark.usefixtures("small_searches")
-def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
-    write_boot(tmp_path / "in" / "boot.json")
-    out = tmp_path / "out"
-    command = ("batch", tmp_path / "in", "--out", out, *QUICK)
-    first = orbiflow(*command)
-    assert first.status == 0, first.err
-    names(first.out, "boot", "IH4", out / "index.html")
-    assert json.loads(rows(out)["boot.json"]["settings"])["seed"] == 0
-    (tmp_path / "in" / "broken.json").write_text("[")
-    done = (out / "boot" / "result.json").stat().st_mtime_ns
-    again = orbiflow(*command)
-    assert again.status == 1
-    names(again.out, "broken.json")
-    names(again.err, "--retry-failed")
-    assert (out / "boot" / "result.json").stat().st_mtime_ns == done
-
-
 def test_every_pair_of_a_folder(tmp_path: Path, orbiflow) -> None:
     (tmp_path / "in").mkdir()
     for name in ("squirrel.dat", "nagata/dolphin_60.dat"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -21,14 +20,6 @@ def result_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return boot_run(tmp_path_factory.mktemp("runs") / "boot")
 
 
-def test_the_ending_is_the_format(result: Path, tmp_path: Path, orbiflow) -> None:
-    out = tmp_path / "boot.dxf"
-    outcome = orbiflow("export", result, "--out", out)
-    assert outcome.status == 0, outcome.err
-    names(outcome.out, out)
-    assert out.read_bytes().startswith(b"  0\nSECTION")
-
-
 @pytest.mark.parametrize(
     ("options", "size"), [((), (85, 57)), (("--area", "double", "--tile-size", "3cm"), (180, 120))]
 )
@@ -41,20 +32,6 @@ def test_a_figure_for_a_paper_is_as_wide_as_its_column(
     page = pypdfium2.PdfDocument(out)[0]
     millimetres = (page.get_width() * 25.4 / 72, page.get_height() * 25.4 / 72)
     assert millimetres == pytest.approx(size, abs=0.01)
-
-
-def test_options_go_before_the_purpose(result: Path, tmp_path: Path, orbiflow) -> None:
-    out = tmp_path / "p.dxf"
-    options = ["--for", "laser", "--cut", "pieces", "--kerf", "0.15mm", "--copies", "3"]
-    outcome = orbiflow("export", result, "--out", out, *options, "--spacing", "2mm")
-    assert outcome.status == 0, outcome.err
-    names(outcome.out, 3, "IH6")
-
-
-def test_the_neck_is_a_note_and_the_work_is_done(result: Path, tmp_path: Path, orbiflow) -> None:
-    outcome = orbiflow("export", result, "--out", tmp_path / "a.svg", "--warn-neck", "6cm")
-    assert outcome.status == 0
-    names(outcome.out, 60)
 
 
 def test_numbered_sheets_and_their_events(result: Path, tmp_path: Path) -> None:
@@ -189,16 +166,6 @@ def test_places_that_cannot_be_written(where: str, result: Path, tmp_path: Path,
     assert outcome.status == 2
     names(outcome.err, where or tmp_path)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_snippet_of_the_documentation(result: Path, tmp_path: Path, monkeypatch) -> None:
-    text = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
-    (snippet,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "turtle").symlink_to(result)
-    exec(compile(snippet, "export.md", "exec"), {})
-    assert (tmp_path / "cut.svg").is_file()
 
 
 def test_an_ending_of_no_format_needs_the_format(result: Path, tmp_path: Path, orbiflow) -> None:

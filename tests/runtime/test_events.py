@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,7 @@ from orbiflow.runtime import (
     Table,
     TileFound,
     Written,
+    call_from_json,
     event_from_json,
 )
 from refusals import refused
@@ -79,3 +81,12 @@ def test_to_json_and_back(event: Event) -> None:
 def test_what_is_no_event(document: object, about: tuple[object, ...]) -> None:
     with refused(*about, kind=SettingError):
         event_from_json(document)
+
+
+def test_the_page_names_all_events_and_a_call_that_can_be_made() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "operations.md").read_text(encoding="utf-8")
+    table = page[page.index("| event") : page.index("Events of several")]
+    named = {name for row in table.splitlines() for name in re.findall(r"`([A-Z]\w+)`", row[:40])}
+    assert named == {kind.__name__ for kind in Event.__subclasses__()}
+    (text,) = re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)
+    assert call_from_json(json.loads(text)).to_json()["classes"] == ["IH4", "IH6"]

@@ -1,12 +1,14 @@
-"""Groups, functions and solids for the tests of what fills space."""
+"""Groups, functions, bodies and solids for the tests of what fills space."""
 
 from __future__ import annotations
 
 import numpy as np
 from hypothesis import strategies as st
+from manifold3d import Manifold
 
 from orbiflow.arrays import Array
 from orbiflow.solids import Mesh
+from orbiflow.solids.bodies import as_mesh
 from orbiflow.solids.closing import CellTile, Function, close_tile
 from orbiflow.solids.complexes import cell_complex
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, space_group
@@ -79,3 +81,41 @@ def dirichlet_solid(group: CrystallographicGroup) -> Mesh:
         faces += [[a, b, len(points)] for a, b in zip(ring, np.roll(ring, -1), strict=True)]
         points.append(middle)
     return Mesh(np.array(points), np.array(faces))
+
+
+def of_volume_one(mesh: Mesh) -> Mesh:
+    """Return a mesh scaled to volume 1 about its centre of mass, which becomes 0."""
+    return mesh.moved(np.eye(3), -mesh.centroid).moved(mesh.volume ** (-1 / 3) * np.eye(3))
+
+
+def ball(segments: int = 48) -> Mesh:
+    """Return a ball of volume 1."""
+    return of_volume_one(as_mesh(Manifold.sphere(1.0, segments)))
+
+
+def creature() -> Mesh:
+    """Return a body with a head and two legs, of volume 1."""
+    trunk = Manifold.sphere(1.0, 40).scale((1.5, 0.9, 0.8))
+    head = Manifold.sphere(0.5, 32).translate((1.7, 0.0, 0.6))
+    legs = [Manifold.cylinder(1.5, 0.28, 0.28, 24).translate((x, 0.0, -1.6)) for x in (-0.8, 0.8)]
+    whole = trunk + head + legs[0] + legs[1]
+    return of_volume_one(as_mesh(whole.refine_to_length(0.2)))
+
+
+def hooked_tile(*axes: int) -> Mesh:
+    """A cube with a T-shaped tab on its faces ahead along some axes, and slots for them behind.
+
+    A tab along axis a is wide along the next axis and runs all along the third: it slides along that.
+    """
+    body = Manifold.cube((1, 1, 1))
+    for axis in axes:
+        tab = _block(axis, (1.0, 1.1), (0.45, 0.55)) + _block(axis, (1.1, 1.2), (0.35, 0.65))
+        body = (body + tab) - tab.translate((-np.eye(3)[axis]).tolist())
+    return as_mesh(body)
+
+
+def _block(axis: int, deep: tuple[float, float], wide: tuple[float, float]) -> Manifold:
+    low, high = np.zeros(3), np.ones(3)
+    for along, (start, end) in ((axis, deep), ((axis + 1) % 3, wide)):
+        low[along], high[along] = start, end
+    return Manifold.cube((high - low).tolist()).translate(low.tolist())

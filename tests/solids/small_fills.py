@@ -17,7 +17,7 @@ from orbiflow.solids import EscherSolid, FillSettings, fill, run_folder, search
 from orbiflow.solids.bodies import as_body
 from orbiflow.solids.closing import Function, ball_of_cells
 from orbiflow.symmetry import CrystallographicGroup
-from solids.known_bodies import creature
+from solids.known_solids import creature
 
 CELLS = 1200  # settings ask for 5000 at least
 SMALL = FillSettings(effort="fast", groups=("P-1", "P21"), detail=5000, workers=1, size=60)

@@ -21,7 +21,7 @@ from orbiflow.solids.search import coverage
 from orbiflow.solids.settings import Sphere
 from orbiflow.symmetry import space_group
 from refusals import refused
-from solids.known_bodies import ball, creature
+from solids.known_solids import ball, creature
 
 NAMES = (*USUAL_GROUPS, "C 2", "P 3", "R 3", "P 61", "I 41", "P 21 3", "P -4")
 SEEDS = st.integers(0, 2**32 - 1)

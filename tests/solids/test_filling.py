@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import shutil
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from orbiflow.errors import (
     SettingError,
 )
 from orbiflow.loading import load
-from orbiflow.runtime import Cancel, Cancelled, Event, Note, Progress
+from orbiflow.runtime import Cancel, Cancelled, Event, Note, Progress, team
 from orbiflow.solids import (
     BuildSettings,
     EscherSolid,
@@ -43,7 +44,7 @@ from orbiflow.solids.search import Goal, usual_size
 from orbiflow.solids.separable import pieces_with_gap
 from orbiflow.solids.solid import SOLID
 from refusals import refused
-from solids.known_bodies import creature
+from solids.known_solids import creature
 from solids.small_fills import SMALL, creature_file, found, small_fills, told
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "solids.schema.json").read_text())
@@ -75,7 +76,12 @@ def test_solids_are_certified_and_come_best_first() -> None:
         np.testing.assert_allclose(own.upright.T @ own.upright, np.eye(3), atol=1e-9)
 
 
-def test_the_same_seed_gives_the_same_solids_in_any_number_of_processes() -> None:
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+def test_the_same_seed_gives_the_same_solids_in_any_number_of_processes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # after a test that has left a thread, workers would come from a server and not know what is small
+    monkeypatch.setattr(team, "process_context", lambda _: multiprocessing.get_context("fork"))
     with small_fills():
         again = fill(creature(), SMALL.replace(workers=2), name="creature")
     for one, two in zip(again, found(), strict=True):

@@ -16,7 +16,7 @@ from orbiflow.solids.print_advice import lying, overhang_share, print_advice
 from orbiflow.solids.sweeping import lifted
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from refusals import refused
-from solids.hooked_tiles import hooked_tile
+from solids.known_solids import hooked_tile
 from solids.mesh_files import ball, box, bumpy_cell, space_tile
 from solids_read import read_3mf, read_stl
 

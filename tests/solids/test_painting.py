@@ -22,7 +22,7 @@ from orbiflow.solids.search import Goal
 from orbiflow.solids.settings import FillSettings, Painted, Sphere
 from orbiflow.solids.soup import Soup
 from refusals import refused
-from solids.known_bodies import creature
+from solids.known_solids import creature
 from solids.mesh_files import CORE, archive, ball, obj, stl
 from solids.small_fills import SMALL, creature_file
 

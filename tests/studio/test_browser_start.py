@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from studio.browser import BOOT, RunningStudio, area_of
+from studio.browser import RunningStudio, area_of
 from studio_checks import serious_issues, untidy_parts
 
 STATIC = Path(__file__).parents[2] / "src" / "orbiflow" / "studio" / "static"
@@ -381,18 +381,3 @@ def test_pages_are_light(studio: RunningStudio) -> None:
             total += len(b"".join(answer.iter_raw()))
     assert total < 165_000
     assert sum(file.stat().st_size for file in STATIC.rglob("*") if file.is_file()) < 417_000
-
-
-def test_a_project_file_opens_again(page, studio: RunningStudio, tmp_path) -> None:
-    own = studio.with_picture(BOOT)
-    (tmp_path / "a.orbiflow").write_bytes(studio.client.get(f"projects/{own}/file").content)
-    page.goto("/")
-    page.set_input_files("input[accept='.orbiflow']", tmp_path / "a.orbiflow")
-    opened = own_project(page)
-    assert opened != own
-    assert studio.project(opened)["silhouette"] == {
-        **studio.project(own)["silhouette"],
-        "backdrop": studio.project(opened)["silhouette"]["backdrop"],
-    }
-    page.goto(f"/#/p/{opened}/picture")
-    page.wait_for_selector(READ)

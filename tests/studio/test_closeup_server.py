@@ -14,7 +14,7 @@ from bent_tiles import bent_tile
 from orbiflow.studio.taking import with_drawing
 from orbiflow.studio.tile_files import tile_folder
 from orbiflow.tiles import EscherTile, certify, read_result, save_tiles
-from studio.served import Client, done, house_tile
+from studio.served import Client, house_tile
 
 
 @pytest.fixture(scope="module")
@@ -83,25 +83,6 @@ def test_no_tile_no_space(client: Client, address: str) -> None:
 
 
 STROKE = {"colour": "#d02030", "width": 0.8, "points": [[0.0, 0.0], [2.0, 1.0]]}
-
-
-def test_a_drawing_is_in_the_file_that_is_taken_away(client: Client, address: str) -> None:
-    project, number = address.split("/tiles/")
-    client.patch(project, json={"view": {"drawing": {"strokes": [STROKE], "eyes": [[0, 0, 1]]}}})
-    settings = {"tile": int(number), "drawing": True, "purpose": "web"}
-    task = done(
-        client, client.post(f"{project}/tasks", json={"operation": "export", "settings": settings})
-    )
-    assert task["state"] == "done", task["error"]
-    [file] = task["result"]["files"]
-    text = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").text
-    assert "#d02030" in text
-    settings["drawing"] = False
-    task = done(
-        client, client.post(f"{project}/tasks", json={"operation": "export", "settings": settings})
-    )
-    [file] = task["result"]["files"]
-    assert "#d02030" not in client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").text
 
 
 def test_nothing_drawn_changes_nothing(tmp_path: Path) -> None:

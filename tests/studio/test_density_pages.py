@@ -175,12 +175,6 @@ def test_other_kinds_of_file_are_not_taken(client: Client, name: str) -> None:
     assert "CSV" in answer.json()["error"]
 
 
-def test_too_large_a_table_is_not_taken(client: Client) -> None:
-    own = density_project(client)
-    answer = client.put(f"{own}/density/table", params={"name": "a.csv"}, content=b"1\n" * 200_000)
-    assert answer.status_code == 413
-
-
 def test_a_tile_has_no_density(client: Client) -> None:
     own = new_project(client)
     for answer in (

@@ -259,15 +259,6 @@ def test_a_tile_that_is_gone_cannot_be_taken_away(client: Client, project: str) 
     assert "no such tile" in make(client, project, "export", tile=tile)["error"]
 
 
-@pytest.mark.parametrize("name", ["search", "export", "art", "solid", "animate"])
-def test_forms_come_from_settings(client: Client, name: str) -> None:
-    schema = client.get(f"/api/operations/{name}/schema").json()
-    assert schema["properties"]
-    for own in schema["properties"].values():
-        assert own["description"].endswith(".")
-    assert not {"out", "result", "force", "workers", "project", "task"} & set(schema["properties"])
-
-
 def test_views_are_merged_and_say_who_changed_them(client: Client, project: str) -> None:
     tab = {"X-Orbiflow-Client": "tab one"}
     client.patch(project, json={"view": {"a": 1, "b": {"c": 2}}}, headers=tab)
@@ -275,16 +266,6 @@ def test_views_are_merged_and_say_who_changed_them(client: Client, project: str)
     found = client.get(project).json()
     assert found["view"] == {"a": 1, "b": 3}
     assert found["name"] == "b"
-
-
-def test_a_project_is_deleted_with_its_files(client: Client) -> None:
-    address = new_project(client)
-    done(client, client.put(f"{address}/input?name=a.json", content=SQUARE))
-    home: Path = client.studio.store.home(address.split("/")[-1])
-    assert home.is_dir()
-    assert client.delete(address).status_code == 200
-    assert not home.exists()
-    assert client.get(address).status_code == 404
 
 
 def test_no_answer_names_a_folder_of_this_machine(client: Client, project: str) -> None:

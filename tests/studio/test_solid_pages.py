@@ -174,12 +174,6 @@ def test_other_kinds_of_file_are_not_taken(client: Client, name: str) -> None:
     assert ".3mf" in answer.json()["error"]
 
 
-def test_too_large_a_mesh_is_not_taken(client: Client) -> None:
-    path = f"{solid_project(client)}/mesh"
-    answer = client.put(path, params={"name": "a.stl"}, content=bytes(UPLOAD + 1))
-    assert answer.status_code == 413
-
-
 def test_a_tile_has_no_mesh(client: Client) -> None:
     own = new_project(client)
     for answer in (

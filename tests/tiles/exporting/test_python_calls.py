@@ -97,20 +97,6 @@ def test_everything_that_holds_a_tile_is_exported_alike(
     assert all(other == first for other in others)
 
 
-@pytest.mark.parametrize("ending", ["svg", "pdf", "dxf", "png", "json"])
-def test_the_ending_decides_an_export_s_format(
-    ending: str, tmp_path: Path, found: EscherTile
-) -> None:
-    starts = {"svg": b"<?xml", "pdf": b"%PDF", "dxf": b"  0\n", "png": b"\x89PNG", "json": b"{"}
-    settings = ExportSettings(tile_size=30, area=(90, 60))
-    if ending == "png":
-        settings = settings.replace(dpi=50)
-    out = export(found, tmp_path / f"a.{ending.upper()}", settings).files[0]
-    assert out.read_bytes().startswith(starts[ending])
-    plain = export(found, tmp_path / "plain", ExportSettings(format="json", tile_size=30))
-    assert plain.files[0].read_bytes().startswith(b"{")
-
-
 def test_a_tile_without_a_map_needs_the_target_for_pictures(tmp_path: Path) -> None:
     target, tile = animal("squirrel.dat"), squirrel("IH4").tile
     plain = Tile(tile.polygon, tile.group, "IH4")

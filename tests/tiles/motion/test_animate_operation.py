@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from orbiflow.errors import SettingError
 from orbiflow.runtime import (
     Call,
     Cancel,
@@ -68,22 +67,6 @@ def test_a_cancelled_one_writes_nothing(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(Cancelled):
         small(folder, tmp_path / "a.gif").run(sink, cancel)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("fields", "about"),
-    [
-        ({"out": "a.webm"}, ("out", ".gif", ".mp4", ".svg")),
-        ({"area": "65x40px"}, ("area", "65 x 40")),
-        ({"seconds": 0.1}, ("seconds",)),
-        ({"fps": 100}, ("fps",)),
-        ({"seconds": 120, "fps": 60, "format": "gif"}, ("seconds", "fps", 2400)),
-        ({"kind": "jump"}, ("kind", "morph")),
-    ],
-)
-def test_settings_that_cannot_be(fields, about: tuple[object, ...]) -> None:
-    with refused(*about, kind=SettingError):
-        animation(result="out", **fields)
 
 
 def test_mistakes_are_said_before_the_work(folder: Path, tmp_path: Path) -> None:

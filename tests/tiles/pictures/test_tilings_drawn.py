@@ -18,7 +18,6 @@ from orbiflow.symmetry import rotation_matrix, wallpaper_group
 from orbiflow.tiles import (
     Page,
     Tile,
-    Tiling,
     colouring,
     copies_meeting,
     tile_picture,
@@ -97,14 +96,6 @@ def test_the_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) ->
     assert len(capsys.readouterr().out.splitlines()) == 28
     with Image.open(out) as picture:
         assert picture.width == 1600
-
-
-def test_the_page() -> None:
-    text = (ROOT / "docs" / "tilings.md").read_text(encoding="utf-8")
-    names: dict[str, object] = {}
-    for snippet in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
-        exec(compile(snippet, "tilings.md", "exec"), names)
-    assert isinstance(names["several"], Tiling)
 
 
 @pytest.mark.parametrize(("top", "y_down"), [(1.0, False), (-1.0, True)])

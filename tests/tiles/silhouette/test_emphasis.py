@@ -9,7 +9,7 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from mask_files import CORNERS, SIZE, assert_emphasised, drawing, mask, picture, polygon, save
 from orbiflow.errors import InputFileError
@@ -237,23 +237,3 @@ def test_a_shape_thinner_than_the_grid_is_still_met(tmp_path: Path) -> None:
     emphasis = Emphasis.read(save(tmp_path, mask("bottom left", (90, 90))), needle)
     assert emphasis.share is not None
     assert 0.2 < emphasis.share < 0.8
-
-
-PHYLOPIC = Path(__file__).parents[3].parent / "shared" / "data" / "silhouettes" / "phylopic"
-
-
-@pytest.mark.skipif(
-    not PHYLOPIC.is_dir(), reason="the shared silhouettes are not beside this checkout"
-)
-def test_a_real_head(tmp_path: Path) -> None:
-    # A rat-kangaroo that looks to the right: its head is at the right, its tail at the lower left.
-    target = Target.read(PHYLOPIC / "Potoroidae.png")
-    head = Image.new("L", (192, 192))
-    ImageDraw.Draw(head).ellipse((145, 58, 200, 96), fill=255)
-    emphasis = Emphasis.read(save(tmp_path, head), target)
-    weights = emphasis.weight(target.normal)
-    nose, tail = target.normal[:, 0].argmax(), target.normal[:, 0].argmin()
-    assert weights[nose] == pytest.approx(4, abs=0.01)
-    assert weights[tail] == 1
-    assert emphasis.share is not None
-    assert 0.1 < emphasis.share < 0.2

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import shapely
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
@@ -143,15 +142,3 @@ def digest(reading: Reading) -> str:
 @pytest.mark.parametrize("name", AS_BEFORE)
 def test_drawings_in_two_levels_are_read_as_before(name: str) -> None:
     assert digest(read_outline(EXAMPLES / name)) == AS_BEFORE[name]
-
-
-SHARED = Path(__file__).parents[4] / "shared" / "data" / "silhouettes"
-PICTURES = sorted(SHARED.rglob("*.png"))
-
-
-@pytest.mark.skipif(not PICTURES, reason="the shared silhouettes are not here")
-def test_no_shared_drawing_is_a_photograph() -> None:
-    for path in PICTURES[::6]:
-        reading = read_outline(path)
-        assert not any("photograph" in note for note in reading.notes), path
-        assert shapely.Polygon(reading.outline).is_valid

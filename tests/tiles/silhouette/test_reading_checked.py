@@ -18,8 +18,6 @@ from orbiflow.tiles import Target, hausdorff, read_outline
 from orbiflow.tiles.silhouette import ReadingSettings, doubts
 from refusals import refused
 
-SHARED = Path(__file__).parents[3].parent / "shared" / "data" / "silhouettes"
-
 
 def wavy(count: int = 400, ripple: float = 4.0) -> Array:
     """A blob, 300 units wide, with a fine ripple and a thorn."""
@@ -151,19 +149,6 @@ def test_what_is_hopeless_is_said(tmp_path: Path) -> None:
     tiny = drawn(tmp_path, 40, "ellipse", (20, 20, 140, 100))
     assert "only 30 pixels long" in tiny[0]
     assert not drawn(tmp_path, 200, "ellipse", (80, 80, 720, 400))
-
-
-@pytest.mark.skipif(not SHARED.exists(), reason="the shared silhouettes are not here")
-def test_no_animal_is_called_hopeless() -> None:
-    files = [*SHARED.glob("nagata/*.dat"), *SHARED.glob("icons/*_80.dat")]
-    files += [
-        *SHARED.glob("nagata_distorted_png/*.png"),
-        *sorted(SHARED.glob("phylopic/*.png"))[::4],
-    ]
-    for file in files:
-        said = " ".join(doubts(ReadingSettings().read(file)))
-        assert "thread" not in said, file
-        assert "pixels" not in said, file
 
 
 def test_a_tight_crop_is_nothing_to_say(tmp_path: Path) -> None:

@@ -9,18 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
-from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles import Target, centroid, compare, iou, signed_area
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import Target, centroid, iou, signed_area
 from refusals import refused
-
-DATA = Path(__file__).parents[3].parent / "shared" / "data" / "silhouettes"
-needs_data = pytest.mark.skipif(
-    not DATA.is_dir(), reason="the shared silhouettes are not beside this checkout"
-)
-GOALS = Path(__file__).parents[3] / "examples" / "silhouettes" / "nagata"
-NAGATA = sorted(path.stem for path in GOALS.glob("*.dat"))
-PHYLOPIC = sorted(path.stem for path in (DATA / "phylopic").glob("*.svg"))
-DISTORTED = sorted(path.stem for path in (DATA / "nagata_distorted_png").glob("*.png"))
 
 
 @st.composite
@@ -128,52 +119,3 @@ def test_raster_round_trip(tmp_path_factory: pytest.TempPathFactory, points: np.
     target = Target.read(path)
     assert iou(target.outline, drawn) > 0.98
     assert iou(target.normal, Target.from_polygon(drawn, y_down=True).normal) > 0.98
-
-
-@pytest.mark.parametrize("name", NAGATA)
-def test_nagata(name: str) -> None:
-    target = Target.read(GOALS / f"{name}.dat")
-    assert len(target.outline) == int(name.rpartition("_")[2])
-    assert target.y_down
-    assert target.notes == ()
-    assert signed_area(target.normal) == pytest.approx(1)
-
-
-@needs_data
-@pytest.mark.parametrize("name", DISTORTED)
-def test_distorted_images(name: str) -> None:
-    target = Target.read(DATA / "nagata_distorted_png" / f"{name}.png")
-    assert target.size == (1024, 1024)
-    assert target.notes[0] == "shape detected: dark on light (edge at 0.50)"
-    assert len(target.outline) < 1000
-
-
-@needs_data
-@pytest.mark.parametrize("name", PHYLOPIC)
-def test_svg_and_image_of_one_animal_agree(name: str) -> None:
-    drawing = Target.read(DATA / "phylopic" / f"{name}.svg")
-    image = Target.read(DATA / "phylopic" / f"{name}.png")
-    assert drawing.size is not None
-    # The viewBox is the animal's box, in user units and not in points: potrace writes both.
-    assert (drawing.outline > -1).all()
-    assert (drawing.outline < np.array(drawing.size) + 1).all()
-    assert np.ptp(drawing.outline, axis=0).max() > 0.8 * max(drawing.size)
-    # At 192 pixels the crab's claws come apart, which opens what the drawing encloses.
-    least = 0.88 if name == "Grapsidae" else 0.95
-    assert compare(image.normal, drawing.normal).iou > least
-
-
-@needs_data
-def test_image_and_polygon_of_one_goal_agree() -> None:
-    # The image is stretched along each axis: undo that by the bounding boxes.
-    image = Target.read(DATA / "nagata_distorted_png" / "spider.png").outline
-    goal = Target.read(GOALS / "spider_120.dat").outline
-    image, goal = ((ring - ring.min(0)) / np.ptp(ring, axis=0) for ring in (image, goal))
-    assert iou(image, goal) > 0.95
-
-
-def test_results_file_is_refused_with_its_keys(tmp_path: Path) -> None:
-    file = tmp_path / "tiles.json"
-    file.write_text('{"goal": 60, "est_euclid_top20": [{"ih": 4, "tile": [[0, 0], [1, 0]]}]}')
-    with refused("tiles.json", "est_euclid_top20", kind=InputFileError):
-        Target.read(file)

@@ -1,15 +1,38 @@
-"""The table of nine classes against the geometry it describes."""
+"""The table of nine classes against the geometry, what is free in a lattice, and how tiles lie."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
-from orbiflow.symmetry import identity
-from orbiflow.tiles import CLASSES, EdgeIdentification, IsohedralClass, isohedral_class, signed_area
+from orbiflow.symmetry import (
+    WALLPAPER_GROUPS,
+    CrystallographicGroup,
+    identity,
+    rotation_matrix,
+    wallpaper_group,
+)
+from orbiflow.tiles import (
+    CLASSES,
+    EdgeIdentification,
+    IsohedralClass,
+    Tile,
+    Tiling,
+    arrangement,
+    dirichlet_tile,
+    isohedral_class,
+    signed_area,
+)
+from orbiflow.tiles.tilings import commutant
+from orbiflow.tiles.tilings.isohedral import stretch_matrix
 from refusals import refused
+from strategies import random_tensor, seeds, wallpaper_groups
 
 GROUP_ORDERS = {"p1": 1, "p2": 2, "pg": 2, "pgg": 4, "p3": 3, "p4": 4, "p6": 6}
 
@@ -132,3 +155,74 @@ def test_wrong_number_of_parameters() -> None:
         isohedral_class("IH21").template(np.zeros(3))
     with refused("IH7", "stretch", "(2,)"):
         isohedral_class("IH7").stretch(torch.zeros(2))
+
+
+WORDS = {
+    **{"IH1": "rows, all alike", "IH2": "brick rows, every other row turned over"},
+    "IH3": "rows, every other row facing the other way",
+    "IH4": "rows, every other row upside down",
+    "IH5": "rows, upside down and turned over by turns",
+    **{"IH6": "every other one upside down, half turned over", "IH7": "three around a point"},
+    **{"IH21": "six around a point", "IH28": "four around a point"},
+}
+
+
+@pytest.mark.parametrize("name", WORDS)
+@settings(max_examples=5)
+@given(degrees=st.floats(0, 360), log_size=st.floats(-9, 9), flip=st.booleans())
+def test_words_do_not_depend_on_the_frame(
+    name: str, degrees: float, log_size: float, flip: bool
+) -> None:
+    turn = rotation_matrix(np.radians(degrees)) @ np.diag([1.0, -1.0 if flip else 1.0])
+    tile = Tile(CLASSES[name].template(), CLASSES[name].group())
+    size = 10.0**log_size
+    assert arrangement(tile.transformed(size * turn, size * np.array([3.0, -7.0]))) == WORDS[name]
+
+
+@pytest.mark.parametrize(
+    ("group", "point", "words"),
+    [
+        ("p1", (0.1, 0.2), "rows, all alike"),
+        ("p6m", (0, 0), "rows, all alike"),  # hexagons with all the symmetry there is
+        ("p4g", (0, 0), "every other one turned over"),  # a chessboard of whirls
+        ("pm", (0.13, 0.21), "rows, every other row turned over"),
+        ("p4m", (0.13, 0.21), "eight around a point, with their mirror images"),
+        ("p6m", (0.13, 0.21), "twelve around a point, with their mirror images"),
+        ("p4", (0.5, 0.0), "every other one turned a quarter"),
+    ],
+)
+def test_cells_of_any_group(group: str, point: tuple[float, float], words: str) -> None:
+    assert arrangement(dirichlet_tile(wallpaper_group(group), point)) == words
+
+
+def test_several_shapes_are_counted() -> None:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    left, right = square * (0.3, 1.0), square * (0.7, 1.0) + (0.3, 0.0)
+    assert arrangement(Tiling(wallpaper_group("p1"), [left, right])) == "2 shapes, rows, all alike"
+
+
+DIMENSION = {"p1": 2, "p2": 2, "pm": 1, "pg": 1, "cm": 1, "pmm": 1, "pmg": 1, "pgg": 1, "cmm": 1}
+"""Of the 17 groups; 0 where a rotation has order 3 or more."""
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_nine_have_the_basis_that_saved_models_are_in(name: str) -> None:
+    kind = CLASSES[name]
+    units: Any = np.eye(2)[: DIMENSION.get(kind.group_name, 0)]
+    assert np.array_equal(commutant(kind.group().linear_parts), units)
+    assert kind.stretch_dim == len(units)
+
+
+@given(st.data())
+def test_dimension_and_commuting(data: st.DataObject) -> None:
+    name = data.draw(st.sampled_from(list(WALLPAPER_GROUPS)))
+    group: CrystallographicGroup = data.draw(wallpaper_groups([name]))
+    basis = commutant(group.linear_parts)
+    assert len(basis) == DIMENSION.get(name, 0)
+    assert np.allclose(basis @ basis.T, np.eye(len(basis)), atol=1e-12)
+    maps = stretch_matrix(basis, random_tensor(data.draw(seeds), 3, len(basis), size=1.0)).numpy()
+    assert np.allclose(np.linalg.det(maps), 1)
+    for linear in group.linear_parts:
+        assert np.abs(linear @ maps - maps @ linear).max() < 1e-9
+    stretched = group.conjugate(maps[0])
+    assert stretched.order == group.order

@@ -1,8 +1,9 @@
-"""A world as a page of its own: opened from a file, turned by hand and by keys, without a network."""
+"""A world as a page of its own, turned without a network; which tile goes to which world."""
 
 from __future__ import annotations
 
 import io
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from orbiflow.tiles import ArtSettings, EscherTile, art
+from orbiflow.tiles import ArtSettings, EscherTile, art, read_result
+from orbiflow.tiles.result_file import read_tiles
+from orbiflow.tiles.worlds import Unfolding, best_in_world, in_world, unfolded
+from orbiflow.tiles.worlds.choosing import Seen, flip_of
+from orbiflow.tiles.worlds.developing import Development
 from refusals import refused
+from runtime.searches import boot_call
+from small_searches import small_searches
 from swirled_tiles import swirled_tile
 
 
@@ -58,3 +65,58 @@ def test_a_world_is_turned(browser: Any, tmp_path: Path, world: Any, order: Any)
 def test_only_spheres_and_discs_are_pages(tmp_path: Path) -> None:
     with refused("world"):
         art(EscherTile(swirled_tile("IH28", 3, 0.1)), tmp_path / "a.html")
+
+
+@pytest.fixture(name="run", scope="module")
+def run_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    with small_searches():
+        boot_call(folder, "IH4", "IH28", "IH21").run()
+    return folder / "out"
+
+
+def test_a_run_gives_the_best_tile_of_each_class(run: Path) -> None:
+    tiles = read_tiles(run)
+    names = [own.isohedral_class for own in tiles]
+    assert len(set(names)) == len(names)
+    assert [own.score for own in tiles] == sorted((own.score for own in tiles), reverse=True)
+    assert [own.name for own in read_tiles(run / names[-1])] == [tiles[-1].name]
+
+
+def test_centres_get_their_orders_as_the_tile_looks_best(run: Path) -> None:
+    tile = read_result(run, "IH28")
+    seen, (found, notes) = Seen(tile), in_world(tile, (2, 4, 5), -1)
+    assert "there" in notes[0]
+    pattern = found.development.potential.pattern
+    for orders in permutations((2, 4, 5)):
+        other = Unfolding(found.tiling, Development.of(pattern, orders), found.tile)
+        assert seen.mark(other) <= seen.mark(found) + 1e-9
+
+
+def test_the_tile_whose_image_looks_best_is_drawn(run: Path, tmp_path: Path) -> None:
+    tiles = read_tiles(run)
+    marks = {}
+    for tile in tiles:
+        if tile.isohedral_class != "IH4":
+            marks[tile.isohedral_class] = Seen(tile).mark(in_world(tile, None, 1)[0])
+    best = best_in_world(tiles, None, 1)
+    assert best is not None
+    assert marks[best.isohedral_class] == max(marks.values())
+    done = art(run, tmp_path / "a.svg", ArtSettings(world="sphere", area=(60.0, 60.0)))
+    assert done.summary["class"] == best.isohedral_class
+    given = art(run, tmp_path / "b.svg", ArtSettings(world="disc", area=(60.0, 60.0)), tile="IH4")
+    assert given.summary["class"] == "IH4"
+
+
+def test_nothing_else_of_a_run_goes_to_a_sphere(run: Path) -> None:
+    assert best_in_world([read_result(run, "IH4")], None, 1) is None
+    tile = read_result(run, "IH21")
+    tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
+    least = unfolded(tiling, (2, 3, 5), 1)
+    assert Seen(tile).mark(least) <= Seen(tile).mark(in_world(tile, (2, 3, 5), 1)[0]) + 1e-9
+
+
+def test_orders_that_no_tile_takes_are_refused_for_what_they_are(run: Path, tmp_path: Path) -> None:
+    with refused("4, 4, 2"):
+        art(run, tmp_path / "a.svg", ArtSettings(world="disc", order=(4, 4, 2)))
+    assert best_in_world([read_result(run, "IH4")], (4, 4, 2), -1) is None
