@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, settings
 
 from orbiflow.arrays import Array
 from orbiflow.density import read_table
-from orbiflow.density.data import Source, TableRows
+from orbiflow.density.data import DataTable, TableRows
 from orbiflow.density.tables import SpaceSettings, TableSettings, read_rows
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import ignore
@@ -25,7 +25,7 @@ def write(tmp_path: Path, content: str | bytes, name: str = "a.csv") -> Path:
     return path
 
 
-def values_of(table: Source) -> Array:
+def values_of(table: DataTable) -> Array:
     """All columns (N, k) of a table of numbers."""
     return np.stack([table.numbers(k) for k in range(len(table.names))], axis=1)
 

@@ -78,7 +78,7 @@ def test_another_number_of_columns(command: str, folder: Path, tmp_path: Path, o
     (other / model.name).write_bytes(model.read_bytes())
     done = orbiflow("density", command, *options, "--columns", "phi")
     assert done.status == 2
-    names(done.err, "1", "(phi)", "2", "(phi, psi)")
+    names(done.err, "1", "phi", "phi, psi")
 
 
 def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, orbiflow) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density.data import arrangements, check_columns, chosen_arrangement, pairs_of
+from orbiflow.density.data import arrangements, check_columns, chosen_arrangement
 from orbiflow.errors import SettingError
 from refusals import refused
 
@@ -91,10 +90,11 @@ def test_what_must_be_converted_is_refused(space: str, names: str) -> None:
 
 def test_several_pairs_are_asked_about() -> None:
     names = ["lat", "lon", "vgp_lat", "vgp_lon"]
-    assert len(pairs_of(names)) == 2
+    assert len(arrangements("sphere", names)) == 2
     with refused("vgp_lat", "vgp_lon", kind=SettingError):
         chosen_arrangement("sphere", names)
-    assert pairs_of(["lat", "lon", "lat_err", "lon_err", "ra_pm"]) == pairs_of(["lat", "lon"])
+    with_errors = ["lat", "lon", "lat_err", "lon_err", "ra_pm"]
+    assert arrangements("sphere", with_errors) == arrangements("sphere", ["lat", "lon"])
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,6 @@ def test_the_order_of_other_columns_does_not_matter(names: list[str]) -> None:
 
 @given(st.lists(st.text(max_size=12), max_size=6), st.sampled_from(["sphere", "torus", "p4"]))
 def test_any_names_are_arranged_or_refused(names: list[str], space: str) -> None:
-    for found in arrangements(space, names):
-        assert len(set(found.columns)) == len(found.columns)
-        assert max(found.columns) < len(names)
-    assert np.all([pair.north != pair.east for pair in pairs_of(names)])
+    for way in arrangements(space, names):
+        assert len(set(way.columns)) == len(way.columns)
+        assert max(way.columns) < len(names)

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import DensityEstimator, Role, UndeclaredError
-from orbiflow.density.data import asked_roles, proposed_role, role_named
+from orbiflow.density import DensityEstimator, Role, RotationSpace, Torus, UndeclaredError
+from orbiflow.density.data import Declaration, asked_roles, proposed_role, role_named
 from orbiflow.density.tables import RowSettings, SpaceSettings, read_rows
-from orbiflow.errors import SettingError
+from orbiflow.errors import InputFileError, SettingError
 from orbiflow.runtime import ignore
 from refusals import refused
 
@@ -137,21 +137,18 @@ TABLES: dict[str, tuple[dict[str, Any], str, str]] = {
 }  # fmt: skip
 
 
-def pasted(data: Any, space: str) -> tuple[str, str]:
+def pasted(data: Any, space: str) -> str:
     """The declaration of a fit once what is asked for was answered with the printed words."""
-    columns = unit = None
+    columns = None
     for _ in range(3):
-        estimator = DensityEstimator(space, columns=columns, unit=unit)
+        estimator = DensityEstimator(space, columns=columns)
         try:
             rows = estimator._columns().read(data)
         except UndeclaredError as error:
-            if error.proposal.count("=angle") and space not in ("torus",):
-                unit = error.proposal.rpartition(":")[2]
-            else:
-                columns = error.proposal
+            columns = error.proposal
         else:
             sides = {k: str(r) for k, r in asked_roles(columns).items() if r and r.is_side}
-            return ",".join([rows.declaration, *(f"{k}={r}" for k, r in sides.items())]), str(unit)
+            return ",".join([rows.declaration, *(f"{k}={r}" for k, r in sides.items())])
     raise AssertionError(columns)
 
 
@@ -160,12 +157,11 @@ def pasted(data: Any, space: str) -> tuple[str, str]:
 def test_tables_are_right_or_asked_for(case: str, tmp_path: Path) -> None:
     columns, space, wanted = TABLES[case]
     frame = pandas.DataFrame(columns)
-    found, unit = pasted(frame, space)
+    found = pasted(frame, space)
     assert sorted(found.split(",")) == sorted(wanted.split(","))
     path = tmp_path / "table.csv"
     frame.to_csv(path, index=False)
-    said: Any = {} if unit == "None" else {"unit": unit}
-    where = SpaceSettings(space=space, **said)
+    where = SpaceSettings(space=space)
     reading = RowSettings()
     for _ in range(2):
         try:
@@ -231,3 +227,70 @@ def test_a_proposal_is_a_role(scale: float, seed: int) -> None:
     for name in ("phi", "speed", "x", "id", "hour", "count", "lat", "phi_deg", "az_gon"):
         values = rng.normal(0, 10**scale, 20)
         assert str(Role.of(proposed_role(name, values))) == proposed_role(name, values)
+
+
+def test_a_space_takes_columns_beside_it_as_its_name_does() -> None:
+    frame = pandas.DataFrame({"lon": LON, "depth": SPEED, "lat": LAT})
+    how: dict[str, Any] = {"columns": "lat,lon,depth=positive", "components": "kernels"}
+    by_name = DensityEstimator("sphere", **how).fit(frame)
+    by_space = DensityEstimator(getattr(by_name.space_, "base"), **how).fit(frame)  # noqa: B009
+    assert by_space.space_ == by_name.space_
+    np.testing.assert_array_equal(by_space.score_samples(frame), by_name.score_samples(frame))
+
+
+def test_quaternions_of_an_array_beside_a_real_column_say_their_form() -> None:
+    quaternions = RNG.normal([3.0, 0, 0, 0], 0.3, (60, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    first = np.column_stack([quaternions, SPEED])
+    last = np.column_stack([np.roll(quaternions, -1, axis=1), SPEED])
+    scores = [
+        DensityEstimator(RotationSpace(form=form), columns={4: "positive"}, components="kernels")
+        .fit(data)
+        .score_samples(data)
+        for form, data in (("scalar-first", first), ("quaternion", last))
+    ]
+    np.testing.assert_allclose(*scores)
+
+
+@pytest.mark.parametrize("kind", ["weight", "count", "group"])
+@pytest.mark.parametrize("space", ["torus", Torus(1, unit="degrees"), "fitted"])
+def test_two_columns_of_one_side_are_refused(kind: str, space: Any, tmp_path: Path) -> None:
+    table = {"phi_deg": DEGREES, "a": np.ones(60), "b": np.ones(60)}
+    columns = f"phi_deg,a={kind},b={kind}"
+    with refused("columns", kind, kind=SettingError):
+        if space != "fitted":
+            DensityEstimator(space, columns=columns).fit(pandas.DataFrame(table))
+        pandas.DataFrame(table).to_csv(tmp_path / "a.csv", index=False)
+        reading = RowSettings(columns=tuple(columns.split(",")))
+        roles = (Role.of("angle:degrees"),)
+        said = Declaration("torus", roles=lambda _: roles, names=("phi_deg",))
+        read_rows(tmp_path / "a.csv", reading, ignore, fitted=said)
+
+
+@pytest.mark.parametrize(("kind", "wrong"), [("weight", -1.0), ("count", -1), ("count", 1.5)])
+def test_weights_and_counts_are_refused_by_their_row(
+    kind: str, wrong: float, tmp_path: Path
+) -> None:
+    frame = pandas.DataFrame({"phi_deg": DEGREES, "n": np.where(np.arange(60) == 3, wrong, 1)})
+    columns = f"phi_deg,n={kind}"
+    with refused("n", kind, "row 4", kind=SettingError):
+        DensityEstimator(columns=columns).fit(frame)
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    reading = RowSettings(columns=tuple(columns.split(",")))
+    with refused("a.csv", "n", kind, "line 5", kind=InputFileError):
+        read_rows(tmp_path / "a.csv", reading, ignore, where=SpaceSettings(space="torus"))
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_options_of_files_are_named_for_files_alone(case: str) -> None:
+    columns, space, declared, _ = REFUSED[case]
+    with refused() as caught:
+        DensityEstimator(space, columns=declared).fit(pandas.DataFrame(columns))
+    assert "missing_codes" not in str(caught.value)
+    assert "drop_missing" not in str(caught.value)
+
+
+def test_two_columns_of_one_name_are_refused() -> None:
+    frame = pandas.DataFrame(np.stack([DEGREES, DEGREES], 1), columns=["phi_deg", "phi_deg"])
+    with refused("phi_deg", "1 and 2", kind=SettingError):
+        DensityEstimator().fit(frame)

@@ -18,8 +18,8 @@ from .conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .covariates.files import conditional_to_bytes as conditional_to_bytes
 from .covariates.files import read_conditional as read_conditional
 from .data.roles import Role as Role
-from .data.rows import TableError as TableError
-from .data.source import UndeclaredError as UndeclaredError
+from .data.table import TableError as TableError
+from .data.table import UndeclaredError as UndeclaredError
 from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density

@@ -14,19 +14,16 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
-    DIRECTIONS,
     OUTPUTS,
-    Frame,
+    DataTable,
+    Declaration,
     TableRows,
     alongside,
     asked_roles,
-    choose_as_fitted,
+    choose,
     frame_of,
-    is_number_name,
-    require_table,
     rows_of,
     runs_of_draws,
-    with_dip_directions,
 )
 from orbiflow.density.fitting import (
     DensitySettings,
@@ -427,7 +424,6 @@ class DensityEstimator(FittedFigures):
     def _checked(self, X: ArrayLike) -> Array:
         """Return data in the order of the fit; warn of those that seem to be in another unit."""
         density, data = self._fitted(), self._in_order(X)
-        require_table(data)
         names = getattr(self, "feature_names_in_", None)
         for doubt in data_doubts(density, data, names):
             warnings.warn(doubt, DataWarning, stacklevel=3)
@@ -435,19 +431,13 @@ class DensityEstimator(FittedFigures):
 
     def _in_order(self, X: ArrayLike) -> Array:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""
-        source, space = Frame.of(X), self.space_
-        fitted = [str(name) for name in getattr(self, "feature_names_in_", ())]
-        if source.is_named and fitted and not all(map(is_number_name, fitted)):
-            roles = [role and str(role) for role in space.roles(len(fitted))]
-            chosen = choose_as_fitted(source, {"columns": fitted, "roles": roles}, {})
-        elif source.is_named:  # the fit's have no names
-            chosen = DataColumns(space).chosen(source, {}, set())
-            for note in chosen.notes:
-                warnings.warn(note, DataWarning, stacklevel=4)
-        else:
-            chosen = choose_as_fitted(source, {}, {})
-        rows = rows_of(source, chosen)
-        return (with_dip_directions(rows)[0] if space.data_name in DIRECTIONS else rows).values
+        table, space = DataTable.of(X), self.space_
+        names = tuple(str(name) for name in getattr(self, "feature_names_in_", ()))
+        said = Declaration(space.data_name, widths=space.widths, roles=space.roles, names=names)
+        chosen = choose(table, said)
+        for note in chosen.notes if table.is_named else ():
+            warnings.warn(note, DataWarning, stacklevel=4)
+        return rows_of(table, chosen).values
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""

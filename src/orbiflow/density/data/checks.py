@@ -10,10 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.column_names import words_of
-from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, VECTORS
 from orbiflow.density.data.roles import Role
-from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, is_angular
+from orbiflow.density.data.table import TableError, UndeclaredError
+from orbiflow.density.data.units import (
+    DIRECTIONS,
+    ROTATIONS,
+    TURN_TOLERANCE,
+    TURNS,
+    VECTORS,
+    is_angular,
+    words_of,
+)
 from orbiflow.errors import SettingError, literal
 
 _CODE = re.compile(
@@ -42,6 +49,9 @@ FEW_ROWS = 10
 
 FULL_SHARE_OF_TURN = 0.75
 """Share of a turn of radians that values fill where they seem to be radians."""
+
+NEAR_NULL = 1.0
+"""Degrees from latitude 0, longitude 0 within which there are no other places where these are a gap."""
 
 
 def is_code(value: float) -> bool:
@@ -82,12 +92,36 @@ def codes_among(column: Array, turn: float | None) -> list[float]:
     return distinct[coded & (is_alone_below | (apart > wide))].tolist()
 
 
+class ValuesError(SettingError):
+    """An error for values that contradict what is declared.
+
+    - `codes`: Those of them that may stand for missing ones.
+    """
+
+    def __init__(self, template: str, codes: Sequence[float]) -> None:
+        super().__init__(template + "; if that stands for a missing value, leave it empty (NaN)")
+        self.codes = tuple(codes)
+
+
+def in_file(error: SettingError, where: str) -> SettingError:
+    """Return an error about a table as one of a file, with the options that files have.
+
+    - `where`: What messages begin with, such as "wind.csv: ".
+    """
+    codes = ",".join(f"{code:.10g}" for code in getattr(error, "codes", ()))
+    cure = f", or give {{missing_codes}} {codes} {{drop_missing}}" if codes else ""
+    begin = "" if error.template.startswith(literal(where)) else literal(where)
+    if isinstance(error, UndeclaredError):
+        return UndeclaredError(begin + error.template, error.columns, error.proposal)
+    return TableError(begin + error.template + cure)
+
+
 class Checked(NamedTuple):
     """A column to be checked: its name, its values (N,), and the word for a row's place."""
 
     name: str
     values: Array
-    place: Callable[[int], str]
+    place: Callable[[int], str] = lambda row: f"row {row + 1}"
 
     @property
     def known(self) -> Array:
@@ -99,6 +133,13 @@ class Checked(NamedTuple):
         rows = np.flatnonzero(self.values == value)
         more = f", {len(rows)} such rows" if len(rows) > 1 else ""
         return f"{value:.10g} ({self.place(int(rows[0]))}{more})"
+
+    def refusal(
+        self, values: Sequence[float], cure: str, codes: Sequence[float] = ()
+    ) -> ValuesError:
+        """Return the error for some of the values; `codes` are those that may be missing ones."""
+        listed = " and ".join(map(self.row_of, values[:3]))
+        return ValuesError(literal(f"{self.name!r} has {listed}, ") + cure, codes or values)
 
 
 def check_turn(column: Checked, turn: float, what: str, *, are_new: bool = False) -> None:
@@ -114,30 +155,13 @@ def check_turn(column: Checked, turn: float, what: str, *, are_new: bool = False
     most *= 2 if what == "axial" or are_new else 1  # either end of a line may be written
     far = high if high >= -low else low
     if abs(far) > most:
-        codes = codes_among(column.values, turn)
-        listed = " and ".join(map(column.row_of, codes[:3])) or column.row_of(far)
-        raise SettingError(
-            literal(f"{column.name!r} has {listed}, beyond a turn of {turn:.10g}: ")
-            + "reduce it to a turn, declare another unit with {columns}; "
-            + _missing(codes or [far])
-        )
+        cure = f"beyond a turn of {turn:.10g}: reduce it to a turn, or declare another unit with "
+        raise column.refusal(codes_among(column.values, turn) or [far], cure + "{columns}")
     if are_new:
         return
     if high - low > most or (what == "cycle" and low < 0 and max(-low, high) > turn / 2):
-        raise SettingError(
-            literal(f"{column.name!r} has {column.row_of(low)} and {column.row_of(high)}, ")
-            + f"which are of no one turn of {turn:.10g}: write all from 0 on or about 0; "
-            + _missing([far])
-        )
-
-
-def _missing(values: Sequence[float]) -> str:
-    """Return what to do with values that may stand for missing ones."""
-    listed = ",".join(f"{value:.10g}" for value in values)
-    return (
-        "if that stands for a missing value, leave it empty (NaN), or give "
-        f"{{missing_codes}} {listed} {{drop_missing}}"
-    )
+        cure = f"which are of no one turn of {turn:.10g}: write all from 0 on or about 0"
+        raise column.refusal([low, high], cure, [far])
 
 
 def check_real(column: Checked, role: Role) -> list[str]:
@@ -149,22 +173,12 @@ def check_real(column: Checked, role: Role) -> list[str]:
     if role.kind == "bounded":
         if low < role.low or high > role.high:
             far = low if low < role.low else high
-            raise SettingError(
-                literal(f"{column.name!r} has {column.row_of(far)}, and is declared as {role}: ")
-                + "declare other ends; "
-                + _missing([far])
-            )
+            raise column.refusal([far], f"and is declared as {role}: declare other ends")
         return []
     if role.kind == "positive" and low <= 0:
-        also = (
-            "0 is a mass of its own: leave those rows out, or declare the column as linear"
-            if low == 0
-            else "declare the column as linear; " + _missing([low])
-        )
-        raise SettingError(
-            literal(f"{column.name!r} has {column.row_of(low)}, and is declared as positive: ")
-            + also
-        )
+        cure = "and is declared as positive: declare the column as linear"
+        cure += ", or leave out those rows, as 0 is a mass of its own" if low == 0 else ""
+        raise column.refusal([low], cure)
     refuse_codes(column, known)
     return doubts_of_ends(column)
 
@@ -173,34 +187,28 @@ def refuse_codes(column: Checked, beside: Array) -> None:
     """Refuse real numbers that stand apart from others, among values (M,) with those of the column."""
     codes = [code for code in codes_among(beside, None) if code in column.values]
     if codes:
-        listed = " and ".join(column.row_of(value) for value in codes[:3])
-        raise SettingError(
-            literal(f"{column.name!r} has {listed}, far from all other values: ")
-            + _missing(codes)
-            + f"; if it is data, declare {{columns}} {literal(column.name)}=bounded:LOW:HIGH"
-        )
+        cure = "far from all other values: if it is data, declare {columns} "
+        raise column.refusal(codes, cure + f"{literal(column.name)}=bounded:LOW:HIGH")
 
 
 def doubts_of_ends(column: Checked) -> list[str]:
     """Return doubts about a value at an end that stands apart, or repeats among fractions."""
     distinct, counts = np.unique(column.known, return_counts=True)
-    found: list[str] = []
-    if len(distinct) < 2:
-        return found
-    for end in (0, -1):
+    doubts: list[str] = []
+    for end in (0, -1) if len(distinct) > 1 else ():
         rest, often = np.delete(distinct, end), int(counts[end])
         if len(rest) < FEW_VALUES or often < 2:
             continue
-        apart = float(np.abs(rest - distinct[end]).min()) > APART * float(np.ptp(rest))
-        fractions = 2 * int((rest != np.round(rest)).sum()) >= len(rest)
+        is_apart = float(np.abs(rest - distinct[end]).min()) > APART * float(np.ptp(rest))
+        are_fractions = 2 * int((rest != np.round(rest)).sum()) >= len(rest)
         repeats = often >= max(LEAST_REPEATS, OFTEN * int(np.delete(counts, end).max()) + 1)
-        if apart or (fractions and repeats):
-            why = "far from all other values" if apart else "and others hardly repeat"
-            found.append(
+        if is_apart or (are_fractions and repeats):
+            why = "far from all other values" if is_apart else "and others hardly repeat"
+            doubts.append(
                 f"{column.name!r} is {distinct[end]:g} in {often} rows, {why}: if that stands for a "
                 "missing value, or for something else, leave these rows out"
             )
-    return found
+    return doubts
 
 
 def check_values(
@@ -230,111 +238,82 @@ def check_values(
         SettingError: For values that contradict what is declared.
     """
     doubts: list[str] = []
-    own = [k for k, role in enumerate(roles) if role is None]
     columns = [Checked(n, v, place) for n, v in zip(names, values.T, strict=True)]
+    coordinates = [column for column, role in zip(columns, roles, strict=True) if role is None]
     for column, role in zip(columns, roles, strict=True):
-        if role is None:
-            continue
-        if role.turn is not None:
+        if role is not None and role.turn is not None:
             check_turn(column, role.turn, role.kind, are_new=are_new)
             doubts += doubts_of_ends(column) if role.kind != "cycle" and not are_new else []
-        elif role.is_real:
-            doubts += check_real(column, role)
-            doubts += [] if are_new else _doubts_of_two(column)
-    if space in DIRECTIONS and len(own) == 2:
-        doubts += _check_places(*(columns[k] for k in own), space=space, unit=unit)
-        doubts += _null_island(*(columns[k] for k in own)) if space == "sphere" else []
-    elif is_angular(space, len(own), form):
-        for k in own:
-            check_turn(columns[k], TURNS[unit or "radians"], "angle", are_new=are_new)
-    elif space not in (*VECTORS, *ROTATIONS):  # points of a quotient
-        for k in own:
-            refuse_codes(columns[k], columns[k].known)
+        elif role is not None and role.is_real:
+            doubts += check_real(column, role) + ([] if are_new else _doubts_of_two(column))
+    if space in DIRECTIONS and len(coordinates) == 2:
+        return doubts + _check_places(*coordinates, space=space, unit=unit)
+    for column in coordinates:
+        if is_angular(space, len(coordinates), form):
+            check_turn(column, TURNS[unit or "radians"], "angle", are_new=are_new)
+        elif space not in (*VECTORS, *ROTATIONS):  # points of a quotient
+            refuse_codes(column, column.known)
     return doubts
 
 
 def _doubts_of_two(column: Checked) -> list[str]:
     """Return a doubt about real numbers of two values alone, which a word has."""
     distinct = np.unique(column.known)
-    if len(distinct) != 2:
-        return []
+    values = " and ".join(f"{value:g}" for value in distinct[:2])
     return [
-        f"{column.name!r} has two values alone, {distinct[0]:g} and {distinct[1]:g}, as a word such "
-        "as yes or no has: a density of real numbers says little of it; make it a covariate, or leave "
-        "it out"
-    ]
+        f"{column.name!r} has two values alone, {values}, as a word such as yes or no has: a density "
+        "of real numbers says little of it; make it a covariate, or leave it out"
+    ] * (len(distinct) == 2)
 
 
 def _check_places(lat: Checked, lon: Checked, *, space: str, unit: str | None) -> list[str]:
     """Refuse places that there are not, and what fills radians or hours; return doubts."""
-    known = lat.known
-    far = float(known[np.abs(known).argmax()]) if len(known) else 0.0
+    far = float(lat.known[np.abs(lat.known).argmax()]) if len(lat.known) else 0.0
     if abs(far) > 90 * (1 + TURN_TOLERANCE):
-        raise SettingError(
-            literal(f"{lat.name!r} has {lat.row_of(far)}, and latitudes are within -90 and 90: ")
-            + "specify with {columns} which column is the latitude; "
-            + _missing(codes_among(lat.values, 90.0) or [far])
-        )
+        cure = "and latitudes are within -90 and 90: specify with {columns} which column they are"
+        raise lat.refusal([far], cure, codes_among(lat.values, 90.0))
     check_turn(lon, 360.0, "longitude")
     whole = np.isfinite(lat.values) & np.isfinite(lon.values)
-    if unit is not None or int(whole.sum()) < FEW_ROWS:
-        return []
-    high, wide = float(np.abs(lat.values[whole]).max()), float(np.ptp(lon.values[whole]))
-    most = float(np.abs(lon.values[whole]).max())
-    small = high <= math.pi / 2 + TURN_TOLERANCE and most <= 2 * math.pi * (1 + TURN_TOLERANCE)
-    if small and wide > FULL_SHARE_OF_TURN * 2 * math.pi:
+    lats, lons = lat.values[whole], lon.values[whole]
+    doubts: list[str] = []
+    null = (lats == 0) & (lons == 0)
+    others = np.maximum(abs(lats), abs(lons))[~null]
+    if space == "sphere" and null.sum() > 1 and others.min(initial=np.inf) >= NEAR_NULL:
+        doubts.append(
+            f"{lat.name} and {lon.name} are both exactly 0 in {null.sum()} rows, far from all others: "
+            "if that stands for a missing place, leave these rows out"
+        )
+    if unit is not None or len(lats) < FEW_ROWS:
+        return doubts
+    high, most, wide = float(abs(lats).max()), float(abs(lons).max()), float(np.ptp(lons))
+    is_small = high <= math.pi / 2 + TURN_TOLERANCE and most <= 2 * math.pi * (1 + TURN_TOLERANCE)
+    if is_small and wide > FULL_SHARE_OF_TURN * 2 * math.pi:
         raise SettingError(
             literal(f"{lat.name!r} is within pi/2 and {lon.name!r} fills 2 pi, as radians do, ")
-            + f"and the {space} takes degrees: convert them (numpy.degrees), or give {{unit}} degrees "
-            "if they are degrees"
+            + f"and the {space} takes degrees: convert them (numpy.degrees), or give {{unit}} degrees"
         )
-    high = float(np.ptp(lat.values[whole]))
-    hours = lon.values[whole].min() >= 0 and most < 24 and (wide > 20 or (wide > 12 and high > 40))
-    if hours and "ra" in words_of(lon.name):
+    is_wide = wide > 20 or (wide > 12 and float(np.ptp(lats)) > 40)
+    if lons.min() >= 0 and most < 24 and is_wide and "ra" in words_of(lon.name):
         raise SettingError(
             literal(f"{lon.name!r} is within 0 and 24, as hours are: ")
             + "multiply it by 15, or give {unit} degrees if it is in degrees"
         )
-    return (
-        [
+    if is_small:
+        doubts.append(
             f"all of {lat.name!r} are within pi/2 and of {lon.name!r} within 2 pi, and they were read "
             "as degrees: if they are radians, convert them; if not, give the unit degrees"
-        ]
-        if small
-        else []
-    )
-
-
-NEAR_NULL = 1.0
-"""Degrees from latitude 0, longitude 0 within which there are no other places where these are a gap."""
-
-
-def _null_island(lat: Checked, lon: Checked) -> list[str]:
-    """Return a doubt if places far from latitude 0, longitude 0 have it again and again."""
-    both = np.stack([lat.values, lon.values], axis=1)
-    known = both[np.isfinite(both).all(axis=1)]
-    here = (known == 0).all(axis=1)
-    others = known[~here]
-    if int(here.sum()) < 2 or not len(others):
-        return []
-    if float(np.abs(others).max(axis=1).min()) < NEAR_NULL:
-        return []
-    return [
-        f"{lat.name} and {lon.name} are both exactly 0 in {int(here.sum())} rows, far from all others: "
-        "if that stands for a missing place, leave these rows out"
-    ]
+        )
+    return doubts
 
 
 def fraction_doubts(values: Array, lengths: Sequence[float]) -> list[str]:
     """Return a doubt if points (N, d) may be fractions of a cell, whose sides (d,) are much longer."""
     known = values[np.isfinite(values).all(axis=1)]
-    inside = bool(((known >= 0) & (known < 1)).all()) and len(known) >= FEW_ROWS
-    if not inside or min(lengths) < 2:
-        return []
+    are_inside = bool(((known >= 0) & (known < 1)).all()) and len(known) >= FEW_ROWS
     return [
         "all coordinates lie in [0, 1), in the unit of the cell: if they are fractions of the cell, "
         "give that option (fractional)"
-    ]
+    ] * (are_inside and min(lengths) >= 2)
 
 
 def written_from_zero(data: Array, period: float) -> list[int]:

@@ -1,4 +1,4 @@
-"""Arrays and data frames of any library as plain numbers, with NaN for whatever is missing."""
+"""Arrays and data frames of any library as columns of plain cells, and cells as numbers."""
 
 from __future__ import annotations
 
@@ -6,19 +6,29 @@ import importlib
 import math
 import numbers
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import date, time, timedelta
 from decimal import Decimal
-from typing import Any, NamedTuple, cast
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.draws import columns_of_draws, has_draws, posterior_of
-from orbiflow.density.data.row_labels import cells_of, is_missing
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import described, is_a, is_tensor
+
+CATEGORIES = ("category", "categorical", "enum", "dictionary")
+"""What the types of columns of categories begin with in pandas, polars and pyarrow."""
+
+DRAWS = ("chain", "draw", "sample")
+"""Dimensions along which there are rows: ArviZ's own, and the one in which it stacks them."""
+
+RUNS = 10
+"""Runs of neighbouring draws in each chain: those of one are held out together."""
+
+LEAST_RUN = 2
+"""Draws in a run, without which they are as good as apart."""
 
 
 class Data(NamedTuple):
@@ -47,113 +57,174 @@ def as_data(data: Any, what: str = "data") -> Data:
     columns = columns_of(data, what)
     if columns is None:
         return Data(as_numbers(data, what), None)
-    parts = [as_numbers(part, f"{what}: column {name!r}") for name, part in columns]
-    sizes = {part.shape for part in parts}
-    if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
-        raise OrbiflowError(f"{what}: the columns must be of one length, got {sorted(sizes)}")
+    parts = [as_numbers(cells, f"{what}: column {name!r}") for name, cells in columns]
+    check_lengths(parts, what)
     values = np.stack(parts, axis=1) if parts else np.empty((0, 0))
-    names = [name for name, _ in columns]
-    named = all(is_a(name, str) for name in names)
-    return Data(values, tuple(cast("list[str]", names)) if named else None)
+    names = tuple(name for name, _ in columns)
+    return Data(values, names if all(is_a(name, str) for name in names) else None)
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """The columns of a data frame or of an array: a `Source`.
-
-    - `parts`: The columns' cells, each (N,).
-    - `is_array`: Whether it is an array, whose angles are radians unless declared.
-    """
-
-    names: tuple[str, ...]
-    is_named: bool
-    parts: tuple[Any, ...]
-    what: str = "data"
-    is_array: bool = False
-
-    @classmethod
-    def of(cls, data: Any, what: str = "data", names: Sequence[str] | None = None) -> Frame:
-        """Return the columns of an array (N, k), which may get names, or of a data frame.
-
-        Raises `OrbiflowError` for data that are neither.
-        """
-        columns = columns_of(data, what)
-        if columns is None:
-            values = as_numbers(data, what)
-            require_table(values)
-            called = tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
-            parts = tuple(values.T)
-            return cls(tuple(names or called), names is not None, parts, what, is_array=True)
-        own = tuple(str(name) for name, _ in columns)
-        named = all(is_a(name, str) for name, _ in columns)
-        if not named:
-            own = tuple(f"column{k}" for k in range(1, len(columns) + 1))
-        parts = tuple(np.asarray(cells_of(part)) for _, part in columns)
-        sizes = {part.shape for part in parts}
-        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
-            raise OrbiflowError(f"{what}: the columns must be of one length, got {sorted(sizes)}")
-        return cls(own, named, parts, what)
-
-    @property
-    def where(self) -> str:
-        """What messages begin with."""
-        return "" if self.what == "data" else f"{self.what}: "
-
-    def is_numeric(self, column: int) -> bool:
-        """Return whether a column is of numbers, by its type or by all of its cells."""
-        part = self.parts[column]
-        if part.dtype.kind != "O":
-            return part.dtype.kind in "fiu"
-        known = [cell for cell in part if not is_missing(cell)]
-        return bool(known) and all(is_a(c, numbers.Real) and not is_a(c, bool) for c in known)
-
-    def numbers(self, column: int) -> Array:
-        """Return a column (N,) as float64, missing values as NaN; refuse what holds no numbers."""
-        return as_numbers(self.parts[column], f"{self.what}: column {self.names[column]!r}")
-
-    def cells(self, column: int) -> NDArray[Any]:
-        """Return the cells (N,) of a column as they are."""
-        return self.parts[column]
-
-    def place(self, row: int) -> str:
-        """Return which row it is, from 1."""
-        return f"row {row + 1}"
+def check_lengths(columns: Sequence[NDArray[Any]], what: str) -> None:
+    """Refuse columns that are not of one length (N,)."""
+    shapes = {cells.shape for cells in columns}
+    if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
+        raise OrbiflowError(f"{what}: the columns must be of one length, got {sorted(shapes)}")
 
 
 def columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
     """Return the names and columns of a frame, or None for what is not one."""
     if hasattr(data, "collect_schema") and hasattr(data, "collect"):
         raise OrbiflowError(f"{what}: a lazy frame holds no numbers yet; call its collect() first")
-    data = posterior_of(data)
-    if has_draws(data):
-        return columns_of_draws(data, what)
-    if hasattr(data, "data_vars"):  # xarray
-        if len(data.dims) != 1:
+    frame: Any = _posterior_of(data)
+    if _has_draws(frame):
+        return _columns_of_draws(frame, what)
+    if hasattr(frame, "data_vars"):  # xarray
+        if len(frame.dims) != 1:
             raise OrbiflowError(
-                f"{what}: a Dataset of the dimensions {', '.join(map(str, data.dims))}; give columns "
+                f"{what}: a Dataset of the dimensions {', '.join(map(str, frame.dims))}; give columns "
                 "along one, such as dataset.to_dataframe().reset_index()[['lat', 'lon']]"
             )
-        return [(name, data[name].values) for name in data.data_vars]
-    if hasattr(data, "column_names"):  # pyarrow
-        return [(n, cells_of(data.column(k))) for k, n in enumerate(data.column_names)]
-    if is_a(data, np.ndarray) and data.dtype.names:
-        return [(name, data[name]) for name in data.dtype.names]
-    frame: Any = data
-    if hasattr(data, "dtype") and not is_tensor(data) and is_a(name := _name_of(data), str):
-        return [(name, cells_of(data))]
-    names = getattr(frame, "columns", None)
+        return [(name, frame[name].values) for name in frame.data_vars]
+    if hasattr(frame, "column_names"):  # pyarrow
+        return [(n, cells_of(frame.column(k))) for k, n in enumerate(frame.column_names)]
+    if is_a(frame, np.ndarray) and frame.dtype.names:
+        return [(name, frame[name]) for name in frame.dtype.names]
+    name: Any = None if is_tensor(frame) else getattr(frame, "name", None)
+    if (
+        is_a(name, str) and name and len(getattr(frame, "shape", ())) == 1
+    ):  # a column of any library
+        return [(name, cells_of(frame))]
+    names: Any = getattr(frame, "columns", None)
     if names is None or callable(names):
         return None
-    if hasattr(frame, "iloc"):  # pandas
-        return [(n, cells_of(frame.iloc[:, k])) for k, n in enumerate(names)]
-    if hasattr(frame, "get_columns"):  # polars
-        return [(n, cells_of(c)) for n, c in zip(names, frame.get_columns(), strict=True)]
-    return list(zip(names, np.asarray(frame).T, strict=True))
+    own: Any = frame
+    if hasattr(own, "iloc"):  # pandas
+        return [(n, cells_of(own.iloc[:, k])) for k, n in enumerate(names)]
+    parts = own.get_columns() if hasattr(own, "get_columns") else np.asarray(own).T  # polars
+    return [(n, cells_of(cells)) for n, cells in zip(names, parts, strict=True)]
 
 
-def _name_of(column: Any) -> str | None:
-    """Return the name of a column (N,) of pandas, polars or xarray, None if it has none."""
-    return (getattr(column, "name", None) or None) if len(column.shape) == 1 else None
+def _posterior_of(data: Any) -> Any:
+    """Return the posterior sample of ArviZ's InferenceData or xarray's DataTree, others as they are."""
+    posterior = getattr(data, "posterior", None)
+    return posterior if hasattr(posterior, "data_vars") else data
+
+
+def _has_draws(data: Any) -> bool:
+    """Return whether a Dataset or a DataArray of xarray has draws along a dimension of its own."""
+    return hasattr(data, "coords") and not set(DRAWS).isdisjoint(getattr(data, "dims", ()))
+
+
+def _columns_of_draws(data: Any, what: str) -> list[tuple[str, Any]]:
+    """Return the names and columns (N,) of a Dataset or DataArray, chain after chain.
+
+    A variable of more dimensions has a column for each entry, named as ArviZ names it: "torsion[phi]".
+    """
+    along = [name for name in DRAWS if name in data.dims]
+    variables = data.data_vars if hasattr(data, "data_vars") else {data.name or "x": data}
+    columns: list[tuple[str, Any]] = []
+    for name, variable in variables.items():
+        if not set(along) <= set(variable.dims):
+            raise OrbiflowError(
+                f"{what}: variable {name!r} is not along {' and '.join(along)}; choose those that are, "
+                "such as dataset[['phi', 'psi']]"
+            )
+        others = [dim for dim in variable.dims if dim not in along]
+        table = variable.transpose(*along, *others).values
+        table = table.reshape(math.prod(table.shape[: len(along)]), -1)
+        for k, entry in enumerate(product(*(variable[dim].values for dim in others))):
+            labels = f"[{', '.join(map(str, entry))}]" if others else ""
+            columns.append((f"{name}{labels}", table[:, k]))
+    return columns
+
+
+def runs_of_draws(data: Any) -> NDArray[np.int64] | None:
+    """Return the run (N,) of neighbouring draws in which each row lies, or None for other data.
+
+    Draws of one chain are like the ones before, so that rows held out one by one would be known by
+    their neighbours.
+    """
+    data = _posterior_of(data)
+    if not (_has_draws(data) and "draw" in data.dims):
+        return None
+    draws, chains = int(data.sizes["draw"]), int(data.sizes.get("chain", 1))
+    if draws < LEAST_RUN * RUNS:
+        return None
+    return (np.arange(chains)[:, None] * RUNS + np.arange(draws) * RUNS // draws).ravel()
+
+
+def cells_of(column: Any) -> Any:
+    """Return a column of pandas, polars or pyarrow as an array, and anything else as it is.
+
+    It is an array of objects where its kind has a mark for missing values, and of words, or None, where
+    it holds categories, which are words even if they are numbers.
+
+    >>> cells_of([1, 2])
+    [1, 2]
+    """
+    kind = getattr(column, "dtype", getattr(column, "type", None))
+    if kind is None or is_tensor(column) or not hasattr(column, "__len__"):
+        return column
+    if isinstance(kind, np.dtype):
+        return column if is_a(column, np.ndarray) else np.asarray(column)
+    cells = column.to_pylist() if hasattr(column, "to_pylist") else list(column)
+    if str(kind).lower().startswith(CATEGORIES):
+        cells = [None if is_missing(cell) else word_of(cell) for cell in cells]
+    return object_array(cells)
+
+
+def object_array(cells: Sequence[Any]) -> NDArray[Any]:
+    """Return an array of objects (N,), whatever they are."""
+    return np.array([*cells, None], dtype=object)[:-1]
+
+
+def word_of(cell: Any) -> str:
+    """Return the word that a cell is; a whole number is the same word whatever its type.
+
+    >>> word_of(2.0), word_of("2.0")
+    ('2', '2.0')
+    """
+    if isinstance(cell, numbers.Real) and not is_a(cell, bool) and float(cell).is_integer():
+        return str(int(float(cell)))
+    return str(cell)
+
+
+def words_of_cells(cells: NDArray[Any]) -> NDArray[np.str_]:
+    """Return cells (N,) as words, empty where they are missing; 2.0 is the word 2."""
+    pairs = zip(cells.tolist(), missing_among(cells).tolist(), strict=True)
+    return np.array(
+        ["" if is_gone else word_of(cell).strip() for cell, is_gone in pairs], dtype=str
+    )
+
+
+def is_missing(cell: Any) -> bool:
+    """Return whether a cell of a column is a mark for a missing value, of any library.
+
+    >>> is_missing(None), is_missing(float("nan")), is_missing("nan")
+    (True, True, False)
+    """
+    if cell is None or type(cell).__name__ in ("NAType", "NaTType", "MaskedConstant"):
+        return True
+    return isinstance(cell, numbers.Real) and math.isnan(cell)
+
+
+def missing_among(cells: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which cells (N,) are marks for missing values, or empty words."""
+    if cells.dtype.kind in "OUS":
+        lacking = [
+            is_missing(c) or (is_a(c, str | bytes) and not c.strip()) for c in cells.tolist()
+        ]
+        return np.array(lacking, dtype=bool)
+    if cells.dtype.kind in "mM":
+        return np.isnat(cells)
+    return np.isnan(cells) if cells.dtype.kind == "f" else np.zeros(cells.shape, dtype=bool)
+
+
+DATES_CURE = "; give numbers, such as hours since a first moment, or hours of the day"
+ANGLES_CURE = "; numpy.angle gives the angles of complex numbers"
+KINDS = {
+    "b": "Booleans", "U": "text", "S": "text", "M": "dates", "m": "durations", "c": "complex numbers",
+}  # fmt: skip
 
 
 def as_numbers(data: Any, what: str) -> Array:
@@ -176,72 +247,37 @@ def as_numbers(data: Any, what: str) -> Array:
         array: NDArray[Any] = np.asarray(data)
     except (TypeError, ValueError) as error:  # ragged
         raise OrbiflowError(f"{what}: expected numbers in rows of one length: {error}") from error
-    if array.dtype.kind == "c":
-        raise OrbiflowError(
-            f"{what}: expected real numbers, got complex ones; numpy.angle gives their angles"
-        )
-    if array.dtype.kind == "O":
+    kind = array.dtype.kind
+    if kind == "O":
         array = _of_objects(array, what)
-    elif array.dtype.kind not in "fiu":
-        cure = DATES_CURE * (array.dtype.kind in "mM")
-        raise OrbiflowError(f"{what}: expected numbers, got {_kind(array)}{cure}")
-    values = array.astype(np.float64)
+    elif kind not in "fiu":
+        sample = f", such as {array.flat[0].item()!r:.40}" if array.size else ""
+        cure = DATES_CURE if kind in "mM" else ANGLES_CURE if kind == "c" else ""
+        words = KINDS.get(kind, str(array.dtype))
+        raise OrbiflowError(f"{what}: expected numbers, got {words}{sample}{cure}")
+    with np.errstate(over="ignore"):
+        values = array.astype(np.float64)
     if mask is not None:
         values[mask] = np.nan
     return values
-
-
-DATES_CURE = "; give numbers, such as hours since a first moment, or hours of the day"
-
-
-def _kind(array: NDArray[Any]) -> str:
-    words = {"b": "Booleans", "U": "text", "S": "text", "M": "dates", "m": "durations"}
-    sample = f", such as {array.flat[0].item()!r:.40}" if array.size else ""
-    return words.get(array.dtype.kind, str(array.dtype)) + sample
 
 
 def _of_objects(array: NDArray[Any], what: str) -> Array:
     values = np.empty(array.shape)
     flat = values.reshape(-1)
     for k, item in enumerate(array.reshape(-1)):
-        if isinstance(item, float | int | Decimal | numbers.Real) and not is_a(item, bool):
+        if isinstance(item, Decimal | numbers.Real) and not is_a(item, bool):
             flat[k] = float(item)
         elif is_missing(item):
             flat[k] = math.nan
         else:
             row = np.unravel_index(k, array.shape)[0] + 1 if array.ndim else 1
-            cure = "; numpy.angle gives the angles of complex numbers" * is_a(item, complex)
+            cure = ANGLES_CURE * is_a(item, complex)
             cure += DATES_CURE * is_a(item, date | time | timedelta)
             raise OrbiflowError(
                 f"{what}: expected numbers, got {described(item)} in row {row}{cure}"
             )
     return values
-
-
-def require_table(data: Array) -> None:
-    """Refuse data that are no rows and columns."""
-    if data.ndim != 2:
-        cure = ""
-        if data.ndim == 1:
-            cure = "; of one row write [[...]], of one column data.reshape(-1, 1) (NumPy)"
-        raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}{cure}")
-
-
-def require_values(values: Array, names: Sequence[str] | None) -> None:
-    """Refuse columns (N, k) of which no row has a value, and values that are infinite."""
-    rows = np.flatnonzero(np.isinf(values).any(axis=1))
-    if len(rows):
-        raise OrbiflowError(
-            f"row {rows[0] + 1} has an infinite value ({len(rows)} such rows): correct or remove it"
-        )
-    empty = np.flatnonzero(np.isnan(values).all(axis=0)).tolist() if len(values) else []
-    if empty:
-        own = [repr(names[k]) if names else str(k + 1) for k in empty]
-        several = len(own) > 1
-        have, them = ("have", "them") if several else ("has", "it")
-        raise OrbiflowError(
-            f"column{'s' * several} {', '.join(own)} {have} no value in any row; leave {them} out"
-        )
 
 
 OUTPUTS = ("default", "pandas", "polars")
@@ -253,8 +289,7 @@ def frame_of(rows: Array, names: Sequence[str], output: str) -> Any:
     if output == "default":
         return rows
     try:
-        made = importlib.import_module(output)
+        library = importlib.import_module(output)
     except ImportError as error:
         raise OrbiflowError(f"{output} is not installed: install it, or ask for arrays") from error
-    columns = {name: rows[:, k] for k, name in enumerate(names)}
-    return made.DataFrame(columns)
+    return library.DataFrame({name: rows[:, k] for k, name in enumerate(names)})

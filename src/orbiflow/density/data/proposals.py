@@ -1,44 +1,37 @@
-"""What columns seem to be: the words that are printed where nothing says it, to be confirmed."""
+"""What columns seem to be: the words that are printed where nothing says it, to be confirmed.
+
+Columns on which a density depends are the simplest case: each has its role, or is asked for.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.data.checks import codes_among
-from orbiflow.density.data.column_names import LATITUDES, LONGITUDES, foreign_unit, words_of
-from orbiflow.density.data.roles import Role, role_named
-from orbiflow.density.data.units import TURN_TOLERANCE
+from orbiflow.density.data.frames import as_numbers
+from orbiflow.density.data.names import LATITUDES, LONGITUDES
+from orbiflow.density.data.roles import WORDS, Asked, Role, role_named
+from orbiflow.density.data.table import UndeclaredError, short
+from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, foreign_unit, words_of
+from orbiflow.errors import SettingError, literal
+from orbiflow.settings import is_a
 
-
-def lacks_unit(role: Role) -> bool:
-    """Return whether a role is an angle or an axis of no unit."""
-    return role.kind in ("angle", "axial") and role.unit is None
-
-
-def turn_of(word: str) -> float | None:
-    """Return after what a column of a role begins again."""
-    return Role.of(word).turn
-
-
-def quoted(text: str) -> str:
-    """Return what a shell takes as one word."""
-    return f"'{text}'" if re.search(r"[\s()'°]", text) else text
-
-
-def range_of(values: Array) -> str:
-    """Return the least and the largest of values (N,), in words."""
-    known = values[np.isfinite(values)]
-    return f"{known.min():.5g} to {known.max():.5g}" if len(known) else "no value"
+FEW_ROWS = 20
+"""Fewer may all have words of their own."""
 
 
 # fmt: off
 COUNTS = frozenset((
     "count", "counts", "n", "num", "nobs", "freq", "frequency", "frequencies", "anzahl", "hits",
 ))
+WEIGHTS = frozenset(("weight", "weights", "gewicht"))
 OTHERS = frozenset((
     "temp", "temperature", "length", "len", "distance", "dist", "radius", "mass", "speed", "spd",
     "windspeed", "wspd", "ws", "gust", "velocity", "pressure", "humidity", "rain", "precipitation",
@@ -46,7 +39,7 @@ OTHERS = frozenset((
     "charge", "magnitude", "mag", "price", "year", "day", "age", "probability", "density",
 ))
 # fmt: on
-"""Words for how often a row was seen, and for other quantities than angles: for proposals alone."""
+"""Words for how often a row was seen or counts, and for other quantities than angles."""
 
 AXIAL = frozenset(
     {"strike", "strikes", "orientation", "orientations", "axis", "axes", "axial", "fibre", "fibres"}
@@ -72,49 +65,142 @@ def proposed_role(
     ('angle:turns', 'ignore')
     """
     known, words = values[np.isfinite(values)], set(words_of(name))
-    own = role or role_named(name)
-    if own is not None and not lacks_unit(own):
-        return str(own)
+    role = role or role_named(name)
+    if role is not None and not role.lacks_unit:
+        return str(role)
     if not len(known):
         return "ignore"
-    if (foreign := foreign_unit(name)) is not None:
-        return f"cycle:{foreign:.10g}"
-    if own is None and len(known) > 2 and bool((np.diff(known) == 1).all()):
-        return "ignore"
-    if own is None and words & {"weight", "weights", "gewicht"}:
-        return "weight"
-    if own is None and words & COUNTS and bool((known == np.round(known)).all()):
-        return "count"
+    if (turn := foreign_unit(name)) is not None:
+        return f"cycle:{turn:.10g}"
     low, high = float(known.min()), float(known.max())
-    is_axis = (own is not None and own.kind == "axial") or bool(words & AXIAL)
-    is_angle = own is not None or is_axis or bool(words & (LATITUDES | LONGITUDES))
+    are_whole = bool((known == np.round(known)).all())
+    is_axis = bool(words & AXIAL) if role is None else role.kind == "axial"
+    is_angle = role is not None or is_axis or bool(words & (LATITUDES | LONGITUDES))
+    if role is None:
+        if len(known) > 2 and bool((np.diff(known) == 1).all()):
+            return "ignore"
+        if words & WEIGHTS:
+            return "weight"
+        if words & COUNTS and are_whole:
+            return "count"
     if words & PARTS_OF_VECTORS and not is_angle:
         return "linear"
     if words & PARTS_OF_VECTORS and max(-low, high) <= 1:
         return "ignore"  # the sine of an angle is none
     unit = unit_by_size(known)
-    if by_size and not is_angle and not words & OTHERS and unit is not None:
-        wide = math.pi if unit == "radians" else 90.0
-        is_angle = unit != "turns" and high - low > wide
-    if is_angle:
-        whole_tens = (
-            low >= 0 and 6 < high <= TENS_IN_TURN and bool((known == np.round(known)).all())
-        )
-        if whole_tens and not is_axis and len(known) > 20:
-            return f"cycle:{TENS_IN_TURN:g}"
-        kind = "axial" if is_axis and high - low <= 180 else "angle"
-        return f"{kind}:{unit or 'degrees'}"
-    return "positive" if low > 0 else "linear"
+    if by_size and not is_angle and not words & OTHERS and unit not in (None, "turns"):
+        is_angle = high - low > (math.pi if unit == "radians" else 90.0)
+    if not is_angle:
+        return "positive" if low > 0 else "linear"
+    if not is_axis and are_whole and low >= 0 and 6 < high <= TENS_IN_TURN and len(known) > 20:
+        return f"cycle:{TENS_IN_TURN:g}"
+    kind = "axial" if is_axis and high - low <= 180 else "angle"
+    return f"{kind}:{unit or 'degrees'}"
 
 
 def unit_by_size(values: Array) -> str | None:
     """Return the unit that angles (N,) may have by their size, None beyond every turn."""
-    known = np.abs(values[np.isfinite(values)])
-    codes = codes_among(values, 360.0)
-    known = known[~np.isin(known, np.abs(codes))] if codes else known
+    known = values[np.isfinite(values)]
+    known = np.abs(known[~np.isin(known, codes_among(known, TURNS["degrees"]))])
     most = float(known.max(initial=0.0))
     if most <= 1 and float(np.min(values, initial=0.0)) >= 0:
         return "turns"
-    if most <= 2 * math.pi * (1 + TURN_TOLERANCE):
+    if most <= TURNS["radians"] * (1 + TURN_TOLERANCE):
         return "radians"
-    return "degrees" if most <= 360 * (1 + TURN_TOLERANCE) else None
+    return "degrees" if most <= TURNS["degrees"] * (1 + TURN_TOLERANCE) else None
+
+
+def undeclared(
+    option: str, columns: Mapping[str, Array], proposal: str, cure: str = "", where: str = ""
+) -> UndeclaredError:
+    """Return the error that asks for what columns (N,) are, with the words that answer it."""
+    ranges: list[str] = []
+    for name, values in columns.items():
+        known = values[np.isfinite(values)]
+        range_of = f"{known.min():.5g} to {known.max():.5g}" if len(known) else "no value"
+        ranges.append(f"{short(name)} ({range_of})")
+    quoted = f"'{proposal}'" if re.search(r"[\s()'°]", proposal) else proposal
+    them = "they are" if len(columns) > 1 else "it is"
+    return UndeclaredError(
+        literal(f"{where}{', '.join(ranges)}: say what {them}; if this is right, declare: ")
+        + f"{{{option}}} {literal(quoted)}{cure} (a role is "
+        + f"{', '.join(WORDS[: 7 if option == 'given' else None])})",
+        list(columns),
+        proposal,
+    )
+
+
+def given_roles(
+    names: Sequence[str],
+    columns: Mapping[str, NDArray[Any]],
+    asked: Asked,
+    unit: str | None = None,
+    *,
+    are_asked: bool = True,
+    where: str = "",
+    option: str = "given",
+) -> dict[str, Role]:
+    """Return what columns are on which a density depends, by their names.
+
+    Text is words. Numbers are as declared, or what the table of names says, or asked for; of arrays
+    they are real.
+
+    Args:
+        names: The columns.
+        columns: Their cells (N,).
+        asked: What was declared, by names.
+        unit: The unit of angles that name none.
+        are_asked: Whether to ask what numbers are, as of a table, and not to take them as real.
+        where: What messages begin with.
+        option: The setting in which they are named.
+
+    Raises:
+        UndeclaredError: For columns of which nothing says what they are.
+        SettingError: For words that are declared as numbers, and roles that covariates do not have.
+    """
+    lower = {str(key).casefold(): role for key, role in asked.items()}
+    roles: dict[str, Role | None] = {}
+    unknown: dict[str, Array] = {}
+    for name in names:
+        declared, cells = lower.get(name.casefold()), columns[name]
+        if declared is not None and declared.is_side:
+            raise SettingError(
+                f"{{{option}}}: {literal(repr(name))} is declared as {declared.kind}, and a density "
+                "may depend on an angle, axial, cycle, linear, positive, bounded or word alone"
+            )
+        is_text = cells.dtype.kind in "USbO" and any(is_a(c, str | bool) for c in cells.tolist())
+        if is_text:
+            _check_words(name, cells, declared, where)
+            roles[name] = Role("word")
+            continue
+        values, by_name = as_numbers(cells, repr(name)), role_named(name)
+        role = declared or (None if by_name is None or by_name.is_side else by_name)
+        role = Role("linear") if role is None and not are_asked else role
+        roles[name] = role = role and role.with_unit(unit)
+        if role is None or role.lacks_unit:
+            unknown[name] = values
+    if unknown:
+        words = {name: str(role) for name, role in roles.items()}
+        for name, values in unknown.items():
+            word = proposed_role(name, values, roles[name], by_size=False)
+            words[name] = "linear" if Role.of(word).is_side else word
+        proposal = ",".join(f"{name}={word}" for name, word in words.items())
+        raise undeclared(option, unknown, proposal, where=where)
+    return {name: role for name, role in roles.items() if role is not None}
+
+
+def _check_words(name: str, cells: NDArray[Any], role: Role | None, where: str) -> None:
+    """Refuse words that are declared as numbers, and of which nearly every row has one of its own."""
+    words = {str(cell) for cell in cells.tolist() if is_a(cell, str | bool)}
+    begin = literal(f"{where}column {name!r} has ")
+    if role is not None and role.kind != "word":
+        raise SettingError(
+            f"{begin}{literal(repr(min(words)))}, and is declared as {role}: correct it, or declare "
+            "the column as word"
+        )
+    if len(cells) >= FEW_ROWS and 2 * len(words) > len(cells):
+        raise SettingError(
+            f"{begin}{len(words)} different words in {len(cells)} rows, such as "
+            f"{literal(repr(min(words)))}: a density depends on words that recur; of dates give "
+            "numbers, such as the hour or the days since a first one, or leave the column out"
+        )

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from orbiflow.density.data.column_names import foreign_unit, unit_named, words_of
-from orbiflow.density.data.units import TURNS, Unit
+from orbiflow.density.data.table import number_of
+from orbiflow.density.data.units import TURNS, Unit, foreign_unit, unit_named, words_of
 from orbiflow.errors import SettingError, literal
 from orbiflow.settings import is_a
 
@@ -58,7 +58,7 @@ class Role:
         kind, *rest = str(text).strip().casefold().split(":")
         if kind in ("angle", "axial") and (not rest or (len(rest) == 1 and rest[0] in TURNS)):
             return cls(kind, rest[0] if rest else None)
-        numbers = [_number(part) for part in rest]
+        numbers = [number_of(part) for part in rest]
         if kind == "cycle" and len(numbers) == 1 and 0 < numbers[0] < math.inf:
             return cls(kind, period=numbers[0])
         ends = len(numbers) == 2 and -math.inf < numbers[0] < numbers[1] < math.inf
@@ -69,7 +69,7 @@ class Role:
         of = f" of the column {name!r}" if name else ""
         raise SettingError(
             f"{{columns}}: {literal(repr(text))}{literal(of)} is no role; the roles are "
-            f"{', '.join(WORDS)}, with units {', '.join(get_args(Unit))}, such as {_example(kind)}"
+            f"{', '.join(WORDS)}, with units {', '.join(get_args(Unit))}"
         )
 
     def __str__(self) -> str:
@@ -100,22 +100,14 @@ class Role:
             return TURNS[self.unit] / (2 if self.kind == "axial" else 1)
         return self.period
 
+    @property
+    def lacks_unit(self) -> bool:
+        """Whether it is an angle or an axis of no unit."""
+        return self.kind in ("angle", "axial") and self.unit is None
+
     def with_unit(self, unit: str | None) -> Role:
         """Return the role with a unit, if it lacks one."""
-        if self.kind not in ("angle", "axial") or self.unit is not None or unit is None:
-            return self
-        return Role(self.kind, unit)
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-def _example(kind: str) -> str:
-    return {"cycle": "cycle:24", "bounded": "bounded:0:1"}.get(kind, "angle:degrees")
+        return Role(self.kind, unit) if self.lacks_unit else self
 
 
 Asked = Mapping[str | int, Role | None]
@@ -137,33 +129,29 @@ def asked_roles(columns: Any) -> dict[str | int, Role | None]:
     """
     if columns is None:
         return {}
-    if is_a(columns, Mapping):
-        given: Mapping[Any, Any] = columns
-        pairs = [(key, value) for key, value in given.items()]
-    else:
+    pairs: Any = columns.items() if is_a(columns, Mapping) else None
+    if pairs is None:
         texts = columns.split(",") if is_a(columns, str) else columns
         if not is_a(texts, Sequence) or not all(is_a(text, str | int) for text in texts):
             raise SettingError(
                 "{columns} must be roles by columns, such as {{'dir': 'angle:degrees'}}, or names with "
                 f"roles, such as 'dir=angle:degrees,speed=positive'; got {literal(repr(columns))}"
             )
-        pairs = [_pair(text) for text in texts]
-    found: dict[str | int, Role | None] = {}
-    for key, value in pairs:
+        pairs = map(_pair, texts)
+    roles: dict[str | int, Role | None] = {}
+    for key, word in pairs:
         name = key.strip() if isinstance(key, str) else key
-        if name in found:
+        if name in roles:
             raise SettingError(
                 f"{{columns}} names {literal(repr(name))} twice: name each column once"
             )
-        found[name] = None if value is None else Role.of(value, str(name))
-    return found
+        roles[name] = None if word is None else Role.of(word, str(name))
+    return roles
 
 
 def _pair(text: str | int) -> tuple[str | int, str | None]:
     name, sign, role = str(text).rpartition("=")
-    if is_a(text, int) or not sign:
-        return text, None
-    return name, role
+    return (name, role) if sign else (text, None)
 
 
 # fmt: off
@@ -184,7 +172,7 @@ ROLES: dict[str, tuple[str, ...]] = {
 # fmt: on
 """The table of names: the role of a column by a word of its name.
 
-Which columns a sphere, axes, rotations and quotients take is in `columns.py`.
+Which columns a sphere, axes, rotations and quotients take is in `names.py`.
 """
 
 _BY_WORD = {word: role for role, words in ROLES.items() for word in words}
@@ -202,11 +190,8 @@ def role_named(name: str) -> Role | None:
     words, unit = words_of(name), unit_named(name)
     if foreign_unit(name) is not None:
         return None
-    joined = ["".join(words), *words]
-    word = next((_BY_WORD[own] for own in joined if own in _BY_WORD), None)
-    if word is None:
-        return None if unit is None else Role("angle", unit)
-    role = Role.of(word)
-    if role.kind != "angle":
-        return role if unit is None else Role("angle", unit)
-    return role.with_unit(unit)
+    word = next((_BY_WORD[key] for key in ["".join(words), *words] if key in _BY_WORD), None)
+    role = Role.of(word or "angle")
+    if unit is not None:
+        return Role("angle", unit)
+    return role if word is not None else None

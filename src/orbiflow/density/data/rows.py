@@ -10,11 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.declaration import Chosen
+from orbiflow.density.data.checks import check_values
+from orbiflow.density.data.choices import ChosenColumns, Declaration, choose
+from orbiflow.density.data.frames import missing_among, object_array, words_of_cells
 from orbiflow.density.data.roles import Role
-from orbiflow.density.data.row_labels import missing_among, word_of
-from orbiflow.density.data.source import Source, found_column, listing
-from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
+from orbiflow.density.data.table import (
+    DataTable,
+    MissingCellsError,
+    found_column,
+    listing,
+    number_of,
+)
+from orbiflow.density.data.units import DIRECTIONS, words_of
+from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.settings import is_a
 
 MAX_ROWS = 20_000_000
@@ -23,13 +31,7 @@ MAX_ROWS = 20_000_000
 MOST_LISTED = 12
 """Values of a column that a message names at most."""
 
-
-class TableError(SettingError, InputFileError):
-    """A table that cannot be read as the settings say; the message names those in braces."""
-
-
-class MissingCellsError(TableError):
-    """An error for cells that are empty, NaN or infinite in rows that must be complete."""
+QUARTER_TURN, TURN = 90.0, 360.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +45,10 @@ class TableRows:
     - `weights`: How much each row counts, (N,). None: all the same.
     - `labels`: What each row belongs to, (N,), None if no column says so.
     - `given`: The cells (N,) of columns on which a density may depend.
-    - `notes`: What was decided.
+    - `notes`, `doubts`: What was decided, and what may be wrong.
     """
 
-    source: Source
+    source: DataTable
     numbers: NDArray[np.int64]
     values: Array
     columns: tuple[str, ...]
@@ -56,6 +58,7 @@ class TableRows:
     labels: NDArray[np.str_] | None = None
     given: Mapping[str, NDArray[Any]] = field(default_factory=dict[str, NDArray[Any]])
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def only(self, kept: NDArray[Any]) -> TableRows:
         """Return some of the rows: those of a mask, or of their numbers."""
@@ -71,8 +74,8 @@ class TableRows:
     @property
     def whole(self) -> NDArray[np.bool_]:
         """Which rows (N,) lack no value, or all, if none is whole: others have another unit."""
-        found = np.logical_and.reduce(np.isfinite(self.values), axis=1)
-        return found if found.any() else np.ones_like(found)
+        are_whole = np.logical_and.reduce(np.isfinite(self.values), axis=1)
+        return are_whole if are_whole.any() else np.ones_like(are_whole)
 
     @property
     def own(self) -> list[int]:
@@ -87,19 +90,17 @@ class TableRows:
     @property
     def declaration(self) -> str:
         """What the columns were taken for, as it may be declared."""
-        words = [
-            name if role is None else f"{name}={role}"
-            for name, role in zip(self.columns, self.roles, strict=True)
-        ]
-        return ",".join(words)
+        pairs = zip(self.columns, self.roles, strict=True)
+        return ",".join(name if role is None else f"{name}={role}" for name, role in pairs)
 
     def beside(self, weights: Any, groups: Any) -> tuple[Any, Any]:
         """Return the weights and groups of the rows, from columns or as they are given.
 
         Raises `OrbiflowError` if both are there.
         """
-        for name, own, given in (("weight", self.weights, weights), ("group", self.labels, groups)):
-            if own is not None and given is not None:
+        both = (("weight", self.weights, weights), ("group", self.labels, groups))
+        for name, column, argument in both:
+            if column is not None and argument is not None:
                 raise OrbiflowError(
                     f"a column is declared as {name}, and one is given: leave one out"
                 )
@@ -113,179 +114,175 @@ class TableRows:
         return self.source.place(int(self.numbers[row]))
 
 
+def checked_rows(
+    table: DataTable,
+    said: Declaration,
+    *,
+    given: Sequence[str] = (),
+    apart: Sequence[str] = (),
+    missing: str = "keep",
+    where: Sequence[str] = (),
+) -> TableRows:
+    """Return the rows of a table as declared, once their values are known to be what is declared.
+
+    Args:
+        table: The table.
+        said: What is said of its columns.
+        given: Columns on which a density may depend.
+        apart: Others that are no data.
+        missing: As for `rows_of`, like `where`.
+
+    Raises:
+        UndeclaredError: For columns of which nothing says what they are.
+        SettingError: For values that contradict what is declared.
+    """
+    others = {found_column(table, name) for name in (*given, *apart)}
+    chosen = choose(table, said, others)
+    rows = rows_of(table, chosen, missing=missing, where=where, given=given)
+    form = said.form_of(rows.own_names)
+    if said.space in DIRECTIONS:
+        _check_hemispheres(table, rows)
+    doubts = check_values(
+        said.space, rows.values, rows.columns, rows.roles, rows.unit, form=form, place=rows.place
+    )
+    return replace(rows, doubts=tuple(doubts))
+
+
 def rows_of(
-    source: Source,
-    chosen: Chosen,
+    table: DataTable,
+    chosen: ChosenColumns,
     *,
     missing: str = "keep",
-    codes: Sequence[str] = (),
     where: Sequence[str] = (),
-    given: Sequence[str | int] = (),
+    given: Sequence[str] = (),
 ) -> TableRows:
     """Return the rows of a table with the columns that were chosen.
 
     Args:
-        source: The table.
+        table: The table.
         chosen: Its columns.
         missing: What is done with rows that lack a value of the data: "keep", "drop" or "refuse". Rows
-            that lack a weight, a count or what is given are dropped or refused.
-        codes: What stands for a missing value, numbers or words.
+            that lack a weight, a count, a label or what is given are dropped or refused.
         where: Conditions on cells of other columns, such as "phase=1".
         given: Columns on which a density may depend.
 
     Raises:
-        TableError: For values that are missing or infinite, columns without values, and labels, weights
-            or counts that are none.
+        SettingError: For values that are missing or infinite, columns without values, and weights or
+            counts that are none.
     """
-    notes = list(chosen.notes)
-    numbers = {k: _without(source.numbers(k), codes) for k in chosen.own}
-    values = np.stack([numbers[k] for k in chosen.own], axis=1)
-    names = tuple(source.names[k] for k in chosen.own)
-    side = {
-        kind: _without(source.numbers(k), codes)
-        for kind, k in chosen.side.items()
-        if kind != "group"
+    notes, names = list(chosen.notes), tuple(table.names[k] for k in chosen.columns)
+    values = np.stack([table.numbers(k) for k in chosen.columns], axis=1)
+    known = {
+        table.names[k]: _given_cells(table, k) for k in (found_column(table, g) for g in given)
     }
-    beside = [found_column(source, name) for name in given]
-    known = {source.names[k]: _cells(source, k, codes) for k in beside}
-    labels = None
-    if "group" in chosen.side:
-        labels = words_of_cells(source.cells(chosen.side["group"]))
+    side = {kind: table.numbers(k) for kind, k in chosen.side.items() if kind != "group"}
     kept = np.ones(len(values), dtype=bool)
     if where:
-        kept = rows_where(source, where)
+        kept = rows_where(table, where)
         notes.append(f"read {kept.sum()} of {len(kept)} rows: those of {', '.join(where)}")
-    _refuse_empty(source, values[kept], names)
-    lost = {
-        f"column {name!r}": np.isnan(column) for name, column in zip(names, values.T, strict=True)
-    }
-    must = {
-        f"column {source.names[chosen.side[kind]]!r}": np.isnan(own) for kind, own in side.items()
-    }
-    must |= {f"column {name!r}": missing_among(own) for name, own in known.items()}
-    must |= {} if missing == "keep" else lost
-    gone = np.zeros(len(values), dtype=bool)
-    for own in must.values():
-        gone |= own
-    gone &= kept
-    if missing == "drop" and gone.any():
-        first = source.place(int(np.flatnonzero(gone)[0]))
+    _refuse_empty(table, values[kept], names)
+    lacking = {table.names[chosen.side[kind]]: np.isnan(own) for kind, own in side.items()}
+    lacking |= {name: missing_among(cells) for name, cells in known.items()}
+    labels = None
+    if "group" in chosen.side:
+        labels = words_of_cells(table.cells(chosen.side["group"]))
+        lacking[table.names[chosen.side["group"]]] = labels == ""
+    if missing != "keep":
+        lacking = dict(zip(names, np.isnan(values).T, strict=True)) | lacking
+    gone = kept & np.logical_or.reduce([*lacking.values(), ~kept])
+    if gone.any() and missing != "drop":
+        _refuse_missing(table, {name: own & kept for name, own in lacking.items()}, names)
+    elif gone.any():
+        first = table.place(int(np.flatnonzero(gone)[0]))
         some = f"{int(gone.sum())} row{'s' * (int(gone.sum()) > 1)}"
         notes.append(f"left out {some} with missing values, the first in {first}")
         kept &= ~gone
         if not kept.any():
-            raise TableError(
-                literal(source.where) + "every row lacks a value; choose others with {columns}"
+            raise SettingError("every row lacks a value; choose others with {columns}")
+    cure = "; leave such rows out with {missing_codes} inf {drop_missing}" if table.is_file else ""
+    for name, column in zip(names, values.T, strict=True):
+        _refuse_rows(table, np.isinf(column) & kept, name, "is infinite: correct it" + cure)
+    for kind, own in side.items():
+        wrong, what = own < 0, "weights must be 0 or more"
+        if kind == "count":
+            wrong, what = wrong | (own % 1 != 0), "counts must be whole numbers from 0 on"
+        name = table.names[chosen.side[kind]]
+        what = f"is declared as {kind}, and {what}: correct it, or declare another column"
+        _refuse_rows(table, (wrong | np.isinf(own)) & kept, name, what)
+    strike = _strike_beside_dip(names) if chosen.space in DIRECTIONS else None
+    if strike is not None:
+        column = values[:, strike]
+        values[:, strike] = np.where(abs(column) > TURN, column, (column + QUARTER_TURN) % TURN)
+        notes.append(
+            f"took {names[strike]} by the right-hand rule, as the strike of planes that dip to its "
+            "right: the direction of dip is the strike + 90"
+        )
+        names = (*names[:strike], "dip_direction", *names[strike + 1 :])
+    rows = np.flatnonzero(kept)
+    if "count" in side:
+        counts = side["count"][rows]
+        if not 0 < counts.sum() <= MAX_ROWS:
+            raise SettingError(
+                f"{{columns}}: counts must be 1 to {MAX_ROWS} in all, got {counts.sum():g}; declare "
+                "another column as count, or this one as weight"
             )
-    elif gone.any():
-        _refuse_missing(source, must, kept)
-    wrong = np.logical_or.reduce(np.isinf(values), axis=1) & kept
-    if wrong.any():
-        row = int(np.flatnonzero(wrong)[0])
-        name = names[int(np.flatnonzero(np.isinf(values[row]))[0])]
-        raise MissingCellsError(
-            literal(f"{source.where}{source.place(row)}: column {name!r} is infinite")
-            + "; correct it, or leave such rows out with {missing_codes} inf {drop_missing}"
-        )
-    if labels is not None and (labels[kept] == "").any():
-        row = int(np.flatnonzero((labels == "") & kept)[0])
-        raise TableError(
-            literal(f"{source.where}{int((labels[kept] == '').sum())} rows have no ")
-            + literal(f"{source.names[chosen.side['group']]!r}, the first in {source.place(row)}; ")
-            + "fill it in"
-        )
-    at = np.flatnonzero(kept)
-    found = TableRows(
-        source, np.arange(len(values), dtype=np.int64), values, names, chosen.roles, chosen.unit,
+        rows = rows.repeat(counts.astype(np.int64))
+    return TableRows(
+        table, np.arange(len(values), dtype=np.int64), values, names, chosen.roles, chosen.unit,
         side.get("weight"), labels, known, tuple(notes),
-    ).only(at)  # fmt: skip
-    return found if "count" not in side else _repeated(found, side["count"][at])
+    ).only(rows)  # fmt: skip
 
 
-def _without(column: Array, codes: Sequence[str]) -> Array:
-    """Return numbers (N,) with NaN for those that stand for missing values."""
-    values = [value for code in codes if (value := _number(code)) is not None]
-    return np.where(np.isin(column, values), np.nan, column) if values else column
+def _strike_beside_dip(names: Sequence[str]) -> int | None:
+    """Return the column, from 0, of a strike if the columns are a dip and a strike."""
+    split = [{"dip", "strike"}.intersection(words_of(name)) for name in names]
+    strike = {"strike"}
+    return split.index(strike) if split in ([{"dip"}, strike], [strike, {"dip"}]) else None
 
 
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
+def _given_cells(table: DataTable, column: int) -> NDArray[Any]:
+    """Return cells (N,): numbers, or words, None where they are missing."""
+    if table.is_numeric(column):
+        return table.numbers(column)
+    cells, codes = table.cells(column), {code.casefold() for code in table.codes}
+    pairs = zip(cells.tolist(), missing_among(cells).tolist(), strict=True)
+    words = [None if gone or str(c).strip().casefold() in codes else c for c, gone in pairs]
+    return object_array(words)
 
 
-def _cells(source: Source, column: int, codes: Sequence[str]) -> NDArray[Any]:
-    """Return cells (N,): numbers, or words, empty where they are missing."""
-    if source.is_numeric(column):
-        return _without(source.numbers(column), codes)
-    cells = source.cells(column)
-    lost = missing_among(cells)
-    codes = [code.casefold() for code in codes]
-    found = [
-        None if gone or str(cell).strip().casefold() in codes else cell
-        for cell, gone in zip(cells.tolist(), lost.tolist(), strict=True)
-    ]
-    return np.array([*found, None], dtype=object)[:-1]
-
-
-def words_of_cells(cells: NDArray[Any]) -> NDArray[np.str_]:
-    """Return cells (N,) as words, empty where they are missing; 2.0 is the word 2."""
-    lost: list[bool] = missing_among(cells).tolist()
-    pairs = zip(cells.tolist(), lost, strict=True)
-    return np.array(["" if gone else word_of(cell).strip() for cell, gone in pairs], dtype=str)
-
-
-def _refuse_empty(source: Source, values: Array, names: Sequence[str]) -> None:
+def _refuse_empty(table: DataTable, values: Array, names: Sequence[str]) -> None:
     """Refuse columns without a value in any row."""
-    if not len(values) and source.where:
-        raise TableError(literal(f"{source.where}holds no rows of numbers; export it again"))
-    empty = [
-        name
-        for name, bare in zip(names, np.logical_and.reduce(np.isnan(values)), strict=True)
-        if bare
-    ]
-    if empty and len(values):
-        several = len(empty) > 1
-        have = "have" if several else "has"
+    if not len(values) and table.is_file:
+        raise SettingError("holds no rows of numbers; export it again")
+    lost = np.flatnonzero(np.isnan(values).all(axis=0)).tolist() if len(values) else []
+    empty = [repr(names[k]) for k in lost]
+    if empty:
         raise MissingCellsError(
-            literal(
-                f"{source.where}column{'s' * several} {listing(empty)} {have} no value in any row; "
-            )
-            + "choose others with {columns}"
+            literal(f"{', '.join(empty)}: no value in any row; ") + "choose others with {columns}"
         )
 
 
 def _refuse_missing(
-    source: Source, lost: Mapping[str, NDArray[np.bool_]], kept: NDArray[np.bool_]
+    table: DataTable, lacking: Mapping[str, NDArray[np.bool_]], data: Sequence[str]
 ) -> None:
-    """Refuse cells that are missing."""
-    count = sum(int((own & kept).sum()) for own in lost.values())
-    row, what = min(
-        (int(np.flatnonzero(own & kept)[0]), name)
-        for name, own in lost.items()
-        if (own & kept).any()
-    )
-    raise MissingCellsError(
-        literal(
-            f"{source.where}{count} cell{'s' * (count > 1)} empty or NaN, the first in "
-            f"{source.place(row)}, {what}"
-        )
-        + "; fill them in or leave their rows out with {drop_missing}"
+    """Refuse cells that are missing, of columns of data and of others."""
+    count = sum(int(own.sum()) for own in lacking.values())
+    row, name = min((int(own.argmax()), name) for name, own in lacking.items() if own.any())
+    kind = MissingCellsError if name in data else SettingError
+    cure = "; fill them in, or leave their rows out" + " with {drop_missing}" * table.is_file
+    raise kind(
+        literal(f"{count} cell{'s' * (count > 1)} empty or NaN, the first in {table.place(row)}, ")
+        + literal(f"column {name!r}")
+        + cure
     )
 
 
-def _repeated(rows: TableRows, counts: Array) -> TableRows:
-    """Return each row as often as it was seen, counts (N,)."""
-    wrong = np.flatnonzero((counts < 0) | (counts != np.round(counts)))
-    if len(wrong) or not 0 < counts.sum() <= MAX_ROWS:
-        what = f"{counts[wrong[0]]:g}" if len(wrong) else f"{counts.sum():g} in all"
-        raise TableError(
-            "{columns}: counts must be whole numbers from 0 on, "
-            f"{MAX_ROWS} in all at most, got {what}; declare another column as count, or this one as "
-            "weight"
-        )
-    return rows.only(np.arange(len(counts)).repeat(counts.astype(np.int64)))
+def _refuse_rows(table: DataTable, rows: NDArray[np.bool_], name: str, what: str) -> None:
+    """Refuse some of the rows (N,), if there are any."""
+    if count := int(rows.sum()):
+        more = f" ({count} such rows)" * (count > 1)
+        where = f"{table.place(int(rows.argmax()))}: column {name!r}{more} "
+        raise SettingError(literal(where) + what)
 
 
 def conditions_of(where: Sequence[str]) -> dict[str, list[str]]:
@@ -294,50 +291,58 @@ def conditions_of(where: Sequence[str]) -> dict[str, list[str]]:
     >>> conditions_of(["phase=1", "phase=2", "site = north"])
     {'phase': ['1', '2'], 'site': ['north']}
     """
-    found: dict[str, list[str]] = {}
+    values: dict[str, list[str]] = {}
     for text in where:
         column, sign, value = (part.strip() for part in text.partition("="))
         if not (column and sign and value):
             raise SettingError(
                 f"{{where}} must hold columns with values, such as phase=1, got {literal(repr(text))}"
             )
-        found.setdefault(column, []).append(value)
-    return found
+        values.setdefault(column, []).append(value)
+    return values
 
 
-def rows_where(source: Source, where: Sequence[str]) -> NDArray[np.bool_]:
+def rows_where(table: DataTable, where: Sequence[str]) -> NDArray[np.bool_]:
     """Return which rows (N,) of a table have one of the values asked for, in each column.
 
-    Numbers are compared as numbers, so 1 is 1.0. Raises TableError if there is no such row.
+    Numbers are compared as numbers, so 1 is 1.0. Raises `SettingError` if there is no such row.
     """
-    kept: NDArray[np.bool_] | None = None
+    kept = np.ones(len(table.columns[0]), dtype=bool)
     for column, values in conditions_of(where).items():
-        own = source.cells(found_column(source, column))
-        kinds, numbers = np.unique(words_of_cells(own), return_inverse=True)
-        pairs = [any(_are_equal(kind, value) for value in values) for kind in kinds.tolist()]
-        chosen = np.array(pairs, dtype=bool)
+        words = words_of_cells(table.cells(found_column(table, column)))
+        kinds, numbers = np.unique(words, return_inverse=True)
+        wanted = {*values, *(v for v in map(number_of, values) if v == v)}
+        chosen = np.array(
+            [k in wanted or number_of(k) in wanted for k in kinds.tolist()], dtype=bool
+        )
         if not chosen.any():
             there = [kind for kind in kinds.tolist() if kind]
             rest = f" and {len(there) - MOST_LISTED} others" if len(there) > MOST_LISTED else ""
-            raise TableError(
-                literal(f"{source.where}no row has {column} {' or '.join(values)}; there are ")
+            raise SettingError(
+                literal(f"no row has {column} {' or '.join(values)}; there are ")
                 + literal(f"{listing(there[:MOST_LISTED])}{rest}")
                 + ": change {where}"
             )
-        mask = chosen[numbers.reshape(-1)]
-        kept = mask if kept is None else kept & mask
-    if kept is None or not kept.any():
-        raise TableError(
-            literal(f"{source.where}no row has all of {', '.join(where)}: change ") + "{where}"
-        )
+        kept &= chosen[numbers.reshape(-1)]
+    if not kept.any():
+        raise SettingError(literal(f"no row has all of {', '.join(where)}: change ") + "{where}")
     return kept
 
 
-def _are_equal(cell: str, value: str) -> bool:
-    if cell == value:
-        return True
-    first, other = _number(cell), _number(value)
-    return first is not None and first == other
+_HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
+
+
+def _check_hemispheres(table: DataTable, rows: TableRows) -> None:
+    """Refuse degrees to the south or west that only a column of letters tells of."""
+    for column, name in enumerate(table.names):
+        if table.is_numeric(column) or name in rows.columns:
+            continue
+        letters = {str(cell).strip().upper() for cell in table.cells(column).tolist()}
+        if letters <= _HEMISPHERES and letters & {"S", "W", "SOUTH", "WEST"}:
+            raise SettingError(
+                literal(f"column {name!r} says which rows are south or west, and it is not read: ")
+                + "make their latitudes and longitudes negative"
+            )
 
 
 def is_declared(given: Any) -> bool:
@@ -346,8 +351,6 @@ def is_declared(given: Any) -> bool:
     >>> is_declared({"hour": "cycle:24"}), is_declared({"hour": [1.0, 2.0]}), is_declared(["hour"])
     (True, False, True)
     """
-    if is_a(given, str):
-        return True
     if is_a(given, Mapping):
         return all(value is None or is_a(value, str | Role) for value in given.values())
-    return is_a(given, list | tuple) and all(is_a(value, str) for value in given)
+    return is_a(given, str) or (is_a(given, list | tuple) and all(is_a(v, str) for v in given))

@@ -1,11 +1,11 @@
-"""Units of angles, and the spaces whose data have one; no numerical library is imported here."""
+"""Units of angles: what names of columns say of them, and which spaces have data with one."""
 
 from __future__ import annotations
 
 import math
+import re
 from typing import Literal, get_args
 
-from orbiflow.density.data.columns import ANGULAR, ROTATIONS, VECTORS
 from orbiflow.errors import SettingError, literal
 
 Unit = Literal["radians", "degrees", "turns"]
@@ -13,6 +13,65 @@ TURNS: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.
 
 TURN_TOLERANCE = 1e-4
 """Share by which rounding may take an angle beyond a turn: 6.2832 is 2 pi."""
+
+DIRECTIONS = ("sphere", "projective-plane")
+CRYSTALS = ("cubic-orientations", "hexagonal-orientations")
+ROTATIONS = ("rotation-space", *CRYSTALS)
+ANGULAR = ("torus", "klein-bottle")
+VECTORS = (*DIRECTIONS, "hypersphere", "projective-space")
+
+UNITS = {
+    **dict.fromkeys(("deg", "degs", "degree", "degrees", "°"), "degrees"),
+    **dict.fromkeys(("rad", "rads", "radian", "radians"), "radians"),
+    **dict.fromkeys(("turn", "turns"), "turns"),
+}
+"""Words for units of angles."""
+
+FOREIGN = {
+    **dict.fromkeys(("gon", "gons", "grads", "gradian", "gradians"), 400.0),
+    **dict.fromkeys(("arcmin", "arcmins", "arcminute", "arcminutes"), 21_600.0),
+    **dict.fromkeys(("arcsec", "arcsecs", "arcsecond", "arcseconds"), 1_296_000.0),
+    **dict.fromkeys(("mrad", "mrads", "milliradian", "milliradians"), 2000 * math.pi),
+    **dict.fromkeys(("mil", "mils"), 6400.0),
+    **dict.fromkeys(("cycles", "rev", "revs"), 1.0),
+    **dict.fromkeys(("hour", "hours", "hr", "hrs", "hms"), 24.0),
+}
+"""Other units by the words of names, and a turn in each: such a column is declared as a cycle."""
+
+_TOKEN = re.compile(r"°|[A-Z]+(?![a-zß-ÿ])|[A-Z]?[^\W\d_A-Z]+|\d+")
+_RUN_TOGETHER = re.compile(r"(?<=[A-Z])(?=(?:deg|rad|hms|dms)$)")
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words of a name in lower case, apart where it is underscored or in camel case.
+
+    >>> words_of("decimalLatitude"), words_of("pole_lat"), words_of("RAdeg"), words_of("wind dir (°)")
+    (['decimal', 'latitude'], ['pole', 'lat'], ['ra', 'deg'], ['wind', 'dir', '°'])
+    >>> words_of("Right Ascension"), words_of("dipDirection")
+    (['ra'], ['dipdir'])
+    """
+    text = " ".join(_TOKEN.findall(_RUN_TOGETHER.sub(" ", name))).casefold()
+    text = re.sub(r"\bright ascension\b", "ra", text)
+    return re.sub(r"\bdip (dir|direction|azimuth|azi|az)\b", "dipdir", text).split()
+
+
+def unit_named(name: str) -> str | None:
+    """Return the unit of angles that a name says, or None.
+
+    >>> unit_named("phi (deg)"), unit_named("lat_rad"), unit_named("radius")
+    ('degrees', 'radians', None)
+    """
+    return next((UNITS[word] for word in words_of(name) if word in UNITS), None)
+
+
+def foreign_unit(name: str) -> float | None:
+    """Return a turn in the unit that a name ends in, where that is none of `UNITS`, or None.
+
+    >>> foreign_unit("azimuth [gon]"), foreign_unit("ra_hours"), foreign_unit("hour")
+    (400.0, 24.0, None)
+    """
+    words = words_of(name)
+    return FOREIGN.get(words[-1]) if len(words) > 1 else None
 
 
 def is_angular(space: str, columns: int, form: str | None = None) -> bool:
@@ -29,18 +88,17 @@ def check_unit(space: str, unit: str | None) -> None:
     >>> check_unit("sphere", "radians")
     Traceback (most recent call last):
     ...
-    orbiflow.errors.SettingError: unit radians applies only to angles on the torus and the Klein \
-bottle: latitude and longitude are degrees; convert them, or give unit vectors x,y,z
+    orbiflow.errors.SettingError: unit radians applies only to angles: latitude and longitude are \
+degrees; convert them, or give unit vectors x,y,z
     """
     if unit is not None and unit not in get_args(Unit):
         raise SettingError(f"{{unit}} must be degrees, radians or turns, got {literal(repr(unit))}")
     if unit is not None and space not in (*ANGULAR, *ROTATIONS, *VECTORS):
         raise SettingError(
-            "{unit} applies only to angles: points of a quotient are in the unit of its cell; leave it "
-            "out"
+            "{unit} applies only to angles: points of a quotient are in that of its cell; leave it out"
         )
     if space in VECTORS and unit in ("radians", "turns"):
         raise SettingError(
-            f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
-            "longitude are degrees; convert them, or give unit vectors x,y,z"
+            f"{{unit}} {unit} applies only to angles: latitude and longitude are degrees; convert "
+            "them, or give unit vectors x,y,z"
         )

@@ -52,7 +52,9 @@ def known_in(
         known = covariates.Covariates.of(rows.given, roles)
         doubts = known.fit_doubts(rows.given)
     except SettingError as error:
-        raise SettingError(error.template.replace("{columns}", "{given}")) from error
+        refusal = data.in_file(error, rows.source.where)
+        refusal.template = refusal.template.replace("{columns}", "{given}")
+        raise refusal from error
     declared = ",".join(f"{name}={role}" for name, role in roles.items())
     tell(runtime.Note(f"given: {declared}"))
     for doubt in doubts:

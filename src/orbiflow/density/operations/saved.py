@@ -17,7 +17,7 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import DIRECTIONS, TableError, TableRows, check_form, with_dip_directions
+from orbiflow.density.data import Declaration, TableRows, check_form, in_file
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.operations import covariates
@@ -105,12 +105,8 @@ def rows_of_model(
     names = tuple(extra.get("columns") or space.columns)
     if len(names) not in space.widths:
         names = space.columns
-    fitted = {"columns": names, "roles": [role and str(role) for role in space.roles(len(names))]}
-    rows = tables.read_rows(data, settings, tell, fitted=fitted, given=given)
-    if space.data_name in DIRECTIONS:
-        rows, note = with_dip_directions(rows)
-        if note is not None:
-            tell(Note(note))
+    said = Declaration(space.data_name, widths=space.widths, roles=space.roles, names=tuple(names))
+    rows = tables.read_rows(data, settings, tell, fitted=said, given=given)
     own = [k for k, role in enumerate(space.roles(len(rows.columns))) if role is None]
     try:
         base = getattr(space, "base", space)
@@ -119,7 +115,7 @@ def rows_of_model(
             check_form(space.data_name, names, base.form_of(len(names)))
         doubts = inference.data_doubts(density, rows.values, rows.columns, rows.place)
     except SettingError as error:
-        raise TableError(literal(f"{data}: ") + error.template) from error
+        raise in_file(error, f"{data}: ") from error
     for doubt in doubts:
         tell(Note(f"WARNING: {data}: {doubt}"))
     return rows

@@ -2,10 +2,10 @@ from .files import append_columns as append_columns
 from .files import read_table as read_table
 from .files import renamed_columns as renamed_columns
 from .files import to_csv as to_csv
-from .lines import with_minus as with_minus
 from .rows import read_rows as read_rows
 from .settings import RotationForm as RotationForm
 from .settings import RowSettings as RowSettings
 from .settings import SpaceSettings as SpaceSettings
 from .settings import TableSettings as TableSettings
 from .settings import check_table_name as check_table_name
+from .text import with_minus as with_minus

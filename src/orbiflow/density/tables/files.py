@@ -7,7 +7,6 @@ import io
 import math
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -15,18 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arrays import Array
-from orbiflow.density.data import Source, TableError, TableRows, as_numbers, short
-from orbiflow.density.tables.lines import is_utf16
-from orbiflow.density.tables.text import (
-    MAX_COLUMNS,
-    MAX_ROWS,
-    TextTable,
-    append_to_text,
-    name_cell,
-    read_text,
-)
-from orbiflow.errors import InputFileError, OrbiflowError, literal
+from orbiflow.density.data import DataTable, TableRows, numbered, object_array, short
+from orbiflow.density.tables.text import append_to_text, check_size, is_utf16, name_cell, read_text
+from orbiflow.errors import InputFileError
 from orbiflow.settings import naming_extras
 
 MAX_BYTES = 2 * 2**30
@@ -43,8 +33,7 @@ def read_table(
     has_header: bool | None = None,
     decimal: str | None = None,
     codes: Sequence[str] = (),
-    wanted: Sequence[str] = (),
-) -> Source:
+) -> DataTable:
     """Return the columns of a text, `.npy` or Parquet file; the options are those of `read_text`.
 
     `.npy` files hold a 2-dimensional array of numbers or a 1-dimensional structured one.
@@ -54,8 +43,8 @@ def read_table(
     path = Path(path)
     kind = kind_of_file(path)
     if kind == "text":
-        return read_text(path, has_header=has_header, decimal=decimal, codes=codes, wanted=wanted)
-    return _read_npy(path) if kind == "npy" else _read_parquet(path)
+        return read_text(path, has_header=has_header, decimal=decimal, codes=codes)
+    return _read_npy(path, codes) if kind == "npy" else _read_parquet(path, codes)
 
 
 def append_columns(rows: TableRows, columns: Mapping[str, ArrayLike]) -> bytes:
@@ -65,23 +54,33 @@ def append_columns(rows: TableRows, columns: Mapping[str, ArrayLike]) -> bytes:
     as CSV. A name that is taken gets a number: "density_2".
     """
     values = [np.asarray(column, dtype=np.float64) for column in columns.values()]
-    source = rows.source
-    if isinstance(source, TextTable):
-        names = free_names(columns, source.names if source.is_named else ())
-        return append_to_text(source, dict(zip(names, values, strict=True)), rows.numbers)
-    names = free_names(columns, rows.columns)
+    names = free_names(columns, _names_of(rows))
+    if rows.source.text is not None:
+        return append_to_text(rows.source, dict(zip(names, values, strict=True)), rows.numbers)
     return to_csv((*rows.columns, *names), np.column_stack([rows.values, *values]))
 
 
 def renamed_columns(rows: TableRows, names: Iterable[str]) -> dict[str, str]:
     """Return what `append_columns` calls columns whose names the file has already."""
-    source = rows.source
-    taken = rows.columns
-    if isinstance(source, TextTable):
-        taken = source.names if source.is_named else ()
     wanted = list(names)
-    pairs = zip(wanted, free_names(wanted, taken), strict=True)
+    pairs = zip(wanted, free_names(wanted, _names_of(rows)), strict=True)
     return {name: free for name, free in pairs if name != free}
+
+
+def _names_of(rows: TableRows) -> tuple[str, ...]:
+    """Return the names of the columns that are written beside new ones."""
+    table = rows.source
+    return rows.columns if table.text is None else table.names if table.is_named else ()
+
+
+def free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
+    """Return names with a number where they are taken."""
+    names, used = list[str](), {name.casefold() for name in taken}
+    for name in wanted:
+        free = chain([name], (f"{name}_{i}" for i in count(2)))
+        names.append(next(text for text in free if text.casefold() not in used))
+        used.add(names[-1].casefold())
+    return names
 
 
 def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
@@ -98,36 +97,20 @@ def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     return out.getvalue()
 
 
-def free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
-    """Return names with a number where they are taken."""
-    found, used = list[str](), {name.casefold() for name in taken}
-    for name in wanted:
-        free = chain([name], (f"{name}_{i}" for i in count(2)))
-        found.append(next(text for text in free if text.casefold() not in used))
-        used.add(found[-1].casefold())
-    return found
-
-
 def kind_of_file(path: Path) -> str:
     """Return "text", "npy" or "parquet", by the first bytes, which must agree with the extension."""
     try:
-        size, is_file, head = path.stat().st_size, path.is_file(), b""
-        if is_file:
-            with path.open("rb") as file:
-                head = file.read(4096)
-    except FileNotFoundError as exc:
-        raise InputFileError(f"{path}: no such file; check the path") from exc
+        size, is_file = path.stat().st_size, path.is_file()
+        with path.open("rb") if is_file else io.BytesIO() as file:
+            head = file.read(4096)
     except (OSError, ValueError) as exc:  # ValueError: a null byte in the name
-        raise InputFileError(f"{path}: cannot be read ({exc}); check it") from exc
-    if not is_file:
-        raise InputFileError(f"{path}: is a folder or a device; give a file")
-    if size > MAX_BYTES:
+        raise InputFileError(f"{path}: cannot be read ({exc}); check the path") from exc
+    if not is_file or size > MAX_BYTES or not head:
+        what = f"{size / 2**30:.1f} GiB, at most {MAX_BYTES / 2**30:g} are read; split the file"
+        what = what if head else "the file is empty; export or download it again"
         raise InputFileError(
-            f"{path}: {size / 2**30:.1f} GiB, at most {MAX_BYTES / 2**30:g} are read; split the "
-            "file or draw a sample of its rows"
+            f"{path}: {what if is_file else 'is a folder or a device; give a file'}"
         )
-    if not head:
-        raise InputFileError(f"{path}: the file is empty; export or download it again")
     for kind, magic in _MAGIC.items():
         if head.startswith(magic) and path.suffix.lower() not in _TEXT:
             return kind
@@ -138,79 +121,13 @@ def kind_of_file(path: Path) -> str:
     return "text"
 
 
-@dataclass(frozen=True, eq=False)
-class BinaryTable:
-    """The columns of an `.npy` or Parquet file: a `Source`.
-
-    - `columns`: The cells (N,) of each column.
-    - `is_array`: Whether it is an array without names, whose angles are radians.
-    """
-
-    path: Path
-    names: tuple[str, ...]
-    is_named: bool
-    columns: Sequence[NDArray[Any]]
-
-    @property
-    def is_array(self) -> bool:
-        """Whether it is an array without names."""
-        return not self.is_named
-
-    @property
-    def where(self) -> str:
-        """What messages begin with."""
-        return f"{self.path}: "
-
-    def place(self, row: int) -> str:
-        """Return which row it is, from 1."""
-        return f"row {row + 1}"
-
-    def is_numeric(self, column: int) -> bool:
-        """Return whether a column is of numbers."""
-        if isinstance(self.columns, ParquetColumns):
-            return self.columns.is_numeric(column)
-        return self.columns[column].dtype.kind in "fiu"
-
-    def numbers(self, column: int) -> Array:
-        """Return a column (N,), NaN where values are missing; refuse what holds no numbers."""
-        cells = self.columns[column]
-        if cells.dtype.kind in "fiu":
-            with np.errstate(over="ignore"):
-                return cells.astype(np.float64)
-        if cells.dtype.kind == "O":
-            try:
-                return as_numbers(cells, f"{self.path}: column {self.names[column]!r}")
-            except OrbiflowError as error:
-                raise TableError(
-                    literal(str(error)) + "; correct it, or choose another with {columns}"
-                ) from error
-        raise TableError(
-            literal(
-                f"{self.path}: column {self.names[column]!r} holds {cells.dtype}, not numbers; "
-            )
-            + "choose another with {columns}"
-        )
-
-    def cells(self, column: int) -> NDArray[Any]:
-        """Return the cells (N,) of a column."""
-        return self.columns[column]
-
-
-def _check_size(path: Path, rows: int, columns: int) -> None:
-    for number, most, what in ((rows, MAX_ROWS, "rows"), (columns, MAX_COLUMNS, "columns")):
-        if number > most:
-            raise InputFileError(
-                f"{path}: more than {most} {what}, the most that is read; save a part of the table"
-            )
-
-
-def _read_npy(path: Path) -> BinaryTable:
+def _read_npy(path: Path, codes: Sequence[str]) -> DataTable:
     """Return the table in an `.npy` file, whose header is checked before anything is read."""
     shape, dtype = _npy_header(path)
     fields = dtype.names
     width = shape[1] if fields is None else len(fields)
-    _check_size(path, shape[0], width)
-    names = fields or tuple(f"column{i}" for i in range(1, width + 1))
+    check_size(path, shape[0], width)
+    names = fields or tuple(numbered(width))
     try:
         data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
         parts = [np.array(data[name] if fields else data[:, i]) for i, name in enumerate(names)]
@@ -218,7 +135,8 @@ def _read_npy(path: Path) -> BinaryTable:
         raise _damaged(path, exc) from exc
     if not len(parts) or not len(parts[0]):
         raise InputFileError(f"{path}: holds no rows of numbers; export it again")
-    return BinaryTable(path, names, fields is not None, tuple(parts))
+    where, is_array = f"{path}: ", fields is None
+    return DataTable(names, not is_array, parts, where, path, is_array, codes=tuple(codes))
 
 
 def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
@@ -267,35 +185,35 @@ class ParquetColumns(Sequence[NDArray[Any]]):
     """The columns of a Parquet file, each read when it is asked for."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.kinds = importlib.import_module("pyarrow").types
+        self.path, self._cells = path, dict[int, NDArray[Any]]()
         with _parquet(path) as file:
-            _check_size(path, file.metadata.num_rows, len(file.schema_arrow.names))
+            check_size(path, file.metadata.num_rows, len(file.schema_arrow.names))
             self.schema: Any = file.schema_arrow
-            # Parquet has categories of words alone, pandas notes others
-            noted: Any = self.schema.pandas_metadata or {"columns": []}
-        self.words = {
+        kinds = importlib.import_module("pyarrow").types
+        # Parquet has categories of words alone, pandas notes others
+        noted: Any = self.schema.pandas_metadata or {"columns": ()}
+        words = {
             own["field_name"] for own in noted["columns"] if own["pandas_type"] == "categorical"
         }
-        self._read: dict[int, NDArray[Any]] = {}
+        tests = kinds.is_integer, kinds.is_floating, kinds.is_decimal
+        pairs = enumerate(zip(self.schema.names, self.schema.types, strict=True))
+        self.numeric = frozenset(
+            k
+            for k, (name, kind) in pairs
+            if name not in words and any(is_so(kind) for is_so in tests)
+        )
 
     def __len__(self) -> int:
         return len(self.schema.names)
 
-    def is_numeric(self, column: int) -> bool:
-        """Return whether a column is of numbers by its type."""
-        kind = self.schema.types[column]
-        tests = self.kinds.is_integer, self.kinds.is_floating, self.kinds.is_decimal
-        return self.schema.names[column] not in self.words and any(test(kind) for test in tests)
-
     def __getitem__(self, column: Any) -> Any:
-        if column not in self._read:
-            self._read[column] = self._column(column)
-        return self._read[column]
+        if column not in self._cells:
+            self._cells[column] = self._read(column)
+        return self._cells[column]
 
-    def _column(self, column: int) -> NDArray[Any]:
+    def _read(self, column: int) -> NDArray[Any]:
         name, kind = self.schema.names[column], self.schema.types[column]
-        if self.kinds.is_temporal(kind):
+        if importlib.import_module("pyarrow").types.is_temporal(kind):
             raise InputFileError(
                 f"{self.path}: column {short(name)!r} holds times ({kind}); save numbers, such as "
                 "hours since a first moment"
@@ -304,18 +222,16 @@ class ParquetColumns(Sequence[NDArray[Any]]):
             raise InputFileError(f"{self.path}: two columns are called {short(name)!r}; rename one")
         with _parquet(self.path) as file:
             chunk = file.read(columns=[name]).column(0)
-            if self.is_numeric(column):
+            if column in self.numeric:
                 return chunk.cast("float64", safe=False).to_numpy()
-            return np.array([*(None if c is None else str(c) for c in chunk.to_pylist()), None])[
-                :-1
-            ]
+            return object_array([None if cell is None else str(cell) for cell in chunk.to_pylist()])
 
 
-def _read_parquet(path: Path) -> BinaryTable:
+def _read_parquet(path: Path, codes: Sequence[str]) -> DataTable:
     """Return the table in a Parquet file."""
-    with naming_extras(f"{path}: reading Parquet"):
-        columns = ParquetColumns(path)
-    return BinaryTable(path, tuple(columns.schema.names), True, columns)
+    columns = ParquetColumns(path)
+    names, numeric = tuple(columns.schema.names), columns.numeric
+    return DataTable(names, True, columns, f"{path}: ", path, False, numeric, tuple(codes))
 
 
 def _damaged(path: Path, exc: Exception) -> InputFileError:

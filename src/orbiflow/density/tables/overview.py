@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from orbiflow.density.data import (
-    Source,
+    DataTable,
     TableError,
     chosen_arrangement,
     listing,
-    pairs_of,
     proposed_role,
     words_of,
 )
@@ -24,7 +23,7 @@ MOST_ANGLES = 7
 """Angles that are chosen ahead: of more, a fit takes long."""
 
 
-def table_overview(table: Source, most: int) -> dict[str, Any]:
+def table_overview(table: DataTable, most: int) -> dict[str, Any]:
     """Return what is seen of the first columns of numbers of a table, and where its rows may live.
 
     Each has a "name", its "role", to be confirmed by who knows, the number of "missing" values, and
@@ -65,9 +64,7 @@ def _guess(columns: list[dict[str, Any]]) -> dict[str, Any]:
         if found is None or (space == "klein-bottle" and len(own) > 2):
             continue
         taken = [own[k] for k in found.columns]
-        pair = next(iter(pairs_of(taken)), None)
-        axial = pair is not None and pair.family.is_axial
-        if space == "sphere" and (axial or AXES & set(words_of(" ".join(taken)))):
+        if space == "sphere" and (found.is_axial or AXES & set(words_of(" ".join(taken)))):
             space, why = "projective-plane", "a line has two ends, which mean the same"
         return {"space": space, "columns": taken, "why": why}
     if angles:
