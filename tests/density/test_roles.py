@@ -249,7 +249,7 @@ def test_quaternions_of_an_array_beside_a_real_column_say_their_form() -> None:
         .score_samples(data)
         for form, data in (("scalar-first", first), ("quaternion", last))
     ]
-    np.testing.assert_allclose(*scores)
+    np.testing.assert_allclose(scores[0], scores[1])
 
 
 @pytest.mark.parametrize("kind", ["weight", "count", "group"])

@@ -207,7 +207,7 @@ def rows_of(
         if kind == "count":
             wrong, what = wrong | (own % 1 != 0), "counts must be whole numbers from 0 on"
         name = table.names[chosen.side[kind]]
-        what = f"is declared as {kind}, and {what}: correct it, or declare another column"
+        what = f"is declared as {kind}, and {what}: correct it, or declare others with {{columns}}"
         _refuse_rows(table, (wrong | np.isinf(own)) & kept, name, what)
     strike = _strike_beside_dip(names) if chosen.space in DIRECTIONS else None
     if strike is not None:

@@ -93,7 +93,7 @@ class DataColumns:
     def _said(self, asked: Any) -> Declaration:
         space = self.space
         if not isinstance(space, Space):
-            widths = (group_by_name(space).dim,) if is_group_name(space) else None
+            widths = (group_by_name(self.name).dim,) if is_group_name(self.name) else None
             return Declaration(self.name, asked, self.unit, widths, self._form)
         units = {unit for width in space.widths if (unit := space.data_unit(width))}
         if self.unit is not None and units and self.unit not in units:
