@@ -25,7 +25,7 @@ WIDTHS = {
 
 @dataclass(frozen=True)
 class Declaration:
-    """What is said of the columns of a table before it is read.
+    """What is known of the columns of a table before it is read.
 
     - `space`: The name of the space, or of the group, whose rules the data obey.
     - `asked`: The columns that are named, and what they are.
@@ -108,7 +108,7 @@ Columns = tuple[Sequence[int], Roles, str | None, list[str]]
 
 @dataclass(frozen=True)
 class _Choice:
-    """A table, what is said of it, and its columns: all that are named, the data among them, others."""
+    """A table, what is declared, and its columns: all that are named, the data among them, others."""
 
     table: DataTable
     said: Declaration

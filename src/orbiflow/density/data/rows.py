@@ -127,7 +127,7 @@ def checked_rows(
 
     Args:
         table: The table.
-        said: What is said of its columns.
+        said: What is declared of its columns.
         given: Columns on which a density may depend.
         apart: Others that are no data.
         missing: As for `rows_of`, like `where`.
