@@ -106,6 +106,6 @@ def test_rotations_of_another_form_than_the_model_are_refused(
     )
     symmetry = ("--crystal", "cubic", "--specimen", "222", "-o", tmp_path / "c.json")
     symmetry += ("--unit", "radians")
-    done = orbiflow("density", "compare", *both, *symmetry)
+    done = orbiflow("density", "compare-data", *both, *symmetry)
     assert done.status == 0, done.err
     assert (tmp_path / "c.json").exists()

@@ -374,7 +374,7 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(tmp_path: P
         return dict(call.run().summary)
 
     where = {"space": "rotation-space", "data": table}
-    with refused("unit", "degrees", kind=UndeclaredError):
+    with refused("rx", "angle:degrees", kind=UndeclaredError):
         run("fit", **where, out=folder)
     run("fit", **where, unit="degrees", out=folder, picture=True)
     assert (folder / "thumbnail.png").exists()

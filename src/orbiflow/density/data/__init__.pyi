@@ -50,7 +50,6 @@ from .table import and_others as and_others
 from .table import found_column as found_column
 from .table import is_missing_word as is_missing_word
 from .table import listing as listing
-from .table import number_of as number_of
 from .table import numbered as numbered
 from .table import require_table as require_table
 from .table import short as short
@@ -61,4 +60,5 @@ from .units import TURNS as TURNS
 from .units import Unit as Unit
 from .units import check_unit as check_unit
 from .units import is_angular as is_angular
+from .units import number_of as number_of
 from .units import words_of as words_of

@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from orbiflow.density.data.table import number_of
-from orbiflow.density.data.units import TURNS, Unit, foreign_unit, unit_named, words_of
+from orbiflow.density.data.units import TURNS, Unit, foreign_unit, number_of, unit_named, words_of
 from orbiflow.errors import SettingError, literal
 from orbiflow.settings import is_a
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.data.frames import as_numbers, cells_of, check_lengths, columns_of, is_missing
+from orbiflow.density.data.units import number_of
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 from orbiflow.settings import is_a
 
@@ -48,20 +49,6 @@ class UndeclaredError(SettingError):
         super().__init__(template)
         self.columns = tuple(columns)
         self.proposal = proposal
-
-
-def number_of(text: str, decimal: str = ".") -> float:
-    """Return the number that a text is, NaN of words.
-
-    >>> number_of("-1,5", ","), number_of("1.500", ","), number_of("1_000")
-    (-1.5, nan, nan)
-    """
-    if decimal == ",":
-        text = "" if "." in text else text.replace(",", ".")
-    try:
-        return np.nan if "_" in text else float(text)
-    except ValueError:
-        return np.nan
 
 
 def is_missing_word(text: str) -> bool:

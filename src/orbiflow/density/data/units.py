@@ -102,3 +102,17 @@ degrees; convert them, or give unit vectors x,y,z
             f"{{unit}} {unit} applies only to angles: latitude and longitude are degrees; convert "
             "them, or give unit vectors x,y,z"
         )
+
+
+def number_of(text: str, decimal: str = ".") -> float:
+    """Return the number that a text is, NaN of words.
+
+    >>> number_of("-1,5", ","), number_of("1.500", ","), number_of("1_000")
+    (-1.5, nan, nan)
+    """
+    if decimal == ",":
+        text = "" if "." in text else text.replace(",", ".")
+    try:
+        return math.nan if "_" in text else float(text)
+    except ValueError:
+        return math.nan

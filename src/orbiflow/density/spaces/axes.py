@@ -11,7 +11,7 @@ from torch import Tensor
 from torch.nn.functional import logsigmoid
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import Role
+from orbiflow.density.data import TURNS, Role
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_array, as_choice, as_number, is_a
 
@@ -243,13 +243,9 @@ class Line(NamedTuple):
 Axis = Circle | Line
 
 
-TURN: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}
-"""A whole turn in each unit."""
-
-
 def whole_turn(unit: str) -> float:
     """Return a whole turn in a unit."""
-    return TURN[as_choice(unit, tuple(TURN), "unit")]
+    return TURNS[as_choice(unit, tuple(TURNS), "unit")]
 
 
 def axis_of(settings: Any, unit: str) -> Axis:
