@@ -24,14 +24,14 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from orbiflow.drawing import ShadedPart, View, draw_solids, font
+from orbiflow.drawing import ShadedPart, SolidView, draw_solids, font
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Team, ignore
 from orbiflow.solids import EscherSolid, FillSettings, GroupFamily, fill, read_mesh, usual_up
 from orbiflow.solids.body import Body
 from orbiflow.solids.distance import points_inside
 from orbiflow.solids.pictures import solid_sheet
-from orbiflow.solids.search import EFFORTS, Goal, quick_bend, starting_poses
+from orbiflow.solids.search import EFFORTS, SolidGoal, quick_bend, starting_poses
 from orbiflow.solids.separable import pieces_with_gap
 
 MOST_COSETS = 8  # of groups in the table: solids of larger ones have little room for limbs
@@ -71,7 +71,7 @@ def _groups(files: list[Path], names: str, workers: int) -> None:
             families.append(own)
     costs = np.zeros((len(files), len(families)))
     for row, file in zip(costs, files, strict=True):
-        goal = Goal.of(read_mesh(file).mesh, FillSettings())
+        goal = SolidGoal.of(read_mesh(file).mesh, FillSettings())
         job = partial(_cost, goal, goal.body(EFFORTS["fast"].rough))
         row[:] = Team(__name__, workers, ignore, NEVER).each(job, families, file.stem, 1.0)
         print(
@@ -86,7 +86,7 @@ def _groups(files: list[Path], names: str, workers: int) -> None:
         print(f"{families[k].name:12} {families[k].order:5}  {worth[k]:9.3f}  {cells}")
 
 
-def _cost(goal: Goal, body: Body, family: GroupFamily) -> float:
+def _cost(goal: SolidGoal, body: Body, family: GroupFamily) -> float:
     effort = EFFORTS["fast"]
     poses = starting_poses(effort, goal.inner_points, (family, np.random.SeedSequence(0)))
     return min(quick_bend(body, pose)[0] for pose in poses)
@@ -143,7 +143,7 @@ def solids_picture(solids: list[EscherSolid], size: int = 480) -> Image.Image:
         part = ShadedPart.smooth(solid.tile.points, solid.tile.faces, "#e9b44c")
         for column, side in enumerate(((0.6, -1.0, 0.35), (-0.9, -0.5, 0.25))):
             direction, up = solid.upright @ side, solid.upright[:, 2]
-            view = View(tuple(direction.tolist()), tuple(up.tolist()))
+            view = SolidView(tuple(direction.tolist()), tuple(up.tolist()))
             picture.paste(draw_solids([part], (size, size), view), (column * size, k * size))
         pen.text((8, k * size + 8), str(k + 1), "black", font(24))
     print("; ".join(f"{k} {own.name}" for k, own in enumerate(solids, 1)))

@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from orbiflow.tiles import ArtSettings, EscherTile, Frame, TileMap, as_map
-from orbiflow.tiles.motifs import Picture
+from orbiflow.tiles.motifs import CarriedPicture
 from orbiflow.tiles.result_file import group_json
 from orbiflow.tiles.search.bent_map import map_of_bent
 from outlines import animal, bent_squirrel, flowless
@@ -45,9 +45,9 @@ def upside_down(tile: EscherTile) -> EscherTile:
     return tile.changed(tile=turned, y_down=False, map_source=TileMap(frame=own, bending=bending))
 
 
-def picture(image: Image.Image, tile: EscherTile) -> Picture:
+def picture(image: Image.Image, tile: EscherTile) -> CarriedPicture:
     """An image over the silhouette."""
-    return Picture(image.convert("RGBA"), tile.covered)
+    return CarriedPicture(image.convert("RGBA"), tile.covered)
 
 
 def size_of(tile: EscherTile, longer: int = 600) -> tuple[int, int]:
@@ -57,19 +57,19 @@ def size_of(tile: EscherTile, longer: int = 600) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def flat(tile: EscherTile, colour: str) -> Picture:
+def flat(tile: EscherTile, colour: str) -> CarriedPicture:
     """One colour."""
     return picture(Image.new("RGB", size_of(tile), colour), tile)
 
 
-def checkerboard(tile: EscherTile, cells: int = 10) -> Picture:
+def checkerboard(tile: EscherTile, cells: int = 10) -> CarriedPicture:
     """Black and white, so many squares along the longer side."""
     width, height = size_of(tile)
     rows, columns = np.indices((height, width)) * cells // max(width, height)
     return picture(Image.fromarray((((rows + columns) % 2) * 255).astype(np.uint8)), tile)
 
 
-def face(tile: EscherTile) -> Picture:
+def face(tile: EscherTile) -> CarriedPicture:
     """White, with a red disc at the eye."""
     width, height = size_of(tile)
     image = Image.new("RGB", (width, height), "white")

@@ -20,7 +20,15 @@ from cli.conftest import call_main
 from orbiflow import __version__
 from orbiflow.cli import terminal
 from orbiflow.runtime import Table
-from orbiflow.tiles import CLASSES, Fit, Rating, Target, TileModel, silhouette, write_tile_folder
+from orbiflow.tiles import (
+    CLASSES,
+    ClassFinalists,
+    Rating,
+    Target,
+    TileModel,
+    silhouette,
+    write_tile_folder,
+)
 from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.run_folder import writing
 from orbiflow.tiles.run_folder.files import FIGURE_FILES
@@ -151,7 +159,7 @@ def test_no_tile_is_status_one(
 def test_a_forced_tile_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(candidates, "TOLERANCES", (5e-3,))  # its thousands of vertices take long
     target = Target.from_polygon(BOOT, source="some/boot.json")
-    result = best_tiles(target, Fit(crossed(), 1, 0, 1), force=True)[0]
+    result = best_tiles(target, ClassFinalists(crossed(), 1, 0, 1), force=True)[0]
     written = write_tile_folder(result, [target], tmp_path / "IH21")
     assert {path.name for path in written} == FILES
     for name in ("tile.svg", "tiling.svg"):

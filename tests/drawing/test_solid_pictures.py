@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from orbiflow.drawing import ShadedPart, View, draw_solids, nearest_triangles, solid_picture
+from orbiflow.drawing import ShadedPart, SolidView, draw_solids, nearest_triangles, solid_picture
 from orbiflow.drawing.solid_pictures import crease_normals
 
-FROM_THE_TOP = View((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+FROM_THE_TOP = SolidView((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 
 
 def triangles(body: Manifold) -> tuple[Any, Any]:
@@ -63,14 +63,16 @@ def test_a_view_from_any_side() -> None:
         ShadedPart.flat(slab(2, -1, 0), "#2222dd"),
     )
     for direction, first in [((0, 0, 1), 0), ((0, 0, -1), 2), ((0.01, 0, 1), 0)]:
-        picture = np.asarray(draw_solids([red, blue], (40, 40), View(direction)))
+        picture = np.asarray(draw_solids([red, blue], (40, 40), SolidView(direction)))
         assert picture[20, 20].argmax() == first
-    side = np.asarray(draw_solids([red, blue], (60, 60), View((0, -1, 0))))
+    side = np.asarray(draw_solids([red, blue], (60, 60), SolidView((0, -1, 0))))
     assert side[15, 30].argmax() == 0
     assert side[45, 30].argmax() == 2
-    over = np.asarray(draw_solids([red, blue], (60, 60), View((0, -1, 0), up=(0, 0, -1))))
+    over = np.asarray(draw_solids([red, blue], (60, 60), SolidView((0, -1, 0), up=(0, 0, -1))))
     assert over[15, 30].argmax() == 2
-    far = np.asarray(draw_solids([red], (60, 60), View((0, -1, 0), middle=(0, 0, 0.5), radius=9.0)))
+    far = np.asarray(
+        draw_solids([red], (60, 60), SolidView((0, -1, 0), middle=(0, 0, 0.5), radius=9.0))
+    )
     assert (far != 255).any(axis=2).mean() < 0.05
 
 

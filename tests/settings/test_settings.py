@@ -22,7 +22,7 @@ from orbiflow.settings import (
     DefaultText,
     Field,
     FlagKind,
-    Group,
+    HelpHeading,
     Length,
     LengthOrZero,
     ListKind,
@@ -44,7 +44,7 @@ from orbiflow.settings.kinds import (
     NumberKind,
     OptionalKind,
     ParsedKind,
-    Refused,
+    RefusedValue,
     TupleKind,
 )
 from refusals import refused
@@ -61,7 +61,7 @@ class Sheet(Settings, group="Sheet"):
     """Longer side."""
 
     kerf: Annotated[
-        LengthOrZero, OnlyWith(cut="pieces", because="lines are cut once"), Group("Cut")
+        LengthOrZero, OnlyWith(cut="pieces", because="lines are cut once"), HelpHeading("Cut")
     ] = 0.0
     """Width that the tool
     burns away."""
@@ -291,5 +291,5 @@ def test_a_field_cannot_hide_a_method() -> None:
 
 
 def test_a_refusal_is_no_setting_error_of_its_own() -> None:
-    with pytest.raises(Refused):
+    with pytest.raises(RefusedValue):
         FIELDS["size"].kind.read("40")

@@ -18,7 +18,7 @@ from orbiflow.solids.families import USUAL_GROUPS
 from orbiflow.solids.likeness import measured, rigid_motion
 from orbiflow.solids.poses import FINENESS, Cover, Pose, best_poses, orbits_of_bins, polished
 from orbiflow.solids.search import coverage
-from orbiflow.solids.settings import Sphere
+from orbiflow.solids.settings import EmphasisSphere
 from orbiflow.symmetry import space_group
 from refusals import refused
 from solids.known_solids import ball, creature
@@ -169,7 +169,7 @@ def test_what_is_emphasised_bends_less() -> None:
     mesh = creature()
     head = mesh.points[mesh.points[:, 0].argmax()]
     bounds = np.stack([mesh.points.min(axis=0), mesh.points.max(axis=0)])
-    weight = Sphere(tuple(head), 0.3, 50.0).weights
+    weight = EmphasisSphere(tuple(head), 0.3, 50.0).weights
     assert weight(head[None])[0] > 40
     heavy = Body.of(SignedDistance.of_mesh(mesh, 0.03), bounds, 0.12, weight)
     assert heavy.importance[: heavy.size].max() > 20 > body().importance.max()
@@ -185,7 +185,7 @@ def test_a_body_is_like_itself() -> None:
 
 def test_spheres_are_read() -> None:
     spheres = FillSettings(emphasis=("1,2,3,4", "0 0 0 1 7")).emphasised
-    assert spheres == (Sphere((1, 2, 3), 4), Sphere((0, 0, 0), 1, 7))
+    assert spheres == (EmphasisSphere((1, 2, 3), 4), EmphasisSphere((0, 0, 0), 1, 7))
 
 
 @pytest.mark.parametrize("text", ["1,2,3", "1,2,3,x", "1,2,3,0", "1,2,3,1,1000", "nan,0,0,1"])

@@ -40,7 +40,7 @@ from orbiflow.solids.bodies import as_body, united
 from orbiflow.solids.operations import build
 from orbiflow.solids.operations import fill as fill_operation
 from orbiflow.solids.run_folder import INDEX, OVERVIEW, SOLID_FILES, SOLIDS, folder_name
-from orbiflow.solids.search import Goal, usual_size
+from orbiflow.solids.search import SolidGoal, usual_size
 from orbiflow.solids.separable import pieces_with_gap
 from orbiflow.solids.solid import SOLID
 from refusals import refused
@@ -277,5 +277,5 @@ def test_it_tells_how_far_it_is_and_stops() -> None:
 def test_sizes_that_nobody_prints_become_usual() -> None:
     assert usual_size(creature()) == 60
     assert usual_size(creature().moved(50 * np.eye(3))) is None
-    goal = Goal.of(creature(), FillSettings())
+    goal = SolidGoal.of(creature(), FillSettings())
     assert np.ptp(goal.mesh.points, axis=0).max() * goal.millimetres == pytest.approx(60)

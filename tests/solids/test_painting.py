@@ -18,8 +18,8 @@ from orbiflow.solids.mesh import Mesh, joined
 from orbiflow.solids.operations import fill as fill_operation
 from orbiflow.solids.painting import Painting, checked_painting, spread
 from orbiflow.solids.reading import read_mesh
-from orbiflow.solids.search import Goal
-from orbiflow.solids.settings import FillSettings, Painted, Sphere
+from orbiflow.solids.search import SolidGoal
+from orbiflow.solids.settings import EmphasisSphere, FillSettings, Painted
 from orbiflow.solids.soup import Soup
 from refusals import refused
 from solids.known_solids import creature
@@ -202,8 +202,8 @@ def test_places_are_even_on_triangles(seed: int) -> None:
 def test_what_is_painted_matters_more() -> None:
     mesh = big()
     painting = Painting.of(Soup(mesh.points, mesh.faces, colours_of(mesh)), mesh)
-    plain = Goal.of(mesh, FillSettings()).body(0.12)
-    heavy = Goal.of(mesh, FillSettings(emphasis=("painted,20",)), painting=painting).body(0.12)
+    plain = SolidGoal.of(mesh, FillSettings()).body(0.12)
+    heavy = SolidGoal.of(mesh, FillSettings(emphasis=("painted,20",)), painting=painting).body(0.12)
     more = (heavy.importance / plain.importance)[: plain.size]
     head = plain.rest[: plain.size, 0] > 1.0
     body = plain.rest[: plain.size, 0] < 0.4
@@ -214,7 +214,7 @@ def test_what_is_painted_matters_more() -> None:
 
 def test_it_is_asked_for_by_one_word() -> None:
     asked = FillSettings(emphasis=("painted", "Painted 8", "1,2,3,4")).emphasised
-    assert asked == (Painted(), Painted(8.0), Sphere((1, 2, 3), 4))
+    assert asked == (Painted(), Painted(8.0), EmphasisSphere((1, 2, 3), 4))
     for wrong in ("painted,1,2", "painted,red", "painted,1000", "paint"):
         with refused("emphasis", kind=SettingError):
             FillSettings(emphasis=(wrong,))

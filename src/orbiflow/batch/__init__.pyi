@@ -1,10 +1,10 @@
 from .executors import LocalProcesses as LocalProcesses
 from .executors import WorkSettings as WorkSettings
 from .folder import BatchFolder as BatchFolder
+from .folder import BatchKind as BatchKind
 from .folder import Column as Column
 from .folder import ContactSheet as ContactSheet
 from .folder import Entry as Entry
-from .folder import Kind as Kind
 from .folder import Matrix as Matrix
 from .folder import Summary as Summary
 from .parcels import Executor as Executor

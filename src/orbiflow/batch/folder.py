@@ -100,7 +100,7 @@ class Column:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Kind:
+class BatchKind:
     """A kind of batch: what is done many times.
 
     - `things`: What is worked on, in the plural.
@@ -180,7 +180,7 @@ class ContactSheet:
     journal: ClassVar[str] = "batch.jsonl"
     what: ClassVar[str] = "batch"
 
-    kind: Kind
+    kind: BatchKind
     title: str
 
     def matrix(self, entries: Sequence[Entry]) -> Matrix | None:  # noqa: ARG002
@@ -260,7 +260,7 @@ class BatchFolder:
     in the order of the overview; it has only the `current` ones, finished with the present settings.
     """
 
-    def __init__(self, path: Path, kind: Kind, overview: Overview) -> None:
+    def __init__(self, path: Path, kind: BatchKind, overview: Overview) -> None:
         self.path, self.kind, self.overview = path, kind, overview
         self._check()
         make_folder(path)

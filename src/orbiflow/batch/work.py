@@ -18,7 +18,7 @@ from typing import Any
 
 from orbiflow import __version__
 from orbiflow.batch.executors import WorkSettings, executor_for
-from orbiflow.batch.folder import PAGE, RESERVED, TABLE, BatchFolder, ContactSheet, Entry, Kind
+from orbiflow.batch.folder import PAGE, RESERVED, TABLE, BatchFolder, BatchKind, ContactSheet, Entry
 from orbiflow.batch.parcels import Parcel, WorkerReply
 from orbiflow.errors import (
     Advice,
@@ -81,7 +81,7 @@ class Item:
     read: Callable[[], bytes]
     more: Mapping[str, Callable[[], bytes]] = field(default_factory=dict[str, Callable[[], bytes]])
 
-    def files(self, kind: Kind) -> dict[str, tuple[str, bytes]]:
+    def files(self, kind: BatchKind) -> dict[str, tuple[str, bytes]]:
         """Return the name and bytes of each file, by its parameter; raises as `read`."""
         calls, flat = {kind.reads: self.read, **self.more}, self.call.flat
         return {key: (flat[key].name, read()) for key, read in calls.items()}
@@ -90,7 +90,7 @@ class Item:
         """Return what the bytes of its files are known by."""
         return code_of(b"".join([self.read(), *(read() for read in self.more.values())]))
 
-    def settings(self, kind: Kind) -> dict[str, Any]:
+    def settings(self, kind: BatchKind) -> dict[str, Any]:
         """Return what decides the result besides the bytes and their name, as JSON has it."""
         flat = self.call.flat
         return {
@@ -231,7 +231,7 @@ class Counts:
 def run_files(
     source: Path,
     out: Path,
-    kind: Kind,
+    kind: BatchKind,
     title: str,
     call_of: Callable[[str, str], Call],
     match: str | None,
@@ -391,7 +391,7 @@ class _Batch:
         self.tell(Progress(finished / self.count, what))
 
 
-def _entry(answer: WorkerReply, item: Item, code: str, kind: Kind) -> Entry | None:
+def _entry(answer: WorkerReply, item: Item, code: str, kind: BatchKind) -> Entry | None:
     """What the journal says of an answer, None of what was interrupted."""
     end = answer.end
     known = (item.key, item.name, code, item.settings(kind), __version__)
@@ -408,7 +408,7 @@ def _entry(answer: WorkerReply, item: Item, code: str, kind: Kind) -> Entry | No
     return Entry(*known, "done", "", kind.best(end.summary), seconds)
 
 
-def _figures(entry: Entry, kind: Kind) -> str:
+def _figures(entry: Entry, kind: BatchKind) -> str:
     """The figures of a result, in words."""
     words = [
         f"{column.title} {column.shown(value)}" if column.form else column.shown(value)

@@ -41,7 +41,7 @@ from .solid_files import read_triangles as read_triangles
 from .solid_files import write_3mf as write_3mf
 from .solid_files import write_stl as write_stl
 from .solid_pictures import ShadedPart as ShadedPart
-from .solid_pictures import View as View
+from .solid_pictures import SolidView as SolidView
 from .solid_pictures import draw_solids as draw_solids
 from .solid_pictures import solid_picture as solid_picture
 from .solid_raster import nearest_triangles as nearest_triangles

@@ -17,7 +17,7 @@ from scipy.ndimage import zoom
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing.palettes import palette
 from orbiflow.drawing.raster import rgb
-from orbiflow.drawing.solid_raster import PIXELS_AT_ONCE, Seen, each, nearest_triangles
+from orbiflow.drawing.solid_raster import PIXELS_AT_ONCE, SeenTriangles, each, nearest_triangles
 
 FINER = 2
 """Factor by which each side of a pixel is drawn finer."""
@@ -94,7 +94,7 @@ class ShadedPart:
 
 
 @dataclass(frozen=True)
-class View:
+class SolidView:
     """From where a picture is seen.
 
     - `direction`: From the middle towards the eye (3,).
@@ -121,7 +121,7 @@ class View:
 def draw_solids(
     parts: Sequence[ShadedPart],
     size: tuple[int, int],
-    view: View | None = None,
+    view: SolidView | None = None,
     *,
     ground: str | None = "#ffffff",
     outlined: bool = True,
@@ -137,7 +137,7 @@ def draw_solids(
         outlined: Draw a thin line where one part or depth ends and another begins.
         margin: Share of each side that is left free, where the view has no radius.
     """
-    view, width, height = view or View(), FINER * size[0], FINER * size[1]
+    view, width, height = view or SolidView(), FINER * size[0], FINER * size[1]
     corners = np.concatenate([np.zeros((0, 3, 3)), *(part.corners for part in parts)])
     normals = np.concatenate([np.zeros((0, 3, 3)), *(part.normals for part in parts)])
     owner = np.repeat(np.arange(len(parts)), [len(part.corners) for part in parts])
@@ -203,7 +203,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _projected(
-    corners: Array, view: View, width: int, height: int, margin: float
+    corners: Array, view: SolidView, width: int, height: int, margin: float
 ) -> tuple[Array, float]:
     """Return corners (n, 3, 3) in pixels, z towards the eye in pixels too, and the radius in pixels."""
     if not len(corners):
@@ -244,7 +244,7 @@ OFFSETS = 20
 """Places about a pixel that are asked whether they shade it."""
 
 
-def _openness(seen: Seen, directions: Array, radius: float) -> Array:
+def _openness(seen: SeenTriangles, directions: Array, radius: float) -> Array:
     """Return how much of the light from around reaches the covered pixels (n,).
 
     Places nearby that stand out before the plane through a pixel keep light from it (Crytek's ambient
@@ -289,7 +289,7 @@ def _shifted(values: NDArray[np.float32], dx: int, dy: int) -> NDArray[np.float3
     return found
 
 
-def _outline(seen: Seen, part: Integers, scale: float) -> Array:
+def _outline(seen: SeenTriangles, part: Integers, scale: float) -> Array:
     """Return the share of light (n,) that covered pixels keep: less where a part or a depth ends."""
     parts = np.full(seen.depth.shape, -1)
     parts[seen.covered] = part

@@ -21,7 +21,7 @@ NARROWEST = 1e-9
 """Twice the area in pixels below which a triangle is seen from its edge, and not drawn."""
 
 
-class Seen(NamedTuple):
+class SeenTriangles(NamedTuple):
     """What is seen in the pixels of a picture, row by row from its upper left corner.
 
     - `triangle`: (height, width) the triangle's number, -1 where there is none.
@@ -54,7 +54,7 @@ class Seen(NamedTuple):
         return found
 
 
-def nearest_triangles(corners: Array, width: int, height: int) -> Seen:
+def nearest_triangles(corners: Array, width: int, height: int) -> SeenTriangles:
     """Return which of triangles (n, 3, 3) is seen in each pixel of a picture.
 
     Corners are in pixels, x to the right, y down, z towards the viewer. A triangle is seen from both
@@ -98,7 +98,7 @@ def nearest_triangles(corners: Array, width: int, height: int) -> Seen:
         on_top = z == depth[place]
         triangle[place[on_top]] = own[on_top]
     shape = height, width
-    return Seen(triangle.reshape(shape), depth.reshape(shape), planes)
+    return SeenTriangles(triangle.reshape(shape), depth.reshape(shape), planes)
 
 
 def each(counts: Integers) -> tuple[Integers, Integers]:

@@ -32,7 +32,7 @@ from .settings import DefaultText as DefaultText
 from .settings import Ending as Ending
 from .settings import Field as Field
 from .settings import FileSettings as FileSettings
-from .settings import Group as Group
+from .settings import HelpHeading as HelpHeading
 from .settings import Hidden as Hidden
 from .settings import Needs as Needs
 from .settings import NotWith as NotWith

@@ -83,7 +83,7 @@ class InMemory:
     wanted: str
 
 
-class Refused(ValueError):
+class RefusedValue(ValueError):
     """A value that a kind does not take.
 
     - `reason`: What is wrong with it, as a sentence that begins with the value. Default: that it is
@@ -119,7 +119,7 @@ class Kind:
     """A field without whose value a text cannot be read."""
 
     def read(self, value: Any, *, text: bool = False) -> Any:
-        """Return a value from Python or JSON as it will be used; raise `Refused` otherwise.
+        """Return a value from Python or JSON as it will be used; raise `RefusedValue` otherwise.
 
         With `text`, it is one that the command line gives.
         """
@@ -141,7 +141,7 @@ class TextKind(Kind):
 
     def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str):
-            raise Refused
+            raise RefusedValue
         return str(value)
 
 
@@ -154,7 +154,7 @@ class PathKind(Kind):
     def read(self, value: Any, *, text: bool = False) -> Path:  # noqa: ARG002
         path = path_text(value)
         if path is None:
-            raise Refused
+            raise RefusedValue
         return Path(path)
 
     def plain(self, value: Any) -> str:
@@ -185,7 +185,7 @@ class FlagKind(Kind):
         known = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
         found = known.get(value.lower()) if text else value
         if not isinstance(found, bool):
-            raise Refused
+            raise RefusedValue
         return found
 
 
@@ -202,14 +202,14 @@ class NumberKind(Kind):
     def read(self, value: Any, *, text: bool = False) -> float:
         made, abstract = (int, Integral) if self.whole else (float, Real)
         if not text and (isinstance(value, bool) or not isinstance(value, abstract)):
-            raise Refused
+            raise RefusedValue
         given: Any = value
         try:
             number = made(given)
         except (OverflowError, ValueError):
-            raise Refused from None
+            raise RefusedValue from None
         if number not in self.allowed:
-            raise Refused(wanted=number_wanted(self.allowed, number, whole=self.whole))
+            raise RefusedValue(wanted=number_wanted(self.allowed, number, whole=self.whole))
         return number
 
 
@@ -221,7 +221,7 @@ class ChoiceKind(Kind):
 
     def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str) or value not in self.choices:
-            raise Refused(hint=meant(value, self.choices))
+            raise RefusedValue(hint=meant(value, self.choices))
         return str(value)
 
 
@@ -242,7 +242,7 @@ class ListKind(Kind):
         if text:
             parts = [part for part in parts if part]
         if not parts and not self.may_be_empty:
-            raise Refused
+            raise RefusedValue
         return _entries(parts, repeat(self.item), text)
 
     def plain(self, value: Any) -> list[Any]:
@@ -262,7 +262,7 @@ class TupleKind(Kind):
     def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
         parts = _parts(value, text)
         if len(parts) != len(self.items):
-            raise Refused
+            raise RefusedValue
         return _entries(parts, self.items, text)
 
     def plain(self, value: Any) -> list[Any]:
@@ -305,7 +305,7 @@ class ParsedKind(Kind):
         try:
             value = self.parsed.read(text, *known)
         except OrbiflowError as error:
-            raise Refused(str(error)) from error
+            raise RefusedValue(str(error)) from error
         return self.inner.read(value)
 
 
@@ -357,10 +357,10 @@ def _entries(parts: Sequence[Any], kinds: Iterable[Kind], text: bool) -> tuple[A
     for part, kind in zip(parts, kinds, strict=False):
         try:
             taken.append(kind.read(part, text=text))
-        except Refused as error:
+        except RefusedValue as error:
             wrong = f"must be {error.wanted or kind.wanted}, got {described(part)}"
             more = f"; {error.hint}" if error.hint else ""
-            raise Refused(f"entry {len(taken) + 1}: {error.reason or wrong + more}") from error
+            raise RefusedValue(f"entry {len(taken) + 1}: {error.reason or wrong + more}") from error
     return tuple(taken)
 
 
@@ -369,5 +369,5 @@ def _parts(value: Any, text: bool) -> Sequence[Any]:
     if text:
         return [part.strip() for part in value.split(",")]
     if not isinstance(value, list | tuple):
-        raise Refused
+        raise RefusedValue
     return cast(Sequence[Any], value)

@@ -50,7 +50,7 @@ from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform
 
 from orbiflow.errors import SettingError, literal
 from orbiflow.settings.arguments import Range, described, meant, one_of, placeholder, refusal
-from orbiflow.settings.kinds import FlagKind, Kind, OptionalKind, Refused, kind_of
+from orbiflow.settings.kinds import FlagKind, Kind, OptionalKind, RefusedValue, kind_of
 
 Count = Annotated[int, Range(1)]
 """A whole number of things."""
@@ -73,7 +73,7 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Group:
+class HelpHeading:
     """The heading in the help under which a field stands."""
 
     name: str
@@ -207,7 +207,7 @@ class Field:
     @cached_property
     def group(self) -> str:
         """Its heading in the help."""
-        own = self.of_class(Group)
+        own = self.of_class(HelpHeading)
         return self.class_group if own is None else own.name
 
     @cached_property
@@ -286,7 +286,7 @@ class Field:
     def _read(self, take: Callable[[Any], Any], value: Any) -> Any:
         try:
             return take(value)
-        except Refused as error:
+        except RefusedValue as error:
             if error.reason:
                 raise SettingError(f"{placeholder(self.name)}: {literal(error.reason)}") from error
             wanted = error.wanted or self.kind.wanted
@@ -415,13 +415,13 @@ class FileSettings(Settings):
 
 @cache
 def fields_of(cls: type[Settings]) -> tuple[Field, ...]:
-    """Return the fields of a settings class as they were written, those under a `Group` last."""
+    """Return the fields of a settings class as they were written, those under a `HelpHeading` last."""
     hints, group = typing.get_type_hints(cls, include_extras=True), cls.default_group
     fields = (
         Field(entry.name, hints[entry.name], entry.default, _doc_finder(cls, entry.name), group)
         for entry in dataclasses.fields(cast(Any, cls))
     )
-    return tuple(sorted(fields, key=lambda entry: entry.of_class(Group) is not None))
+    return tuple(sorted(fields, key=lambda entry: entry.of_class(HelpHeading) is not None))
 
 
 def check_names(given: Iterable[str], known: Iterable[Field], what: str) -> None:

@@ -87,7 +87,7 @@ class BentBody:
         """Return the body with its nodes elsewhere."""
         return BentBody(self.body, self.family, self.stretches, nodes)
 
-    def copies(self) -> Copies:
+    def copies(self) -> GroupElements:
         """Return the elements, but the identity, whose copies of the body may touch it."""
         points, lattice = self.surface.points, self.lattice
         inverse, low, high = np.linalg.inv(lattice), points.min(axis=0), points.max(axis=0)
@@ -111,10 +111,10 @@ class BentBody:
                 near &= cells.any(axis=1)
             cosets += [k] * int(near.sum())
             shifts += list(cells[near])
-        return Copies(np.array(cosets, dtype=np.intp), np.reshape(shifts, (-1, 3)))
+        return GroupElements(np.array(cosets, dtype=np.intp), np.reshape(shifts, (-1, 3)))
 
 
-class Copies(NamedTuple):
+class GroupElements(NamedTuple):
     """Elements of a group: a coset's number (n,) and a cell of the lattice (n, 3) each."""
 
     cosets: Integers
@@ -129,7 +129,7 @@ class Contacts(NamedTuple):
     - `point`: (N,) which point of that copy is the nearest.
     """
 
-    copies: Copies
+    copies: GroupElements
     gaps: Array
     copy: Integers
     point: Integers

@@ -23,7 +23,7 @@ class Neighbor(NamedTuple):
     kind: int
 
 
-class Part(NamedTuple):
+class CellPart(NamedTuple):
     """An edge or a corner of a cell.
 
     - `offset`: The block, from the cell's own, to which the edge or corner belongs.
@@ -93,7 +93,7 @@ class CellShape:
         return tuple(found)
 
     @cached_property
-    def parts(self) -> tuple[tuple[Part, ...], ...]:
+    def parts(self) -> tuple[tuple[CellPart, ...], ...]:
         """For each kind its edges and corners."""
         numbers: dict[tuple[tuple[int, ...], ...], int] = {}
         return tuple(self._parts_of(kind, numbers) for kind in range(self.kinds))
@@ -122,13 +122,13 @@ class CellShape:
 
     def _parts_of(
         self, kind: int, numbers: dict[tuple[tuple[int, ...], ...], int]
-    ) -> tuple[Part, ...]:
+    ) -> tuple[CellPart, ...]:
         faces = self.faces[kind]
         edges = {
             frozenset(e) for face in faces for e in zip(face, face[1:] + face[:1], strict=True)
         }
         ones = [frozenset([corner]) for corner in range(self.corners.shape[1])]
-        found: list[Part] = []
+        found: list[CellPart] = []
         for own in [*ones, *sorted(edges, key=sorted)]:
             points = sorted(self.corners[kind][sorted(own)].tolist())
             offset = np.array(points[0]) // self.denominator
@@ -136,7 +136,7 @@ class CellShape:
             number = numbers.setdefault(local, len(numbers))
             bits = sum(1 << bit for bit, face in enumerate(faces) if own <= set(face))
             x, y, z = offset.tolist()
-            found.append(Part((x, y, z), number, bits))
+            found.append(CellPart((x, y, z), number, bits))
         return tuple(found)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import ShadedPart, View, draw_solids, font
+from orbiflow.drawing import ShadedPart, SolidView, draw_solids, font
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.solid import EscherSolid
 from orbiflow.solids.stacks import (
@@ -100,7 +100,7 @@ def solid_gif(
         view = _view(own.upright, (cos * x - sin * y, sin * x + cos * y, z))
         parts = stack.parts(apart)
         middle, radius = stack.ball(parts)
-        view = View(view.direction, view.up, middle, radius)
+        view = SolidView(view.direction, view.up, middle, radius)
         drawn.append(draw_solids(parts, (size, size), view))
         if progress:
             progress((k + 1) / frames)
@@ -164,8 +164,8 @@ def figure_axes(figure: Mesh) -> Array:
     return np.stack([right, depth, up], axis=1)
 
 
-def _view(axes: Array, direction: tuple[float, float, float]) -> View:
+def _view(axes: Array, direction: tuple[float, float, float]) -> SolidView:
     """Return the view from a direction that is given as the figure stands."""
     x, y, z = (axes @ np.asarray(direction)).tolist()
     up_x, up_y, up_z = axes[:, 2].tolist()
-    return View((x, y, z), (up_x, up_y, up_z))
+    return SolidView((x, y, z), (up_x, up_y, up_z))

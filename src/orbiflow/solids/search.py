@@ -25,7 +25,7 @@ from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.painting import Painting, checked_painting
 from orbiflow.solids.poses import FINENESS, Pose, best_poses, polished
 from orbiflow.solids.separable import SEPARABLE_GROUPS, check_separable, separable_tile
-from orbiflow.solids.settings import FillSettings, Sphere
+from orbiflow.solids.settings import EmphasisSphere, FillSettings
 from orbiflow.solids.solid import EscherSolid
 from orbiflow.solids.surfaces import tile_surface
 from orbiflow.symmetry import CrystallographicGroup
@@ -80,7 +80,7 @@ EFFORTS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Goal:
+class SolidGoal:
     """What solids are to look like.
 
     - `name`: What it is called.
@@ -103,7 +103,7 @@ class Goal:
         settings: FillSettings,
         name: str = "solid",
         painting: Painting | None = None,
-    ) -> Goal:
+    ) -> SolidGoal:
         """Return the goal of a closed mesh in mm, on which something may be painted.
 
         Raises:
@@ -120,7 +120,7 @@ class Goal:
         millimetres = size / longest if size else side
         weights = [
             own.weights
-            if isinstance(own, Sphere)
+            if isinstance(own, EmphasisSphere)
             else partial(checked_painting(painting).weights, own.weight)
             for own in settings.emphasised
         ]
@@ -177,7 +177,7 @@ def fill(
     """
     settings = settings or FillSettings()
     make = _tile_maker(settings)
-    effort, goal = EFFORTS[settings.effort], Goal.of(mesh, settings, name, painting)
+    effort, goal = EFFORTS[settings.effort], SolidGoal.of(mesh, settings, name, painting)
     usual = SEPARABLE_GROUPS if settings.separable else USUAL_GROUPS[: effort.groups]
     families = [GroupFamily.named(own) for own in settings.groups or usual]
     if settings.separable:
@@ -261,7 +261,7 @@ def coverage(found: BentBody) -> tuple[float, float]:
 
 
 def _solid(
-    goal: Goal, body: Body, make: TileMaker, effort: Effort, pose: Pose
+    goal: SolidGoal, body: Body, make: TileMaker, effort: Effort, pose: Pose
 ) -> EscherSolid | None:
     """Return the solid of a pose, or None if it is not one piece without handles that fills space."""
     begin = time.process_time()

@@ -28,7 +28,7 @@ MOST_WEIGHT = 100.0
 DEFAULT_WEIGHT = 5.0
 
 
-class Sphere(NamedTuple):
+class EmphasisSphere(NamedTuple):
     """A part of a solid that matters more, in the coordinates of its file.
 
     - `center`: (x, y, z), and `radius`.
@@ -53,7 +53,7 @@ class Painted(NamedTuple):
     weight: float = DEFAULT_WEIGHT
 
 
-def emphasised(text: str) -> Sphere | Painted:
+def emphasised(text: str) -> EmphasisSphere | Painted:
     """Return what a text emphasises: x, y, z and the radius of a sphere, or painted; perhaps a weight.
 
     >>> emphasised("0, 10, 2, 4")
@@ -78,7 +78,11 @@ def emphasised(text: str) -> Sphere | Painted:
             f"{text!r}: the radius must be above 0, and the weight from {1 / MOST_WEIGHT:g} to "
             f"{MOST_WEIGHT:g}"
         )
-    return Sphere((place[0], place[1], place[2]), place[3], weight) if place else Painted(weight)
+    return (
+        EmphasisSphere((place[0], place[1], place[2]), place[3], weight)
+        if place
+        else Painted(weight)
+    )
 
 
 def group_names(text: str) -> tuple[str, ...]:
@@ -142,7 +146,7 @@ class FillSettings(Settings, group="Search"):
     """Number of processes."""
 
     @property
-    def emphasised(self) -> tuple[Sphere | Painted, ...]:
+    def emphasised(self) -> tuple[EmphasisSphere | Painted, ...]:
         """What matters more."""
         return tuple(map(emphasised, self.emphasis))
 

@@ -21,7 +21,7 @@ SERVER_SET = ("project", "task", "force", "workers", "tile", "picture")
 
 
 @dataclass(frozen=True)
-class Kind:
+class TaskKind:
     """A kind of task.
 
     - `work`: The operation that does it, in `orbiflow.settings.commands.WORK`, of a `Job`.
@@ -58,29 +58,29 @@ READS = ("read", "read second")
 """The kind of task that reads the first picture of a project, and the second."""
 
 KINDS = {
-    **dict.fromkeys(READS, Kind("studio read", "quick")),
-    "open": Kind("studio open", "quick"),
-    "search": Kind("studio search"),
-    "space": Kind("studio space", "quick"),
-    "pull": Kind("studio pull", "quick"),
-    "class": Kind("studio class", "quick"),
-    "preview": Kind("studio preview", "quick"),
-    "export": Kind("studio take", makes="export"),
-    "art": Kind("studio take", makes="art"),
-    "solid": Kind("studio take", makes="solid"),
-    "animate": Kind("studio take", makes="animate"),
-    "mesh read": Kind("studio mesh", "quick"),
-    "fill": Kind("studio fill"),
-    "film": Kind("studio film"),
-    "build": Kind("studio take", makes="build"),
-    "density table": Kind("studio table", "quick"),
-    "density fit": Kind("studio density"),
-    "density map": Kind("studio density map", "quick"),
-    "density take": Kind("studio density take"),
+    **dict.fromkeys(READS, TaskKind("studio read", "quick")),
+    "open": TaskKind("studio open", "quick"),
+    "search": TaskKind("studio search"),
+    "space": TaskKind("studio space", "quick"),
+    "pull": TaskKind("studio pull", "quick"),
+    "class": TaskKind("studio class", "quick"),
+    "preview": TaskKind("studio preview", "quick"),
+    "export": TaskKind("studio take", makes="export"),
+    "art": TaskKind("studio take", makes="art"),
+    "solid": TaskKind("studio take", makes="solid"),
+    "animate": TaskKind("studio take", makes="animate"),
+    "mesh read": TaskKind("studio mesh", "quick"),
+    "fill": TaskKind("studio fill"),
+    "film": TaskKind("studio film"),
+    "build": TaskKind("studio take", makes="build"),
+    "density table": TaskKind("studio table", "quick"),
+    "density fit": TaskKind("studio density"),
+    "density map": TaskKind("studio density map", "quick"),
+    "density take": TaskKind("studio density take"),
 }
 
 
-def kind_of_work(operation: str) -> Kind:
+def kind_of_work(operation: str) -> TaskKind:
     """Return the kind of task of a name."""
     if operation not in KINDS:
         raise OrbiflowError(f"there is no such task; there are {', '.join(KINDS)}")

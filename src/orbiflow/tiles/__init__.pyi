@@ -112,7 +112,7 @@ from .run_folder.writing import write_run as write_run
 from .run_folder.writing import write_tile_folder as write_tile_folder
 from .search.bent_map import carried_anew as carried_anew
 from .search.bent_map import carried_on as carried_on
-from .search.candidates import Fit as Fit
+from .search.candidates import ClassFinalists as ClassFinalists
 from .search.escherize_settings import EscherizeSettings as EscherizeSettings
 from .search.escherize_settings import SearchSettings as SearchSettings
 from .search.escherizing import SearchResult as SearchResult

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 
 from orbiflow.batch import (
     PAIRED,
+    BatchKind,
     Column,
     ContactSheet,
     Entry,
-    Kind,
     Matrix,
     Summary,
     WorkSettings,
@@ -97,7 +97,7 @@ def _written(folder: Path) -> set[str]:
     return written_files(folder)
 
 
-TILES = Kind(
+TILES = BatchKind(
     things="silhouettes",
     items="files",
     endings=(".png", ".jpg", ".jpeg", ".webp", ".svg", ".json", ".geojson", ".dat", ".wkt"),

@@ -30,7 +30,7 @@ from orbiflow.tiles import (
     write_dxf,
     write_pdf,
 )
-from orbiflow.tiles.page import INK, Part
+from orbiflow.tiles.page import INK, PathPart
 from refusals import refused
 
 PAGE = art_settings(area="300x200px", tile_size="130px", outline=0.0, samples=4)
@@ -67,7 +67,7 @@ def rgb(colour: str) -> np.ndarray:
     return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=float)
 
 
-def region(part: Part) -> Any:
+def region(part: PathPart) -> Any:
     """What a filled part covers, by the even-odd rule."""
     found: Any = shapely.Polygon()
     for curve in part.curves:
@@ -262,7 +262,7 @@ def test_strokes_that_are_no_plain_lines_are_carried_as_regions(body: str, tmp_p
 )
 def test_artwork_is_carried_as_it_is_seen(body: str, plain: str, tmp_path: Path) -> None:
     tile = squirrel("IH4")
-    parts: list[Part] = []
+    parts: list[PathPart] = []
     for text in (body, plain):
         over = read_over(svg_of("IH4", text, tmp_path), tile)
         assert over.drawing is not None

@@ -16,7 +16,7 @@ from exported import tile_of
 from orbiflow.tiles import Curve, ExportSettings, Scene, scenes
 from orbiflow.tiles.make import exporting
 from orbiflow.tiles.make.cut_order import in_cutting_order, ordered_lines
-from orbiflow.tiles.page import Layer, Part, Style
+from orbiflow.tiles.page import Layer, PathPart, Style
 
 rows = st.lists(st.tuples(*[st.floats(0, 100)] * 4), min_size=1, max_size=60)
 
@@ -36,7 +36,7 @@ def test_open_lines_are_kept_and_go_to_the_nearest(ends: list) -> None:
         place = own[1]
 
 
-def key(line: Curve | Part) -> tuple:
+def key(line: Curve | PathPart) -> tuple:
     """What stays of a line however it is turned."""
     curve = line if isinstance(line, Curve) else line.curves[0]
     corners = curve.pieces[:, 0] if curve.closed else np.stack([curve.start, curve.end])
@@ -112,15 +112,15 @@ def test_a_filled_part_keeps_its_holes() -> None:
         for side in (8.0, 4.0)
     ]
     hole = rings[1].reversed()
-    part = Part((rings[0], hole), Style("#000000"))
-    lone = Part(
+    part = PathPart((rings[0], hole), Style("#000000"))
+    lone = PathPart(
         (Curve.polyline([[0.6, 0], [0.7, 0]]), Curve.polyline([[0, 0], [0.5, 0]])),
         Style(None, "#0000ff", 0.1),
     )
     layer = Layer("engrave", "drawing", Style(None, "#0000ff", 0.1), (part, lone))
     (done,) = in_cutting_order(Scene(10.0, 10.0, (layer,))).layers
     kinds = [type(item) for item in done.items]
-    assert kinds == [Curve, Curve, Part]
+    assert kinds == [Curve, Curve, PathPart]
     assert np.array_equal(done.items[0].start, [0, 0])  # type: ignore[union-attr]
     assert len(done.items[2].curves) == 2  # type: ignore[union-attr]
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from exported import tile_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import MILLIMETRES, PAGES, Length, LengthOrZero, PageSize, length
-from orbiflow.settings.kinds import Refused, kind_of
+from orbiflow.settings.kinds import RefusedValue, kind_of
 from orbiflow.settings.units import length_or_none, page_size, signed_length, size
 from orbiflow.tiles import ExportSettings, scenes
 from refusals import refused
@@ -127,7 +127,7 @@ def test_no_lengths(text: str, about: str) -> None:
 @pytest.mark.parametrize("text", ["0", "0.0 mm"])
 def test_zero_where_it_is_one(text: str) -> None:
     assert length(text) == kind_of(LengthOrZero).read(text) == 0
-    with refused(0, 20000, kind=Refused):
+    with refused(0, 20000, kind=RefusedValue):
         kind_of(Length).read(text)
 
 
@@ -144,7 +144,7 @@ def test_no_sizes(text: str, about: str) -> None:
 
 
 def test_no_size_is_without_area() -> None:
-    with refused("entry 1", "0.0", kind=Refused):
+    with refused("entry 1", "0.0", kind=RefusedValue):
         kind_of(PageSize).read("0x200mm")
 
 

@@ -23,7 +23,7 @@ from artworks import EYE, face, squirrel
 from exported import Line, dxf_lines, svg_lines
 from orbiflow.tiles import ExportSettings, Scene, scenes, sheet_content
 from orbiflow.tiles.make.drawings import burnt
-from orbiflow.tiles.page import Curve, Motif, Part, Style, boundary, region_of
+from orbiflow.tiles.page import Curve, Motif, PathPart, Style, boundary, region_of
 from refusals import refused
 
 Cut = Literal["none", "skeleton", "pieces"]
@@ -113,7 +113,7 @@ def test_programs_agree_on_cut_and_engraving() -> None:
     seen = centres(black, places, 10)
     printed = centres(pdf, places, np.array(pdf.shape[::-1]) / PAGE["area"])
     rings = tuple(Curve.polyline(ring.coords[:-1], closed=True) for ring in flat["engrave"])
-    dark = region_of(Part(rings, Style()))
+    dark = region_of(PathPart(rings, Style()))
     burned = [(dark & shapely.Point(at).buffer(2)).centroid.coords[0] for at in places]
     assert np.hypot(*(seen - burned).T).max() < 0.01
     assert np.hypot(*(printed - burned).T).max() < 0.01
@@ -172,7 +172,7 @@ def disc(x: float, y: float, radius: float) -> tuple[Curve, ...]:
 def test_what_is_light_erases_what_is_under_it(
     discs: list[tuple[float, float, float, str]],
 ) -> None:
-    parts = tuple(Part(disc(x, y, r), Style(colour)) for x, y, r, colour in discs)
+    parts = tuple(PathPart(disc(x, y, r), Style(colour)) for x, y, r, colour in discs)
     area = shapely.box(-6, -6, 6, 6)
     styles = {"engrave": Style("#000000"), "score": Style(None, "#0000ff", 0.01)}
     found = burnt(Motif(parts), area, styles)["engrave"]
@@ -190,8 +190,8 @@ def test_what_is_light_erases_what_is_under_it(
 
 
 def test_lines_are_scored_unless_something_lies_over_them() -> None:
-    line = Part((Curve.polyline([[-9.0, 0.0], [9.0, 0.0]]),), Style(None, "#102030", 2.0))
-    over = Part(disc(0, 0, 3), Style("#ffffff"))
+    line = PathPart((Curve.polyline([[-9.0, 0.0], [9.0, 0.0]]),), Style(None, "#102030", 2.0))
+    over = PathPart(disc(0, 0, 3), Style("#ffffff"))
     styles = {"engrave": Style("#000000"), "score": Style(None, "#0000ff", 0.01)}
     found = burnt(Motif((line, over)), shapely.box(-5, -5, 20, 5), styles)
     assert found["engrave"].parts == ()
@@ -204,10 +204,10 @@ def test_lines_are_scored_unless_something_lies_over_them() -> None:
 @pytest.mark.parametrize("fill", ["#000000", None])
 def test_the_drawing_s_own_outline_is_not_drawn_beside_the_tile_s(fill: str | None) -> None:
     area = shapely.box(-20, -10, 20, 10)
-    own = Part(
+    own = PathPart(
         boundary(area.buffer(-0.4)), Style("#000000" if fill is None else None, "#000000", 1.0)
     )
-    mouth = Part((Curve.polyline([[-20.0, 0.0], [-12.0, 2.0]]),), Style(None, "#000000", 1.0))
+    mouth = PathPart((Curve.polyline([[-20.0, 0.0], [-12.0, 2.0]]),), Style(None, "#000000", 1.0))
     styles = {"engrave": Style(fill, "#000000"), "score": Style(None, "#0000ff", 0.01)}
     found = burnt(Motif((own, mouth)), area, styles, 0.7)
     assert found["engrave"].parts == ()
@@ -232,7 +232,7 @@ def test_sheets_share_the_engraving_out() -> None:
             region_of(part).area
             for scene in found
             for part in scene.layers[0].items
-            if isinstance(part, Part)
+            if isinstance(part, PathPart)
         )
         for found in (one, several)
     ]

@@ -13,7 +13,7 @@ from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
 from orbiflow.tiles import ExportSettings, Tile, as_tile, scenes, sheet_content
 from orbiflow.tiles.make import cut_ring
 from orbiflow.tiles.make.layout import layout
-from orbiflow.tiles.make.nesting import Arrangement, on_sheet
+from orbiflow.tiles.make.nesting import Nesting, on_sheet
 from orbiflow.tiles.make.offsets import offset_ring
 from refusals import refused
 
@@ -95,7 +95,7 @@ def test_a_single_piece_goes_in_whichever_way_it_fits() -> None:
     tile = Tile(bar, tile_of("IH1").group)
     chosen = ExportSettings(cut="pieces", tile_size=100)
     line = layout(as_tile(Tile(bar, tile.group)), chosen).page.ring
-    one = Arrangement(300 * np.eye(2), np.eye(2)[None], np.zeros((1, 2)))
+    one = Nesting(300 * np.eye(2), np.eye(2)[None], np.zeros((1, 2)))
     assert len(on_sheet([one], line, 12, 101)) == 1
     assert len(on_sheet([one], line, 79, 79)) == 1  # along the diagonal
     assert len(on_sheet([one], line, 70, 70)) == 0

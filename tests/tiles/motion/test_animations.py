@@ -31,7 +31,7 @@ from orbiflow.tiles import (
     border,
     escherize_class,
 )
-from orbiflow.tiles.motifs import Over, Picture
+from orbiflow.tiles.motifs import CarriedPicture, Over
 from orbiflow.tiles.motion.kinds import BendingWay, frames, motion
 from orbiflow.tiles.motion.writers import frame_image, frame_scene
 from orbiflow.tiles.write import scene_image
@@ -166,7 +166,7 @@ def test_what_lies_on_the_tiles_goes_where_their_bodies_go(
     low, high = bent.covered.low, bent.covered.high
     shades = np.stack(np.meshgrid(*[np.linspace(0, 255, 64)] * 2), axis=-1)
     image = np.dstack([shades, np.full((64, 64), 128.0), np.full((64, 64), 255.0)])
-    over = Over(Picture(Image.fromarray(image.astype(np.uint8), "RGBA"), bent.covered))
+    over = Over(CarriedPicture(Image.fromarray(image.astype(np.uint8), "RGBA"), bent.covered))
     page: Any = {"area": "360x240px", "tile_size": "120px", "outline": "none"}
     chosen = AnimationSettings(kind=kind, **page)
     moving = motion(bent, chosen, over)
@@ -188,7 +188,7 @@ def test_what_lies_on_the_tiles_goes_where_their_bodies_go(
 
 
 def test_frames_with_a_picture_are_full_and_of_one_palette(bent: EscherTile) -> None:
-    over = Over(Picture(Image.new("RGBA", (16, 16), (200, 30, 60, 255)), bent.covered))
+    over = Over(CarriedPicture(Image.new("RGBA", (16, 16), (200, 30, 60, 255)), bent.covered))
     plain = palette("lagoon")._replace(paper="#ff00ff")
     for share in (0.0, 0.3, 1.0):
         frame = frame_image(motion(bent, AnimationSettings(), over), plain, share)

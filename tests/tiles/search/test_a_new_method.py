@@ -12,9 +12,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
     CLASSES,
+    ClassFinalists,
     EscherizeSettings,
     EscherTile,
-    Fit,
     Pins,
     Target,
     escherize,
@@ -40,11 +40,11 @@ class TemplateSearch(SearchMethod):
 
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
-    ) -> Fit:
+    ) -> ClassFinalists:
         starts = template_starts(kind, turns=self.turns, stretch=0.2, phase=self.seed / 10)
         cancel.check()
         progress(1.0, float(goal.target.area))
-        return Fit(StillTiles(kind, starts), len(starts), 0, per_class)
+        return ClassFinalists(StillTiles(kind, starts), len(starts), 0, per_class)
 
 
 @pytest.mark.parametrize("workers", [1, 2])

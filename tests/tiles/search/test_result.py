@@ -13,8 +13,8 @@ from orbiflow.errors import CertificationError
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
     CLASSES,
+    ClassFinalists,
     EscherTile,
-    Fit,
     Likeness,
     Rating,
     Target,
@@ -32,7 +32,7 @@ KIND = CLASSES["IH21"]
 def best_tile(
     target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
 ) -> EscherTile:
-    fit = Fit(model, starts, 0, model.size)
+    fit = ClassFinalists(model, starts, 0, model.size)
     found = best_tiles(target, fit, force=force)[0]
     return found.changed(search=replace(found.search, seconds=seconds))
 

@@ -25,7 +25,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.likeness import mutual_iou
-from orbiflow.tiles.search import Fit, Goal
+from orbiflow.tiles.search import ClassFinalists, Goal
 from orbiflow.tiles.search.likeness_search import SKETCH
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import animal, searched
@@ -280,7 +280,7 @@ def test_later_phases_are_of_promising_classes() -> None:
     asked: list[tuple[str, int]] = []
 
     class Watched(type(method)):
-        def fit(self, goal: Goal, kind: IsohedralClass, *rest: Any) -> Fit:
+        def fit(self, goal: Goal, kind: IsohedralClass, *rest: Any) -> ClassFinalists:
             asked.append((kind.name, self.passed))
             return super().fit(goal, kind, *rest)
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
+    ClassFinalists,
     Emphasis,
     EscherizeSettings,
-    Fit,
     LikenessSearch,
     Pins,
     Rating,
@@ -64,12 +64,12 @@ class Hairless(SearchMethod):
 
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
-    ) -> Fit:
+    ) -> ClassFinalists:
         del progress, cancel
         if goal.target.normal[:, 1].max() > self.highest:
             raise CertificationError("all tiles near the silhouette cross themselves")
         starts = template_starts(kind, turns=2, stretch=0.2)
-        return Fit(StillTiles(kind, starts), len(starts), 0, per_class)
+        return ClassFinalists(StillTiles(kind, starts), len(starts), 0, per_class)
 
     def goals(self, goal: Goal):
         return LikenessSearch().goals(goal)

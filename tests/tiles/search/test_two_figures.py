@@ -45,7 +45,7 @@ from orbiflow.tiles import (
     write_scene,
 )
 from orbiflow.tiles.likeness import mixing_factor
-from orbiflow.tiles.motifs import Picture
+from orbiflow.tiles.motifs import CarriedPicture
 from orbiflow.tiles.motion.kinds import motion
 from orbiflow.tiles.result_file import part_file
 from orbiflow.tiles.tilings import mixing
@@ -177,7 +177,7 @@ def test_prototiles_have_colours_of_their_own(seed: int, name: str) -> None:
 
 
 def _flat(figure: EscherTile, colour: str) -> Over:
-    return Over(Picture(Image.new("RGBA", (40, 40), colour), figure.covered))
+    return Over(CarriedPicture(Image.new("RGBA", (40, 40), colour), figure.covered))
 
 
 def test_each_figure_carries_its_own_picture() -> None:

@@ -10,7 +10,7 @@ from awkward import NOT_SIMPLE, STRANGE
 from orbiflow.arrays import Array
 from orbiflow.settings import as_array
 from orbiflow.tiles import orient, resampled, signed_area
-from orbiflow.tiles.silhouette import Mesh, triangulate, unfolded
+from orbiflow.tiles.silhouette import SilhouetteMesh, triangulate, unfolded
 from orbiflow.tiles.silhouette.bending import _Distortion
 from outlines import ANIMALS, SHAPES, animal, comb, disc, dumbbell, slit_square, star, unit
 from refusals import refused
@@ -28,7 +28,7 @@ HARD: dict[str, Array] = {
 }
 
 
-def assert_fills(mesh: Mesh, ring: Array) -> None:
+def assert_fills(mesh: SilhouetteMesh, ring: Array) -> None:
     """All that a mesh promises."""
     n, outline = len(ring), mesh.size + len(mesh.sides)
     area = signed_area(ring)
@@ -104,7 +104,7 @@ def test_a_point_twice_is_refused(ring: Array, data: st.DataObject) -> None:
         triangulate(np.insert(unit(orient(ring)), place, unit(orient(ring))[place], axis=0))
 
 
-MESHES: dict[str, Mesh] = {
+MESHES: dict[str, SilhouetteMesh] = {
     name: triangulate(ring)
     for name, ring in {
         "disc": disc(48),
@@ -115,11 +115,11 @@ MESHES: dict[str, Mesh] = {
 }
 
 
-def outline(mesh: Mesh) -> int:
+def outline(mesh: SilhouetteMesh) -> int:
     return mesh.size + len(mesh.sides)
 
 
-def shuffled(mesh: Mesh, seed: int, share: float) -> Array:
+def shuffled(mesh: SilhouetteMesh, seed: int, share: float) -> Array:
     """Points inside put elsewhere inside the bounding box, the outline left."""
     rng = np.random.default_rng(seed)
     images = mesh.points.copy()

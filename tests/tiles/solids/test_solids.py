@@ -19,7 +19,7 @@ from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, S
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import SolidSettings, Tile, as_tile, make_solid, polygons_in, solid_files
 from orbiflow.tiles.make import ExportSettings, dark_parts, laid_out
-from orbiflow.tiles.page import Curve, Motif, Part, Style, longer_side
+from orbiflow.tiles.page import Curve, Motif, PathPart, Style, longer_side
 from orbiflow.tiles.solids.plates import plates_of
 from orbiflow.tiles.solids.shapes import Plan
 from refusals import refused
@@ -213,11 +213,11 @@ def test_dark_lines_stand_out_and_light_ones_do_not() -> None:
 
 
 def test_what_is_raised() -> None:
-    def disc(radius: float, colour: str, opacity: float = 1.0) -> Part:
+    def disc(radius: float, colour: str, opacity: float = 1.0) -> PathPart:
         ring = shapely.get_coordinates(shapely.Point(0, 0).buffer(radius))[:-1]
-        return Part((Curve.polyline(ring, closed=True),), Style(colour), opacity)
+        return PathPart((Curve.polyline(ring, closed=True),), Style(colour), opacity)
 
-    line = Part((Curve.polyline([[20, 0], [30, 0]]),), Style(None, "currentColor", 0.1))
+    line = PathPart((Curve.polyline([[20, 0], [30, 0]]),), Style(None, "currentColor", 0.1))
     eye = disc(5, "#202020"), disc(3, "#fff0e0"), disc(1, "#000000"), disc(9, "#000000", 0.3)
     areas = sorted(part.area for part in polygons_in(dark_parts(Motif((*eye, line)), 0.4)[0]))
     assert areas == pytest.approx([np.pi, 10 * 0.4 + np.pi * 0.2**2, 16 * np.pi], rel=0.01)

@@ -14,7 +14,7 @@ from PIL import Image
 from orbiflow.tiles import ArtSettings, EscherTile, art, read_result
 from orbiflow.tiles.result_file import read_tiles
 from orbiflow.tiles.worlds import Unfolding, best_in_world, in_world, unfolded
-from orbiflow.tiles.worlds.choosing import Seen, flip_of
+from orbiflow.tiles.worlds.choosing import WorldLikeness, flip_of
 from orbiflow.tiles.worlds.developing import Development
 from refusals import refused
 from runtime.searches import boot_call
@@ -85,7 +85,7 @@ def test_a_run_gives_the_best_tile_of_each_class(run: Path) -> None:
 
 def test_centres_get_their_orders_as_the_tile_looks_best(run: Path) -> None:
     tile = read_result(run, "IH28")
-    seen, (found, notes) = Seen(tile), in_world(tile, (2, 4, 5), -1)
+    seen, (found, notes) = WorldLikeness(tile), in_world(tile, (2, 4, 5), -1)
     assert "there" in notes[0]
     pattern = found.development.potential.pattern
     for orders in permutations((2, 4, 5)):
@@ -98,7 +98,7 @@ def test_the_tile_whose_image_looks_best_is_drawn(run: Path, tmp_path: Path) -> 
     marks = {}
     for tile in tiles:
         if tile.isohedral_class != "IH4":
-            marks[tile.isohedral_class] = Seen(tile).mark(in_world(tile, None, 1)[0])
+            marks[tile.isohedral_class] = WorldLikeness(tile).mark(in_world(tile, None, 1)[0])
     best = best_in_world(tiles, None, 1)
     assert best is not None
     assert marks[best.isohedral_class] == max(marks.values())
@@ -113,7 +113,10 @@ def test_nothing_else_of_a_run_goes_to_a_sphere(run: Path) -> None:
     tile = read_result(run, "IH21")
     tiling = tile.tiling.transformed(np.diag(flip_of(tile)), np.zeros(2))
     least = unfolded(tiling, (2, 3, 5), 1)
-    assert Seen(tile).mark(least) <= Seen(tile).mark(in_world(tile, (2, 3, 5), 1)[0]) + 1e-9
+    assert (
+        WorldLikeness(tile).mark(least)
+        <= WorldLikeness(tile).mark(in_world(tile, (2, 3, 5), 1)[0]) + 1e-9
+    )
 
 
 def test_orders_that_no_tile_takes_are_refused_for_what_they_are(run: Path, tmp_path: Path) -> None:

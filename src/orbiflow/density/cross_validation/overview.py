@@ -160,7 +160,7 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     return found.st_size, found.st_mtime_ns
 
 
-FITS = batch.Kind(
+FITS = batch.BatchKind(
     things="fits",
     items="fits",
     reads="data",

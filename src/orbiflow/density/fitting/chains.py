@@ -314,14 +314,14 @@ HARMONICS, ADDED_VARIANCE = 4, 1e-3
 """Waves of each angle by which dependence is screened, and what is added to their variances."""
 
 
-class Shape(NamedTuple):
+class FactorShape(NamedTuple):
     """The shape of a factor: its angles, parents before their child, and its number of components."""
 
     axes: tuple[int, ...]
     components: int
 
 
-def network_shapes(rows: Rows, held: Rows, generator: torch.Generator) -> Iterator[Shape]:
+def network_shapes(rows: Rows, held: Rows, generator: torch.Generator) -> Iterator[FactorShape]:
     """Yield factors one after the other, chosen by held-out rows; parents before their children.
 
     The order is that of Prim's algorithm on the angles' dependence (as Chow and Liu, 1968), parents
@@ -335,7 +335,7 @@ def network_shapes(rows: Rows, held: Rows, generator: torch.Generator) -> Iterat
 
 
 def fit_network(
-    space: Torus, rows: Rows, held: Rows, shapes: Sequence[Shape], generator: torch.Generator
+    space: Torus, rows: Rows, held: Rows, shapes: Sequence[FactorShape], generator: torch.Generator
 ) -> VonMisesNetwork:
     """Fit factors of these shapes."""
     return VonMisesNetwork(
@@ -345,7 +345,7 @@ def fit_network(
 
 def _factor_shape(
     axis: int, before: list[int], seen: Screen, rows: Rows, held: Rows, generator: torch.Generator
-) -> Shape:
+) -> FactorShape:
     most = max(SIZES[0], len(rows) // ROWS_PER_COMPONENT)
     first = max(size for size in SIZES if size <= min(FIRST_COMPONENTS, most))
 
@@ -370,7 +370,7 @@ def _factor_shape(
         if gain_of(value, best, held.weights).nats < WORTHWHILE_NATS:
             break
         size, best = 2 * size, value
-    return Shape(axes, size)
+    return FactorShape(axes, size)
 
 
 def _fitted(

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.chains import (
-    Shape,
+    FactorShape,
     fit_chain_mixture,
     fit_network,
     network_shapes,
@@ -278,7 +278,7 @@ class NetworkFamily(Family):
     space: Torus
     seed: int
     name = "network"
-    _shapes: list[Shape] = field(default_factory=list[Shape])
+    _shapes: list[FactorShape] = field(default_factory=list[FactorShape])
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         train = train[:MOST_CHAINED]

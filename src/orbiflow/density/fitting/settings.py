@@ -5,7 +5,16 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, get_args
 
 from orbiflow.errors import SettingError
-from orbiflow.settings import DefaultText, Group, Hidden, Parsed, Range, Settings, Unit, fields_of
+from orbiflow.settings import (
+    DefaultText,
+    HelpHeading,
+    Hidden,
+    Parsed,
+    Range,
+    Settings,
+    Unit,
+    fields_of,
+)
 
 Component = Literal[
     "flow", "kernels", "mixture", "chains", "network", "von-mises", "von-mises-sine",
@@ -22,7 +31,7 @@ COMPONENTS = KNOWN[:5]
 PARAMETRIC = KNOWN[5:]
 """Parametric families: alone each is a fit of its own, beside others it is one of the candidates."""
 
-FLOW = Group("Flow")
+FLOW = HelpHeading("Flow")
 
 
 def component_names(text: str) -> tuple[str, ...] | None:

@@ -250,7 +250,7 @@ class _NearLogSum(torch.autograd.Function):
         return found, None, None
 
 
-class Tile:
+class FeatureBox:
     """A box around features (m, N), N > 0."""
 
     def __init__(self, features: Tensor, factors: int) -> None:
@@ -301,7 +301,7 @@ class _Walk:
 
         `idle` is how many times in a row hardly any term has been left out.
         """
-        tile, count, given = Tile(features, terms.factors), len(at), terms.size
+        tile, count, given = FeatureBox(features, terms.factors), len(at), terms.size
         least, largest = tile.bounds(terms)
         bottom = float(np.logaddexp(self.floor, float(log_sum_exp(least))))
         far = largest < bottom + LOG_TOLERANCE - math.log(given)

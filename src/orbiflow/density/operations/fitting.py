@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
-from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
+from orbiflow.batch import BatchKind, Column, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
 from orbiflow.density.data import asked_roles
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
@@ -279,7 +279,7 @@ def _figures(summary: Summary) -> dict[str, Any]:
     }
 
 
-DENSITIES = Kind(
+DENSITIES = BatchKind(
     things="tables",
     items="files",
     endings=(".csv", ".tsv", ".txt", ".npy", ".parquet"),

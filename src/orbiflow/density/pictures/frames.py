@@ -298,7 +298,7 @@ class Room(NamedTuple):
         return self._replace(below=self.below + 1.3 * (len(caption_lines(words, sheet)) + 1))
 
 
-class Frame(NamedTuple):
+class FigureFrame(NamedTuple):
     """A figure with its axes, `side` inches wide, and those of its colour bar, below or beside."""
 
     figure: Figure
@@ -316,7 +316,7 @@ class Panel(NamedTuple):
     light: bool = False
 
 
-def make_frame(sheet: Sheet, room: Room, aspect: float = 1.0) -> Frame:
+def make_frame(sheet: Sheet, room: Room, aspect: float = 1.0) -> FigureFrame:
     """Make a figure as wide as the sheet, with axes of this width over height and a colour bar."""
     side = sheet.width - sheet.em * (room.left + room.right)
     inner = side / aspect
@@ -325,7 +325,7 @@ def make_frame(sheet: Sheet, room: Room, aspect: float = 1.0) -> Frame:
     gap, thick = sheet.em * room.gap, sheet.em * room.bar
     under = (left, below - gap - thick, side, thick)
     bar = axes_at(figure, *(under if room.under else (left + side + gap, below, thick, inner)))
-    return Frame(figure, axes_at(figure, left, below, side, inner), bar, side, room.under)
+    return FigureFrame(figure, axes_at(figure, left, below, side, inner), bar, side, room.under)
 
 
 def two_panels(
@@ -406,7 +406,7 @@ def write_caption(figure: Figure, words: str, sheet: Sheet) -> None:
 
 
 def colour_bar(
-    image: AxesImage, frame: Frame, sheet: Sheet, label: str, shade: Shade | None = None
+    image: AxesImage, frame: FigureFrame, sheet: Sheet, label: str, shade: Shade | None = None
 ) -> None:
     """Draw the bar of an image's colours; those of a density have ticks in its units."""
     from matplotlib.ticker import MaxNLocator

@@ -194,7 +194,7 @@ class Pixels(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Colouring:
+class GroundColouring:
     """The colours of a density on a ground.
 
     - `places`: Place of each pixel on the colour bar, (rows, columns), the lowest row first.
@@ -303,7 +303,7 @@ class Ground(ABC):
 
     def colouring(
         self, density: Density, settings: PlotSettings, count: int | None = None
-    ) -> Colouring:
+    ) -> GroundColouring:
         """Return the colours of a density, on as many `pixels` as it needs or on a `count` of them."""
         pixels = self.pixels(count or self.pixels_for(density))
         values = density_over(density, pixels.points, settings.measure, pixels.side)
@@ -318,7 +318,7 @@ class Ground(ABC):
         if is_sharp(density, pixels.side):
             note = f"peaks narrower than {pixels.size} are averaged over it"
         places = pixels.table(shade.places(values), 0.0)
-        return Colouring(places, pixels.extent, shade, reason, note, logs, self.outline)
+        return GroundColouring(places, pixels.extent, shade, reason, note, logs, self.outline)
 
     def fill(self, axes: Axes) -> None:
         """Fill the ground with one light colour."""
@@ -326,7 +326,7 @@ class Ground(ABC):
 
     def write_on_screen(
         self,
-        frame: frames.Frame,
+        frame: frames.FigureFrame,
         sheet: Sheet,
         title: str,
         notes: Sequence[str],
@@ -336,7 +336,7 @@ class Ground(ABC):
         self.write_title(frame, sheet, title)
         frames.write_caption(frame.figure, self.caption(notes, dots), sheet)
 
-    def write_title(self, frame: frames.Frame, sheet: Sheet, title: str) -> None:
+    def write_title(self, frame: frames.FigureFrame, sheet: Sheet, title: str) -> None:
         """Write the title above the picture."""
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
 

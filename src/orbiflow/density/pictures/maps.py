@@ -195,7 +195,7 @@ class Map(Ground):
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes or ["dots are points"], None)
 
-    def write_title(self, frame: frames.Frame, sheet: Sheet, title: str) -> None:
+    def write_title(self, frame: frames.FigureFrame, sheet: Sheet, title: str) -> None:
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
             0.5, top, f"{title}: {self._subtitle}", ha="center", va="center",

@@ -14,7 +14,7 @@ from orbiflow.density.inference import chosen_columns, conditional, marginal
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.colours import bar_label, bar_ticks, density_over, is_sharp, shading
-from orbiflow.density.pictures.grounds import Colouring, Ground
+from orbiflow.density.pictures.grounds import Ground, GroundColouring
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import ProductSpace
 from orbiflow.drawing import Picture, Sheet
@@ -116,7 +116,7 @@ def series_picture(
     for k, (value, values) in enumerate(zip(along.values, tables, strict=True)):
         axes = page.axes(k)
         places = pixels.table(shade.places(values), 0.0)
-        colouring = Colouring(places, pixels.extent, shade, "", "", None, ground.outline)
+        colouring = GroundColouring(places, pixels.extent, shade, "", "", None, ground.outline)
         image = colouring.draw(axes)
         ground.draw_axes(axes, sheet, page.side, frames.Panel(False, k % page.columns == 0))
         number = f"{value:.{DIGITS}g}".replace("-", "\N{MINUS SIGN}")
@@ -160,10 +160,10 @@ class _Page:
         below += (self.rows - 1 - row) * (self.high + self.between)
         return frames.axes_at(self.figure, left, below, self.side, self.high)
 
-    def frame(self, axes: Axes) -> frames.Frame:
+    def frame(self, axes: Axes) -> frames.FigureFrame:
         """Return the frame of one panel with the bar of all."""
         em, wide = self.sheet.em, self.figure.get_size_inches()[0]
         left = wide - em * (self.room.right - self.beside - self.room.gap)
         tall = self.rows * self.high + (self.rows - 1) * self.between
         bar = frames.axes_at(self.figure, left, em * self.room.below, em * self.room.bar, tall)
-        return frames.Frame(self.figure, axes, bar, tall)
+        return frames.FigureFrame(self.figure, axes, bar, tall)

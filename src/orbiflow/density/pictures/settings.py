@@ -11,7 +11,7 @@ from orbiflow.drawing import NARROWEST, WIDEST, FigureFormat, Sheet, column_widt
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import (
     DefaultText,
-    Group,
+    HelpHeading,
     Hidden,
     Needs,
     Option,
@@ -24,7 +24,7 @@ from orbiflow.settings import (
 MAX_REGIONS = 4
 """Number of styles of lines that can be told apart."""
 
-MAPS, POINTS = Group("Maps"), Group("Points and regions")
+MAPS, POINTS = HelpHeading("Maps"), HelpHeading("Points and regions")
 
 
 def read_center(text: str) -> tuple[float, ...]:

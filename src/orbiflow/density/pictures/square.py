@@ -124,7 +124,7 @@ class Square(Ground):
 
     def write_on_screen(
         self,
-        frame: frames.Frame,
+        frame: frames.FigureFrame,
         sheet: Sheet,
         title: str,
         notes: Sequence[str],

@@ -37,7 +37,7 @@ MAX_RESOLUTION = 250
 """Cells along an edge at most: their corners are numbered in 16 bits."""
 
 
-class Mesh(NamedTuple):
+class SurfaceMesh(NamedTuple):
     """Chart points (N, 2) of the square, edges included, and triangles (M, 3), numbers of points."""
 
     points: Tensor
@@ -113,7 +113,7 @@ def _of_vectors(space: Space, vectors: Array) -> Array:
     return boy_surface(vectors) if space.name == "projective-plane" else vectors
 
 
-def mesh(space: Space, resolution: int) -> Mesh:
+def mesh(space: Space, resolution: int) -> SurfaceMesh:
     """Return an even grid on the canonical square, whose edges a group identifies, in triangles."""
     immersion(space)
     as_whole(resolution, "resolution", 2, MAX_RESOLUTION)
@@ -122,7 +122,7 @@ def mesh(space: Space, resolution: int) -> Mesh:
     number = np.arange((resolution + 1) ** 2).reshape(resolution + 1, -1)
     a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
     corners = np.stack([a, b, c, a, c, d], axis=-1)
-    return Mesh(points, corners.reshape(-1, 3))
+    return SurfaceMesh(points, corners.reshape(-1, 3))
 
 
 def normals(space: Space, points: Tensor) -> Array:

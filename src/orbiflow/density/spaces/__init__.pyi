@@ -6,7 +6,7 @@ from .checked import row_count as row_count
 from .data_columns import DataColumns as DataColumns
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
-from .frame import Frame as Frame
+from .frame import LatticeFrame as LatticeFrame
 from .point_groups import rotation_group_name as rotation_group_name
 from .point_groups import rotations_of as rotations_of
 from .product import ProductSpace as ProductSpace

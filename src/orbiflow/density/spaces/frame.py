@@ -19,7 +19,7 @@ MOST_CELLS = 6
 """The most lattice cells that a rectangular frame may have."""
 
 
-class Frame(NamedTuple):
+class LatticeFrame(NamedTuple):
     """A group written on a sublattice whose basis is as nearly rectangular as can be.
 
     The sublattice need not be one that the group preserves: `group.cosets` represent the right cosets
@@ -46,7 +46,7 @@ def is_rectangular(basis: Array) -> bool:
     return bool(np.allclose(unit.T @ unit, np.eye(len(basis)), rtol=0, atol=1e-9))
 
 
-def frame_of(group: CrystallographicGroup) -> Frame:
+def frame_of(group: CrystallographicGroup) -> LatticeFrame:
     """Return the frame of a group; with a diagonal lattice, the group itself, if it turns no axes.
 
     >>> from orbiflow.symmetry import wallpaper_group
@@ -56,7 +56,7 @@ def frame_of(group: CrystallographicGroup) -> Frame:
     """
     basis = straight_basis(group)
     if basis is group.lattice and _keeps_axes(basis, group.linear_parts).all():
-        return Frame(group, group.order)
+        return LatticeFrame(group, group.order)
     finer = CrystallographicGroup.generate(basis, [translation(v) for v in group.lattice.T])
     every = [
         Isometry(g.linear, finer.wrap(g.translation + shift))
@@ -69,7 +69,7 @@ def frame_of(group: CrystallographicGroup) -> Frame:
         if not found.contains(g):
             images = [Isometry((s @ g).linear, finer.wrap((s @ g).translation)) for s in own]
             found = CrystallographicGroup(basis, (*found.cosets, *images), group.name)
-    return Frame(found, len(own))
+    return LatticeFrame(found, len(own))
 
 
 def _keeps_axes(bases: Array, linear: Array) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.data import Role
 from orbiflow.density.spaces.axes import Axis
-from orbiflow.density.spaces.frame import Frame, frame_of
+from orbiflow.density.spaces.frame import LatticeFrame, frame_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import as_choice, as_tensor, as_whole, is_a
 from orbiflow.symmetry import (
@@ -165,7 +165,7 @@ class Space(ABC):
         return DirichletDomain(self.group, np.full(self.dim, 0.5) if self.has_square else None)
 
     @cached_property
-    def frame(self) -> Frame:
+    def frame(self) -> LatticeFrame:
         """The group on a lattice whose coordinates kernels are products in."""
         return frame_of(self.group)
 

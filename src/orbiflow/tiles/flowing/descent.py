@@ -30,7 +30,7 @@ from orbiflow.tiles.flowing.soft_target import SoftTarget
 from orbiflow.tiles.flowing.starts import Starts, outline_starts, template_starts
 from orbiflow.tiles.flowing.tile_model import TileModel
 from orbiflow.tiles.likeness import Overlap, Recogniser, boundary_iou, prepared_region, rank_score
-from orbiflow.tiles.search import Fit, OnProgress, Prototiles, SearchMethod, silent
+from orbiflow.tiles.search import ClassFinalists, OnProgress, Prototiles, SearchMethod, silent
 from orbiflow.tiles.silhouette import Emphasis, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import linalg
@@ -269,7 +269,7 @@ def fit_descent(
     emphasis: Emphasis | None = None,
     progress: OnProgress = silent,
     cancel: Cancel = NEVER,
-) -> Fit:
+) -> ClassFinalists:
     """Fit tiles of one class to a target by Sobolev descent, all starts side by side.
 
     `progress` is called with 1 - IoU as the loss.
@@ -306,7 +306,7 @@ def fit_descent(
     if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis
         progress(0.92, 1 - best)
         model = _polished(target, model, settings, cancel)
-    return Fit(model, len(prototiles), crossed, 1)
+    return ClassFinalists(model, len(prototiles), crossed, 1)
 
 
 @lru_cache(maxsize=2)  # targets hash by identity; one serves all classes

@@ -16,7 +16,7 @@ from orbiflow.tiles.flowing.descent import fit_descent, shared_soft_target
 from orbiflow.tiles.flowing.occupancy import fit_occupancy
 from orbiflow.tiles.flowing.starts import initial_poses, outline_starts
 from orbiflow.tiles.flowing.tile_model import MAX_FREQUENCY, MAX_SEGMENTS
-from orbiflow.tiles.search import Fit, Goal, OnProgress, SearchMethod, StillTiles
+from orbiflow.tiles.search import ClassFinalists, Goal, OnProgress, SearchMethod, StillTiles
 from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, IsohedralClass
 
 NotNegative = Annotated[float, Range(0)]
@@ -112,7 +112,7 @@ class OverlapSearch(Settings, SearchMethod):
 
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
-    ) -> Fit:
+    ) -> ClassFinalists:
         """Let flows carry near tiles closer to the silhouette."""
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
         own = replace(self, stages=stages)
@@ -122,7 +122,7 @@ class OverlapSearch(Settings, SearchMethod):
             )
         return found._replace(enough=1 if per_class == 1 else 2 * per_class)
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> ClassFinalists:
         """Return the tiles nearest to the outline."""
         if self.starts != "outline":
             return super().sketch(goal, kind, cancel)
@@ -131,7 +131,7 @@ class OverlapSearch(Settings, SearchMethod):
         own = outline_starts(goal.target, kind, replace(self, **few), cancel=cancel).prototiles
         if not len(own):
             raise CertificationError("no tile near the outline is simple")
-        return Fit(StillTiles(kind, own), len(own), 0, 1)
+        return ClassFinalists(StillTiles(kind, own), len(own), 0, 1)
 
     def prepare(self, goal: Goal) -> None:
         """Draw the silhouette's soft edge."""
@@ -196,11 +196,11 @@ class OccupancySearch(Settings, SearchMethod):
 
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
-    ) -> Fit:
+    ) -> ClassFinalists:
         """Let flows carry templates onto the silhouette; each class has a seed of its own."""
         del per_class  # all survivors are given
         number = list(dict.fromkeys((*CLASSES, *ISOHEDRAL_TYPES))).index(kind.name)
         own = replace(self, seed=(self.seed * 1009 + number) % 2**32)
         with one_thread():
             model = fit_occupancy(goal.target, kind, own, progress, cancel=cancel)
-        return Fit(model, len(initial_poses(kind, self.turns)[0]), 0, model.size)
+        return ClassFinalists(model, len(initial_poses(kind, self.turns)[0]), 0, model.size)

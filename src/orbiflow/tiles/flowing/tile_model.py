@@ -21,7 +21,7 @@ from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.settings import as_array, as_instance, as_number, as_whole, is_a
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles.search import Candidates, Prototiles, StillTiles, simplest_tile
+from orbiflow.tiles.search import ClassCandidates, Prototiles, StillTiles, simplest_tile
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tile_map import TileMap, naming_file
@@ -37,7 +37,7 @@ VERTICES, CORNERS = "prototile.outline", "prototile.corners"
 NO_FLOW = "no flow made this tile, so there is no model of it; a search for overlap has one"
 
 
-class TileModel(nn.Module, Candidates):
+class TileModel(nn.Module, ClassCandidates):
     """A stack of S candidate tiles of one isohedral class, in the target's normal form.
 
     The flow commutes with the class's group in the group's own frame; the lattice freedom L and the
@@ -269,7 +269,7 @@ class TileModel(nn.Module, Candidates):
         return self
 
 
-def trainable(candidates: Candidates) -> TileModel:
+def trainable(candidates: ClassCandidates) -> TileModel:
     """Return candidates as a torch module, to be trained: that of start tiles has a field of zero."""
     if isinstance(candidates, TileModel):
         return candidates

@@ -1,7 +1,7 @@
 from .any_shape import faithfulness as faithfulness
 from .bending_onto import bent_onto as bent_onto
-from .elastic import Body as Body
 from .elastic import Elastic as Elastic
+from .elastic import ElasticBody as ElasticBody
 from .elastic import Stiffness as Stiffness
 from .faithful import Fidelity as Fidelity
 from .faithful import fidelity as fidelity

@@ -25,7 +25,7 @@ from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.tiles.likeness.measures import Measures
-from orbiflow.tiles.silhouette import Mesh, triangulate
+from orbiflow.tiles.silhouette import SilhouetteMesh, triangulate
 
 # the bounds of the weights of areas, which are negative for obtuse triangles
 COTANGENT_BOUNDS = (0.05, 40.0)
@@ -56,7 +56,7 @@ class Stiffness:
     forgiven: tuple[float, float] = (0.1, 0.15)
 
 
-class Body(ABC):
+class ElasticBody(ABC):
     """What springs can pull: N points, of which the first n are an outline, and a quadratic energy.
 
     Subclasses have the points at rest (N,), the number `size` n, the stiffness matrix (N, N), and the
@@ -119,7 +119,7 @@ class Body(ABC):
         return solver
 
 
-class Elastic(Body):
+class Elastic(ElasticBody):
     """A triangulated silhouette of area about 1 and its energies.
 
     Its first n points are the counter-clockwise outline `ring` (n, 2). Where some should deform less,
@@ -132,7 +132,7 @@ class Elastic(Body):
         stiffness: Stiffness | None = None,
         *,
         stiff: Array | None = None,
-        mesh: Mesh | None = None,
+        mesh: SilhouetteMesh | None = None,
     ) -> None:
         super().__init__()
         self.mesh = mesh or triangulate(ring)

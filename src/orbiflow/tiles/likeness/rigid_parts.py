@@ -24,7 +24,7 @@ import numpy as np
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import best_similarity
 from orbiflow.tiles.likeness.elastic import Condensed, Elastic, Stiffness
-from orbiflow.tiles.silhouette import Mesh
+from orbiflow.tiles.silhouette import SilhouetteMesh
 
 SHAPE_WEIGHT = 1e5  # weight of the mean squared distance of the body's points from similar copies
 SIZE_WEIGHT = 30.0  # the weight of a part's change of size, for the whole body
@@ -49,7 +49,7 @@ class Pinned(Elastic):
         *,
         keep_angle: bool = False,
         stiff: Array | None = None,
-        mesh: Mesh | None = None,
+        mesh: SilhouetteMesh | None = None,
     ) -> None:
         super().__init__(ring, stiffness, stiff=stiff, mesh=mesh)
         self.keep_angle = keep_angle

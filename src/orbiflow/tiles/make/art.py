@@ -25,10 +25,10 @@ from orbiflow.tiles.make.repeats import repeating_page
 from orbiflow.tiles.motifs import (
     NOWHERE,
     TEXELS_PER_PIXEL,
+    CarriedPicture,
     Grid,
     Over,
     Paint,
-    Picture,
     bilinear,
     carried_raster,
     figure_paint,
@@ -41,7 +41,7 @@ from orbiflow.tiles.motifs import (
     with_map,
     worn,
 )
-from orbiflow.tiles.page import Curve, Motif, Page, Part, Scene, Style, edge_margin, tiling_size
+from orbiflow.tiles.page import Curve, Motif, Page, PathPart, Scene, Style, edge_margin, tiling_size
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.write import write_pdf, write_svg
 
@@ -67,7 +67,7 @@ class Artwork(Outcome):
     tile: EscherTile
     settings: ArtSettings
     page: Page
-    pictures: tuple[Picture | None, ...]
+    pictures: tuple[CarriedPicture | None, ...]
     motifs: tuple[Motif, ...]
     tint: float
     notes: tuple[str, ...]
@@ -187,7 +187,9 @@ def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
     chosen, samples = palette(art.settings.palette), art.settings.samples
     shaded = art.page.palette(chosen)
     painted = [
-        Painted(paint.grid, paint.coloured(shaded, art.page.count, art.tint), art.place(number))
+        PaintedPrototile(
+            paint.grid, paint.coloured(shaded, art.page.count, art.tint), art.place(number)
+        )
         for number, paint in enumerate(map(partial(paint_of, art), range(len(art.motifs))))
     ]
     return render_page(
@@ -207,7 +209,7 @@ def paint_of(art: Artwork, number: int) -> Paint:
     if art.outline > 0:
         # half of its width inside
         colour, width = palette(art.settings.palette).outline, art.outline / art.place(number).scale
-        line = Part((Curve.polyline(polygon, closed=True),), Style(None, colour, width))
+        line = PathPart((Curve.polyline(polygon, closed=True),), Style(None, colour, width))
         paint_motif(paint, Motif((line,)))
     return paint
 
@@ -248,7 +250,7 @@ def png_of(pixels: np.ndarray, dpi: float) -> bytes:
     return png_bytes(Image.fromarray(pixels), dpi=(dpi, dpi), compress_level=5)
 
 
-class Painted(NamedTuple):
+class PaintedPrototile(NamedTuple):
     """The raster of one prototile in all colours."""
 
     grid: Grid
@@ -259,7 +261,7 @@ class Painted(NamedTuple):
 def render_page(
     page: Page,
     pixels: float,
-    painted: Sequence[Painted],
+    painted: Sequence[PaintedPrototile],
     paper: str,
     *,
     samples: int,
@@ -323,7 +325,7 @@ def _as_one(rings: Sequence[Array]) -> Array:
 
 
 def _lookup(
-    page: Page, samples: float, painted: Sequence[Painted], paper: str
+    page: Page, samples: float, painted: Sequence[PaintedPrototile], paper: str
 ) -> Callable[[Integers, Array, Array], Array]:
     """Return a function for colours (..., 3) in copies of the tile, by their number, at x and y."""
     copies, width = page.copies, max(own.colours.shape[2] for own in painted)

@@ -10,7 +10,7 @@ import shapely
 from scipy.spatial import KDTree
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.page import Curve, Item, Layer, Part, Scene
+from orbiflow.tiles.page import Curve, Item, Layer, PathPart, Scene
 
 MOST_STARTS = 24  # the places at which a closed line may begin: more shorten the way no further
 FINE = 0.01  # distance in mm at which a line is taken for a polygon, to see what lies in it
@@ -26,8 +26,8 @@ def in_cutting_order(scene: Scene) -> Scene:
     place, layers = np.zeros(2), list[Layer]()
     for layer in scene.layers:
         items = [own for item in layer.items for own in _single(item, layer)]
-        lines = [item for item in items if isinstance(item, Curve | Part)]
-        others = [item for item in items if not isinstance(item, Curve | Part)]
+        lines = [item for item in items if isinstance(item, Curve | PathPart)]
+        others = [item for item in items if not isinstance(item, Curve | PathPart)]
         ordered, place = ordered_lines(lines, place)
         layers.append(replace(layer, items=(*others, *ordered)))
     return replace(scene, layers=tuple(layers))
@@ -35,7 +35,12 @@ def in_cutting_order(scene: Scene) -> Scene:
 
 def _single(item: Item, layer: Layer) -> Iterator[Item]:
     """Yield the lines of an item one by one; what is filled stays whole, as its holes are its own."""
-    if not isinstance(item, Part) or item.style.fill or not item.style.stroke or item.opacity < 1:
+    if (
+        not isinstance(item, PathPart)
+        or item.style.fill
+        or not item.style.stroke
+        or item.opacity < 1
+    ):
         yield item
         return
     (_, stroke, width), usual = item.style, layer.style
@@ -44,7 +49,9 @@ def _single(item: Item, layer: Layer) -> Iterator[Item]:
     yield from item.curves if as_the_layer else (item._replace(curves=(c,)) for c in item.curves)
 
 
-def ordered_lines(lines: Sequence[Curve | Part], place: Array) -> tuple[list[Curve | Part], Array]:
+def ordered_lines(
+    lines: Sequence[Curve | PathPart], place: Array
+) -> tuple[list[Curve | PathPart], Array]:
     """Return lines in their order from a place (2,) on, and where the way ends."""
     starts = [_starts(_curve(line)) for line in lines]
     owners = np.repeat(np.arange(len(lines)), [len(own) for own in starts])
@@ -52,7 +59,7 @@ def ordered_lines(lines: Sequence[Curve | Part], place: Array) -> tuple[list[Cur
     points = np.concatenate([np.zeros((0, 2)), *starts])
     within = _containing(lines)
     waiting = np.bincount([k for around in within for k in around], minlength=len(lines))
-    left, ordered = np.ones(len(lines), dtype=bool), list[Curve | Part]()
+    left, ordered = np.ones(len(lines), dtype=bool), list[Curve | PathPart]()
     tree, numbers, taken = None, np.zeros(0, dtype=np.int64), 0
     for _ in lines:
         if tree is None or 2 * taken > len(numbers):  # most that the tree knows is taken: a new one
@@ -75,7 +82,7 @@ def ordered_lines(lines: Sequence[Curve | Part], place: Array) -> tuple[list[Cur
     return ordered, place
 
 
-def _curve(line: Curve | Part) -> Curve:
+def _curve(line: Curve | PathPart) -> Curve:
     return line if isinstance(line, Curve) else line.curves[0]
 
 
@@ -90,7 +97,7 @@ def _step(curve: Curve) -> int:
     return -(-len(curve.pieces) // MOST_STARTS)
 
 
-def _begun(line: Curve | Part, start: int) -> Curve | Part:
+def _begun(line: Curve | PathPart, start: int) -> Curve | PathPart:
     """Return a line that begins at one of its starts."""
     if isinstance(line, Curve):
         return _turned(line, start)
@@ -107,7 +114,7 @@ def _turned(curve: Curve, start: int) -> Curve:
     return Curve(np.roll(curve.pieces, shift, 0), np.roll(curve.straight, shift), closed=True)
 
 
-def _containing(lines: Sequence[Curve | Part]) -> list[list[int]]:
+def _containing(lines: Sequence[Curve | PathPart]) -> list[list[int]]:
     """Return for each line the closed lines in which it lies."""
     found: list[list[int]] = [[] for _ in lines]
     closed = [k for k, line in enumerate(lines) if isinstance(line, Curve) and line.closed]

@@ -18,7 +18,7 @@ from orbiflow.tiles.page import (
     USUAL_WIDTH,
     Layer,
     Motif,
-    Part,
+    PathPart,
     PlacedTile,
     Scene,
     Style,
@@ -143,8 +143,8 @@ def burnt(
     kept = (curve for line in lines for curve in polylines(line & inner))
     scored = tuple(c for c in kept if c.closed or np.ptp(c.bounds(), axis=0).max() > edge)
     pictures = cut_off(Motif(rasters=motif.rasters), tile).rasters
-    engraved = tuple(Part(region, styles["engrave"]) for region in regions if region)
+    engraved = tuple(PathPart(region, styles["engrave"]) for region in regions if region)
     return {
         "engrave": Motif(engraved, pictures),
-        "score": Motif((Part(scored, styles["score"]),) if scored else ()),
+        "score": Motif((PathPart(scored, styles["score"]),) if scored else ()),
     }

@@ -11,7 +11,7 @@ from orbiflow.settings import (
     PAGES,
     Colour,
     DefaultText,
-    Group,
+    HelpHeading,
     Hidden,
     Length,
     LengthOrZero,
@@ -27,7 +27,7 @@ from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import MARKS_EDGE, ColourRule, PageSettings, usual_tolerance
 from orbiflow.tiles.write import SceneFormat
 
-PIECES = Group("Pieces")
+PIECES = HelpHeading("Pieces")
 FINE = 0.01  # in mm: a step of a machine
 WRAPPED = ("mug", "phone")  # pages that things are wrapped in, and so without an edge
 PRINTER_EDGE = 5.0  # width in mm of the page's edge that printers at home leave empty

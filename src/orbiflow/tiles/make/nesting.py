@@ -23,24 +23,24 @@ from orbiflow.tiles.tilings import Tiling
 
 
 @dataclass(frozen=True, eq=False)
-class Arrangement:
+class Nesting:
     """An arrangement of pieces, A of them in each cell of a lattice."""
 
     lattice: Array  # the basis vectors in mm, as columns (2, 2)
     linear: Array  # how each piece of a cell is turned or mirrored (A, 2, 2)
     offsets: Array  # where each piece is (A, 2): a point p of the piece goes to linear p + offset
 
-    def scaled(self, stretch: Array, middle: Array) -> Arrangement:
+    def scaled(self, stretch: Array, middle: Array) -> Nesting:
         """Return the arrangement with the pieces' middles moved by the linear map `stretch` (2, 2)."""
         centers = self.linear @ middle + self.offsets
-        return Arrangement(
+        return Nesting(
             stretch @ self.lattice, self.linear, self.offsets + centers @ (stretch - np.eye(2)).T
         )
 
-    def turned(self, angle: float) -> Arrangement:
+    def turned(self, angle: float) -> Nesting:
         """Return the arrangement turned about the origin by an angle in radians."""
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        return Arrangement(turn @ self.lattice, turn @ self.linear, self.offsets @ turn.T)
+        return Nesting(turn @ self.lattice, turn @ self.linear, self.offsets @ turn.T)
 
     @cached_property
     def cell_area(self) -> float:
@@ -79,11 +79,11 @@ class Arrangement:
 MOST_SPREAD = 4.0  # how far apart pieces are moved at most, in their distances
 
 
-def tightened(start: Arrangement, ring: Array, gap: float) -> Arrangement:
+def tightened(start: Nesting, ring: Array, gap: float) -> Nesting:
     """Move the pieces' middles evenly, apart or together, until the pieces are just clear."""
     middle = _middle(ring)
 
-    def spread(factor: float) -> Arrangement:
+    def spread(factor: float) -> Nesting:
         return start.scaled(factor * np.eye(2), middle)
 
     low, high = 0.0, 1.0
@@ -113,12 +113,12 @@ PAIRS = 24  # places of the turned piece of a pair that are tried
 KEPT_LATTICES = 3  # number of best lattices that are then tightened exactly
 
 
-def raster_starts(ring: Array, gap: float) -> list[Arrangement]:
+def raster_starts(ring: Array, gap: float) -> list[Nesting]:
     """Return dense lattices, to the raster's precision, of the piece and of pairs of opposite ones."""
     raster = _Raster(ring, gap)
     still, center = np.eye(2), raster.center
     single = [
-        Arrangement(lattice, still[None], np.zeros((1, 2)))
+        Nesting(lattice, still[None], np.zeros((1, 2)))
         for _, lattice in raster.lattices(raster.same, 1)[:KEPT_LATTICES]
     ]
     found = []
@@ -132,7 +132,7 @@ def raster_starts(ring: Array, gap: float) -> list[Arrangement]:
     turns = np.stack([still, -still])
     return single + [
         # q = c - (p - c) + w in the raster's frame, whose origin is the piece's centre c
-        Arrangement(lattice, turns, np.stack([np.zeros(2), 2 * center + place * raster.cell]))
+        Nesting(lattice, turns, np.stack([np.zeros(2), 2 * center + place * raster.cell]))
         for _, lattice, place in found[:KEPT_LATTICES]
     ]
 
@@ -205,7 +205,7 @@ KEPT = 4  # number of densest arrangements that are tried on a sheet
 ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 
-def dense_arrangements(tiling: Tiling, ring: Array, gap: float) -> list[Arrangement]:
+def dense_arrangements(tiling: Tiling, ring: Array, gap: float) -> list[Nesting]:
     """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first."""
     group = tiling.group
     own = group.lattice, group.linear_parts, group.translations
@@ -214,15 +214,13 @@ def dense_arrangements(tiling: Tiling, ring: Array, gap: float) -> list[Arrangem
 
 
 @lru_cache(maxsize=8)  # a preview asks again for each setting that changes
-def _dense(
-    shapes: tuple[Any, ...], parts: tuple[bytes, ...], gap: float
-) -> tuple[Arrangement, ...]:
+def _dense(shapes: tuple[Any, ...], parts: tuple[bytes, ...], gap: float) -> tuple[Nesting, ...]:
     *own, ring = (
         np.frombuffer(part).reshape(shape) for part, shape in zip(parts, shapes, strict=True)
     )
     rng = np.random.default_rng(0)
     coarse = _simplified(ring, gap)
-    starts = [Arrangement(*own), *raster_starts(coarse, gap)]
+    starts = [Nesting(*own), *raster_starts(coarse, gap)]
     tight = sorted((tightened(start, coarse, gap) for start in starts), key=attrgetter("cell_area"))
     clear = [found for found in tight if found.clear(ring, gap)]
     improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]
@@ -240,12 +238,12 @@ def _simplified(ring: Array, gap: float) -> Array:
     return shapely.get_coordinates(shapely.get_exterior_ring(polygon.simplify(0.8 * slack)))[:-1]
 
 
-def _improved(start: Arrangement, ring: Array, gap: float, rng: np.random.Generator) -> Arrangement:
+def _improved(start: Nesting, ring: Array, gap: float, rng: np.random.Generator) -> Nesting:
     best, size = start, 0.04
     extent = float(np.ptp(ring, axis=0).max())
     for _ in range(TRIALS):
         stretch = np.eye(2) + size * rng.normal(size=(2, 2))
-        moved = Arrangement(
+        moved = Nesting(
             stretch @ best.lattice,
             best.linear,
             best.offsets @ stretch.T + 0.3 * size * extent * rng.normal(size=best.offsets.shape),
@@ -261,7 +259,7 @@ def _improved(start: Arrangement, ring: Array, gap: float, rng: np.random.Genera
     return best
 
 
-def on_sheet(arrangements: Sequence[Arrangement], ring: Array, width: float, height: float) -> Uses:
+def on_sheet(arrangements: Sequence[Nesting], ring: Array, width: float, height: float) -> Uses:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top."""
     best = Uses("piece", np.eye(2)[None], np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
@@ -277,7 +275,7 @@ def on_sheet(arrangements: Sequence[Arrangement], ring: Array, width: float, hei
     return best
 
 
-def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
+def _angles(arrangement: Nesting, ring: Array) -> list[float]:
     box = shapely.get_coordinates(shapely.oriented_envelope(shapely.MultiPoint(ring)))
     sides = [*arrangement.lattice.T, box[1] - box[0]]
     along = [-np.arctan2(y, x) + turn for x, y in sides for turn in (0, np.pi / 2)]
@@ -286,7 +284,7 @@ def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
 
 
 def _within(
-    turned: Arrangement, low: Array, high: Array, shift: Array, width: float, height: float
+    turned: Nesting, low: Array, high: Array, shift: Array, width: float, height: float
 ) -> Uses:
     inverse = np.linalg.inv(turned.lattice)
     corners = np.array([[x, y] for x in (0, width) for y in (0, height)])

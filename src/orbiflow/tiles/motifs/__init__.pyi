@@ -1,5 +1,5 @@
+from .carried import CarriedPicture as CarriedPicture
 from .carried import Over as Over
-from .carried import Picture as Picture
 from .carried import carried_places as carried_places
 from .carried import carried_raster as carried_raster
 from .carried import drawn_motif as drawn_motif
@@ -10,7 +10,7 @@ from .carried import read_overs as read_overs
 from .carried import require_figures as require_figures
 from .carried import with_map as with_map
 from .on_figures import TEXELS_PER_PIXEL as TEXELS_PER_PIXEL
-from .on_figures import Worn as Worn
+from .on_figures import FigurePictures as FigurePictures
 from .on_figures import figure_paint as figure_paint
 from .on_figures import worn as worn
 from .page_pictures import page_picture as page_picture

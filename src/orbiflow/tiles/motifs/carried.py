@@ -25,7 +25,7 @@ from orbiflow.tiles.geometry import polygons_in, triangle_sides
 from orbiflow.tiles.motifs.engraving import engraved, eye
 from orbiflow.tiles.motifs.raster import Grid, Paint, bilinear, inside_ring, region_sides, runs
 from orbiflow.tiles.motifs.settings import MotifSettings
-from orbiflow.tiles.page import INK, Curve, Motif, Part, Raster, Style, boundary
+from orbiflow.tiles.page import INK, Curve, Motif, PathPart, Raster, Style, boundary
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.silhouette import (
     Covered,
@@ -44,7 +44,7 @@ from orbiflow.tiles.silhouette import (
 )
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tile_map import TileMap
-from orbiflow.tiles.write import Sheet, painted, shape_of
+from orbiflow.tiles.write import PixelSheet, painted, shape_of
 
 
 def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
@@ -112,14 +112,14 @@ THIN = 4.0
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class CarriedPicture:
     """A picture of the silhouette."""
 
     image: Image.Image  # the image: RGBA, straight, 8 bits
     covered: Covered  # the rectangle that it covers in the silhouette's coordinates
     notes: tuple[str, ...] = ()  # what was decided for the user
 
-    def reduced(self, pixel: float) -> Picture:
+    def reduced(self, pixel: float) -> CarriedPicture:
         """Return the picture averaged to pixels no smaller than `pixel` in the silhouette's units."""
         area = (self.covered.high - self.covered.low).prod()
         share = float(np.sqrt(area / (self.image.width * self.image.height))) / pixel
@@ -129,10 +129,10 @@ class Picture:
         # averaged with their opacity, for transparent pixels have no colour
         premultiplied = self.image.convert("RGBa")
         small = premultiplied.resize((size[0], size[1]), Image.Resampling.BOX, reducing_gap=3.0)
-        return Picture(small.convert("RGBA"), self.covered, self.notes)
+        return CarriedPicture(small.convert("RGBA"), self.covered, self.notes)
 
 
-def read_picture(path: Path, tile: EscherTile) -> Picture:
+def read_picture(path: Path, tile: EscherTile) -> CarriedPicture:
     """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
     image, notes = open_image(path)
     image, covered = image.convert("RGBA"), tile.covered
@@ -144,10 +144,10 @@ def read_picture(path: Path, tile: EscherTile) -> Picture:
             f"laid the picture ({width} x {height} pixels) over {covered.name} "
             f"({wide:.6g} x {high:.6g})"
         )
-    return Picture(image, covered, tuple(notes))
+    return CarriedPicture(image, covered, tuple(notes))
 
 
-def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Array, Array]:
+def carried_picture(picture: CarriedPicture, tile: EscherTile, grid: Grid) -> tuple[Array, Array]:
     """Carry a picture onto a tile's raster; its colours extend a little beyond the outline.
 
     Returns colours (height, width, 3) times their opacity, and the opacity (height, width).
@@ -231,7 +231,7 @@ def read_drawing(
     drawing = Drawing(path)
     carry = _Carry(path, drawing, tile, widest)
     regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
-    parts: list[Part] = []
+    parts: list[PathPart] = []
     for shape in drawing.shapes:
         try:
             parts += parts_of(shape, regions, carry)
@@ -290,7 +290,7 @@ class Carry(Protocol):
         ...
 
 
-def parts_of(shape: DrawnShape, regions: Regions, carry: Carry) -> list[Part]:
+def parts_of(shape: DrawnShape, regions: Regions, carry: Carry) -> list[PathPart]:
     """Return what is filled and stroked of a shape, carried.
 
     Raises `InputFileError` for a shape that reaches too far.
@@ -302,7 +302,7 @@ def parts_of(shape: DrawnShape, regions: Regions, carry: Carry) -> list[Part]:
         raise InputFileError(
             f"{drawing.path}: a path reaches much too far beyond the page; delete or shorten it"
         )
-    found: list[Part] = []
+    found: list[PathPart] = []
     for kind, paint in painted.items():
         width = shape.width * shape.scale
         line = kind == "stroke" and (width <= carry.widest or shape.keeps_its_width)
@@ -314,7 +314,7 @@ def parts_of(shape: DrawnShape, regions: Regions, carry: Carry) -> list[Part]:
             region, (colour, opacity, _), _ = regions.layer(shape, kind, paint)
             style, curves = Style(colour), _area(region, carry)
         if curves:
-            found.append(Part(tuple(curves), style, opacity))
+            found.append(PathPart(tuple(curves), style, opacity))
     return found
 
 
@@ -339,7 +339,7 @@ def _line(carry: Carry, points: Array, path: SubPath) -> Curve:
 class Over(NamedTuple):
     """What lies over the silhouette, a picture or a drawing; and what was decided for the user."""
 
-    picture: Picture | None = None
+    picture: CarriedPicture | None = None
     drawing: Motif | None = None
     notes: tuple[str, ...] = ()
 
@@ -396,13 +396,13 @@ def paint_motif(paint: Paint, motif: Motif) -> None:
             paint.lay(canvas[..., :3] * alpha[..., None], alpha)
 
 
-def _canvas(parts: list[Part], grid: Grid) -> Array:
+def _canvas(parts: list[PathPart], grid: Grid) -> Array:
     """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
     shapes = []
     for part in parts:
         fill, stroke = ("#000000" if colour == INK else colour for colour in part.style[:2])
         shapes.append(shape_of(part._replace(style=Style(fill, stroke, part.style.width))))
-    drawn = painted([Sheet(tuple(shapes))], (grid.width, grid.height))
+    drawn = painted([PixelSheet(tuple(shapes))], (grid.width, grid.height))
     return np.asarray(drawn, dtype=np.float32) / 255
 
 
@@ -428,7 +428,7 @@ def drawn_motif(
 
 
 def picture_paint(
-    picture: Picture | None, tile: EscherTile, density: float, colours: int = 1
+    picture: CarriedPicture | None, tile: EscherTile, density: float, colours: int = 1
 ) -> Paint:
     """Paint a tile's raster of `density` texels along its unit with a picture alone."""
     polygon = tile.tile.polygon
@@ -439,7 +439,9 @@ def picture_paint(
     return paint
 
 
-def carried_raster(picture: Picture, tile: EscherTile, density: float, colours: int = 1) -> Raster:
+def carried_raster(
+    picture: CarriedPicture, tile: EscherTile, density: float, colours: int = 1
+) -> Raster:
     """Return a picture carried onto a tile, in its units, with `density` pixels along one."""
     paint = picture_paint(picture, tile, density, colours)
     values, grid = paint.values, paint.grid

@@ -22,7 +22,7 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.motifs.raster import Grid
 from orbiflow.tiles.motifs.settings import Strokes
-from orbiflow.tiles.page import INK, Curve, Part, Style
+from orbiflow.tiles.page import INK, Curve, PathPart, Style
 from orbiflow.tiles.silhouette import outside
 from orbiflow.tiles.tile import EscherTile
 
@@ -32,7 +32,7 @@ LIGHT = np.array([-0.6, -0.8])
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class TileDepths:
     """A tile at area 1 with y down, and how deep places in it lie."""
 
     ring: Array  # the outline (N, 2)
@@ -119,7 +119,7 @@ class Eye(NamedTuple):
 
     middle: Array
     radius: float
-    parts: tuple[Part, ...]
+    parts: tuple[PathPart, ...]
 
 
 def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
@@ -145,9 +145,9 @@ def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     light = middle + radius * np.array([spot.real, spot.imag]) * 0.9
     edge = Style(palette.paper, palette.outline, 0.2 * radius)
     parts = (
-        Part((_circle(middle, radius),), edge),
-        Part((_circle(middle, 0.58 * radius),), Style(palette.outline)),
-        Part((_circle(light, 0.2 * radius),), Style(palette.paper)),
+        PathPart((_circle(middle, radius),), edge),
+        PathPart((_circle(middle, 0.58 * radius),), Style(palette.outline)),
+        PathPart((_circle(light, 0.2 * radius),), Style(palette.paper)),
     )
     return Eye(middle, radius, parts)
 
@@ -160,12 +160,12 @@ def _circle(middle: Array, radius: float) -> Curve:
 
 def engraved(
     tile: EscherTile, strokes: Strokes, around: Sequence[Eye] = (), *, hairlines: bool = False
-) -> tuple[Part, ...]:
+) -> tuple[PathPart, ...]:
     """Return lines of one kind, clear of eyes, thin in the light and deep inside, or without width."""
     polygon = tile.tile.polygon
     size = float(np.sqrt(abs(tile.tile.signed_area)))
     flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
-    body = Body(polygon * flip / size)
+    body = TileDepths(polygon * flip / size)
     rings = {"hatch": _hatch, "echoes": _echoes, "feathers": _feathers}[strokes](body)
     rings = [ring * flip * size for ring in rings]
     for eye in around:
@@ -173,11 +173,11 @@ def engraved(
         rings = [ring for ring in rings if np.hypot(*(ring - eye.middle).T).min() > far]
     if hairlines:  # a ring runs along one side of its line and back along the other
         middles = [(ring + ring[::-1])[: len(ring) // 2] / 2 for ring in rings]
-        return (Part(tuple(map(Curve.polyline, middles)), Style(None, INK)),)
-    return (Part(tuple(Curve.polyline(ring, closed=True) for ring in rings), Style(INK)),)
+        return (PathPart(tuple(map(Curve.polyline, middles)), Style(None, INK)),)
+    return (PathPart(tuple(Curve.polyline(ring, closed=True) for ring in rings), Style(INK)),)
 
 
-def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
+def _hatch(body: TileDepths, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
     """Return ticks inwards from the outline as on a woodcut: long in the shade, up to `reach`."""
     count = int(arc_lengths(body.ring)[-1] / spacing)
     points = resampled(body.ring, count)
@@ -212,7 +212,7 @@ def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Arra
     return found
 
 
-def _echoes(body: Body) -> list[Array]:
+def _echoes(body: TileDepths) -> list[Array]:
     """Return the outline repeated inwards, thick in the shade and fading in the light."""
     found: list[Array] = []
     shape = shapely.Polygon(body.ring)
@@ -225,7 +225,7 @@ def _echoes(body: Body) -> list[Array]:
     return found
 
 
-def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
+def _echo(body: TileDepths, part: shapely.Polygon, depth: float) -> list[Array]:
     ring = shapely.get_coordinates(part.exterior)[:-1]
     total = arc_lengths(ring)[-1] if len(ring) > 2 else 0.0
     if total < 0.12:
@@ -242,7 +242,7 @@ def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
     return [stroke(points[own], width[own]) for own in arcs]
 
 
-def _feathers(body: Body) -> list[Array]:
+def _feathers(body: TileDepths) -> list[Array]:
     """Return rows of scallops that follow the body from one end to the other."""
     found = []
     axis = body.axis
@@ -257,7 +257,7 @@ def _feathers(body: Body) -> list[Array]:
     return found + _hatch(body, reach=0.035, spacing=0.022)
 
 
-def _scallop(body: Body, point: Array, size: float) -> list[Array]:
+def _scallop(body: TileDepths, point: Array, size: float) -> list[Array]:
     depth = float(body.depth(point))
     if depth < 0.02:
         return []

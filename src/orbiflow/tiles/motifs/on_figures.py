@@ -7,7 +7,13 @@ from itertools import zip_longest
 from typing import NamedTuple
 
 from orbiflow.drawing import Palette
-from orbiflow.tiles.motifs.carried import Over, Picture, drawn_motif, paint_motif, picture_paint
+from orbiflow.tiles.motifs.carried import (
+    CarriedPicture,
+    Over,
+    drawn_motif,
+    paint_motif,
+    picture_paint,
+)
 from orbiflow.tiles.motifs.raster import Paint
 from orbiflow.tiles.motifs.settings import MotifSettings
 from orbiflow.tiles.page import Motif
@@ -17,7 +23,7 @@ TEXELS_PER_PIXEL = 1.5
 """Texels of a figure's raster along a pixel of what is drawn."""
 
 
-class Worn(NamedTuple):
+class FigurePictures(NamedTuple):
     """What lies on the figures of a tile.
 
     - `pictures`: The picture over the silhouette of each figure, or None.
@@ -26,7 +32,7 @@ class Worn(NamedTuple):
     - `notes`: What the user should know of it.
     """
 
-    pictures: tuple[Picture | None, ...]
+    pictures: tuple[CarriedPicture | None, ...]
     motifs: tuple[Motif, ...]
     tint: float
     notes: tuple[str, ...]
@@ -38,7 +44,7 @@ def worn(
     palette: Palette,
     overs: Sequence[Over | None],
     tint: float,
-) -> Worn:
+) -> FigurePictures:
     """Return what lies on a tile with a map; `overs` are as `read_over` returns them.
 
     Raises:
@@ -54,7 +60,7 @@ def worn(
         drawn_motif(figure, settings.of_figure(number), palette, over.drawing)
         for number, (over, figure) in enumerate(zip(known, figures, strict=True))
     )
-    return Worn(
+    return FigurePictures(
         tuple(over.picture for over in known),
         motifs,
         tint * any(over.picture or over.drawing for over in known),
@@ -63,7 +69,7 @@ def worn(
 
 
 def figure_paint(
-    picture: Picture | None, motif: Motif, figure: EscherTile, density: float, colours: int
+    picture: CarriedPicture | None, motif: Motif, figure: EscherTile, density: float, colours: int
 ) -> Paint:
     """Paint a figure's raster, of `density` texels along its unit, with all that lies on it."""
     paint = picture_paint(picture, figure, density, colours)

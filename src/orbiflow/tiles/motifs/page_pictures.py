@@ -18,7 +18,7 @@ from orbiflow.tiles.silhouette import (
     TooManyPoints,
     TooTangled,
 )
-from orbiflow.tiles.write import Sheet, painted, shape_of
+from orbiflow.tiles.write import PixelSheet, painted, shape_of
 
 FLATNESS_PIXELS = 0.2  # greatest distance of flattened curves from the drawing's, in pixels
 MAX_POINTS = 400_000
@@ -60,5 +60,5 @@ def page_picture(content: FileContent, covered: Covered, size: tuple[int, int]) 
         parts = [part for shape in drawing.shapes for part in parts_of(shape, regions, laid)]
     except (TooManyPoints, TooTangled, GEOSException, shapely.GEOSException) as error:
         raise InputFileError(f"{content}: too intricate to be drawn; simplify it") from error
-    sheet = Sheet(tuple(shape_of(part) for part in parts))
+    sheet = PixelSheet(tuple(shape_of(part) for part in parts))
     return painted([sheet], size, ground=drawing.ground)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.settings import Group, Option, Parsed, Range, Repeated, Settings
+from orbiflow.settings import HelpHeading, Option, Parsed, Range, Repeated, Settings
 
 Strokes: TypeAlias = Literal["hatch", "echoes", "feathers"]
 
@@ -24,7 +24,7 @@ def eye_numbers(text: str) -> tuple[float, ...]:
 
 
 Eye: TypeAlias = Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")]
-ON_TILE = Group("On the tile")
+ON_TILE = HelpHeading("On the tile")
 
 
 class TintSettings(Settings):

@@ -20,7 +20,7 @@ from orbiflow.tiles.motifs import Over
 from orbiflow.tiles.motion.morph import Morph
 from orbiflow.tiles.motion.own_frame import OwnFrame
 from orbiflow.tiles.motion.settings import AnimationSettings
-from orbiflow.tiles.motion.skins import Body, Dress
+from orbiflow.tiles.motion.skins import BendingFigure, Dress
 from orbiflow.tiles.page import Page, Style, edge_margin, tiling_size
 from orbiflow.tiles.silhouette import Bending
 from orbiflow.tiles.tile import EscherTile
@@ -34,7 +34,7 @@ class Places(NamedTuple):
     offset: Array
 
 
-class Seen(NamedTuple):
+class SeenCopy(NamedTuple):
     """A copy that is seen in a frame: its points p lie at `linear` p + `offset`, in pixels."""
 
     ring: Array  # (N, 2)
@@ -75,14 +75,14 @@ class Motion:
         start, end = self.births.T
         return eased(np.clip((progress - start) / (end - start), 0, 1))
 
-    def seen(self, progress: float) -> Iterator[Seen]:
+    def seen(self, progress: float) -> Iterator[SeenCopy]:
         """Yield every visible copy: those that grow, and above them the whole ones."""
         outlines, (linear, offset) = self.outlines(progress), self.places(progress)
         size = self.grown(progress)
         for k in (*np.flatnonzero((size > 0) & (size < 1)), *np.flatnonzero(size == 1)):
             kind, by = int(self.kinds[k]), size[k] * linear[k]
             ring, whole = outlines[kind] @ by.T + offset[k], bool(size[k] == 1)
-            yield Seen(ring, kind, int(self.colours[k]), whole, by, offset[k])
+            yield SeenCopy(ring, kind, int(self.colours[k]), whole, by, offset[k])
 
 
 OUTLINE = 0.0016  # width of outlines, as a share of the page's, where none is given
@@ -136,7 +136,7 @@ def _window(page: Page, linear: Array) -> Window:
 
 
 def morph(
-    given: EscherTile, page: Page, bodies: Sequence[Body] = (), *, steady: bool = False
+    given: EscherTile, page: Page, bodies: Sequence[BendingFigure] = (), *, steady: bool = False
 ) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
@@ -188,7 +188,7 @@ def morph(
     )
 
 
-def grow(given: EscherTile, page: Page, bodies: Sequence[Body] = ()) -> Motion:
+def grow(given: EscherTile, page: Page, bodies: Sequence[BendingFigure] = ()) -> Motion:
     """Return one tile, with all of its figures, and the tiling growing around it, nearest first."""
     outlines = [own.polygon - own.center for own in page.tiling.prototiles]
     still = [

@@ -34,7 +34,7 @@ from orbiflow.tiles.silhouette import triangulate
 
 
 @dataclass(frozen=True, eq=False)
-class Orbits:
+class VertexOrbits:
     """The orbits of N vertices: vertex i lies at linear[i] p + shift[i], with p vertex `source[i]`."""
 
     source: NDArray[np.int64]  # the number (N,) of a vertex that is its own source
@@ -43,7 +43,7 @@ class Orbits:
     fixed: NDArray[np.bool_]  # whether (N,) the vertex lies on a centre of rotation and cannot move
 
     @classmethod
-    def of(cls, own: OwnFrame) -> Orbits:
+    def of(cls, own: OwnFrame) -> VertexOrbits:
         """Return the orbits of a polygon's vertices."""
         links = _links(own)
         count = len(own.points)
@@ -69,10 +69,10 @@ class Orbits:
         shift = np.stack([element.translation for element in found])
         return cls(source, linear, shift, fixed)
 
-    def with_inner(self, count: int) -> Orbits:
+    def with_inner(self, count: int) -> VertexOrbits:
         """Return the orbits with `count` more vertices, each its own source."""
         n = len(self.source)
-        return Orbits(
+        return VertexOrbits(
             np.concatenate([self.source, np.arange(n, n + count)]),
             np.concatenate([self.linear, np.broadcast_to(np.eye(2), (count, 2, 2))]),
             np.concatenate([self.shift, np.zeros((count, 2))]),
@@ -198,7 +198,7 @@ class _Weights:
     """The weights of template and tile, from which places between them are solved for."""
 
     own: OwnFrame  # with as many vertices as the triangles need; they are the first n points
-    orbits: Orbits  # the orbits of all points
+    orbits: VertexOrbits  # the orbits of all points
     sides: NDArray[np.int64]  # each side (E, 2) of a triangle, from either end
     first: Array  # with `last`: weights (E,) of template and tile, which add up to 1 for each orbit
     last: Array
@@ -220,7 +220,7 @@ class _Weights:
             own = own.refined(set(mesh.sides.tolist()))
         else:
             raise OrbiflowError("the tile is too thin somewhere to be animated")
-        orbits = Orbits.of(own).with_inner(len(mesh.points) - mesh.size)
+        orbits = VertexOrbits.of(own).with_inner(len(mesh.points) - mesh.size)
         pairs = [(a, b) for a in range(3) for b in range(3) if a != b]
         sides = np.unique(np.concatenate([mesh.triangles[:, pair] for pair in pairs]), axis=0)
         first, last = (
@@ -319,7 +319,7 @@ def _open_ways(own: OwnFrame) -> Array:
     return ways[sizes < 1e-6]
 
 
-def _sums(weights: Array, sides: NDArray[np.int64], orbits: Orbits) -> Array:
+def _sums(weights: Array, sides: NDArray[np.int64], orbits: VertexOrbits) -> Array:
     """Return for each side (E,) the sum of the weights over all sides at the same orbit."""
     own = orbits.source[sides[:, 0]]
     return np.bincount(own, weights, minlength=len(orbits.source))[own]

@@ -34,14 +34,14 @@ from orbiflow.tiles.tile import EscherTile
 STILL = 1e-9  # pixels by which a body moves that has not moved
 
 
-class Body(NamedTuple):
+class BendingFigure(NamedTuple):
     """What of a figure bends: points (V, 2) of the tile, in its figure's units, and triangles."""
 
     points: Array
     triangles: Integers
 
     @classmethod
-    def of(cls, figure: EscherTile) -> Body:
+    def of(cls, figure: EscherTile) -> BendingFigure:
         """Return the body of a silhouette that bends, or else of the tile as it is."""
         if figure.bending is not None and figure.frame is not None:
             return cls(figure.frame.to_input(figure.bending.images), figure.bending.triangles)
@@ -52,7 +52,7 @@ class Body(NamedTuple):
 class Skin:
     """What lies on a figure, in each colour that its copies have."""
 
-    def __init__(self, body: Body, grid: Grid, colours: Array) -> None:
+    def __init__(self, body: BendingFigure, grid: Grid, colours: Array) -> None:
         self._triangles, self._colours = body.triangles, colours
         self._places = grid.texels(body.points)
         self._at, self._bent = np.zeros((0, 2)), list[Image.Image]()
@@ -93,7 +93,7 @@ class Skin:
 class Dress:
     """Skins of a tile's figures; `bodies` are in their units."""
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[BendingFigure, ...]
     skins: tuple[Skin, ...]
 
     @classmethod
@@ -108,10 +108,10 @@ class Dress:
     ) -> Dress:
         """Paint all that lies on a tile's figures, whose units lie at `places`, in so many colours."""
         on = worn(tile, settings, shaded, overs, settings.tint)
-        bodies, skins = list[Body](), list[Skin]()
+        bodies, skins = list[BendingFigure](), list[Skin]()
         own = zip(on.pictures, on.motifs, tile.figures, places, strict=True)
         for picture, motif, part, place in own:
-            density, body = TEXELS_PER_PIXEL * place.scale, Body.of(part.figure)
+            density, body = TEXELS_PER_PIXEL * place.scale, BendingFigure.of(part.figure)
             paint = figure_paint(picture, motif, part.figure, density, count)
             bodies.append(body)
             skins.append(Skin(body, paint.grid, paint.coloured(shaded, count, on.tint)))

@@ -23,10 +23,10 @@ from orbiflow.tiles.motifs import Over
 from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Motion, Places, eased, frames, motion
 from orbiflow.tiles.motion.settings import AnimationSettings
 from orbiflow.tiles.motion.skins import dressed, lay_skin
-from orbiflow.tiles.page import Curve, Layer, Part, Scene, Style, rectangle, symbol_of
+from orbiflow.tiles.page import Curve, Layer, PathPart, Scene, Style, rectangle, symbol_of
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import TileSource
-from orbiflow.tiles.write import Numbers, Sheet, painted, scene_image, shape_of
+from orbiflow.tiles.write import Numbers, PixelSheet, painted, scene_image, shape_of
 
 GIF_COLOURS = 128  # of all frames of a GIF that shows pictures
 
@@ -58,13 +58,13 @@ def animation(
 def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
     """Return one frame as a scene in pixels, in plain colours: growing tiles below the whole ones."""
     page, seen = motion.page, list(motion.seen(progress))
-    parts = [Part((rectangle(page.box),), Style(chosen.paper))]
+    parts = [PathPart((rectangle(page.box),), Style(chosen.paper))]
     growing = [[own] for own in seen if not own.whole]
     for layer in (*growing, [own for own in seen if own.whole]):
         curves = [Curve.polyline(own.ring, closed=True) for own in layer]
         fills = (Style(chosen.fill(own.colour)) for own in layer)
-        parts += [Part((curve,), fill) for curve, fill in zip(curves, fills, strict=True)]
-        parts += [Part((curve,), motion.line) for curve in curves if motion.line.width]
+        parts += [PathPart((curve,), fill) for curve, fill in zip(curves, fills, strict=True)]
+        parts += [PathPart((curve,), motion.line) for curve in curves if motion.line.width]
     return Scene(*page.size, (Layer("frame", "tiles", Style(), tuple(parts)),))
 
 
@@ -97,8 +97,8 @@ def _draw_outlines(picture: Image.Image, rings: Sequence[Array], line: Style) ->
     if (high <= low).any():
         return
     curves = (Curve.polyline(ring - low, closed=True) for ring in rings)
-    shapes = tuple(shape_of(Part((curve,), line)) for curve in curves)
-    drawn = painted([Sheet(shapes)], (int(high[0] - low[0]), int(high[1] - low[1])))
+    shapes = tuple(shape_of(PathPart((curve,), line)) for curve in curves)
+    drawn = painted([PixelSheet(shapes)], (int(high[0] - low[0]), int(high[1] - low[1])))
     picture.paste(drawn, (int(low[0]), int(low[1])), drawn)
 
 

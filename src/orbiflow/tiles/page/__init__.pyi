@@ -28,7 +28,7 @@ from .scene import Curve as Curve
 from .scene import Item as Item
 from .scene import Layer as Layer
 from .scene import Motif as Motif
-from .scene import Part as Part
+from .scene import PathPart as PathPart
 from .scene import PlacedTile as PlacedTile
 from .scene import Raster as Raster
 from .scene import Scene as Scene

@@ -20,7 +20,7 @@ from orbiflow.tiles.page.scene import (
     Item,
     Layer,
     Motif,
-    Part,
+    PathPart,
     Raster,
     Scene,
     Style,
@@ -91,7 +91,7 @@ def cut_off(motif: Motif, area: shapely.Polygon, *, whole_strokes: bool = True) 
     return Motif(tuple(parts), tuple(_masked(raster, area) for raster in motif.rasters))
 
 
-def _cut_off(part: Part, area: shapely.Polygon, whole_strokes: bool) -> Iterator[Part]:
+def _cut_off(part: PathPart, area: shapely.Polygon, whole_strokes: bool) -> Iterator[PathPart]:
     lines, style = lines_of(part), part.style
     if area.covers(lines) and (whole_strokes or not style.stroke):
         yield part
@@ -109,7 +109,7 @@ def _cut_off(part: Part, area: shapely.Polygon, whole_strokes: bool) -> Iterator
 FINE = 1e-3  # distance in mm of points on a motif's curves from these, which are mostly polylines
 
 
-def lines_of(part: Part) -> BaseGeometry:
+def lines_of(part: PathPart) -> BaseGeometry:
     """Return the curves of a part as lines."""
     rings = [curve.flattened(FINE) for curve in part.curves]
     return shapely.MultiLineString(
@@ -120,7 +120,7 @@ def lines_of(part: Part) -> BaseGeometry:
     )
 
 
-def region_of(part: Part) -> BaseGeometry:
+def region_of(part: PathPart) -> BaseGeometry:
     """Return the region that a part fills."""
     return fill([curve.flattened(FINE) for curve in part.curves if curve.closed])
 

@@ -137,17 +137,17 @@ class Style(NamedTuple):
     width: float = 0.0
 
 
-class Part(NamedTuple):
+class PathPart(NamedTuple):
     """Curves drawn as one."""
 
     curves: tuple[Curve, ...]  # the curves; closed ones are filled, holes run the other way
     style: Style  # fill and stroke, which may be `INK`
     opacity: float = 1.0  # a number from 0 to 1
 
-    def moved(self, linear: Array, offset: Array) -> Part:
+    def moved(self, linear: Array, offset: Array) -> PathPart:
         """Return the image under a map p -> linear p + offset."""
         scale = float(np.sqrt(abs(np.linalg.det(linear))))
-        return Part(
+        return PathPart(
             tuple(curve.moved(linear, offset) for curve in self.curves),
             self.style._replace(width=self.style.width * scale),
             self.opacity,
@@ -187,7 +187,7 @@ class Words(NamedTuple):
 class Motif:
     """A drawing of many parts that every copy of a tile carries."""
 
-    parts: tuple[Part, ...] = ()  # what is drawn, from the bottom up
+    parts: tuple[PathPart, ...] = ()  # what is drawn, from the bottom up
     rasters: tuple[Raster, ...] = ()  # pictures of pixels under the parts
     within: str | None = None  # the name of the symbol that cuts the drawing off, if any
 
@@ -234,7 +234,7 @@ class Uses:
             yield Curve(pieces, curve.straight, curve.closed)
 
 
-Item = Curve | Uses | Part | Raster | Words
+Item = Curve | Uses | PathPart | Raster | Words
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +302,7 @@ class Scene:
         for item in layer.items:
             if isinstance(item, Uses):
                 yield from item.curves(self.symbols[item.symbol])
-            elif isinstance(item, Part):
+            elif isinstance(item, PathPart):
                 yield from item.curves
             elif isinstance(item, Curve):
                 yield item

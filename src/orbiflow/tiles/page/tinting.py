@@ -10,7 +10,7 @@ from PIL import Image
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import png_bytes, rgb
-from orbiflow.tiles.page.scene import INK, Motif, Part, Raster
+from orbiflow.tiles.page.scene import INK, Motif, PathPart, Raster
 
 
 def glass(colour: str, tint: float) -> Array:
@@ -30,7 +30,7 @@ def tinted(motif: Motif, through: Array) -> Motif:
             return colour
         return "#" + "".join(f"{round(v):02x}" for v in np.array(rgb(colour)) * through)
 
-    def part(own: Part) -> Part:
+    def part(own: PathPart) -> PathPart:
         style = own.style._replace(fill=seen(own.style.fill), stroke=seen(own.style.stroke))
         return own._replace(style=style)
 

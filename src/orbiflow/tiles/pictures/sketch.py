@@ -18,7 +18,7 @@ from orbiflow.tiles.page import (
     Curve,
     Item,
     Layer,
-    Part,
+    PathPart,
     Scene,
     Style,
     Words,
@@ -101,7 +101,7 @@ class Sketch:
         self.linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
         self.origin = np.array([window[0], window[1] if y_down else window[3]])
         self.items: list[Item] = [
-            Part((rectangle(Box(0.0, 0.0, self.width, self.height)),), Style(paper))
+            PathPart((rectangle(Box(0.0, 0.0, self.width, self.height)),), Style(paper))
         ]
 
     @classmethod
@@ -124,11 +124,11 @@ class Sketch:
         style = Style(colour, colour, HAIRLINE) if self.sheet.printed else Style(colour)
         if not isinstance(region, BaseGeometry):
             ring = region if on_page else self.on_page(region)
-            self.items.append(Part((Curve.polyline(ring, closed=True),), style))
+            self.items.append(PathPart((Curve.polyline(ring, closed=True),), style))
             return
         for polygon in polygons_in(region):
             moved = shapely.transform(polygon, self.on_page)
-            self.items.append(Part(boundary(moved), style))
+            self.items.append(PathPart(boundary(moved), style))
 
     def line(
         self,
@@ -150,7 +150,7 @@ class Sketch:
 
     def _stroke(self, curves: Sequence[Curve], colour: str, width: float) -> None:
         width = max(width, LEAST_LINE) if self.sheet.printed else width
-        self.items.append(Part(tuple(curves), Style(None, colour, width)))
+        self.items.append(PathPart(tuple(curves), Style(None, colour, width)))
 
     def arrow(self, start: Array, end: Array, colour: str, width: float) -> None:
         """Draw an arrow from a point (2,) of the plane to another, with its head at the end."""

@@ -1,8 +1,8 @@
 from .bent_map import carried_anew as carried_anew
 from .bent_map import carried_on as carried_on
 from .bent_map import matched as matched
-from .candidates import Candidates as Candidates
-from .candidates import Fit as Fit
+from .candidates import ClassCandidates as ClassCandidates
+from .candidates import ClassFinalists as ClassFinalists
 from .candidates import OnProgress as OnProgress
 from .candidates import Prototiles as Prototiles
 from .candidates import StillTiles as StillTiles

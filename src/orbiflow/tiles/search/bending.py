@@ -26,7 +26,7 @@ from orbiflow.tiles.likeness import (
     neck_factor,
     neck_up_to,
 )
-from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles
+from orbiflow.tiles.search.candidates import ClassFinalists, OnProgress, Prototiles, StillTiles
 from orbiflow.tiles.search.carving import BehindError, Carved, Race, carved
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
@@ -391,7 +391,7 @@ def fit_bending(
     per_class: int,
     progress: OnProgress,
     cancel: Cancel,
-) -> Fit:
+) -> ClassFinalists:
     """Fit tiles of one class to a target by letting the silhouette bend (design point 15).
 
     Each of so many phases is the silhouette and its mirror image.
@@ -411,7 +411,7 @@ def fit_bending(
         raise CertificationError("all tiles near the silhouette cross themselves")
     # one to spare, if one is not certified
     candidates = PlacedTiles(kind, target.normal, _best_first(found)[: enough + 1])
-    return Fit(candidates, settings.placements, dropped, enough)
+    return ClassFinalists(candidates, settings.placements, dropped, enough)
 
 
 class PlacedTiles(StillTiles):

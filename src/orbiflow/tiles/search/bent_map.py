@@ -26,7 +26,7 @@ from orbiflow.tiles.geometry import (
     signed_area,
 )
 from orbiflow.tiles.search.bending import Bent
-from orbiflow.tiles.silhouette import Bending, Mesh, harmonic, triangulate, unfolded
+from orbiflow.tiles.silhouette import Bending, SilhouetteMesh, harmonic, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
 
 SAME_PLACE = 1e-9  # distance along the outline, in outlines, below which points are one
@@ -65,8 +65,8 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
 
 
 def onto_polygon(
-    mesh: Mesh, images: Array, polygon: Array, corners: Integers, vertices: Integers
-) -> tuple[Mesh, Array]:
+    mesh: SilhouetteMesh, images: Array, polygon: Array, corners: Integers, vertices: Integers
+) -> tuple[SilhouetteMesh, Array]:
     """Move the outline's images, of `images` (N, 2), onto a polygon (Q, 2); return mesh and images.
 
     Vertices of the polygon become points of the mesh; points between two vertices are laid onto their
@@ -126,7 +126,7 @@ def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[
     return np.where(fresh, places, near), fresh
 
 
-def with_outline(mesh: Mesh, points: Array, outline: Array) -> Array:
+def with_outline(mesh: SilhouetteMesh, points: Array, outline: Array) -> Array:
     """Return a map's points (N, 2) with those of the outline moved a little, to `outline` (O, 2).
 
     All stay in place where the inside cannot follow without folds: behind hairs.
@@ -136,19 +136,19 @@ def with_outline(mesh: Mesh, points: Array, outline: Array) -> Array:
     return points
 
 
-def shares(mesh: Mesh) -> Array:
+def shares(mesh: SilhouetteMesh) -> Array:
     """Return where (O,) the points of a mesh's outline lie on it, in vertices from the first."""
     return np.concatenate([np.arange(mesh.size), mesh.sides + mesh.shares])
 
 
-def _unknown(mesh: Mesh, at: Array) -> Array:
+def _unknown(mesh: SilhouetteMesh, at: Array) -> Array:
     """Return the places (m,) on the outline, in vertices from the first, that are no points of it."""
     found = np.sort(at % mesh.size)
     found = found[_snapped(found, np.append(np.sort(shares(mesh)), mesh.size), 1.0)[1]]
     return found[np.diff(found, prepend=-1.0) > SAME_PLACE]
 
 
-def divided(mesh: Mesh, at: Array, images: Array) -> tuple[Mesh, Array]:
+def divided(mesh: SilhouetteMesh, at: Array, images: Array) -> tuple[SilhouetteMesh, Array]:
     """Return a mesh with new points on its outline, and its `images` (N, 2) extended linearly.
 
     The points lie at `at` (m,), in vertices from the first. Where several divide the side of one
@@ -185,7 +185,9 @@ def divided(mesh: Mesh, at: Array, images: Array) -> tuple[Mesh, Array]:
     side = np.minimum(np.floor(at).astype(np.int64), mesh.size - 1)
     sides, at_side = np.concatenate([mesh.sides, side]), np.concatenate([mesh.shares, at - side])
     triangles = np.array([t for t in rows if t], dtype=np.int64)
-    return Mesh(extended(mesh.points), triangles, sides, at_side, mesh.size), extended(images)
+    return SilhouetteMesh(extended(mesh.points), triangles, sides, at_side, mesh.size), extended(
+        images
+    )
 
 
 def carried_on(
@@ -204,7 +206,7 @@ def carried_on(
     first = border(bending.triangles)
     order = np.concatenate([first, np.setdiff1d(np.arange(len(bending.rest)), first)])
     triangles = np.argsort(order)[bending.triangles]
-    mesh = Mesh(bending.rest[order], triangles, np.zeros(0, int), np.zeros(0), len(first))
+    mesh = SilhouetteMesh(bending.rest[order], triangles, np.zeros(0, int), np.zeros(0), len(first))
     images = bending.images[order]
     old, new = (p[:: -1 if signed_area(before) < 0 else 1] for p in (before, after))
     # both run along the same curve, from a point that they share
@@ -275,7 +277,7 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     knots, lengths = arc_lengths(ring), arc_lengths(rest)
     turns, numbers = np.arange(TILE_POINTS + 1), np.arange(len(knots))
 
-    def outline(mesh: Mesh) -> Array:
+    def outline(mesh: SilhouetteMesh) -> Array:
         turn: Array = np.interp(shares(mesh), numbers, knots) / knots[-1] * TILE_POINTS
         place: Array = np.interp((turn - first) % TILE_POINTS, turns, places) + start
         return points_along(rest, place / SILHOUETTE_POINTS * lengths[-1])

@@ -197,7 +197,7 @@ def silent(_share: float, _loss: float) -> None:
     """Report no progress."""
 
 
-class Candidates(ABC):
+class ClassCandidates(ABC):
     """Tiles of one class that are not certified yet."""
 
     @property
@@ -218,7 +218,7 @@ class Candidates(ABC):
         return None
 
 
-class Fit(NamedTuple):
+class ClassFinalists(NamedTuple):
     """Finalists of one class, not certified yet.
 
     - `candidates`: The finalists, best first.
@@ -227,13 +227,13 @@ class Fit(NamedTuple):
     - `enough`: Certified finalists after which the others need not be looked at.
     """
 
-    candidates: Candidates
+    candidates: ClassCandidates
     starts: int
     crossed: int
     enough: int
 
 
-class StillTiles(Candidates):
+class StillTiles(ClassCandidates):
     """Start tiles as candidates: no flow moves them, and torch is not needed."""
 
     def __init__(self, kind: IsohedralClass, prototiles: Prototiles) -> None:

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import plane_points, reverse, signed_area
-from orbiflow.tiles.likeness import Body, Elastic, Pinned, Stiffness
+from orbiflow.tiles.likeness import Elastic, ElasticBody, Pinned, Stiffness
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
@@ -48,7 +48,7 @@ class BentTiles(NamedTuple):
 
 
 def drawn_to_tiles(
-    body: Body,
+    body: ElasticBody,
     kind: IsohedralClass,
     placements: Placements,
     *,
@@ -66,7 +66,7 @@ def drawn_to_tiles(
     return z, space
 
 
-def held_on_tiles(body: Body, space: TileSpace, z: Complex, rounds: int) -> BentTiles:
+def held_on_tiles(body: ElasticBody, space: TileSpace, z: Complex, rounds: int) -> BentTiles:
     """Minimise the energy among tiles from shapes (N, C): outlines move in their placements' spaces."""
     condensed = body.condensed
     low = condensed.low

@@ -13,7 +13,7 @@ from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import (
     Count,
     DefaultText,
-    Group,
+    HelpHeading,
     Needs,
     OnlyWith,
     Parsed,
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from orbiflow.tiles.silhouette import Target
 
 
-LIKENESS = Group("Search for likeness")
-OVERLAP = Group("Search for overlap")
-OCCUPANCY = Group("Occupancy method")
-TWO = Group("Two silhouettes")
+LIKENESS = HelpHeading("Search for likeness")
+OVERLAP = HelpHeading("Search for overlap")
+OCCUPANCY = HelpHeading("Occupancy method")
+TWO = HelpHeading("Two silhouettes")
 
 LEAST_RATIO = 0.1  # of the areas of two figures
 BACKGROUND_RATIO = (0.15, 0.6)

@@ -32,7 +32,7 @@ from orbiflow.runtime import (
 from orbiflow.settings import as_instance, described, is_a
 from orbiflow.tiles.likeness import NearSymmetry, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
-from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
+from orbiflow.tiles.search.candidates import ClassFinalists, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.finished_tiles import ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
@@ -242,7 +242,7 @@ def fit_tile(
     per_class: int = 1,
     progress: OnProgress = silent,
     cancel: Cancel = NEVER,
-) -> Fit:
+) -> ClassFinalists:
     """Fit tiles of one class to a target, in this process; `certified_tiles` makes polygons of them.
 
     `escherize` does both, for several classes. This is for those who look at, or go on with, what

@@ -25,7 +25,7 @@ from orbiflow.tiles.likeness import (
 )
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
-from orbiflow.tiles.search.candidates import Candidates, Fit
+from orbiflow.tiles.search.candidates import ClassCandidates, ClassFinalists
 from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Target, is_mere_line, left_out_share
 from orbiflow.tiles.tile import EscherTile, SearchFacts
 from orbiflow.tiles.tile_map import TileMap
@@ -42,7 +42,7 @@ class ClassFailure:
 
 def best_tiles(
     target: Target,
-    fit: Fit,
+    fit: ClassFinalists,
     *,
     force: bool = False,
     min_neck: float = 0.0,
@@ -78,7 +78,9 @@ def best_tiles(
     return [result.changed(search=replace(result.search, dropped=dropped)) for result in found]
 
 
-def _result(target: Target, fit: Fit, index: int, original: Target, *, force: bool) -> EscherTile:
+def _result(
+    target: Target, fit: ClassFinalists, index: int, original: Target, *, force: bool
+) -> EscherTile:
     tile, flow = fit.candidates.finished(index, force=force)
     found = measured_tile(target, tile, flow, original)
     return found.changed(search=SearchFacts(starts=fit.starts))
@@ -209,7 +211,7 @@ def rounded_for(tiles: Sequence[EscherTile]) -> Advice:
 
 
 def certified_tiles(
-    target: Target, found: Fit | Candidates, *, force: bool = False
+    target: Target, found: ClassFinalists | ClassCandidates, *, force: bool = False
 ) -> list[EscherTile]:
     """Return polygons of what was fitted to a target, each proved to tile the plane, best first.
 
@@ -223,8 +225,10 @@ def certified_tiles(
         CertificationError: if none of them is certified and `force` is not set.
     """
     as_instance(target, Target, "the target", HOW_TO_GET_A_TARGET)
-    if isinstance(found, Candidates):
-        found = Fit(found, found.size, 0, found.size)
-    as_instance(found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel")
+    if isinstance(found, ClassCandidates):
+        found = ClassFinalists(found, found.size, 0, found.size)
+    as_instance(
+        found, ClassFinalists, "what was found", "fit_tile gives a Fit, load_model a TileModel"
+    )
     with one_thread(), one_blas_thread():
         return best_tiles(target, found, force=force)

@@ -16,7 +16,7 @@ from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.bending import fit_bending
-from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
+from orbiflow.tiles.search.candidates import ClassFinalists, OnProgress, silent
 from orbiflow.tiles.search.co_deformation import Orientation, orientations
 from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import Target
@@ -108,13 +108,13 @@ class LikenessSearch(Settings, SearchMethod):
 
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
-    ) -> Fit:
+    ) -> ClassFinalists:
         """Let the silhouette bend into tiles of the class."""
         phases = range(self.passed, self.phases)
         both = (self.orientations(goal, kind.divisor, phase) for phase in phases)
         return fit_bending(goal.target, kind, self, both, len(phases), per_class, progress, cancel)
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> ClassFinalists:
         """Let the silhouette bend in haste."""
         return replace(self, passed=0, **SKETCH).fit(goal, kind, 1, silent, cancel)
 

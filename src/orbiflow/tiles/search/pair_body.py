@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import plane_points, signed_area
-from orbiflow.tiles.likeness import Body, Elastic
+from orbiflow.tiles.likeness import Elastic, ElasticBody
 
 LEAST_AREA = 0.1  # the area of a figure of area about 1 below which nothing is left of it
 
@@ -32,7 +32,7 @@ class Glue(NamedTuple):
         return Glue(*(multiple * own for own in self))
 
 
-class PairBody(Body):
+class PairBody(ElasticBody):
     """Two elastic bodies with the points of a path in common; each keeps its own rotations and pose.
 
     Its first n points are the outline of both together, counter-clockwise: the first figure's from the

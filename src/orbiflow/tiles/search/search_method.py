@@ -14,7 +14,7 @@ import numpy as np
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import as_choice, as_instance
-from orbiflow.tiles.search.candidates import Fit, OnProgress
+from orbiflow.tiles.search.candidates import ClassFinalists, OnProgress
 from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
@@ -106,7 +106,7 @@ class SearchMethod(ABC):
     @abstractmethod
     def fit(
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
-    ) -> Fit:
+    ) -> ClassFinalists:
         """Return candidates of one class, best first.
 
         Args:
@@ -137,7 +137,7 @@ class SearchMethod(ABC):
                 return best_tiles(own.target, fit, original=goal.target, smoothed=share)[0]
         return None
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:  # noqa: ARG002
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> ClassFinalists:  # noqa: ARG002
         """Return candidates in a moment, for `preview`, or raise `CertificationError`."""
         raise CertificationError(f"{self.method_name} has no quick way to tiles of {kind.name}")
 
@@ -186,7 +186,7 @@ class Sketches(SearchMethod):
         per_class: int,  # noqa: ARG002
         progress: OnProgress,  # noqa: ARG002
         cancel: Cancel,
-    ) -> Fit:
+    ) -> ClassFinalists:
         """Sketch tiles of the class."""
         return self.whole.sketch(goal, kind, cancel)._replace(enough=1)
 

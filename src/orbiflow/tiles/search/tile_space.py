@@ -287,7 +287,7 @@ class TileSpace:
         return turn @ _linear(self.kind, solution[:, 2:]), offset
 
 
-class Rows(NamedTuple):
+class EdgeRows(NamedTuple):
     """What the nearest tiles of R lengths of edges are found by, with the glide axes along x.
 
     A point x + iy is two numbers in `along` and `moved`.
@@ -305,7 +305,7 @@ class Rows(NamedTuple):
     root: Array  # (R, m, m) takes what is projected to offset and linear part
 
 
-def _rows_of(kind: IsohedralClass, lengths: Integers) -> Rows:
+def _rows_of(kind: IsohedralClass, lengths: Integers) -> EdgeRows:
     """Work out those of lengths (R, K)."""
     orbits = Orbits(kind, lengths)
     count, n = len(lengths), int(lengths[0].sum())
@@ -315,7 +315,7 @@ def _rows_of(kind: IsohedralClass, lengths: Integers) -> Rows:
     m = int(columns.shape[2])
     none = np.zeros((count, 0))
     known = orbits.source, orbits.factor, orbits.flips, orbits.fixed, orbits.mirror
-    rows = Rows(*known, total.astype(float), columns, none, none, none)
+    rows = EdgeRows(*known, total.astype(float), columns, none, none, none)
     moved, basis = columns.copy(), columns.copy()
     for k in range(m):
         pulled = _unturn(orbits.factor, orbits.flips, columns[..., k])
@@ -336,7 +336,7 @@ def _rows_of(kind: IsohedralClass, lengths: Integers) -> Rows:
     )
 
 
-def _means(rows: Rows, values: Complex) -> Complex:
+def _means(rows: EdgeRows, values: Complex) -> Complex:
     """Return at each vertex the mean of values (R, n) over its orbit, pulled to its source."""
     count, n = len(values), int(values.shape[1])
     flat: Integers = rows.source + np.arange(count)[:, None] * n
@@ -360,9 +360,9 @@ class TileTable:
         self._kind, self._lock = kind, threading.Lock()
         self._most = max(1, MAX_TABLE_BYTES // (MOST_BYTES_PER_VERTEX * size))
         self._places: dict[bytes, int] = {}
-        self._kept: Rows | None = None
+        self._kept: EdgeRows | None = None
 
-    def rows(self, lengths: Integers) -> Rows:
+    def rows(self, lengths: Integers) -> EdgeRows:
         """Return the rows of lengths (C, K); more than are kept are worked out for this call alone."""
         if len(lengths) > self._most:
             return _rows_of(self._kind, lengths)
@@ -377,9 +377,9 @@ class TileTable:
                 self._keep(list(fresh), _rows_of(self._kind, lengths[list(fresh.values())]))
             assert self._kept is not None
             at = [self._places[key] for key in keys]
-            return Rows._make(part[at] for part in self._kept)
+            return EdgeRows._make(part[at] for part in self._kept)
 
-    def _keep(self, keys: list[bytes], made: Rows) -> None:
+    def _keep(self, keys: list[bytes], made: EdgeRows) -> None:
         """Add rows, in arrays that have twice the room when they are full."""
         first, count = len(self._places), len(self._places) + len(keys)
         if self._kept is None or not first or count > len(self._kept.total):
@@ -388,7 +388,7 @@ class TileTable:
             ]
             for old, new in zip(self._kept or (), room, strict=False):
                 new[:first] = old[:first]
-            self._kept = Rows._make(room)
+            self._kept = EdgeRows._make(room)
         for kept, part in zip(self._kept, made, strict=True):
             kept[first:count] = part
         self._places.update(zip(keys, range(first, count), strict=True))

@@ -6,7 +6,7 @@ from .checks import is_mere_line as is_mere_line
 from .checks import left_out_share as left_out_share
 from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
-from .mesh import Mesh as Mesh
+from .mesh import SilhouetteMesh as SilhouetteMesh
 from .mesh import harmonic as harmonic
 from .mesh import triangulate as triangulate
 from .outlines import CORNER_DEPTH as CORNER_DEPTH

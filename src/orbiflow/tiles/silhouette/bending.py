@@ -17,7 +17,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_array, is_tensor
 from orbiflow.tiles.geometry import best_similarity, complex_points, doubled_areas, triangle_sides
-from orbiflow.tiles.silhouette.mesh import Mesh, harmonic
+from orbiflow.tiles.silhouette.mesh import SilhouetteMesh, harmonic
 
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
@@ -160,7 +160,7 @@ def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
     return triangles.astype(np.int64)
 
 
-def unfolded(mesh: Mesh, points: Array, sharpenings: int | None = None) -> Array:
+def unfolded(mesh: SilhouetteMesh, points: Array, sharpenings: int | None = None) -> Array:
     """Move the inner points of a map (N, 2) until no triangle is turned over.
 
     Foldover-free maps in few steps (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov,
@@ -202,7 +202,7 @@ def _untangled(work: _Distortion, sharpenings: int) -> Array | None:
 class _Distortion:
     """The distortion as a function of the inner points, with its gradient."""
 
-    def __init__(self, mesh: Mesh, points: Array) -> None:
+    def __init__(self, mesh: SilhouetteMesh, points: Array) -> None:
         self.mesh, self.images = mesh, points.copy()
         self.fixed = mesh.size + len(mesh.sides)
         edges = triangle_sides(mesh.points, mesh.triangles)
@@ -249,7 +249,7 @@ class _Distortion:
         return float(energy.sum()), gradient[self.fixed :].ravel()
 
 
-def _slopes(mesh: Mesh, inverse: Array) -> Any:
+def _slopes(mesh: SilhouetteMesh, inverse: Array) -> Any:
     """Return the matrix (2 M, N) of the derivatives along x, then y, of what is linear on triangles.
 
     `inverse` (M, 2, 2) is of the triangles' sides.

@@ -26,7 +26,7 @@ DISC_OVERREACH = 1.02  # the factor of the discs' radii that makes up for the si
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class SilhouetteMesh:
     """The triangles (M, 3), counter-clockwise, that fill a polygon of `size` n.
 
     `points` (N, 2) are the polygon's n vertices, then points on its `sides` (k,) at `shares` (k,) of
@@ -72,7 +72,7 @@ class Mesh:
         return found
 
 
-def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
+def triangulate(ring: Array, spacing: float | None = None) -> SilhouetteMesh:
     """Triangulate the inside of a simple, counter-clockwise ring (n, 2), with its sides.
 
     This is a Delaunay triangulation of the vertices and of points inside. Sides of the polygon that
@@ -101,7 +101,9 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
             break
         if not missing.any():
             sides = placed[:, 0].astype(np.int64)
-            return _divided(_kept(Mesh(points, triangles, sides, placed[:, 1], n), polygon))
+            return _divided(
+                _kept(SilhouetteMesh(points, triangles, sides, placed[:, 1], n), polygon)
+            )
         start, end, side, low, high = pieces[missing].T
         middle, at = (low + high) / 2, side.astype(np.int64)
         fresh = n + len(extra) + np.arange(len(middle))
@@ -142,7 +144,7 @@ def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bo
     return np.isin(wanted[:, 0] * count + wanted[:, 1], known)
 
 
-def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
+def _kept(mesh: SilhouetteMesh, polygon: shapely.Polygon) -> SilhouetteMesh:
     """Return the triangles inside the polygon, counter-clockwise, and the points that they use."""
     middle = mesh.points[mesh.triangles].mean(axis=1)
     area = doubled_areas(mesh.points, mesh.triangles)
@@ -173,7 +175,7 @@ def _without_flat(triangles: Integers, flat: Integers) -> Integers:
     return triangles.astype(np.int64)
 
 
-def _divided(mesh: Mesh) -> Mesh:
+def _divided(mesh: SilhouetteMesh) -> SilhouetteMesh:
     """Halve every side that crosses the inside between two points of the outline."""
     on_outline = mesh.size + len(mesh.sides)
     if len(mesh.points) == 3:  # no side crosses, and yet nothing could follow
@@ -211,7 +213,7 @@ def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tu
     return [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
 
 
-def harmonic(mesh: Mesh, outline: Array) -> Array:
+def harmonic(mesh: SilhouetteMesh, outline: Array) -> Array:
     """Return values (N, 2) at all points, from those on the outline: inside the mean of neighbours."""
     import scipy.sparse as sparse
     import scipy.sparse.linalg as solvers

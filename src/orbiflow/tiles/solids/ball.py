@@ -14,7 +14,7 @@ from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.tiles.geometry import border, orient, polygons_in, ring_length
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.solids.settings import SolidSettings
-from orbiflow.tiles.solids.shapes import Body
+from orbiflow.tiles.solids.shapes import ClosedBody
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.worlds import Unfolding, copies, facing, in_world, joints
 
@@ -26,7 +26,9 @@ FINE, ROWS = 0.5, 5  # mm of those beside its grooves, and rows of them across h
 ROUNDS = 6  # number of times that all sides may be halved for the triangulation
 
 
-def ball_of(tile: EscherTile, settings: SolidSettings) -> tuple[dict[str, Body], tuple[str, ...]]:
+def ball_of(
+    tile: EscherTile, settings: SolidSettings
+) -> tuple[dict[str, ClosedBody], tuple[str, ...]]:
     """Return the bodies of a ball, a ball's piece, or a lamp, and what the user should know.
 
     Raises:
@@ -40,10 +42,10 @@ def ball_of(tile: EscherTile, settings: SolidSettings) -> tuple[dict[str, Body],
     # mm in a unit of the plane, in the mean
     scale = radius * float(np.sqrt(4 * np.pi / len(motions) / found.tiling.tile_area))
     if settings.kind == "ball":
-        bodies = {"ball": Body(_relief(found, motions, radius, scale, settings.relief))}
+        bodies = {"ball": ClosedBody(_relief(found, motions, radius, scale, settings.relief))}
         return bodies, seen
     if settings.kind == "lamp":
-        return {"lamp": Body(_openwork(found, motions, radius, scale, settings))}, seen
+        return {"lamp": ClosedBody(_openwork(found, motions, radius, scale, settings))}, seen
     piece = _piece(found, radius, scale, settings)
     note = f"a ball of {settings.diameter:g} mm has {len(motions)} of these pieces, all alike"
     notes = [note, *seen]
@@ -53,7 +55,7 @@ def ball_of(tile: EscherTile, settings: SolidSettings) -> tuple[dict[str, Body],
             f"{2 * count} holes for magnets of {settings.magnet:g} x {settings.magnet_depth:g} mm in "
             "each piece; where two holes meet, the magnets' poles must be unlike, in all pieces alike"
         )
-    return {"piece": Body(piece)}, tuple(notes)
+    return {"piece": ClosedBody(piece)}, tuple(notes)
 
 
 def _closed(points: Array, triangles: Integers) -> Manifold:

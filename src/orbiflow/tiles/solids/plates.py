@@ -13,14 +13,14 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.make import dice, fit_clearances, two_neighbours
-from orbiflow.tiles.solids.sections import Level, stacked
-from orbiflow.tiles.solids.shapes import SHAPES, Body, Plan, tile_body
+from orbiflow.tiles.solids.sections import CrossSection, stacked
+from orbiflow.tiles.solids.shapes import SHAPES, ClosedBody, Plan, tile_body
 from orbiflow.tiles.tilings import Copies
 
 MOST_PIECES = 400  # of a puzzle, so that its files stay below some 100 MB
 APART = 3.0  # distance in mm of parts on the bed
 
-Plate = dict[str, Body]
+Plate = dict[str, ClosedBody]
 """Bodies by name that are printed together, seen from above."""
 
 
@@ -64,7 +64,7 @@ def _side_by_side(plans: Sequence[Plan], across: float) -> Plate:
     return placed
 
 
-def _moved(body: Body, shift: Sequence[float]) -> Body:
+def _moved(body: ClosedBody, shift: Sequence[float]) -> ClosedBody:
     x, y = shift
     return body.changed(lambda own: own.translate((x, y, 0.0)))
 
@@ -83,7 +83,7 @@ def _puzzle(plans: Sequence[Plan]) -> list[Plate]:
     centers = copies.centers()
     far = np.linalg.norm(centers - centers.mean(axis=0), axis=1)
     copies = copies.select(np.sort(np.argsort(far, kind="stable")[:wanted]))
-    tray = Body(_tray(plan, copies.rings([own.ring for own in plans])))
+    tray = ClosedBody(_tray(plan, copies.rings([own.ring for own in plans])))
     z = settings.floor if settings.assembled else 0.0
     pieces = _copied([tile_body(own) for own in plans], copies, z)
     named = {f"piece {k}": body for k, body in enumerate(pieces, 1)}
@@ -92,7 +92,7 @@ def _puzzle(plans: Sequence[Plan]) -> list[Plate]:
     return [{"tray": tray}, *_in_rows(named, settings.area)]
 
 
-def _copied(kinds: Sequence[Body], copies: Copies, z: float) -> list[Body]:
+def _copied(kinds: Sequence[ClosedBody], copies: Copies, z: float) -> list[ClosedBody]:
     """Return a body of its kind for each copy, at a height."""
     moves = np.zeros((len(copies), 3, 4))
     moves[:, :2, :2] = copies.group.linear_parts[copies.cosets]
@@ -116,11 +116,13 @@ def _tray(plan: Plan, rings: Sequence[Array]) -> Manifold:
         parts = polygons_in(cavity.buffer(settings.wall))
         around = shapely.union_all([shapely.Polygon(part.exterior) for part in parts])
     floor, walls = settings.floor, around.difference(cavity)
-    top = Level(floor + settings.height / 2, walls)
-    return stacked(Level(0.0, around), Level(floor, around), Level(floor, walls), top)
+    top = CrossSection(floor + settings.height / 2, walls)
+    return stacked(
+        CrossSection(0.0, around), CrossSection(floor, around), CrossSection(floor, walls), top
+    )
 
 
-def _in_rows(bodies: Mapping[str, Body], area: tuple[float, float]) -> Iterator[Plate]:
+def _in_rows(bodies: Mapping[str, ClosedBody], area: tuple[float, float]) -> Iterator[Plate]:
     """Yield plates no larger than an area with bodies apart in rows, as few as their boxes allow."""
     boxes = np.array([own.solid.bounding_box() for own in bodies.values()])
     boxes = boxes.reshape(-1, 2, 3)[:, :, :2]
@@ -145,7 +147,7 @@ def _fit_test(plans: Sequence[Plan]) -> list[Plate]:
     found = Plate()
     for number, clearance in enumerate(fit_clearances(settings.clearance), 1):
         own = settings.replace(clearance=clearance)
-        kinds = list[Body]()
+        kinds = list[ClosedBody]()
         for plan in plans:
             face = plan.piece.buffer(-settings.chamfer - settings.nozzle)
             marked = plan._replace(settings=own, drawing=dice(face, number))

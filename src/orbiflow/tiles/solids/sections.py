@@ -17,14 +17,14 @@ from orbiflow.tiles.geometry import orient, polygons_in
 GRAIN = 1e-4  # the finest detail in mm: the 32 bits of an STL tell it up to a metre
 
 
-class Level(NamedTuple):
+class CrossSection(NamedTuple):
     """The cross-section of a solid at a height in mm; two at one height are a step."""
 
     z: float
     region: BaseGeometry
 
 
-def stacked(*levels: Level) -> Manifold:
+def stacked(*levels: CrossSection) -> Manifold:
     """Return the solid with these cross-sections, from the lowest up, straight between them.
 
     Of two successive regions one holds the other. A ring that both have becomes an upright wall. The
@@ -33,7 +33,7 @@ def stacked(*levels: Level) -> Manifold:
     step. So the faces meet by construction, and the library makes sure of it.
     """
     nothing = shapely.Polygon()
-    closed = [Level(levels[0].z, nothing), *levels, Level(levels[-1].z, nothing)]
+    closed = [CrossSection(levels[0].z, nothing), *levels, CrossSection(levels[-1].z, nothing)]
     faces = [part for below, above in pairwise(closed) for part in _between(below, above)]
     points, corners = np.unique(np.concatenate(faces).reshape(-1, 3), axis=0, return_inverse=True)
     made = Manifold(Mesh64(points, corners.reshape(-1, 3).astype(np.uint64)))
@@ -42,7 +42,7 @@ def stacked(*levels: Level) -> Manifold:
     return made.simplify(GRAIN)
 
 
-def _between(below: Level, above: Level) -> Iterator[Array]:
+def _between(below: CrossSection, above: CrossSection) -> Iterator[Array]:
     """Yield triangles (n, 3, 3) between two levels, counter-clockwise from outside."""
     old, new = _rings(below), _rings(above)
     shared = [key for key in old if key in new]
@@ -58,7 +58,7 @@ def _between(below: Level, above: Level) -> Iterator[Array]:
         yield band[:, ::-1] if grows else band
 
 
-def _rings(level: Level) -> dict[bytes, Array]:
+def _rings(level: CrossSection) -> dict[bytes, Array]:
     """Return the rings (n, 3) of a level, its region on their left, by their bytes in the plane."""
     found = dict[bytes, Array]()
     for polygon in polygons_in(shapely.normalize(level.region)):

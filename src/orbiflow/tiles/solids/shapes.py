@@ -12,21 +12,21 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make import Layout, cut_ring
-from orbiflow.tiles.solids.sections import Level, stacked
+from orbiflow.tiles.solids.sections import CrossSection, stacked
 from orbiflow.tiles.solids.settings import SolidSettings
 
 FLATNESS = 0.01  # how far in mm straight sides may be from the tile's curves: no printer shows it
 
 
-class Body(NamedTuple):
+class ClosedBody(NamedTuple):
     """A closed body, and what fills the drawing that is sunk in it, in another colour."""
 
     solid: Manifold
     inlay: Manifold | None = None
 
-    def changed(self, change: Callable[[Manifold], Manifold]) -> Body:
+    def changed(self, change: Callable[[Manifold], Manifold]) -> ClosedBody:
         """Return both after a change of their places."""
-        return Body(change(self.solid), self.inlay and change(self.inlay))
+        return ClosedBody(change(self.solid), self.inlay and change(self.inlay))
 
 
 class Plan(NamedTuple):
@@ -61,42 +61,57 @@ def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
     return found
 
 
-def tile_body(plan: Plan) -> Body:
+def tile_body(plan: Plan) -> ClosedBody:
     """Return a tile with a bevelled upper edge, in which what is drawn is sunk."""
     settings, piece = plan.settings, plan.piece
     face, top = _grown(piece, -settings.chamfer), settings.height
-    body = stacked(Level(0.0, piece), Level(top - settings.chamfer, piece), Level(top, face))
+    body = stacked(
+        CrossSection(0.0, piece),
+        CrossSection(top - settings.chamfer, piece),
+        CrossSection(top, face),
+    )
     drawing = plan.drawing.intersection(face.buffer(-settings.nozzle))
     if drawing.is_empty or not drawing.area:
-        return Body(body)
-    inlay = stacked(Level(top - settings.relief, drawing), Level(top, drawing))
-    return Body(body - inlay, inlay)
+        return ClosedBody(body)
+    inlay = stacked(CrossSection(top - settings.relief, drawing), CrossSection(top, drawing))
+    return ClosedBody(body - inlay, inlay)
 
 
-def _cutter(plan: Plan) -> Body:
+def _cutter(plan: Plan) -> ClosedBody:
     """Return a cutter that stands on its rim, blade up; its walls stand outside of the tile."""
     settings, tile = plan.settings, shapely.Polygon(plan.ring)
     widths = (settings.foot, settings.wall, settings.blade)
     foot, wall, blade = (_grown(tile, width).difference(tile) for width in widths)
     rim, top = settings.floor, settings.floor + settings.height
-    thins = Level(top - settings.height / 3, wall)
-    return Body(
-        stacked(Level(0.0, foot), Level(rim, foot), Level(rim, wall), thins, Level(top, blade))
+    thins = CrossSection(top - settings.height / 3, wall)
+    return ClosedBody(
+        stacked(
+            CrossSection(0.0, foot),
+            CrossSection(rim, foot),
+            CrossSection(rim, wall),
+            thins,
+            CrossSection(top, blade),
+        )
     )
 
 
-def _stamp(plan: Plan) -> Body:
+def _stamp(plan: Plan) -> ClosedBody:
     """Return a stamp, face up: the tile's border and the drawing inside it are raised."""
     settings, tile = plan.settings, shapely.Polygon(plan.ring)
     low = tile.buffer(-settings.wall).difference(plan.drawing)
     raised = tile.difference(low)
     base, top = settings.height, settings.height + settings.relief
-    return Body(
-        stacked(Level(0.0, tile), Level(base, tile), Level(base, raised), Level(top, raised))
+    return ClosedBody(
+        stacked(
+            CrossSection(0.0, tile),
+            CrossSection(base, tile),
+            CrossSection(base, raised),
+            CrossSection(top, raised),
+        )
     )
 
 
-def _mould(plan: Plan) -> Body:
+def _mould(plan: Plan) -> ClosedBody:
     """Return a block with a cavity that is the tile at its mouth, with the drawing on its floor."""
     settings, mouth = plan.settings, plan.piece
     block = shapely.box(*mouth.bounds).buffer(settings.wall)
@@ -105,17 +120,17 @@ def _mould(plan: Plan) -> Body:
     drawing = plan.drawing.intersection(bottom.buffer(-settings.nozzle))
     floor, relief = settings.floor, settings.floor + settings.relief
     levels = (
-        Level(0.0, block),
-        Level(floor, block),
-        Level(floor, block.difference(bottom).union(drawing)),
-        Level(relief, block.difference(middle).union(drawing)),
-        Level(relief, block.difference(middle)),
-        Level(floor + settings.height, block.difference(mouth)),
+        CrossSection(0.0, block),
+        CrossSection(floor, block),
+        CrossSection(floor, block.difference(bottom).union(drawing)),
+        CrossSection(relief, block.difference(middle).union(drawing)),
+        CrossSection(relief, block.difference(middle)),
+        CrossSection(floor + settings.height, block.difference(mouth)),
     )
-    return Body(stacked(*levels))
+    return ClosedBody(stacked(*levels))
 
 
-SHAPES: Mapping[str, Callable[[Plan], Body]] = {
+SHAPES: Mapping[str, Callable[[Plan], ClosedBody]] = {
     "tile": tile_body,
     "cutter": _cutter,
     "stamp": _stamp,

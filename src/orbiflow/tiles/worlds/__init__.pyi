@@ -8,7 +8,7 @@ from .sheet import world_scene as world_scene
 from .unfolding import Unfolding as Unfolding
 from .unfolding import unfolded as unfolded
 from .unfolding import usual_orders as usual_orders
-from .views import View as View
+from .views import WorldView as WorldView
 from .world_art import WorldArt as WorldArt
 from .world_art import world_artwork as world_artwork
 from .world_art import world_file as world_file

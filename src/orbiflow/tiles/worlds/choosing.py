@@ -26,7 +26,7 @@ POINTS = 240  # of a silhouette's outline
 BETTER = 0.5  # marks, of 10, that an image has beyond its tile's in the plane at most
 
 
-class Seen:
+class WorldLikeness:
     """How a tile's image in another world looks beside its silhouette.
 
     Args:
@@ -84,7 +84,7 @@ def in_world(
     """
     if tile.parts or tile.bending is None:
         return _unfolded(tile, orders, sign, distortion), ()
-    seen = Seen(tile)
+    seen = WorldLikeness(tile)
     found = _unfolded(tile, orders, sign, lambda own: -seen.mark(own))
     here, there = (Rating.of_mark(mark) for mark in (seen.plane, seen.mark(found)))
     return found, (f"likeness {there} there, {here} in the plane",)
@@ -109,7 +109,7 @@ def best_in_world(
     for tile in tiles:
         if tile.parts or tile.bending is None:
             continue
-        seen = Seen(tile)
+        seen = WorldLikeness(tile)
         if seen.plane + BETTER < highest:
             break
         try:

@@ -21,10 +21,10 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make import ArtSettings
 from orbiflow.tiles.motion import Morph, OwnFrame
 from orbiflow.tiles.page import Box, Curve, Page, tiling_size
-from orbiflow.tiles.silhouette import Mesh, harmonic, triangulate
+from orbiflow.tiles.silhouette import SilhouetteMesh, harmonic, triangulate
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.worlds.sheet import World, motions_of
-from orbiflow.tiles.worlds.views import View
+from orbiflow.tiles.worlds.views import WorldView
 
 STEPS = 40  # of the way, between which points go straight
 STILL, BRIEF = 0.12, 0.05  # of the sheet at each end, where nothing changes; from another tile
@@ -176,7 +176,7 @@ class Changing(NamedTuple):
     placed: EscherTile
     linear: Array
     shift: Array
-    mesh: Mesh
+    mesh: SilhouetteMesh
     way: Array
     last: Array
     shown: tuple[float, float]
@@ -277,7 +277,7 @@ def _on_page(ends: Sequence[Changing], settings: ArtSettings, scale: float) -> M
                 _placer(page, own),
                 motions,
                 wider.colours,
-                View("sheet", page.size, np.eye(3)),
+                WorldView("sheet", page.size, np.eye(3)),
                 page=wider,
                 way=np.stack([page.place(way) for way in own.way]),
                 last=page.place(own.last),

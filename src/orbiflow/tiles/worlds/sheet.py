@@ -24,7 +24,7 @@ from orbiflow.tiles.page import (
     Curve,
     Layer,
     Motif,
-    Part,
+    PathPart,
     Raster,
     Scene,
     Style,
@@ -39,7 +39,7 @@ from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tilings import Tiling
 from orbiflow.tiles.worlds.outlines import with_points
 from orbiflow.tiles.worlds.unfolding import Unfolding
-from orbiflow.tiles.worlds.views import View
+from orbiflow.tiles.worlds.views import WorldView
 
 Booleans = NDArray[np.bool_]
 
@@ -84,7 +84,7 @@ class World:
     vectors: Callable[[Array], Array]
     motions: Array
     colours: Integers
-    view: View
+    view: WorldView
     unfolding: Unfolding | None = None
     flip: Array = field(default_factory=lambda: np.eye(2))
 
@@ -158,7 +158,7 @@ class World:
             for k, places in zip(mine.tolist(), self.places(vectors, mine), strict=True):
                 yield k, _through(places.reshape(-1, 4, 2))
 
-    def drawn(self, motif: Motif, kind: int) -> Iterator[tuple[int, Part]]:
+    def drawn(self, motif: Motif, kind: int) -> Iterator[tuple[int, PathPart]]:
         """Yield the parts of a motif, which lies on a prototile, in each copy that is large enough."""
         within = cut_off(motif, shapely.Polygon(self.tiling.prototiles[kind].polygon)).parts
         seen = np.flatnonzero((self.sizes > LEAST_DRAWN) & self.faces & (self.fade > 0))
@@ -247,7 +247,7 @@ def _through(points: Array) -> Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Painting:
+class PrototilePainting:
     """What lies on a prototile: a raster in each colour, as `Paint.coloured` returns it.
 
     `place` takes the raster's units to the tiling's.
@@ -258,16 +258,19 @@ class Painting:
     place: Place
 
 
-class Worn(NamedTuple):
+class CopyMotifs(NamedTuple):
     """What lies on the prototiles of copies: a motif and, of pixels, a painting of each, or none."""
 
     world: World
     motifs: Sequence[Motif]
-    paintings: Sequence[Painting] = ()
+    paintings: Sequence[PrototilePainting] = ()
 
 
 def pictured(
-    world: World, paintings: Sequence[Painting], pixels: float, cancel: Cancel | None = None
+    world: World,
+    paintings: Sequence[PrototilePainting],
+    pixels: float,
+    cancel: Cancel | None = None,
 ) -> Raster:
     """Return a picture of pixels of all copies with what is painted on them; nothing around them."""
     cancel = cancel or Cancel()
@@ -321,7 +324,7 @@ def _lay(
 def world_scene(
     world: World,
     chosen: Palette,
-    worn: Sequence[Worn] = (),
+    worn: Sequence[CopyMotifs] = (),
     *,
     pixels: float,
     line: float | None = None,
@@ -337,7 +340,7 @@ def world_scene(
     fills = {world.colour(k, kind) for kind in kinds for k in outlines[kind]}
     ground = Style(chosen.mean(fills))
     rings = (curve.flattened(TOLERANCE) for own in outlines for curve in own.values())
-    under = Part(boundary(ground_of(rings)), ground)
+    under = PathPart(boundary(ground_of(rings)), ground)
     layers.append(Layer("ground", "paper", ground, (under,), clipped=True))
     plain = not any(own.paintings or any(motif.parts for motif in own.motifs) for own in worn)
     widths = {k: _width(world, k, line) for own in outlines for k in own}
@@ -375,6 +378,6 @@ def _width(world: World, copy: int, line: float | None) -> float:
     return max(0.01, float(f"{given:.1g}"))
 
 
-def _inked(part: Part, chosen: Palette, colour: int) -> Part:
+def _inked(part: PathPart, chosen: Palette, colour: int) -> PathPart:
     fill, stroke = (chosen.ink(colour) if own == INK else own for own in part.style[:2])
     return part._replace(style=part.style._replace(fill=fill, stroke=stroke))

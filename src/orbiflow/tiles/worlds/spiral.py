@@ -12,7 +12,7 @@ from orbiflow.tiles.make import ArtSettings
 from orbiflow.tiles.page import tiling_size
 from orbiflow.tiles.tilings import Tiling, copies_meeting
 from orbiflow.tiles.worlds.sheet import LEAST_COPY, World, motions_of
-from orbiflow.tiles.worlds.views import View
+from orbiflow.tiles.worlds.views import WorldView
 
 AROUND = 9.0  # sizes of the tile that one turn of a spiral has
 MOST_STEPS = 8  # along a lattice vector that a turn has by default
@@ -36,7 +36,7 @@ def spiral(
     x, y = np.real(corners), np.imag(corners)
     window = float(x.min()), float(y.min()), float(x.max()), float(y.max())
     linear, shift, share = _first_copies(tiling, window, start, period)
-    view = View("spiral", settings.page, np.eye(3), period)
+    view = WorldView("spiral", settings.page, np.eye(3), period)
     keep = (share.real > -0.5 + 1e-9) & (share.real <= 0.5 + 1e-9) & (share.imag < inner)
     begin = start - period * np.radians(settings.rotate) / (2 * np.pi)
     motions = motions_of(linear[keep], shift[keep] - (begin.real, begin.imag))
@@ -78,7 +78,7 @@ def cylinder(
     numbers = _around(once, rings, period, size)
     steps = np.array([period.real, period.imag]) * np.array([[-1.0], [0.0], [1.0]])
     motions = np.concatenate([motions_of(once[:, :2, :2], once[:, :2, 2] + step) for step in steps])
-    view = View("cylinder", settings.page, np.eye(3), period)
+    view = WorldView("cylinder", settings.page, np.eye(3), period)
     near = view.meets(view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings))))
     colours = np.tile(numbers, 3)[near] * (settings.colour != "one")
     said = f"the left and the right edge meet, {arms[0]},{arms[1]} lattice vectors around"

@@ -23,7 +23,7 @@ from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
 from orbiflow.tiles.geometry import complex_points, doubled_areas
-from orbiflow.tiles.silhouette import Mesh, triangulate
+from orbiflow.tiles.silhouette import SilhouetteMesh, triangulate
 from orbiflow.tiles.tilings import Tiling
 from orbiflow.tiles.worlds.curved import curvature, motions_of_spinors, norms, vectors_of
 from orbiflow.tiles.worlds.developing import Development
@@ -65,7 +65,7 @@ class TileMesh:
     """
 
     ring: Array
-    mesh: Mesh
+    mesh: SilhouetteMesh
     around: Around
     parents: Integers
     order: Integers
@@ -231,7 +231,7 @@ def distortion(found: Unfolding) -> float:
     return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
 
 
-def _tree(mesh: Mesh, root: int) -> tuple[Integers, Integers, Complex]:
+def _tree(mesh: SilhouetteMesh, root: int) -> tuple[Integers, Integers, Complex]:
     """Return `parents`, `order` and `halves` of a mesh's triangles from a root."""
     triangles, count = mesh.triangles, len(mesh.triangles)
     pairs = np.sort(np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)

@@ -19,7 +19,7 @@ CIRCLE_SIDES = 360
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class WorldView:
     """What takes vectors (..., 3) of a world to places in mm on a page, y down.
 
     - `model`: What the page shows.

@@ -27,11 +27,17 @@ from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.worlds.choosing import flip_of, in_world
 from orbiflow.tiles.worlds.curved import facing, turned, undone
 from orbiflow.tiles.worlds.metamorphosis import Metamorphosis, metamorphosis
-from orbiflow.tiles.worlds.sheet import LEAST_COPY, Painting, World, Worn, world_scene
+from orbiflow.tiles.worlds.sheet import (
+    LEAST_COPY,
+    CopyMotifs,
+    PrototilePainting,
+    World,
+    world_scene,
+)
 from orbiflow.tiles.worlds.spiral import cylinder, spiral
 from orbiflow.tiles.worlds.turning import turning_page
 from orbiflow.tiles.worlds.unfolding import Unfolding
-from orbiflow.tiles.worlds.views import View
+from orbiflow.tiles.worlds.views import WorldView
 from orbiflow.tiles.worlds.world_copies import colours, copies
 from orbiflow.tiles.write import write_pdf, write_png, write_svg
 
@@ -53,7 +59,7 @@ class WorldArt(Outcome):
     settings: ArtSettings
     world: World
     palette: Palette
-    worn: tuple[Worn, ...]
+    worn: tuple[CopyMotifs, ...]
     notes: tuple[str, ...]
 
     def scene(self, cancel: Cancel | None = None) -> Scene:
@@ -145,9 +151,9 @@ def _worn(
     chosen: Palette,
     overs: Sequence[Over | None],
     notes: list[str],
-) -> Worn:
+) -> CopyMotifs:
     """Return what lies on a tile's copies in a world, and add what the user should know of it."""
-    on, paintings = worn(tile, settings, chosen, overs, settings.tint), list[Painting]()
+    on, paintings = worn(tile, settings, chosen, overs, settings.tint), list[PrototilePainting]()
     motifs = [own.moved(*part.place) for own, part in zip(on.motifs, tile.figures, strict=True)]
     notes += on.notes
     if any(on.pictures) and settings.format == "html":
@@ -159,8 +165,8 @@ def _worn(
         for picture, part in zip(on.pictures, tile.figures, strict=True):
             paint = picture_paint(picture, part.figure, scale * part.place.scale, count)
             coloured = paint.coloured(chosen, count, on.tint)
-            paintings.append(Painting(paint.grid, coloured, part.place))
-    return Worn(world, motifs, paintings)
+            paintings.append(PrototilePainting(paint.grid, coloured, part.place))
+    return CopyMotifs(world, motifs, paintings)
 
 
 def world_file(art: WorldArt, format: str, *, cancel: Cancel | None = None) -> bytes | str:
@@ -186,7 +192,7 @@ def world_of(
         return wound(tile.tiling, tiling, flip, settings)
     sign = 1 if settings.world == "sphere" else -1
     found, seen = in_world(tile, settings.order, sign)
-    view = View(settings.world or "disc", settings.page, _facing(found, settings))
+    view = WorldView(settings.world or "disc", settings.page, _facing(found, settings))
     ring = found.vectors(found.ring[:: max(1, len(found.ring) // 30)])
 
     def shown(motions: Array) -> Any:

@@ -8,7 +8,7 @@ from .html import page_script as page_script
 from .json import write_json as write_json
 from .pdf import write_pdf as write_pdf
 from .png import INCH as INCH
-from .png import Sheet as Sheet
+from .png import PixelSheet as PixelSheet
 from .png import painted as painted
 from .png import scene_image as scene_image
 from .png import shape_of as shape_of

@@ -18,7 +18,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.page import INK, Endless, Motif, Scene, cut_off
-from orbiflow.tiles.write.png import Sheet, painted, shape_of
+from orbiflow.tiles.write.png import PixelSheet, painted, shape_of
 
 SIDE_PIXELS = 900  # of the longer side of a picture on a tile, at most
 PAD_PIXELS = 2  # around the outline, or what is below would show between two copies
@@ -88,7 +88,7 @@ def _skin(ring: Array, motif: Motif, whole: Endless) -> dict[str, Any] | None:
     ]
     shown = (int(pixels[0]), int(pixels[1]))
     images = [
-        painted([Sheet((*rasters, *map(shape_of, parts)))], shown)
+        painted([PixelSheet((*rasters, *map(shape_of, parts)))], shown)
         for rasters, parts in ((placed.rasters, plain), ((), black))
     ]
     return {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
-from orbiflow.tiles.page import Curve, Layer, Part, Raster, Scene, Style, Words, flattened
+from orbiflow.tiles.page import Curve, Layer, PathPart, Raster, Scene, Style, Words, flattened
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
@@ -68,7 +68,7 @@ class _Page:
         for item in layer.items:
             if isinstance(item, Raster):
                 self.picture(item)
-            elif isinstance(item, Part):
+            elif isinstance(item, PathPart):
                 self.curves(item.curves, item.style, item.opacity)
             elif isinstance(item, Curve):
                 self.curves([item], layer.style)

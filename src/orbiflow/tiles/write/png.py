@@ -15,7 +15,18 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import FINER, draw_line, fine_places, font, in_bands, limited, png_bytes, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import signed_area
-from orbiflow.tiles.page import INK, Box, Curve, Layer, Part, Raster, Scene, Style, Words, flattened
+from orbiflow.tiles.page import (
+    INK,
+    Box,
+    Curve,
+    Layer,
+    PathPart,
+    Raster,
+    Scene,
+    Style,
+    Words,
+    flattened,
+)
 
 INCH = 25.4
 """An inch in mm."""
@@ -83,18 +94,18 @@ def _drawn(scene: Scene, pixels: float) -> tuple[Image.Image, list[str]]:
     return picture, colours
 
 
-def _few_colours(sheets: Sequence[Sheet]) -> list[str]:
+def _few_colours(sheets: Sequence[PixelSheet]) -> list[str]:
     """Return the colours of layers without transparency and pictures, the ground's first; or none."""
     shapes = [item for sheet in sheets for item in sheet.items]
-    if not all(isinstance(item, Shape) and item.opacity >= 1 for item in shapes):
+    if not all(isinstance(item, PixelShape) and item.opacity >= 1 for item in shapes):
         return []
-    styles = [item.style for item in shapes if isinstance(item, Shape)]
+    styles = [item.style for item in shapes if isinstance(item, PixelShape)]
     used = (colour for style in styles for colour in style[:2] if colour)
     colours = list(dict.fromkeys([GROUND, *used]))
     return colours if len(colours) <= MOST_COLOURS else []
 
 
-class Shape(NamedTuple):
+class PixelShape(NamedTuple):
     """Curves that are drawn as one, as polygons and lines in pixels."""
 
     rings: tuple[Array, ...]  # to fill; holes run the other way
@@ -106,52 +117,52 @@ class Shape(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class PixelSheet:
     """What is drawn of a layer, from the bottom up, and the window that it shows in, in pixels."""
 
-    items: tuple[Shape | Raster, ...]
+    items: tuple[PixelShape | Raster, ...]
     window: Box | None = None
 
 
-def _sheet(scene: Scene, layer: Layer, scale: float, size: tuple[int, int]) -> Sheet:
+def _sheet(scene: Scene, layer: Layer, scale: float, size: tuple[int, int]) -> PixelSheet:
     """Return a layer of a scene, whose motifs are flattened, at `scale` pixels a mm."""
     window = None
     if layer.clipped:
         left, top, right, bottom = (side * scale for side in scene.clip)
         if left > 0 or top > 0 or right < size[0] or bottom < size[1]:
             window = Box(left, top, right, bottom)
-    return Sheet(tuple(_items(scene, layer, scale)), window)
+    return PixelSheet(tuple(_items(scene, layer, scale)), window)
 
 
-def _items(scene: Scene, layer: Layer, scale: float) -> Iterator[Shape | Raster]:
+def _items(scene: Scene, layer: Layer, scale: float) -> Iterator[PixelShape | Raster]:
     for item in layer.items:
         if isinstance(item, Words):
             continue  # they are written last
         if isinstance(item, Raster):
             yield item.moved(scale * np.eye(2), np.zeros(2))
-        elif isinstance(item, Part):
+        elif isinstance(item, PathPart):
             shape = shape_of(item.moved(scale * np.eye(2), np.zeros(2)), least_width=1.0)
             yield from _lines(shape) if not shape.rings and shape.opacity >= 1 else [shape]
         else:
             curves = [item] if isinstance(item, Curve) else item.curves(scene.symbols[item.symbol])
             for curve in curves:
-                moved = Part((curve,), layer.style).moved(scale * np.eye(2), np.zeros(2))
+                moved = PathPart((curve,), layer.style).moved(scale * np.eye(2), np.zeros(2))
                 yield shape_of(moved, least_width=1.0)
 
 
-def shape_of(part: Part, *, least_width: float = 0.0) -> Shape:
+def shape_of(part: PathPart, *, least_width: float = 0.0) -> PixelShape:
     """Return curves in pixels as what is drawn, with strokes at least so many pixels wide."""
     points = [curve.flattened(FLATNESS) for curve in part.curves]
     closed = [curve.closed for curve in part.curves]
     lines = [np.concatenate([p, p[:1]]) if c else p for p, c in zip(points, closed, strict=True)]
     width = max(part.style.width, least_width) if part.style.stroke else 0.0
     rings = tuple(ring for ring in points if len(ring) > 2) if part.style.fill else ()
-    return Shape(
+    return PixelShape(
         rings, tuple(lines), part.style._replace(width=width), part.opacity, *_reach(lines, width)
     )
 
 
-def _lines(shape: Shape) -> Iterator[Shape]:
+def _lines(shape: PixelShape) -> Iterator[PixelShape]:
     """Yield each line of a shape that is lines alone: most bands have few of many dashes."""
     for line in shape.lines:
         low, high = _reach([line], shape.style.width)
@@ -164,7 +175,7 @@ def _reach(lines: Sequence[Array], width: float) -> tuple[float, float]:
 
 
 def painted(
-    sheets: Sequence[Sheet],
+    sheets: Sequence[PixelSheet],
     size: tuple[int, int],
     *,
     ground: str | None = None,
@@ -201,7 +212,7 @@ def _colour(colour: str, table: Mapping[str, Colour]) -> Colour:
 
 def _draw_sheet(
     band: Image.Image,
-    sheet: Sheet,
+    sheet: PixelSheet,
     top: int,
     rows: int,
     pictures: Mapping[bytes, Image.Image],
@@ -232,7 +243,9 @@ def _outside(band: Image.Image, window: Box, top: int) -> list[tuple[int, int, i
     return [box for box in boxes if box[2] > box[0] and box[3] > box[1]]
 
 
-def _draw_shape(band: Image.Image, shape: Shape, top: int, table: Mapping[str, Colour]) -> None:
+def _draw_shape(
+    band: Image.Image, shape: PixelShape, top: int, table: Mapping[str, Colour]
+) -> None:
     """Draw a shape on a band."""
     rings = [fine_places(ring, top) for ring in shape.rings]
     lines = [fine_places(line, top) for line in shape.lines]

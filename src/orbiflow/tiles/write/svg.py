@@ -13,7 +13,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from orbiflow.tiles.page import Curve, Layer, Motif, Part, Raster, Scene, Style, Uses, Words
+from orbiflow.tiles.page import Curve, Layer, Motif, PathPart, Raster, Scene, Style, Uses, Words
 from orbiflow.tiles.write.formats import TOLERANCE
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
@@ -135,7 +135,7 @@ def _words(words: Words, number: Numbers) -> str:
     )
 
 
-def _part(part: Part, number: Numbers) -> str:
+def _part(part: PathPart, number: Numbers) -> str:
     path = "".join(path_data(curve, number) for curve in part.curves)
     opacity = f' opacity="{part.opacity:.3g}"' if part.opacity < 1 else ""
     return f'<path{_style_attributes(part.style)}{opacity} d="{path}"/>\n'

@@ -33,7 +33,7 @@ _PARTS = {
 
 
 @dataclass(frozen=True)
-class Picture:
+class ImageChannel:
     """One channel of an image."""
 
     channel: Array  # (H, W), 0 to 1
@@ -69,7 +69,7 @@ def read_image(
 
 
 def _traced(
-    path: Source, picture: Picture, threshold: float | None, invert: bool | None
+    path: Source, picture: ImageChannel, threshold: float | None, invert: bool | None
 ) -> Reading:
     if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
@@ -96,12 +96,12 @@ def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[
 
 def _drawing(
     band: Image.Image, name: str, notes: Sequence[str] = (), more: Sequence[str] = ()
-) -> Picture:
+) -> ImageChannel:
     channel, reduced, averaging = _reduced(band)
-    return Picture(channel, name, band.size, reduced, (*notes, *averaging, *more))
+    return ImageChannel(channel, name, band.size, reduced, (*notes, *averaging, *more))
 
 
-def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Picture | None:
+def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> ImageChannel | None:
     """Return how far each pixel belongs to the shape, or None for a drawing in two colours."""
     levels, reduced, averaging = _reduced(image, MAX_SIDE_OF_PHOTOGRAPH)
     rgb = levels if levels.ndim == 3 else np.repeat(levels[..., None], 3, axis=2)
@@ -113,7 +113,7 @@ def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Pictu
             f"{path}: no shape stands out in the photograph; cut it out, photograph it on a plain "
             "ground of another colour, or set a threshold"
         )
-    return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging))
+    return ImageChannel(channel, "photograph", image.size, reduced, (*notes, *averaging))
 
 
 def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
@@ -151,7 +151,7 @@ def _is_hardly_cut_out(image: Image.Image) -> bool:
 
 
 def choose_shape(
-    path: Source, picture: Picture, threshold: float | None, invert: bool | None
+    path: Source, picture: ImageChannel, threshold: float | None, invert: bool | None
 ) -> tuple[Level, list[str]]:
     """Return the level turned so that the shape is high, and notes of how it was distinguished."""
     channel = picture.channel
@@ -188,7 +188,7 @@ def choose_shape(
     return Level(1 - channel, 1 - cut, 1 - float(low)), notes
 
 
-def _cut(path: Source, picture: Picture) -> float:
+def _cut(path: Source, picture: ImageChannel) -> float:
     """Return level midway between the usual levels of the two classes that Otsu's method finds."""
     if picture.name != "luminance":
         return 0.5
@@ -290,7 +290,7 @@ def _levels(array: Array, name: str) -> tuple[NDArray[np.float32], bool]:
 _PAINT = "paint what must survive white and the rest black"
 
 
-def read_mask(path: Source) -> Picture:
+def read_mask(path: Source) -> ImageChannel:
     """Read a mask from an image: its opacity where some is more transparent, else its luminance."""
     found = decoded_image(path)
     image, notes = found.image, [*found.notes]
@@ -315,4 +315,4 @@ def read_mask(path: Source) -> Picture:
             f"{path}: the mask is uniform, its levels are {low:.2f} to {high:.2f} of white, and "
             f"emphasises nothing above the rest; {_PAINT}"
         )
-    return Picture(levels, "mask", found.size, reduced * found.shrunk, tuple(notes))
+    return ImageChannel(levels, "mask", found.size, reduced * found.shrunk, tuple(notes))

@@ -43,7 +43,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")  # of "pickup_longitude" and "decimalLatitude"
 
 
-class Line:
+class TextLine:
     """A line that is neither blank nor a comment.
 
     - `number`: Its number in the file, from 1.
@@ -119,7 +119,7 @@ def read_points(path: Source) -> Reading:
     )
 
 
-def _lines(path: Source) -> list[Line]:
+def _lines(path: Source) -> list[TextLine]:
     """Return lines that are neither blank nor comments."""
     try:
         text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
@@ -127,7 +127,7 @@ def _lines(path: Source) -> list[Line]:
         raise InputFileError(
             f"{path}: not a text file (byte {exc.start} is not UTF-8); a list of points is one"
         ) from exc
-    lines: list[Line] = []
+    lines: list[TextLine] = []
     run = after_blank = 0
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip():
@@ -135,13 +135,13 @@ def _lines(path: Source) -> list[Line]:
         elif not line.lstrip().startswith("#"):
             run += after_blank if lines else 0
             after_blank = 0
-            lines.append(Line(number, line, run))
+            lines.append(TextLine(number, line, run))
     if not lines:
         raise InputFileError(f"{path}: the file holds only blank lines; export it again")
     return lines
 
 
-def _vertex(path: Source, line: Line) -> tuple[float, float]:
+def _vertex(path: Source, line: TextLine) -> tuple[float, float]:
     pair = line.pair
     if pair is not None and np.isfinite(pair).all():
         return pair
@@ -152,7 +152,7 @@ def _vertex(path: Source, line: Line) -> tuple[float, float]:
     raise line.refused(path, f"is not a vertex; write two numbers, `x y`{cure}")
 
 
-def _counted(path: Source, lines: list[Line]) -> Reading:
+def _counted(path: Source, lines: list[TextLine]) -> Reading:
     """Read a goal polygon, or an aerofoil whose title is a number."""
     first, rest = lines[0], lines[1:]
     title = first.text.strip()
@@ -192,7 +192,7 @@ def _counted(path: Source, lines: list[Line]) -> Reading:
     return reading
 
 
-def _plain(path: Source, lines: list[Line], title: str) -> Reading:
+def _plain(path: Source, lines: list[TextLine], title: str) -> Reading:
     """Read lines of two numbers, below a title or none: an aerofoil of one run or two, or a ring."""
     notes = [f"took line {lines[0].number - 1} for a title: {quoted(title)}"] if title else []
     points = np.array([_vertex(path, line) for line in lines])
@@ -241,7 +241,7 @@ def _is_aerofoil(points: Array) -> bool:
     return bool(ends and is_monotonic and high[1] - low[1] < MAX_HEIGHT * length)
 
 
-def _numbered(path: Source, lines: list[Line]) -> Reading:
+def _numbered(path: Source, lines: list[TextLine]) -> Reading:
     """Read three columns without a header, the first of which numbers the rows."""
     first, rows = lines[0], [line.values for line in lines]
     if len(rows) > 2 and all(len(row) == 3 and None not in row for row in rows):
@@ -257,7 +257,7 @@ def _numbered(path: Source, lines: list[Line]) -> Reading:
     )
 
 
-def _header(line: Line) -> list[str]:
+def _header(line: TextLine) -> list[str]:
     """Return the axis that the name of each column says, "" for none; nothing without x and y."""
     axes = [{COLUMNS.get(word.lower(), "") for word in _WORD.findall(cell)} for cell in line.cells]
     named = [(found - {""}).pop() if len(found - {""}) == 1 else "" for found in axes]
@@ -265,7 +265,7 @@ def _header(line: Line) -> list[str]:
     return next((names for names in (named, in_pixels) if {"x", "y"} <= {*names}), list[str]())
 
 
-def _table(path: Source, lines: Sequence[Line], header: list[str]) -> Reading:
+def _table(path: Source, lines: Sequence[TextLine], header: list[str]) -> Reading:
     """Read the columns x and y, or longitude and latitude, that a header names."""
     if header.count("x") > 1 or header.count("y") > 1:
         raise lines[0].refused(path, "names several columns of x or of y; keep one of each")
@@ -286,7 +286,7 @@ def _table(path: Source, lines: Sequence[Line], header: list[str]) -> Reading:
     return read_rings(path, rings, "dat", y_down=is_down, degrees=are_degrees, notes=notes)
 
 
-def _points(path: Source, lines: Sequence[Line], at: tuple[int, int]) -> Array:
+def _points(path: Source, lines: Sequence[TextLine], at: tuple[int, int]) -> Array:
     """Return the numbers (N, 2) in two columns below a header."""
     names = lines[0].cells
     points: list[list[float | None]] = []
@@ -306,7 +306,7 @@ def _points(path: Source, lines: Sequence[Line], at: tuple[int, int]) -> Array:
 
 
 def _parted(
-    lines: Sequence[Line], header: list[str], points: Array
+    lines: Sequence[TextLine], header: list[str], points: Array
 ) -> tuple[list[Array], list[str]]:
     """Return the rings that columns of parts distinguish, and a note of it.
 

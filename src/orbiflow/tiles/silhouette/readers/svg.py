@@ -34,7 +34,7 @@ from orbiflow.tiles.silhouette.readers.svg_overlays import (
     without_grid,
 )
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
-from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, Layer, Regions
+from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, PaintedLayer, Regions
 
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
 FLATNESS = 1 / 2000
@@ -117,7 +117,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
                 "height); fit the page to the drawing"
             )
         fills = [regions.shown(shape, regions.fill(shape)) for shape in drawing.shapes]
-        layers = [[Layer(region, BLACK)] for region in fills if region.area > 0]
+        layers = [[PaintedLayer(region, BLACK)] for region in fills if region.area > 0]
         notes = ["nothing is painted: took the closed paths as filled"]
     layers = [own for own in layers if own]
     paper, grounds = _background(layers, drawing)
@@ -148,14 +148,14 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     return seen, notes + decided
 
 
-def _page(layers: list[list[Layer]], drawing: Drawing) -> shapely.Polygon:
+def _page(layers: list[list[PaintedLayer]], drawing: Drawing) -> shapely.Polygon:
     """Return the page, or without one the box of what is painted."""
     every = [layer.region for own in layers for layer in own]
     xmin, ymin, xmax, ymax = drawing.box or shapely.total_bounds(every)
     return shapely.box(xmin, ymin, xmax, ymax)
 
 
-def _background(layers: list[list[Layer]], drawing: Drawing) -> tuple[str | None, set[int]]:
+def _background(layers: list[list[PaintedLayer]], drawing: Drawing) -> tuple[str | None, set[int]]:
     """Return the background's colour, if it is painted, and which shapes are no more than it."""
     if not layers:
         return drawing.ground, set()
@@ -176,7 +176,7 @@ def _covers(region: BaseGeometry, page: shapely.Polygon) -> bool:
     return _without_holes(region).area >= WHOLE_SHARE * region.envelope.area
 
 
-def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
+def _paving(layers: list[list[PaintedLayer]], page: shapely.Polygon) -> int:
     """Return how many of the lowest shapes are rectangles that pave the page for others on them.
 
     Corners may be rounded. Once the page is paved, what lies beside the rest or reaches from edge to
@@ -204,13 +204,13 @@ def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
     return count if paved and has_others else 0
 
 
-def _shown_on(colour: str, layers: Iterable[Layer]) -> list[Layer]:
+def _shown_on(colour: str, layers: Iterable[PaintedLayer]) -> list[PaintedLayer]:
     """Return the layers that are no fainter than what is seen, and of another colour."""
     visible = (layer for layer in layers if layer.brush.opacity >= MIN_VISIBLE_OPACITY)
     return [layer for layer in visible if not alike(layer.brush.colour, colour)]
 
 
-def _is_badge(seen: BaseGeometry, layers: list[Layer]) -> bool:
+def _is_badge(seen: BaseGeometry, layers: list[PaintedLayer]) -> bool:
     """Return whether what is seen is a disc in one colour with a drawing of another on it."""
     whole = outer_outline(seen)[0]
     gap = DISC_AREA_TOLERANCE * whole.envelope.area

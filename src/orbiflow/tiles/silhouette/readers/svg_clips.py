@@ -19,7 +19,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     SHAPES,
     Clip,
     DrawnShape,
-    Place,
+    ElementPlace,
     bounds_of,
     ellipse,
     mapped,
@@ -51,7 +51,9 @@ class Clips:
         self.drawing = drawing
         self._known: dict[tuple[Element, bytes, bytes], list[Clip]] = {}
 
-    def cut(self, shapes: list[DrawnShape], key: str, text: str, place: Place) -> list[DrawnShape]:
+    def cut(
+        self, shapes: list[DrawnShape], key: str, text: str, place: ElementPlace
+    ) -> list[DrawnShape]:
         """Return shapes cut by the property `clip-path` or `mask` of the element in a place."""
         drawing = self.drawing
         if REFERENCE.match(text) is None:
@@ -69,7 +71,7 @@ class Clips:
         self._note_mode(text, key, source)
         return _with(shapes, self._clips(source, shapes, place))
 
-    def _basic(self, text: str, shapes: list[DrawnShape], place: Place) -> Clip | None:
+    def _basic(self, text: str, shapes: list[DrawnShape], place: ElementPlace) -> Clip | None:
         """Return what a basic shape of CSS cuts, or None for others."""
         if place.depth > 0:
             return _basic(text, _reference_box(text, shapes, place), place)
@@ -89,7 +91,7 @@ class Clips:
         if key == "mask" and style.get("color-interpolation") == "linearrgb":
             notes.add("a mask in linearRGB is read as one in sRGB")
 
-    def _clips(self, source: Element, shapes: list[DrawnShape], place: Place) -> list[Clip]:
+    def _clips(self, source: Element, shapes: list[DrawnShape], place: ElementPlace) -> list[Clip]:
         """Return what a <clipPath> or <mask> cuts shapes by."""
         mask = source.tag == "mask"
         units = "maskContentUnits" if mask else "clipPathUnits"
@@ -119,7 +121,7 @@ class Clips:
             self._known[key] = found
         return self._known[key]
 
-    def _content(self, source: Element, place: Place) -> list[DrawnShape]:
+    def _content(self, source: Element, place: ElementPlace) -> list[DrawnShape]:
         if np.linalg.det(place.matrix) == 0:
             return []
         drawing = self.drawing
@@ -141,7 +143,7 @@ class Clips:
         return [shape for shape in found if not shape.place.decorates]
 
 
-def window_clip(frame: Window, place: Place) -> Clip:
+def window_clip(frame: Window, place: ElementPlace) -> Clip:
     """Return the rectangle x, y, width, height of a place as what cuts."""
     return _as_clip(rectangle(*frame), place)
 
@@ -150,7 +152,7 @@ def _with(shapes: list[DrawnShape], clips: list[Clip]) -> list[DrawnShape]:
     return [replace(shape, clips=(*shape.clips, *clips)) for shape in shapes]
 
 
-def _mask_frame(source: Element, place: Place, box: Window | None) -> Window:
+def _mask_frame(source: Element, place: ElementPlace, box: Window | None) -> Window:
     """Return x, y, width and height of the region of a mask, in its user units."""
     texts = {key: source.get(key, usual) for key, usual in _MASK_FRAME.items()}
     if box is None:
@@ -161,13 +163,13 @@ def _mask_frame(source: Element, place: Place, box: Window | None) -> Window:
     return box[0] + x * wide, box[1] + y * high, width * wide, height * high
 
 
-def _as_clip(shape: Shape | None, place: Place, rule: str = "nonzero") -> Clip:
+def _as_clip(shape: Shape | None, place: ElementPlace, rule: str = "nonzero") -> Clip:
     """Return a shape in the units of a place as what cuts."""
     paths = [] if shape is None else sub_paths(shape, place.matrix)
     return Clip([DrawnShape(paths, replace(place, style={"clip-rule": rule}), place.matrix)])
 
 
-def _basic(text: str, box: Window | None, place: Place) -> Clip | None:
+def _basic(text: str, box: Window | None, place: ElementPlace) -> Clip | None:
     """Return what a basic shape of CSS such as "circle(40% at center)" cuts, or None for others."""
     found = _BASIC.search(text)
     if found is None or box is None:
@@ -183,7 +185,7 @@ def _basic(text: str, box: Window | None, place: Place) -> Clip | None:
         return None
 
 
-def _reference_box(text: str, shapes: list[DrawnShape], place: Place) -> Window | None:
+def _reference_box(text: str, shapes: list[DrawnShape], place: ElementPlace) -> Window | None:
     if "view-box" in text:
         return 0.0, 0.0, *place.viewport
     box = bounds_of(shapes, place.matrix)

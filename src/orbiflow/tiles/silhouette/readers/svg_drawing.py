@@ -19,7 +19,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     SHAPES,
     BadElement,
     DrawnShape,
-    Place,
+    ElementPlace,
     bounds_of,
     mapped,
     path_tokens,
@@ -128,7 +128,7 @@ class Drawing:
             self.notes.add("style sheets in other files are not read")
         xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 100.0, 100.0)
         size = xmax - xmin, ymax - ymin
-        place = Place(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
+        place = ElementPlace(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
         self.view = view
         ground = colour_of(style.get("background-color", "transparent"))
         self.ground = ground.colour if ground and ground.opacity == 1 else None
@@ -160,7 +160,7 @@ class Drawing:
         text = style.get(key, "").strip()
         if not text or text.endswith("%") or text == "auto":
             return None
-        return Place(np.eye(3), (0.0, 0.0), style).length(self.root, key, text)
+        return ElementPlace(np.eye(3), (0.0, 0.0), style).length(self.root, key, text)
 
     def pixel(self) -> float:
         """Return the size of a pixel in user units."""
@@ -168,11 +168,11 @@ class Drawing:
         sizes = zip((xmax - xmin, ymax - ymin), self.sides, strict=True)
         return max(own / (pixels or own) for own, pixels in sizes)
 
-    def children(self, element: Element, place: Place) -> list[DrawnShape]:
+    def children(self, element: Element, place: ElementPlace) -> list[DrawnShape]:
         """Return the shapes that the elements inside one show."""
         return [shape for child in element if is_own(child) for shape in self.visit(child, place)]
 
-    def visit(self, element: Element, place: Place) -> list[DrawnShape]:
+    def visit(self, element: Element, place: ElementPlace) -> list[DrawnShape]:
         """Return the shapes that an element shows in a place, from bottom to top."""
         self.visited += 1
         if self.visited > MAX_DRAWN:
@@ -193,7 +193,7 @@ class Drawing:
                 return []
         return self._cut(self._content(element, place), style, self._inside(element, place))
 
-    def _inside(self, element: Element, place: Place) -> Place:
+    def _inside(self, element: Element, place: ElementPlace) -> ElementPlace:
         """Return the place in whose units an element's clips are: after its own shift or view."""
         if element.tag == "use":
             return self._shifted(element, place)
@@ -203,11 +203,11 @@ class Drawing:
             return replace(place.moved(matrix), viewport=size)
         return place
 
-    def _shifted(self, use: Element, place: Place) -> Place:
+    def _shifted(self, use: Element, place: ElementPlace) -> ElementPlace:
         x, y = (place.length(use, key, place.style.get(key)) for key in ("x", "y"))
         return place.moved(shift(x, y))
 
-    def _content(self, element: Element, place: Place) -> list[DrawnShape]:
+    def _content(self, element: Element, place: ElementPlace) -> list[DrawnShape]:
         tag = element.tag
         if tag == "svg":
             return self.viewport(element, self._frame(element, place.style, place), place)
@@ -226,7 +226,7 @@ class Drawing:
             self.others += Counter([_OTHERS[tag]] * (not empty))
         return []
 
-    def _cut(self, shapes: list[DrawnShape], style: Style, place: Place) -> list[DrawnShape]:
+    def _cut(self, shapes: list[DrawnShape], style: Style, place: ElementPlace) -> list[DrawnShape]:
         """Return shapes cut by the clip and mask of their element, and note its other effects."""
         if style.get("filter", "none") != "none":
             tint = self._tint(style["filter"])
@@ -276,7 +276,7 @@ class Drawing:
             self.notes.add(f"left out what is for other languages than {LANGUAGE!a}")
         return meant
 
-    def _use(self, use: Element, place: Place) -> list[DrawnShape]:
+    def _use(self, use: Element, place: ElementPlace) -> list[DrawnShape]:
         target = self.named(reference(use), "<use>")
         if target is None:
             return []
@@ -296,7 +296,7 @@ class Drawing:
         frame = self._frame(target, {**style, **own}, inner)
         return self._cut(self.viewport(target, frame, inner), style, inner)
 
-    def _frame(self, element: Element, style: Style, place: Place) -> Window:
+    def _frame(self, element: Element, style: Style, place: ElementPlace) -> Window:
         """Return x, y, width and height of an inner <svg> or a <symbol>."""
         usual = {"x": 0.0, "y": 0.0, "width": place.viewport[0], "height": place.viewport[1]}
         x, y, width, height = (
@@ -304,7 +304,7 @@ class Drawing:
         )
         return x, y, width, height
 
-    def viewport(self, element: Element, frame: Window, place: Place) -> list[DrawnShape]:
+    def viewport(self, element: Element, frame: Window, place: ElementPlace) -> list[DrawnShape]:
         """Return what an inner <svg>, a <symbol> or a <marker> shows in a frame, cut at its edges."""
         if not np.isfinite(frame).all():
             raise BadElement(element, "its size cannot be read")
@@ -317,7 +317,7 @@ class Drawing:
         clip = window_clip(frame, place)
         return [replace(shape, clips=(*shape.clips, clip)) for shape in own]
 
-    def _shape(self, element: Element, place: Place) -> list[DrawnShape]:
+    def _shape(self, element: Element, place: ElementPlace) -> list[DrawnShape]:
         self.tokens += path_tokens(element, place.style)
         if self.tokens > MAX_TOKENS:
             raise BadElement(element, "the paths hold too much data; simplify the drawing")
@@ -328,7 +328,9 @@ class Drawing:
             drawn = replace(drawn, matrix=np.diag([self.pixel()] * 2 + [1.0]))
         return self._with_markers(element, drawn, place)
 
-    def _with_markers(self, element: Element, shape: DrawnShape, place: Place) -> list[DrawnShape]:
+    def _with_markers(
+        self, element: Element, shape: DrawnShape, place: ElementPlace
+    ) -> list[DrawnShape]:
         """Return a shape and its markers, in the order in which they are painted."""
         if element.tag not in MARKED or place.style.get("visibility", "visible") != "visible":
             return [shape]
@@ -350,7 +352,7 @@ class Drawing:
         return [*drawn, shape] if order[:1] == ["markers"] else [shape, *drawn]
 
     def _marker(
-        self, marker: Element, shape: DrawnShape, place: Place, turn: float, key: str
+        self, marker: Element, shape: DrawnShape, place: ElementPlace, turn: float, key: str
     ) -> list[DrawnShape]:
         """Return what one marker shows with its reference point at the origin of a place."""
         orient = marker.get("orient", "0").strip()
@@ -382,7 +384,7 @@ class Drawing:
         x, y = -mapped(view_matrix(marker, frame)[0], np.array([at]))[0]
         return self.viewport(marker, (x, y, width, height), inner)
 
-    def _own_box(self, element: Element, place: Place) -> Window:
+    def _own_box(self, element: Element, place: ElementPlace) -> Window:
         """Return the box of what an element holds, in the units of a place, without counting it."""
         others, texts = self.others.copy(), self.notes.texts.copy()
         box = bounds_of(self._content(element, place), place.matrix)
@@ -390,7 +392,7 @@ class Drawing:
         return box or (0.0, 0.0, 0.0, 0.0)
 
     def own_transform(
-        self, element: Element, style: Style, place: Place, origin: str = "0 0"
+        self, element: Element, style: Style, place: ElementPlace, origin: str = "0 0"
     ) -> Array:
         """Return the matrix of an element's transforms, about their origin."""
         texts = [style.get(key, "none") for key in _MOVES]

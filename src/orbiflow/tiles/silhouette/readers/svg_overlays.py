@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.drawing import rgb
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import outer_outline, percent
-from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, Layer, painted
+from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, PaintedLayer, painted
 from orbiflow.tiles.silhouette.readers.svg_values import Brush
 
 OVERLAY_GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
@@ -31,7 +31,7 @@ _Shades = dict[tuple[float, float], BaseGeometry]
 """Regions by how much of the shapes' paint is seen there, and how much of the ground is covered."""
 
 
-def overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list[str]]:
+def overlay(layers: list[PaintedLayer], ground: str | None) -> tuple[BaseGeometry, list[str]]:
     """Return the region that is seen of layers on a ground, and notes."""
     paper = ground or PAPER_COLOUR
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
@@ -65,7 +65,7 @@ def overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list
     return seen, notes
 
 
-def _sign(layers: list[Layer], k: int, pale: list[bool]) -> int:
+def _sign(layers: list[PaintedLayer], k: int, pale: list[bool]) -> int:
     """Return -1 for a pale layer that lies over darker ones for a good part, else 1."""
     below = [layer.region for layer, own in zip(layers[:k], pale, strict=False) if not own]
     over = shapely.area(shapely.intersection(below, layers[k].region)).sum() if pale[k] else 0.0
@@ -83,7 +83,7 @@ def solid(region: BaseGeometry) -> float:
     return outer_outline(region)[0].area if region.area > 0 else 0.0
 
 
-def _with_faint_joined(layers: list[Layer], paper: str) -> tuple[list[Layer], int]:
+def _with_faint_joined(layers: list[PaintedLayer], paper: str) -> tuple[list[PaintedLayer], int]:
     """Return opaque layers, with one where faint ones together are opaque; and how many show nowhere.
 
     A group is laid on with its opacity as a whole: what overlaps inside it does not add up to more.
@@ -91,7 +91,7 @@ def _with_faint_joined(layers: list[Layer], paper: str) -> tuple[list[Layer], in
     faint = [layer for layer in layers if _is_faint(layer)]
     if not 1 < len(faint) <= MAX_FAINT_LAYERS or not _overlap(faint):
         return [layer for layer in layers if not _is_faint(layer)], len(faint)
-    found: list[Layer] = []
+    found: list[PaintedLayer] = []
     shades: _Shades = {}
     runs = (run for own in _by_groups(layers, 0) for run in groupby(own, key=_is_faint))
     for is_faint, run in runs:
@@ -108,7 +108,7 @@ def _with_faint_joined(layers: list[Layer], paper: str) -> tuple[list[Layer], in
         shades = {key: region for key, region in shades.items() if key[0] < MIN_VISIBLE_OPACITY}
         colours = (layer.brush.colour for layer in own if not alike(layer.brush.colour, paper))
         brush = Brush(next(colours, BLACK.colour), 1.0)
-        found += [Layer(region, brush) for region in dense]
+        found += [PaintedLayer(region, brush) for region in dense]
     seen = _united(found)
     if len(faint) == len(layers) and seen.area < MIN_SHOWN_SHARE * _united(layers).area:
         return [], len(faint)  # the overlaps of a drawing that is all faint are not its shape
@@ -116,20 +116,20 @@ def _with_faint_joined(layers: list[Layer], paper: str) -> tuple[list[Layer], in
     return found, sum(share < MIN_SHOWN_SHARE for share in shares)
 
 
-def _united(layers: Sequence[Layer]) -> BaseGeometry:
+def _united(layers: Sequence[PaintedLayer]) -> BaseGeometry:
     return shapely.union_all([layer.region for layer in layers])
 
 
-def _is_faint(layer: Layer) -> bool:
+def _is_faint(layer: PaintedLayer) -> bool:
     return layer.brush.opacity < MIN_VISIBLE_OPACITY
 
 
-def _overlap(layers: Sequence[Layer]) -> bool:
+def _overlap(layers: Sequence[PaintedLayer]) -> bool:
     tree = shapely.STRtree([layer.region for layer in layers])
     return tree.query(tree.geometries, predicate="intersects").shape[1] > len(layers)
 
 
-def _by_groups(layers: Sequence[Layer], depth: int) -> Iterator[list[Layer]]:
+def _by_groups(layers: Sequence[PaintedLayer], depth: int) -> Iterator[list[PaintedLayer]]:
     """Yield layers that are of one group at a depth together, and any other by itself."""
 
     def key(at: int) -> object:
@@ -140,7 +140,7 @@ def _by_groups(layers: Sequence[Layer], depth: int) -> Iterator[list[Layer]]:
         yield [layers[at] for at in run]
 
 
-def _shades(layers: Sequence[Layer], depth: int, paper: str) -> _Shades:
+def _shades(layers: Sequence[PaintedLayer], depth: int, paper: str) -> _Shades:
     """Return what is seen of one layer, or of those that are of one group at a depth."""
     first = layers[0]
     if len(first.groups) <= depth:
@@ -170,7 +170,7 @@ def _laid(shades: _Shades, region: BaseGeometry, dark: float, cover: float) -> _
     return {key: region for key, region in joined.items() if region.area > 0}
 
 
-def without_grid(layers: list[Layer], paper: str) -> tuple[list[Layer], list[str]]:
+def without_grid(layers: list[PaintedLayer], paper: str) -> tuple[list[PaintedLayer], list[str]]:
     """Return layers without level or upright thin lines of another colour that run past the shape."""
     bounds = shapely.total_bounds([layer.region for layer in layers])
     thin = MAX_GRID_LINE_SHARE * max(bounds[2] - bounds[0], bounds[3] - bounds[1])

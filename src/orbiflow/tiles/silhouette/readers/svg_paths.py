@@ -206,7 +206,7 @@ SIMPLIFICATION_SHARE = 1 / 500  # of half a pen's width: lines are simplified by
 MIN_SMOOTH_COSINE = 0.999  # the cosine of half the turn above which a corner needs no mitre
 
 
-class Line(NamedTuple):
+class Polyline(NamedTuple):
     """A polyline (N, 2), which of its vertices are corners, not on curves, and whether it is closed."""
 
     points: Array
@@ -214,7 +214,7 @@ class Line(NamedTuple):
     closed: bool
 
 
-def stroked(lines: list[Line], shape: DrawnShape) -> BaseGeometry:
+def stroked(lines: list[Polyline], shape: DrawnShape) -> BaseGeometry:
     """Return the region that a shape's pen covers along polylines."""
     half, unit = shape.width / 2, _dash_unit(lines, shape)
     dashes = [unit * dash for dash in shape.dashes] if unit else []
@@ -238,7 +238,7 @@ def stroked(lines: list[Line], shape: DrawnShape) -> BaseGeometry:
     return shapely.union_all(np.concatenate(regions))
 
 
-def _dash_unit(lines: list[Line], shape: DrawnShape) -> float:
+def _dash_unit(lines: list[Polyline], shape: DrawnShape) -> float:
     """Return how long a unit of dashes is: more or less than 1 where an author gives the path's length.
 
     It is 0 where dashes are longer than any path.
@@ -250,7 +250,7 @@ def _dash_unit(lines: list[Line], shape: DrawnShape) -> float:
     return total / shape.path_length if shape.path_length > 0 else 0.0
 
 
-def _pieces(line: Line, dashes: list[float], offset: float) -> list[Line]:
+def _pieces(line: Polyline, dashes: list[float], offset: float) -> list[Polyline]:
     """Return the dashes of a line; or its whole, ending where it began if it is closed."""
     points, corners, closed = line
     if closed:
@@ -258,7 +258,9 @@ def _pieces(line: Line, dashes: list[float], offset: float) -> list[Line]:
     steps = np.hypot(*np.diff(points, axis=0).T)
     points, corners = points[np.r_[True, steps > 0]], corners[np.r_[True, steps > 0]]
     if not dashes or len(points) == 1:
-        return [Line(points if len(points) > 1 else np.repeat(points, 2, axis=0), corners, closed)]
+        return [
+            Polyline(points if len(points) > 1 else np.repeat(points, 2, axis=0), corners, closed)
+        ]
     along: Array = np.r_[0.0, np.cumsum(steps[steps > 0])]
     edges: Array = np.r_[0.0, np.cumsum(dashes)]
     total, period = float(along[-1]), float(edges[-1])
@@ -268,20 +270,20 @@ def _pieces(line: Line, dashes: list[float], offset: float) -> list[Line]:
     starts: Array = (turns + edges[:-1:2]).ravel()
     ends: Array = (turns + edges[1::2]).ravel()
     shown = (starts < total) & ((ends > 0) | (starts == ends) & (starts >= 0))
-    found: list[Line] = []
+    found: list[Polyline] = []
     for start, end in zip(starts[shown].clip(0), ends[shown].clip(max=total), strict=True):
         inner = (along > start) & (along < end)
         at: Array = np.r_[start, along[inner], end]
         both: list[Array] = [np.interp(at, along, points[:, k]) for k in (0, 1)]
-        found.append(Line(np.stack(both, axis=1), np.r_[True, corners[inner], True], False))
+        found.append(Polyline(np.stack(both, axis=1), np.r_[True, corners[inner], True], False))
     if closed and len(found) > 1 and (found[0].points[0] == found[-1].points[-1]).all():
         last, first = found.pop(), found[0]  # one dash around the start
         around = np.r_[last.corners[:-1], corners[:1], first.corners[1:]]
-        found[0] = Line(np.vstack([last.points, first.points[1:]]), around, False)
+        found[0] = Polyline(np.vstack([last.points, first.points[1:]]), around, False)
     return found
 
 
-def _joins(line: Line, half: float, limit: float) -> Array:
+def _joins(line: Polyline, half: float, limit: float) -> Array:
     """Return what sharpens the bevelled corners of a line within a limit, and rounds its curves."""
     points, corners, closed = line
     if closed:

@@ -20,8 +20,14 @@ from orbiflow.tiles.geometry import complex_points
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_gradients import gradient_of, references
-from orbiflow.tiles.silhouette.readers.svg_paths import Line, SubPath, TooManyPoints, fill, stroked
-from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape, Group
+from orbiflow.tiles.silhouette.readers.svg_paths import (
+    Polyline,
+    SubPath,
+    TooManyPoints,
+    fill,
+    stroked,
+)
+from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape, PaintGroup
 from orbiflow.tiles.silhouette.readers.svg_values import (
     CURRENT,
     REFERENCE,
@@ -96,12 +102,12 @@ def _served(element: Element | None, drawing: Drawing, shape: DrawnShape) -> Bru
     return Brush(mean_colour(gradient.brushes).colour, 1.0, gradient)
 
 
-class Layer(NamedTuple):
+class PaintedLayer(NamedTuple):
     """A region that is painted, and with what."""
 
     region: BaseGeometry
     brush: Brush
-    groups: tuple[Group, ...] = ()  # whose opacities are in that of the brush
+    groups: tuple[PaintGroup, ...] = ()  # whose opacities are in that of the brush
 
 
 class Regions:
@@ -150,10 +156,10 @@ class Regions:
         """Return what the stroke of a shape covers, before clips."""
         linear, offset = shape.matrix[:2, :2], shape.matrix[:2, 2]
         back = np.linalg.inv(linear).T
-        lines: list[Line] = []
+        lines: list[Polyline] = []
         for points, path in self.lines(shape, STROKE_REFINEMENT):
             corners = np.isin(complex_points(points), complex_points(path.ends))
-            lines.append(Line((points - offset) @ back, corners, path.closed))
+            lines.append(Polyline((points - offset) @ back, corners, path.closed))
         region = stroked(lines, shape)
         return shapely.transform(region, lambda points: points @ linear.T + offset)
 
@@ -185,7 +191,7 @@ class Regions:
         whole = self.stroke(shape)
         return self.shown(shape, whole) is whole
 
-    def layer(self, shape: DrawnShape, kind: str, paint: Brush) -> Layer:
+    def layer(self, shape: DrawnShape, kind: str, paint: Brush) -> PaintedLayer:
         """Return what the "fill" or "stroke" of a shape covers, and its colour.
 
         Of a gradient that fades it is the part that is at least half visible, if there is one.
@@ -193,7 +199,7 @@ class Regions:
         whole = self.fill(shape) if kind == "fill" else self.stroke(shape)
         region = self.shown(shape, whole)
         if paint.gradient is None:
-            return Layer(region, paint)
+            return PaintedLayer(region, paint)
         values = paint.opacity * np.array([brush.opacity for brush in paint.gradient.brushes])
         along = np.interp(_SAMPLES, paint.gradient.offsets, values)
         part = paint.gradient.part(values, MIN_VISIBLE_OPACITY, region)
@@ -202,11 +208,11 @@ class Regions:
         opacity = along[counts].mean() if counts.any() else beyond
         brush = Brush(paint.colour, float(opacity))
         if not 0 < part.area < (1 - NEGLIGIBLE_SHARE) * region.area:
-            return Layer(region, brush)
+            return PaintedLayer(region, brush)
         self.drawing.notes.add("left out what of a gradient is less than half visible")
-        return Layer(part, brush)
+        return PaintedLayer(part, brush)
 
-    def layers(self, shape: DrawnShape) -> list[Layer]:
+    def layers(self, shape: DrawnShape) -> list[PaintedLayer]:
         """Return what a shape paints, from bottom to top."""
         found = [
             self.layer(shape, kind, paint) for kind, paint in paints(self.drawing, shape).items()
@@ -223,7 +229,7 @@ class Regions:
         found = [part for shape in clip.shapes for part in self._masking(shape, clip.kind)]
         return painted([layer for layer, _ in found], [sign for _, sign in found])
 
-    def _masking(self, shape: DrawnShape, kind: str) -> Iterator[tuple[Layer, int]]:
+    def _masking(self, shape: DrawnShape, kind: str) -> Iterator[tuple[PaintedLayer, int]]:
         """Yield where a shape on a mask hides what is masked (-1) and where it shows it (1)."""
         for key, paint in paints(self.drawing, shape).items():
             region = self.clipped(shape, self.fill(shape) if key == "fill" else self.stroke(shape))
@@ -235,7 +241,7 @@ class Regions:
             for values, sign in ((opaque, -1), (shown, 1)):
                 part = gradient.part(values, MIN_VISIBLE_OPACITY, region) if gradient else region
                 if gradient or values[0] >= MIN_VISIBLE_OPACITY:
-                    yield Layer(part, paint), sign
+                    yield PaintedLayer(part, paint), sign
 
 
 def _is_within(bounds: Array, page: BaseGeometry) -> bool:
@@ -245,7 +251,9 @@ def _is_within(bounds: Array, page: BaseGeometry) -> bool:
     return bool((bounds[:2] >= [xmin, ymin]).all() and (bounds[2:] <= [xmax, ymax]).all())
 
 
-def painted(layers: list[Layer], signs: list[int], grid: float | None = None) -> BaseGeometry:
+def painted(
+    layers: list[PaintedLayer], signs: list[int], grid: float | None = None
+) -> BaseGeometry:
     """Paint layers in turn, which add their region (sign 1), take it away (-1) or do nothing (0)."""
     found: BaseGeometry = Polygon()
     acting = [(sign, layer) for sign, layer in zip(signs, layers, strict=True) if sign]

@@ -43,7 +43,7 @@ class DrawnShape:
     """One element's sub-paths in the drawing's user units, and how they are painted."""
 
     paths: list[SubPath]
-    place: "Place"
+    place: "ElementPlace"
     matrix: Array  # the map (3, 3) from the units of its pen to the drawing's
     path_length: float | None = None  # what its author takes for the length of its paths
     clips: tuple["Clip", ...] = ()  # what cuts it: it shows where all of these are
@@ -91,14 +91,14 @@ class Clip:
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class PaintGroup:
     """An element that is painted as a whole and then laid over what is below with an opacity."""
 
     opacity: float
 
 
 @dataclass(frozen=True)
-class Place:
+class ElementPlace:
     """Where in the drawing an element stands: what it inherits."""
 
     matrix: Array  # (3, 3), to the drawing's user units
@@ -106,7 +106,7 @@ class Place:
     style: Style
     rem: float = FONT_SIZE
     depth: int = 0
-    groups: tuple[Group, ...] = ()  # those around that are not opaque, the outermost first
+    groups: tuple[PaintGroup, ...] = ()  # those around that are not opaque, the outermost first
     context: tuple[str, str] = ("none", "none")  # the fill and stroke around a marker or <use>
     decorates: bool = False  # as a marker does, which is not part of a shape's box
 
@@ -120,10 +120,10 @@ class Place:
         """The product of the opacities of all groups around."""
         return math.prod(group.opacity for group in self.groups)
 
-    def moved(self, matrix: Array) -> "Place":
+    def moved(self, matrix: Array) -> "ElementPlace":
         return replace(self, matrix=self.matrix @ matrix)
 
-    def styled(self, style: Style) -> "Place":
+    def styled(self, style: Style) -> "ElementPlace":
         """Return the place inside an element of a style."""
         share = min(max(as_number(style.get("opacity"), 1.0), 0.0), 1.0)
         known = {"context-fill": self.context[0], "context-stroke": self.context[1]}
@@ -131,7 +131,7 @@ class Place:
             key: known[text] for key in ("fill", "stroke") if (text := style.get(key, "")) in known
         }
         style = {**style, **own} if own else style
-        groups = self.groups if share == 1 else (*self.groups, Group(share))
+        groups = self.groups if share == 1 else (*self.groups, PaintGroup(share))
         return replace(self, depth=self.depth + 1, style=style, groups=groups)
 
     def length(self, element: Element, key: str, text: str | None, usual: float = 0.0) -> float:
@@ -155,7 +155,7 @@ def path_tokens(element: Element, style: Style) -> int:
     return sum(1 for text in texts for _ in _TOKEN.finditer(text))
 
 
-def shape_paths(element: Element, place: Place) -> list[SubPath]:
+def shape_paths(element: Element, place: ElementPlace) -> list[SubPath]:
     """Return the sub-paths of an element in the drawing's user units; none of what has no size."""
     try:
         shape = _shape(element, place)
@@ -164,7 +164,7 @@ def shape_paths(element: Element, place: Place) -> list[SubPath]:
         raise BadElement(element, "its geometry cannot be read; redraw or delete it") from exc
 
 
-def _shape(element: Element, place: Place) -> svgelements.Shape | None:
+def _shape(element: Element, place: ElementPlace) -> svgelements.Shape | None:
     tag, style = element.tag, place.style
     if tag == "path":
         return svgelements.Path({"d": style["d"]}) if style.get("d") else None
