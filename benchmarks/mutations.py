@@ -39,13 +39,15 @@ from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from queue import Queue
 from typing import Any
 
-import coverage  # pyright: ignore[reportMissingImports]
 import pytest
 
+coverage: Any = import_module("coverage") if find_spec("coverage") else None
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "orbiflow"
 OTHER: dict[type[ast.AST], type[ast.AST]] = {
@@ -292,6 +294,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=40.0)
     parser.add_argument("--processes", type=int, default=1)
     options = parser.parse_args()
+    if coverage is None:
+        parser.error("it needs the package coverage; run pip install coverage")
 
     fresh = mutations(options.rooms, options.seed)
     if options.again:

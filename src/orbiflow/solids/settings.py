@@ -57,7 +57,7 @@ def emphasised(text: str) -> EmphasisSphere | Painted:
     """Return what a text emphasises: x, y, z and the radius of a sphere, or painted; perhaps a weight.
 
     >>> emphasised("0, 10, 2, 4")
-    Sphere(center=(0.0, 10.0, 2.0), radius=4.0, weight=5.0)
+    EmphasisSphere(center=(0.0, 10.0, 2.0), radius=4.0, weight=5.0)
     >>> emphasised("painted, 8")
     Painted(weight=8.0)
     """
