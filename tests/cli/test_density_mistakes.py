@@ -51,7 +51,7 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
         ("fit gaps.csv --space torus --missing marginalise --components flow", "--components"),
         ("fit gaps.csv --space torus --unit radians", "--drop-missing 9 psi"),
         ("fit nothing.csv --space torus --unit radians", "nothing.csv phi"),
-        ("fit weights.csv --space torus --unit radians --columns w=weight", "0 1 -1"),
+        ("fit weights.csv --space torus --unit radians --columns w=weight", "'w' weight -1:"),
         (
             "cv gaps.csv --space torus --missing marginalise --components flow",
             "--missing marginalise",

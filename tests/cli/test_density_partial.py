@@ -179,7 +179,7 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     [
         ("--columns heft=weight", "heft"),
         ("--columns phi=weight,phi", "phi"),
-        ("--columns chi=weight,count=ignore", "0 1 -"),
+        ("--columns chi=weight,count=ignore", "'chi' weight -"),
         ("--missing marginalise --drop-missing", "--missing"),
         ("--missing marginalise --space sphere --columns phi,psi", "--missing marginalise"),
     ],

@@ -197,7 +197,7 @@ class WorkQueue:
         while not self._closed:
             self._wanted.wait()
             self._wanted.clear()
-            while not self._closed and self._is_short():
+            while self._is_short():
                 try:
                     process = self._spawn()
                 except OSError:  # no memory, or too many processes: again when something ends
@@ -213,7 +213,8 @@ class WorkQueue:
         """Whether more processes should be ready; all but one may be lent to quick tasks."""
         with self._lock:
             lent = sum(lane == "quick" for _, lane, _ in self._lanes.values())
-            return len(self._spares) + min(lent, max(0, self._spare_count - 1)) < self._spare_count
+            ready = len(self._spares) + min(lent, max(0, self._spare_count - 1))
+            return not self._closed and ready < self._spare_count
 
     def _ready(self) -> CallProcess | None:
         """Return a process that waits for a call, if there is one."""

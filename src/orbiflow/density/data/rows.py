@@ -206,9 +206,12 @@ def rows_of(
         wrong, what = own < 0, "weights must be 0 or more"
         if kind == "count":
             wrong, what = wrong | (own % 1 != 0), "counts must be whole numbers from 0 on"
-        name = table.names[chosen.side[kind]]
-        what = f"is declared as {kind}, and {what}: correct it, or declare others with {{columns}}"
-        _refuse_rows(table, (wrong | np.isinf(own)) & kept, name, what)
+        name, wrong = table.names[chosen.side[kind]], (wrong | np.isinf(own)) & kept
+        what = (
+            f"is declared as {kind}, and {what}, got {own[wrong.argmax()]:g}: correct it, or declare "
+            "others with {columns}"
+        )
+        _refuse_rows(table, wrong, name, what)
     strike = _strike_beside_dip(names) if chosen.space in DIRECTIONS else None
     if strike is not None:
         column = values[:, strike]
