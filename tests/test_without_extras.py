@@ -45,10 +45,10 @@ from sys import argv, modules
 
 for words in (
     f"escherize {argv[1]} --effort fast --classes IH4 --figures --out run",
-    *(f"export run --out cut.{form}" for form in ("svg", "pdf", "png", "dxf", "json")),
-    "export run --for laser --cut jigsaw --out pieces.svg",
-    "art run --engrave --area 300x200px --out art.png",
-    f"art run --picture {argv[1]} --area 300x200px --out picture.svg",
+    *(f"export run --area 90x60mm --out cut.{form}" for form in ("svg", "pdf", "png", "dxf", "json")),
+    "export run --for laser --cut jigsaw --area 90x60mm --out pieces.svg",
+    "art run --engrave --area 150x100px --out art.png",
+    f"art run --picture {argv[1]} --area 150x100px --out picture.svg",
     "animate run --area 100x66px --seconds 0.5 --out run.gif",
     "solid run --out tile.stl",
     "solid run --out cutter.3mf",

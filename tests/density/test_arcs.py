@@ -28,7 +28,7 @@ def kernels(space: Space, means: Any, kappas: Any, weights: Any) -> Density:
 @given(st.floats(0, 360), st.floats(-1, 6), st.floats(0.02, 0.98), st.booleans())
 @example(180.0, 2.0, 0.9, False)
 @example(0.0, 2.0, 0.9, True)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_figures_of_a_circle_turn_with_it(
     mean: float, power: float, mass: float, from_zero: bool
 ) -> None:
@@ -95,7 +95,7 @@ def test_intervals_are_of_a_mass_and_of_one_column() -> None:
         shortest_intervals(UniformDensity(Torus(2)), 0.5)
 
 
-@pytest.mark.parametrize("shift", [0.0, 100.0, 180.0, 260.0])
+@pytest.mark.parametrize("shift", [0.0, 260.0])
 def test_data_come_back_as_they_were_given(
     shift: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -76,7 +76,7 @@ def test_moments_have_all_their_digits(width: int, kappa: float) -> None:
 
 @given(WIDTHS, KAPPAS)
 @example(48, 1e-12)
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_concentrations_come_back_from_their_means(width: int, kappa: float) -> None:
     _, mean, below, _ = exact(kappa, width)
     assert float(concentration_for(number(mean), number(below), width)) == pytest.approx(kappa)

@@ -55,7 +55,7 @@ ROLES = st.sampled_from(["covariate", "column"])
 
 
 @pytest.mark.filterwarnings("ignore::orbiflow.errors.DataWarning")
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(columns(), ROLES)
 def test_ordinary_columns_raise_no_alarm(column: np.ndarray, role: str) -> None:
     assume(len(np.unique(column)) > 2)
@@ -64,7 +64,7 @@ def test_ordinary_columns_raise_no_alarm(column: np.ndarray, role: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::orbiflow.errors.DataWarning")
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(
     columns(),
     st.sampled_from([999.0, -999.9, 9999.0, -9999.0, 99999.0, -32768.0, 1e20, 9.96921e36, 99.0]),

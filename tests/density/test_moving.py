@@ -98,7 +98,7 @@ def test_elsewhere_all_is_the_same(kind: int) -> None:
     assert torch.equal(density.log_prob(points), expected)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(SEEDS, st.sampled_from(SPACES))
 def test_gradients_elsewhere(seed: int, name: str) -> None:
     density = blend(name, seed, sharp=1e3)

@@ -178,11 +178,11 @@ def test_matrix_fisher_is_the_trace_of_a_matrix_times_a_rotation() -> None:
 @pytest.mark.parametrize(("kappa", "rows"), [(0.0, 20), (0.5, 40), (3.0, 15), (25.0, 8)])
 def test_concentration_is_in_its_interval_as_often_as_said(kappa: float, rows: int) -> None:
     rng = np.random.default_rng(5)
-    angles = rng.vonmises(0, kappa, (200, rows))
+    angles = rng.vonmises(0, kappa, (50, rows))
     lengths = abs(np.exp(1j * angles).mean(axis=1))
     ends = np.array([concentration_interval(1 - one, rows, 2) for one in lengths])
     inside = ((ends[:, 0] <= kappa) & (kappa <= ends[:, 1])).mean()
-    assert inside > 0.9  # three standard errors of 200 trials below 0.95
+    assert inside > 0.85  # three standard errors of 50 trials below 0.95
 
 
 @pytest.mark.parametrize("name", ["kent", "bingham"])

@@ -141,9 +141,9 @@ def test_concentrations_are_likeliest(kappa: float, width: int) -> None:
 
 def test_intervals_hold() -> None:
     """Of rows and of groups, intervals of 90 % hold the truth in about 90 % of cases."""
-    rng, held = np.random.default_rng(1), np.zeros(2)
+    rng, held, trials = np.random.default_rng(1), np.zeros(2), 80
     labels = np.arange(200) // 5
-    for _ in range(200):
+    for _ in range(trials):
         rows = rng.vonmises(1.0, 1.5, 200)
         grouped = (rng.vonmises(1.0, 2.0, 40)[:, None] + rng.normal(0, 0.2, (40, 5))).ravel()
         for k, (angles, groups) in enumerate([(rows, None), (grouped, labels)]):
@@ -151,13 +151,13 @@ def test_intervals_hold() -> None:
             assert one.mean is not None
             assert one.half_width is not None
             held[k] += abs(math.remainder(one.mean - 1, 2 * math.pi)) < one.half_width
-    assert (abs(held / 200 - 0.9) < 0.06).all(), held
+    assert (abs(held / trials - 0.9) < 0.08).all(), held
 
 
 def test_groups_are_no_evidence_of_a_direction() -> None:
     rng, naive, right = np.random.default_rng(2), 0, 0
     labels = np.arange(120) // 6
-    for _ in range(200):
+    for _ in range(60):
         angles = np.repeat(rng.uniform(0, 2 * np.pi, 20), 6) + rng.normal(0, 0.1, 120)
         angles %= 2 * np.pi
         (alone,), _ = summarize_angles(angles, unit="radians")
@@ -165,8 +165,8 @@ def test_groups_are_no_evidence_of_a_direction() -> None:
         assert (grouped.kuiper_p, grouped.watson_p) == (None, None)
         naive += (alone.rayleigh_p or 0) < 0.05
         right += (grouped.rayleigh_p or 0) < 0.05
-    assert naive > 70
-    assert right < 21
+    assert naive > 21
+    assert right < 8
 
 
 def test_weights_are_repeated_rows() -> None:

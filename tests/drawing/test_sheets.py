@@ -49,7 +49,7 @@ every_space = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 24)
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 24)
-    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 20)
 
 
 def coarse(width: Any) -> Sheet:

@@ -162,7 +162,7 @@ def test_paint_is_kept_where_a_mesh_is_mended(tmp_path: Path) -> None:
     assert painting_of(tmp_path, "a.ply", by_trimesh(scrap, "ply", colours)).share == 0
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.02, 0.45), st.floats(0.3, 0.9))
 def test_the_rarer_colour_is_paint_whatever_the_colours(
     seed: int, share: float, apart: float

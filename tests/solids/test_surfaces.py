@@ -12,7 +12,7 @@ from solids.known_solids import names, random_tile, seeds
 
 
 @given(names, seeds)
-@settings(max_examples=12)
+@settings(max_examples=6)
 def test_a_surface_is_certified_and_knows_what_is_behind_each_face(name, seed):
     tile, function = random_tile(name, seed)
     surface = tile_surface(tile, function)

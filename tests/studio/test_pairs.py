@@ -221,7 +221,7 @@ def test_what_is_drawn_on_either_figure_goes_to_it(pair: EscherTile, tmp_path: P
     assert given_settings == {"eyes": (tuple(one),), "second_eyes": (tuple(two),)}
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(seeds, st.floats(0.0, 0.3))
 def test_a_pulled_pair_is_certified_and_keeps_both_maps(seed: int, reach: float) -> None:
     pair = pair_result().tiles[0]

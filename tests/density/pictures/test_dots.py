@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,7 +96,7 @@ def test_a_peak_is_seen_through_its_dots(
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 20_000)
     density = peaked(name)
     drawn = density.sample((count,), torch.Generator().manual_seed(0))
-    sheet = Sheet.column("single", "png")
+    sheet = replace(Sheet.column("single", "png"), dpi=300)
     settings = PlotSettings(samples=count, scale="linear")
 
     def picture(dots: torch.Tensor | None) -> np.ndarray:
@@ -108,11 +109,11 @@ def test_a_peak_is_seen_through_its_dots(
 
     bare, dotted = picture(None), picture(drawn)
     yellow = (bare[..., 0] > 180) & (bare[..., 1] > 200) & (bare[..., 2] < 120)
-    assert yellow.sum() > 500
+    assert yellow.sum() > 100
     off = np.abs(bare - dotted).max(axis=-1)
     assert off[yellow].mean() < 70
     assert (off[yellow] > 60).mean() < 0.45
-    assert (off > 100).sum() > 20 * min(count, 300)  # dots are seen all the same
+    assert (off > 100).sum() > 5 * min(count, 300)  # dots are seen all the same
 
 
 @pytest.mark.parametrize("name", SPACES)

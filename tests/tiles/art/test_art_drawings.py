@@ -112,7 +112,7 @@ def colours_at(art: Artwork, points: np.ndarray) -> np.ndarray:
     return found
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH21"])
+@pytest.mark.parametrize("name", ["IH4", "IH21"])
 def test_vector_and_raster_agree(name: str, tmp_path: Path) -> None:
     art = drawn(name, BODY, tmp_path)
     made = render_artwork(art).astype(float)

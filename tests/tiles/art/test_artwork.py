@@ -21,7 +21,7 @@ from artworks import (
     upside_down,
 )
 from orbiflow.drawing import palette
-from orbiflow.tiles import CLASSES, ArtSettings, Artwork, Over, artwork, render_artwork
+from orbiflow.tiles import ArtSettings, Artwork, Over, artwork, render_artwork
 from orbiflow.tiles.make import art_scene
 from orbiflow.tiles.motifs import NOWHERE, runs
 from orbiflow.tiles.motifs.raster import region_sides
@@ -94,7 +94,7 @@ def test_a_checkerboard_is_carried(name: str) -> None:
     np.testing.assert_allclose(made[row, column][clear], parity[clear], atol=0.02)
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH28"])
 def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
     tile = squirrel(name)
     art = artwork(tile, settings(area="480x320px"), Over(face(tile)))

@@ -22,7 +22,7 @@ def polyline(seed: int, count: int, rough: float) -> np.ndarray:
     return np.concatenate([[[0, 0]], np.cumsum(steps, axis=0)])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(0, 1.0), st.floats(1e-3, 0.3))
 def test_fits_keep_their_tolerance(seed, count, rough, tolerance) -> None:
     points = polyline(seed, count, rough)

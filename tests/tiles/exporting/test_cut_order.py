@@ -80,7 +80,7 @@ def test_every_cut_goes_inside_out_and_loses_no_line(
     given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chosen = ExportSettings(
-        **{"purpose": "laser", "area": (150.0, 130.0), "tile_size": 40.0, "eyes": (EYE,), **given}
+        **{"purpose": "laser", "area": (110.0, 95.0), "tile_size": 40.0, "eyes": (EYE,), **given}
     )
     tile = squirrel("IH4")
     written, _ = scenes(tile, chosen)

@@ -52,7 +52,7 @@ def apart(some: np.ndarray, others: np.ndarray) -> float:
     return float(gaps.min(axis=1).max())
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(
     st.sampled_from(list(CLASSES)),
     st.booleans(),

@@ -31,7 +31,7 @@ def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:
     return found
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     tiles,
     st.sampled_from([0.0, 0.15, 0.4]),

@@ -51,7 +51,7 @@ def bent_fixture() -> EscherTile:
     return found
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(
     swirled, st.floats(0, 1), st.booleans(), st.sampled_from(["90x160px", "150x150px", "150x100px"])
 )

@@ -33,7 +33,7 @@ def filled(target: Target) -> BaseGeometry:
     return shapely.union_all([shapely.Polygon(p.exterior) for p in polygons_in(target.seen)])
 
 
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.0, 0.02, 0.06]))
 def test_what_was_seen_covers_the_outline(
     picture: np.ndarray, threshold: int, thicken: float
@@ -68,7 +68,7 @@ def test_smoothing_keeps_the_shape_that_was_read(
     assert smooth.buffer(width / 10).covers(kept)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.01, 0.05, 0.15]))
 def test_smoothing_counts_the_parts_that_it_left_out(
     picture: np.ndarray, threshold: int, share: float

@@ -63,7 +63,7 @@ def test_weierstrass_keeps_its_equation_and_its_periods(drawn: Any, z: complex) 
     assert laurent == pytest.approx(own.series(np.array([small]), np.ones(1))[0, 0], rel=1e-9)
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(st.sampled_from(["p3", "p4", "p6"]), triples, st.complex_numbers(max_magnitude=4))
 def test_the_map_is_a_quotient_of_hypergeometric_functions(
     name: str, orders: Any, w: complex
@@ -120,7 +120,7 @@ def test_turns_about_three_centres(name: str, orders: Any) -> None:
     check_turns(Development.of(pattern, orders))
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(lattices, quadruples)
 def test_turns_about_four_centres_keep_one_hyperbolic_plane(drawn: Any, orders: Any) -> None:
     pattern = half_turns(drawn)
@@ -134,7 +134,7 @@ def test_turns_about_four_centres_keep_one_hyperbolic_plane(drawn: Any, orders: 
     assert (np.abs(values[:, 0]) < np.abs(values[:, 1])).all()
 
 
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(lattices, quadruples, st.floats(0.2, 0.8), st.floats(0.2, 0.8))
 def test_solutions_are_those_of_the_equation(drawn: Any, orders: Any, a: float, b: float) -> None:
     pattern = half_turns(drawn)

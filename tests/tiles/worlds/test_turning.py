@@ -28,9 +28,7 @@ def seen(page: Any) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
 
 
-@pytest.mark.parametrize(
-    ("world", "order"), [("sphere", (2, 3, 4)), ("disc", (3, 3, 4)), ("disc", (2, 3, 7))]
-)
+@pytest.mark.parametrize(("world", "order"), [("sphere", (2, 3, 4)), ("disc", (2, 3, 7))])
 def test_a_world_is_turned(browser: Any, tmp_path: Path, world: Any, order: Any) -> None:
     tile = EscherTile(swirled_tile("IH28", 3, 0.1))
     chosen = ArtSettings(format="html", world=world, order=order, engrave=True, palette="lagoon")
