@@ -1,7 +1,5 @@
 """Squirrels' tiles with their maps, pictures to carry onto them, and a run's folder that holds one."""
 
-from __future__ import annotations
-
 import json
 from functools import lru_cache
 from pathlib import Path

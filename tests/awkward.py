@@ -1,7 +1,5 @@
 """Awkward geometries, shared by all tests: shapes that are right but strange, and what is no shape."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A bent tile of a class to draw."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

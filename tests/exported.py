@@ -1,7 +1,5 @@
 """Exported files read back by programs that are not orbiflow, and tiles to export."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Densities whose regions are known in closed form, shared by tests."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

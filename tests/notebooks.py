@@ -3,8 +3,6 @@
 `python tests/notebooks.py docs/quickstart.ipynb` runs it anew and stores the outputs in it.
 """
 
-from __future__ import annotations
-
 import ast
 import base64
 import contextlib

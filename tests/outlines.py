@@ -1,7 +1,5 @@
 """Outlines to bend, measure and triangulate: simple shapes, animals, and what is hard about them."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple

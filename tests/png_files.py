@@ -1,7 +1,5 @@
 """Pictures as bytes, PNGs of any depth among them, which Pillow does not write."""
 
-from __future__ import annotations
-
 import io
 import struct
 import zlib

@@ -1,7 +1,5 @@
 """What is on a printed figure: sizes of letters, and whether all lies on the page."""
 
-from __future__ import annotations
-
 import ctypes
 from itertools import pairwise
 

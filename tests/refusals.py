@@ -1,7 +1,5 @@
 """Errors and warnings by their class and by what they are about, whatever the words around it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """Files that were changed on purpose, with a checksum that fits: their content is checked as well."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 

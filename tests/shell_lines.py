@@ -3,8 +3,6 @@
 Nothing of what a line asks for is done: `refusal` reads the words of a command and stops.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import re

@@ -1,7 +1,5 @@
 """Searches for two figures made small, and the pair that one finds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache

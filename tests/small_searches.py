@@ -1,7 +1,5 @@
 """Searches at the effort "fast" made smaller still, for tests of what a search is embedded in."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """Solids read back from their files by other programs' readers, and cut through."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from typing import Any, NamedTuple

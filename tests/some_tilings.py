@@ -1,7 +1,5 @@
 """Tilings to test with: of all 17 groups, with tiles that have a symmetry, with several prototiles."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

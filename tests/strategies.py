@@ -1,7 +1,5 @@
 """Random isometries, lattices, groups, points and fields, shared by all tests."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Tiles that are bent far: the straight way to their template may cross itself."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """Awkward calls of public functions: it works, or an `OrbiflowError` says what to give instead."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A folder of results is one run's: replaced whole, or left as it was."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -52,9 +50,7 @@ def test_a_new_folder_and_its_parents(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", ["elsewhere", "working directory", "above it"])
-def test_an_earlier_run_goes_whole(
-    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_earlier_run_goes_whole(place: str, tmp_path, monkeypatch) -> None:
     out = tmp_path / "out"
     fill(out, *OURS, text="old")
     (out / ".DS_Store").touch()

@@ -1,7 +1,5 @@
 """The gallery's table and page are consistent: files, licences, classes and commands."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

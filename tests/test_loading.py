@@ -1,7 +1,5 @@
 """`orbiflow.load`: what commands left, certified anew, and folders that cannot be loaded."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

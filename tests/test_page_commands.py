@@ -3,8 +3,6 @@
 Searches and fits try little, and tables have few rows: what they find is tested where they are made.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -193,13 +191,7 @@ def smaller(words: list[str]) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_a_page(
-    page: str,
-    workshop: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_page(page: str, workshop: Path, tmp_path, monkeypatch, capsys) -> None:
     desk = shutil.copytree(workshop, tmp_path / "desk", symlinks=True)
     monkeypatch.chdir(desk)
     for (of, name), columns in OF_A_PAGE.items():

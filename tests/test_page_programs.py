@@ -1,7 +1,5 @@
 """Programs in Python that pages print: they run in the page's order and print what the page says."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path
@@ -63,6 +61,12 @@ SMALLER = (
     ('(effort="fast")', '(effort="fast", classes=["IH4"])'),
     ("escherize(target)", 'escherize(target, orbiflow.EscherizeSettings(classes=["IH4"]))'),
     ('"effort": "fast"}', '"effort": "fast", "classes": ["IH6"]}'),
+    *(("torch.rand(1000,", "torch.rand(100,"), ("iterations=20)", "iterations=5)")),
+    *(
+        ('"900x600px"', '"300x200px"'),
+        ("seconds=4", "seconds=1"),
+        ("4.0, (500, 2)", "4.0, (150, 2)"),
+    ),
 )
 """What makes a program quick enough for a test."""
 
@@ -75,13 +79,7 @@ def programs(page: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PRINTED)
-def test_a_page(
-    page: str,
-    workshop: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_page(page: str, workshop: Path, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(shutil.copytree(workshop, tmp_path / "desk", symlinks=True))
     names: dict[str, object] = {"__name__": "__main__"}
     for program in programs(page):

@@ -1,7 +1,5 @@
 """Worker processes: news, errors, deaths and cancelling."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator
@@ -89,9 +87,7 @@ def dying_of_two(item: int, _tell: Tell, _cancel: Cancel) -> int:
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5])
-def test_a_worker_that_dies_is_replaced_and_its_item_tried_again(
-    workers: int, tmp_path: Path
-) -> None:
+def test_a_worker_that_dies_is_replaced_and_its_item_tried_again(workers: int, tmp_path) -> None:
     items = [(number, tmp_path / "mark") for number in range(4)]
     news = list(work(dying_once, items, workers, tries=2))
     assert sorted(n.value for n in news) == [0, 1, 2, 3]

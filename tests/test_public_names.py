@@ -1,7 +1,5 @@
 """What the package names at its top is there, and costs nothing until it is used."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import subprocess

@@ -1,7 +1,5 @@
 """The quick-start notebook runs, and holds what its cells show."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every shell line of README and docs would be accepted by the program that it names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

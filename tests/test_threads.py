@@ -1,7 +1,5 @@
 """One torch thread in a block: restored, nested, and entered by many threads at once."""
 
-from __future__ import annotations
-
 import random
 import threading
 from collections.abc import Callable, Iterator

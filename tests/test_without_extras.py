@@ -1,7 +1,5 @@
 """All that tiles need works without torch, matplotlib and the other packages of extras."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Words that orbiflow does without, and files, names and links of its pages, which are there."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import re

@@ -1,7 +1,5 @@
 """Small batches, an executor that stays in this process, and work that kills its worker."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """Batches: what is done once, again and not at all; what is kept; what is shown."""
 
-from __future__ import annotations
-
 import functools
 import json
 import shutil
@@ -103,9 +101,7 @@ def test_what_is_done_again(here: Here, call: Call) -> None:
     assert again(changed(call, seed=1, workers=3)) == []
 
 
-def test_another_version_does_all_again(
-    here: Here, call: Call, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_version_does_all_again(here: Here, call: Call, monkeypatch) -> None:
     run_call(call)
     here.done.clear()
     monkeypatch.setattr(work, "__version__", "999")
@@ -144,9 +140,7 @@ def test_stopping_keeps_what_was_finished(here: Here, call: Call) -> None:
     assert summary["kept"] == 1
 
 
-def test_a_full_disk_ends_it_and_loses_nothing(
-    here: Here, call: Call, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_ends_it_and_loses_nothing(here: Here, call: Call, monkeypatch) -> None:
     out = call.flat["out"]
 
     def full(folder: Path, _files: object) -> None:

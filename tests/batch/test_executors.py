@@ -1,7 +1,5 @@
 """The same parcels by every executor: the same answers; deaths cost their time and nothing else."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal
@@ -106,9 +104,7 @@ def expected_fixture() -> dict[str, Any]:
     return without_seconds(dict(answer.files))
 
 
-def test_local_processes_give_the_same(
-    expected: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_local_processes_give_the_same(expected: dict[str, Any], monkeypatch) -> None:
     monkeypatch.setattr(executors, "_serve", small_locally)
     found = answers(LocalProcesses(2, ("orbiflow.tiles.search",)), boot_parcels(2))
     assert sorted(found) == ["boot 0", "boot 1"]
@@ -168,9 +164,7 @@ def test_what_kills_workers_fails_alone(monkeypatch: pytest.MonkeyPatch, cluster
     assert found["0"].files == {"file": b"a"}
 
 
-def test_a_worker_killed_once_its_result_is_fetched(
-    monkeypatch: pytest.MonkeyPatch, cluster: Any
-) -> None:
+def test_a_worker_killed_once_its_result_is_fetched(monkeypatch, cluster: Any) -> None:
     monkeypatch.setattr(dask_cluster, "_serve", deadly)
     tasks, workers = cluster.scheduler.tasks, cluster.scheduler.workers
     with DaskCluster(cluster.scheduler_address) as executor:
@@ -185,9 +179,7 @@ def test_a_worker_killed_once_its_result_is_fetched(
     assert sorted(keys) == ["0", "1", "2"]
 
 
-def test_stopping_a_cluster_leaves_nothing_on_it(
-    monkeypatch: pytest.MonkeyPatch, cluster: Any
-) -> None:
+def test_stopping_a_cluster_leaves_nothing_on_it(monkeypatch, cluster: Any) -> None:
     monkeypatch.setattr(dask_cluster, "_serve", deadly)
     cancel = Cancel()
     with DaskCluster(cluster.scheduler_address) as executor:
@@ -200,9 +192,7 @@ def test_stopping_a_cluster_leaves_nothing_on_it(
     ]
 
 
-def test_stopping_a_cluster_at_work_prints_no_traceback(
-    monkeypatch: pytest.MonkeyPatch, cluster: Any
-) -> None:
+def test_stopping_a_cluster_at_work_prints_no_traceback(monkeypatch, cluster: Any) -> None:
     monkeypatch.setattr(dask_cluster, "_serve", endless)
 
     def all_at_work() -> bool:

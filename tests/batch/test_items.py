@@ -1,7 +1,5 @@
 """The files of a batch, their names, and the journal of what was done to them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -55,9 +55,7 @@ def test_the_best_similarity_undoes_one(common) -> None:
 
 
 @pytest.mark.parametrize("name", WANTING)
-def test_what_is_missing_is_said_in_one_line(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_missing_is_said_in_one_line(name: str, tmp_path, monkeypatch, capsys) -> None:
     arguments = ["--distorted"] if name == "escherization.py" else ["narrow", "--data", "proline"]
     monkeypatch.setenv("ORBIFLOW_DATA", str(tmp_path))
     monkeypatch.setattr(sys, "argv", [str(BENCHMARKS / name), *arguments])

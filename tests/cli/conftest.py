@@ -1,11 +1,10 @@
 """Running the command line in this process and in one of its own."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import pytest
 
@@ -27,7 +26,26 @@ class Outcome:
     err: str
 
 
-Run = Callable[..., Outcome]
+class Run(NamedTuple):
+    """Calls the command line with its arguments, in this process alone."""
+
+    capture: Callable[[], tuple[str, str]]
+
+    def __call__(self, *arguments: object) -> Outcome:
+        return call_main(self.capture, *arguments)
+
+    def done(self, *arguments: object) -> Outcome:
+        """Call it, and expect that it does its work."""
+        outcome = self(*arguments)
+        assert outcome.status == 0, outcome.err
+        return outcome
+
+    def refused(self, *arguments: object) -> Outcome:
+        """Call it, and expect that it refuses what it was told."""
+        outcome = self(*arguments)
+        assert outcome.status == 2, outcome.out
+        return outcome
+
 
 # Python's code for `orbiflow`; whether Ctrl-C is ignored is inherited from the shell, and must not
 # decide a test
@@ -61,11 +79,11 @@ def call_main(capture: Callable[[], tuple[str, str]], *arguments: object) -> Out
 @pytest.fixture(name="orbiflow")
 def orbiflow_fixture(capsys: pytest.CaptureFixture[str]) -> Run:
     """Call it with the command line's arguments; stays in this process."""
-    return lambda *arguments: call_main(capsys.readouterr, *arguments)
+    return Run(capsys.readouterr)
 
 
 @pytest.fixture(name="orbiflow_process", scope="session")
-def orbiflow_process_fixture() -> Run:
+def orbiflow_process_fixture() -> Callable[..., Outcome]:
     """The same as a process of its own."""
 
     def run(*arguments: object) -> Outcome:

@@ -1,7 +1,5 @@
 """`orbiflow art`: files written, mistakes answered with status 2 and one sentence."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -31,8 +29,9 @@ SMALL = ("--area", "120x80px", "--tile-size", "60px")
 
 def test_a_picture(result: Path, picture: Path, tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "tiles.png"
-    outcome = orbiflow("art", result, "--picture", picture, "--outline", "none", *SMALL, "-o", out)
-    assert outcome.status == 0, outcome.err
+    outcome = orbiflow.done(
+        "art", result, "--picture", picture, "--outline", "none", *SMALL, "-o", out
+    )
     names(outcome.out, out, 120, 80)
     with Image.open(out) as made:
         assert made.info["dpi"] == pytest.approx((300, 300), abs=0.1)
@@ -41,7 +40,7 @@ def test_a_picture(result: Path, picture: Path, tmp_path: Path, orbiflow) -> Non
 
 def test_the_default_name(result: Path, tmp_path: Path, orbiflow, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert orbiflow("art", result, *SMALL).status == 0
+    orbiflow.done("art", result, *SMALL)
     assert [path.name for path in tmp_path.iterdir()] == ["squirrel-IH6.png"]
 
 
@@ -58,16 +57,14 @@ def test_the_default_name(result: Path, tmp_path: Path, orbiflow, monkeypatch) -
     ],
 )
 def test_mistakes(options, about: str, result: Path, tmp_path: Path, orbiflow) -> None:
-    outcome = orbiflow("art", result, *options, "-o", tmp_path / "out.png")
-    assert outcome.status == 2
+    outcome = orbiflow.refused("art", result, *options, "-o", tmp_path / "out.png")
     names(outcome.err, *about.split())
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("out", ["tiles.tiff", "tiles"])
 def test_other_endings(out: str, result: Path, tmp_path: Path, orbiflow) -> None:
-    outcome = orbiflow("art", result, "-o", tmp_path / out)
-    assert outcome.status == 2
+    outcome = orbiflow.refused("art", result, "-o", tmp_path / out)
     names(outcome.err, "--out", ".html", ".pdf", ".png", ".svg", out)
 
 

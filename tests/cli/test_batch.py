@@ -1,7 +1,5 @@
 """`orbiflow batch` and `orbiflow density batch`: what a user sees."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -52,11 +50,9 @@ def test_every_pair_of_a_folder(tmp_path: Path, orbiflow) -> None:
     left = {path.name for path in (own / name).iterdir()}
     assert left == {*TILE_FILES, "overlay-2.png", "model-2.safetensors"}
     ElementTree.parse(own / name / "tiling.svg")
-    made = orbiflow("export", own, "--cut", "pieces", "-o", tmp_path / "pieces.svg")
-    assert made.status == 0, made.err
+    orbiflow.done("export", own, "--cut", "pieces", "-o", tmp_path / "pieces.svg")
     assert (tmp_path / "pieces-2.svg").is_file()
-    again = orbiflow(*command[:2], "--ratio", "1", "--out", tmp_path / "other")
-    assert again.status == 2
+    again = orbiflow.refused(*command[:2], "--ratio", "1", "--out", tmp_path / "other")
     names(again.err, "--ratio")
 
 
@@ -90,11 +86,10 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
     (tmp_path / "in").mkdir()
     draws = np.random.default_rng(0).vonmises(0, 2, size=(60, 2))
     np.savetxt(tmp_path / "in" / "one.csv", draws, delimiter=",")
-    outcome = orbiflow(
+    orbiflow.done(
         *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
         *("--space", "torus", "--unit", "radians", "--components", "mixture"),
     )
-    assert outcome.status == 0, outcome.err
     row = rows(tmp_path / "out")["one.csv"]
     report = json.loads((tmp_path / "out" / "one" / "report.json").read_text())
     assert float(row["log_likelihood"]) == report["log_likelihood"]["natural"]
@@ -108,12 +103,11 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
     # it is a density's folder like any other: pictures may come and go there
     model = ("--model", tmp_path / "out" / "one", "--out", tmp_path / "out" / "one")
     for form in ("png", "svg"):
-        assert orbiflow("density", "plot", *model, "--format", form).status == 0
-    again = orbiflow(
+        orbiflow.done("density", "plot", *model, "--format", form)
+    orbiflow.done(
         *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
         *("--space", "torus", "--unit", "radians", "--components", "chains"),
     )
-    assert again.status == 0, again.err
     assert sorted(path.name for path in (tmp_path / "out" / "one").iterdir()) == [
         "density.safetensors",
         "report.json",
@@ -128,15 +122,12 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
         *((("in", "--out", "in/out"), "in/out"), (("in", "--match", "*.webp"), "1 *.webp")),
     ],
 )
-def test_mistakes(
-    arguments: tuple[str, ...], about: str, tmp_path: Path, orbiflow, monkeypatch
-) -> None:
+def test_mistakes(arguments: tuple[str, ...], about: str, tmp_path, orbiflow, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     (tmp_path / "file.png").touch()
     write_boot(tmp_path / "in" / "boot.json")
-    outcome = orbiflow("batch", *arguments)
-    assert outcome.status == 2
+    outcome = orbiflow.refused("batch", *arguments)
     assert outcome.err.startswith("error: ")
     names(outcome.err, *about.split())
     assert not (tmp_path / "batch").exists()

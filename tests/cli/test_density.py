@@ -45,8 +45,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
     columns = "lat=angle:degrees,lon=angle:degrees" if space == "torus" else "lat,lon"
     how = ("--space", space, "--columns", columns, "--out", model)
-    fitted = orbiflow("density", "fit", data, *how, *FIT)
-    assert fitted.status == 0, fitted.err
+    fitted = orbiflow.done("density", "fit", data, *how, *FIT)
     names(fitted.out, columns)
     report = json.loads((model / "report.json").read_text())
     assert report["columns"] == ["lat", "lon"]
@@ -55,7 +54,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
     assert gain > 0.5
 
     scores = tmp_path / "scores.csv"
-    assert orbiflow("density", "score", data, "--model", model, "--out", scores).status == 0
+    orbiflow.done("density", "score", data, "--model", model, "--out", scores)
     header, *rows = scores.read_text().splitlines()
     assert header == "lat,lon,log_prob"
     values = np.array([row.split(",") for row in rows], dtype=float)
@@ -63,7 +62,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
 
     drawn = tmp_path / "drawn.csv"
     arguments = ("density", "sample", "--model", model, "-n", 50, "--out", drawn)
-    assert orbiflow(*arguments).status == 0
+    orbiflow.done(*arguments)
     first = drawn.read_text()
     assert first.startswith("lat,lon\n")
     assert len(first.splitlines()) == 51
@@ -73,8 +72,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
 
 def test_plots(tmp_path: Path, orbiflow, fitted) -> None:
     data, model, out = table(tmp_path), fitted("sphere"), tmp_path / "plots"
-    drawn = orbiflow("density", "plot", "--model", model, "--data", data, "--out", out)
-    assert drawn.status == 0, drawn.err
+    orbiflow.done("density", "plot", "--model", model, "--data", data, "--out", out)
     names = {path.name for path in out.iterdir()}
     pictures = {"density.png", "latlon.png", "square.png", "samples.png"}
     assert names - {"flow.png"} == pictures | {"surface.html"}
@@ -84,15 +82,13 @@ def test_plots(tmp_path: Path, orbiflow, fitted) -> None:
 def test_plots_for_papers(tmp_path: Path, orbiflow, fitted) -> None:
     data, model, out = table(tmp_path), fitted("sphere"), tmp_path / "plots.pdf"
     plot = ("density", "plot", "--model", model, "--data", data)
-    drawn = orbiflow(*plot, "--width", "double", "--out", out)
-    assert drawn.status == 0, drawn.err
+    drawn = orbiflow.done(*plot, "--width", "double", "--out", out)
     pages = pypdfium2.PdfDocument(out)
     assert {round(page.get_width()) for page in pages} == {510}
     assert len(pages) in (4, 5)  # with the flow, where it has a part in the density
     names(drawn.out, out)
     folder = tmp_path / "figures"
-    drawn = orbiflow(*plot, "--format", "svg", "--width", "9cm", "--out", folder)
-    assert drawn.status == 0, drawn.err
+    orbiflow.done(*plot, "--format", "svg", "--width", "9cm", "--out", folder)
     figures = {"density.svg", "latlon.svg", "square.svg", "samples.svg", "surface.html"}
     assert {path.name for path in folder.iterdir()} - {"flow.svg"} == figures
     assert 'width="255.1' in (folder / "latlon.svg").read_text()
@@ -102,8 +98,7 @@ def test_plots_for_papers(tmp_path: Path, orbiflow, fitted) -> None:
         (("--out", tmp_path / "plot.png"), "plot.png .pdf"),
         (("--out", tmp_path / "none" / "plots.pdf"), "none"),
     ):
-        refused = orbiflow(*plot, *options)
-        assert refused.status == 2, options
+        refused = orbiflow.refused(*plot, *options)
         names(refused.err, *about.split())
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
@@ -118,8 +113,7 @@ def test_plot_of_angles_has_their_names_and_options(tmp_path: Path, orbiflow, fi
         ("turned", "--scale", "linear", "--center", "180,180"),
         ("log", "--scale", "log"),
     ):
-        drawn = orbiflow(*plot, tmp_path / name, *options)
-        assert drawn.status == 0, drawn.err
+        orbiflow.done(*plot, tmp_path / name, *options)
         pictures[name] = {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
     first = pictures["plain"]
     for name in ("dots", "turned", "log"):
@@ -140,16 +134,13 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
     data.write_text("a,b,c\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
     three = ",".join(f"{name}=angle:radians" for name in "abc")
     fit = ("density", "fit", data, "--space", "torus", "--columns", three, *FIT)
-    fitted = orbiflow(*fit, "--out", model)
-    assert fitted.status == 0
+    orbiflow.done(*fit, "--out", model)
     plot = ("density", "plot", "--model", model, "--out", out)
     for options in ((), ("--data", data, "--center", "pi,0,-pi")):
-        drawn = orbiflow(*plot, *options)
-        assert drawn.status == 0, drawn.err
+        drawn = orbiflow.done(*plot, *options)
         names(drawn.out, 3)
         assert {path.name for path in out.iterdir()} == {"samples.png"}
-    wrong = orbiflow(*plot, "--center", "0,0")
-    assert wrong.status == 2
+    wrong = orbiflow.refused(*plot, "--center", "0,0")
     names(wrong.err, "--center", 3)
 
 
@@ -186,8 +177,7 @@ def test_mistakes_in_the_data(case: str, tmp_path: Path, orbiflow) -> None:
     data = tmp_path / ("nowhere.csv" if case == "no file" else "data.csv")
     if case != "no file":
         data.write_text(content)
-    outcome = orbiflow("density", "fit", data, "--space", space, "--out", tmp_path / "out")
-    assert outcome.status == 2
+    outcome = orbiflow.refused("density", "fit", data, "--space", space, "--out", tmp_path / "out")
     names(outcome.err, *about.split())
     assert not (tmp_path / "out" / "density.safetensors").exists()
 
@@ -203,8 +193,7 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow, fitted) -> None:
         (("density", "plot", "--model", model, "--coastlines", data), "--coastlines"),
         (("density", "plot", "--model", model, "--center", "0,nan"), "nan"),
     ):
-        outcome = orbiflow(*arguments)
-        assert outcome.status == 2, arguments
+        outcome = orbiflow.refused(*arguments)
         names(outcome.err, *about.split())
 
 
@@ -232,15 +221,15 @@ def test_nothing_of_an_earlier_model_stays(tmp_path: Path, orbiflow) -> None:
     fit = ("density", "fit", data, "--space", "torus", *ANGLES, "--out", model)
     fit = (*fit, "--components", "mixture")
     plot = ("density", "plot", "--model", model, "--out", model)
-    assert orbiflow(*fit).status == 0
-    assert orbiflow(*plot, "--data", data).status == 0
+    orbiflow.done(*fit)
+    orbiflow.done(*plot, "--data", data)
     names = {"density.png", "samples.png", "surface.html", "density.safetensors", "report.json"}
     assert {path.name for path in model.iterdir()} - {"flow.png"} == names
     # without data there is no picture of samples beside them
-    assert orbiflow(*plot).status == 0
+    orbiflow.done(*plot)
     assert not (model / "samples.png").exists()
     assert (model / "density.safetensors").exists()
-    assert orbiflow(*fit).status == 0
+    orbiflow.done(*fit)
     assert {path.name for path in model.iterdir()} == {"density.safetensors", "report.json"}
 
 
@@ -248,8 +237,9 @@ def test_a_fit_does_not_touch_what_it_did_not_write(tmp_path: Path, orbiflow) ->
     data, model = table(tmp_path), tmp_path / "model"
     model.mkdir()
     (model / "density.png").write_text("mine")
-    refused = orbiflow("density", "fit", data, "--space", "torus", *ANGLES, *FIT, "--out", model)
-    assert refused.status == 2
+    refused = orbiflow.refused(
+        "density", "fit", data, "--space", "torus", *ANGLES, *FIT, "--out", model
+    )
     names(refused.err, "density.png")
     assert (model / "density.png").read_text() == "mine"
 
@@ -259,8 +249,7 @@ def test_a_plot_leaves_other_files_alone(tmp_path: Path, orbiflow, fitted) -> No
     out.mkdir()
     (out / "notes.txt").write_text("mine")
     (out / "surface.html").write_text("of an earlier model")
-    wrong = orbiflow("density", "plot", "--model", model, "--center", "0,0,0", "--out", out)
-    assert wrong.status == 2
+    orbiflow.refused("density", "plot", "--model", model, "--center", "0,0,0", "--out", out)
     assert (out / "surface.html").read_text() == "of an earlier model"
     assert (out / "notes.txt").read_text() == "mine"
 
@@ -271,8 +260,7 @@ def test_maps_as_asked_for(tmp_path: Path, orbiflow, fitted) -> None:
     coast.write_text('{"type": "LineString", "coordinates": [[170, 10], [-170, 20]]}')
     plot = ("density", "plot", "--model", model, "--out", out)
     asked = ("--coastlines", coast, "--center", "150", "--samples", "20", "--format", "svg")
-    drawn = orbiflow(*plot, *asked)
-    assert drawn.status == 0, drawn.err
+    drawn = orbiflow.done(*plot, *asked)
     names(drawn.out, "150° E", "30°")
     assert (out / "samples.svg").exists()
     before = (out / "density.svg").read_bytes()

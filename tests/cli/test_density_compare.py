@@ -1,7 +1,5 @@
 """`orbiflow density compare` and `region`, `score --region`, columns by their names, and mistakes."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -58,8 +56,7 @@ def folder_fixture(made: Path, tmp_path: Path) -> Path:
 def test_models_are_compared_by_the_names_of_their_columns(folder: Path, orbiflow: Any) -> None:
     models = ("-m", folder / "poor", "-m", folder / "good")
     out = folder / "c.json"
-    done = orbiflow("density", "compare", *models, "--data", folder / "held.csv", "--out", out)
-    assert done.status == 0, done.err
+    done = orbiflow.done("density", "compare", *models, "--data", folder / "held.csv", "--out", out)
     names(done.out, "good", "poor")
     assert "WARNING" not in done.out
     found = json.loads(out.read_text())
@@ -69,25 +66,20 @@ def test_models_are_compared_by_the_names_of_their_columns(folder: Path, orbiflo
     good = next(s for s in found["scores"] if s["name"] == "good")
     # phi and psi by name: as if the file had them in the order of the fit
     plain = write(folder / "plain.csv", "phi,psi", angles(2))
-    scored = orbiflow(
-        "density", "score", plain, "--model", folder / "good", "--out", folder / "s.csv"
-    )
-    assert scored.status == 0, scored.err
+    orbiflow.done("density", "score", plain, "--model", folder / "good", "--out", folder / "s.csv")
     rows = table_of(folder / "s.csv")
     assert np.mean([float(row["log_prob"]) for row in rows]) == pytest.approx(
         good["mean"], abs=1e-6
     )
-    grouped = orbiflow(
+    grouped = orbiflow.done(
         "density", "compare", *models, "--data", folder / "held.csv", "--columns",
         "name=group", "--out", folder / "c.csv",
     )  # fmt: skip
-    assert grouped.status == 0, grouped.err
     names(grouped.out, 30)
     data = write(folder / "w.csv", "phi,psi,w", np.column_stack([angles(2), np.arange(1, 121)]))
-    done = orbiflow(
+    orbiflow.done(
         "density", "compare", *models, "--data", data, "--columns", "w=weight", "--out", out
     )
-    assert done.status == 0, done.err
     scores = [float(row["log_prob"]) for row in rows]
     good = next(s for s in json.loads(out.read_text())["scores"] if s["name"] == "good")
     assert good["mean"] == pytest.approx(np.average(scores, weights=range(1, 121)), abs=1e-6)
@@ -97,19 +89,17 @@ def test_models_are_compared_by_the_names_of_their_columns(folder: Path, orbiflo
 
 def test_rows_that_a_model_was_fitted_to_are_known(folder: Path, orbiflow: Any) -> None:
     models = ("-m", folder / "good", "-m", folder / "poor")
-    done = orbiflow("density", "compare", *models, "--data", folder / "good.csv")
-    assert done.status == 0, done.err
+    done = orbiflow.done("density", "compare", *models, "--data", folder / "good.csv")
     names(done.out, "WARNING: good", 120)
     mixed = write(folder / "mixed.csv", "phi,psi", np.concatenate([angles(0)[:20], angles(3)]))
     done = orbiflow("density", "compare", *models, "--data", mixed)
     names(done.out, 20, 140, "good")
     extra = DensityEstimator(unit="degrees", components="mixture").fit(angles(0))
     (folder / "old.safetensors").write_bytes(density_to_bytes(extra.density_))
-    done = orbiflow(
+    done = orbiflow.done(
         "density", "compare", "-m", folder / "good", "-m", folder / "old.safetensors",
         "--columns", "phi,psi", "--data", mixed,
     )  # fmt: skip
-    assert done.status == 0, done.err
     names(done.out, "old")
 
 
@@ -117,8 +107,7 @@ def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
     flipped = write(folder / "b.csv", "psi,phi", angles(5, rows=60)[:, ::-1])
     compare = ("density", "compare-data", "--space", "torus", "--unit", "degrees")
     compare = (*compare, "--permutations", 99, "-d", folder / "good.csv", "-d")
-    done = orbiflow(*compare, flipped)
-    assert done.status == 0, done.err
+    orbiflow.done(*compare, flipped)
     out = folder / "d.csv"
     how = ("--divergence", "--bootstrap", 200, "--out", out)
     done = orbiflow(*compare, folder / "poor.csv", *how)
@@ -132,20 +121,18 @@ def test_groups_of_data_sets_are_no_columns_of_theirs(folder: Path, orbiflow: An
     labels = [str(k % 7) for k in range(18)]
     for name, seed in (("x", 1), ("y", 2)):
         write(folder / f"{name}.csv", "station,phi,psi", angles(seed)[:18], labels)
-    done = orbiflow(
+    orbiflow.done(
         "density", "compare-data", "-d", folder / "x.csv", "-d", folder / "y.csv",
         "--columns", "station=group", "--space", "torus", "--unit", "degrees",
         "--permutations", 49, "--out", folder / "xy.json",
     )  # fmt: skip
-    assert done.status == 0, done.err
     found = json.loads((folder / "xy.json").read_text())
     assert (found["groups"], found["rows"], found["divergence"]) == (7, [18, 18], None)
 
 
 def test_regions(folder: Path, orbiflow: Any) -> None:
     out = folder / "r.json"
-    done = orbiflow("density", "region", "-m", folder / "good", "--mass", "0.5, 0.9", "--out", out)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "region", "-m", folder / "good", "--mass", "0.5, 0.9", "--out", out)
     found = json.loads(out.read_text())
     assert found["size_unit"] == "degrees^2"
     assert [r["mass"] for r in found["regions"]] == [0.5, 0.9]
@@ -155,19 +142,18 @@ def test_regions(folder: Path, orbiflow: Any) -> None:
         assert shape.area == pytest.approx(region["polygons_size"])
         assert region["polygons_mass"] == pytest.approx(region["mass"], abs=0.02)
     table = folder / "r.csv"
-    done = orbiflow("density", "region", "-m", folder / "good", "--level", "-9", "--out", table)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "region", "-m", folder / "good", "--level", "-9", "--out", table)
     header, first, *_ = table.read_text().splitlines()
     assert header == "region,mass,log_prob,polygon,ring,angle1,angle2"
     assert first.startswith("1,,-9,1,0,")
-    refused = orbiflow("density", "region", "-m", folder / "good", "--out", folder / "r.geojson")
-    assert refused.status == 2
+    refused = orbiflow.refused(
+        "density", "region", "-m", folder / "good", "--out", folder / "r.geojson"
+    )
     names(refused.err, "torus")
     scored = folder / "s.csv"
-    done = orbiflow(
+    orbiflow.done(
         "density", "score", folder / "held.csv", "-m", folder / "good", "--region", "--out", scored
     )
-    assert done.status == 0, done.err
     rows = table_of(scored)
     assert list(rows[0]) == ["name", "psi", "phi", "log_prob", "hdr"]
     level = found["regions"][1]["log_prob"]
@@ -179,8 +165,7 @@ def test_regions(folder: Path, orbiflow: Any) -> None:
 def test_masses_have_errors_that_are_not_zero(folder: Path, orbiflow: Any) -> None:
     def said(*options: object) -> str:
         out = folder / "said.json"
-        done = orbiflow("density", "region", "-m", folder / "good", "--out", out, *options)
-        assert done.status == 0, done.err
+        done = orbiflow.done("density", "region", "-m", folder / "good", "--out", out, *options)
         (line,) = [line for line in done.out.splitlines() if line.startswith("  mass ")]
         assert not re.search(r"± 0\.0*( |:|$)", line)
         return line
@@ -199,47 +184,40 @@ def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orb
         "lat,lon",
         np.stack([rng.normal(0, 20, 90).clip(-80, 80), rng.normal(170, 30, 90)], axis=1),
     )
-    fit = orbiflow(
+    orbiflow.done(
         "density", "fit", tmp_path / "d.csv", "--space", "sphere", *QUICK, "--out", tmp_path / "m"
     )
-    assert fit.status == 0, fit.err
     out = tmp_path / "r.geojson"
-    done = orbiflow("density", "region", "-m", tmp_path / "m", "--mass", "0.8", "--out", out)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "region", "-m", tmp_path / "m", "--mass", "0.8", "--out", out)
     (feature,) = json.loads(out.read_text())["features"]
     xs = np.concatenate([np.array(rings[0])[:, 0] for rings in feature["geometry"]["coordinates"]])
     assert xs.max() == 180
     assert xs.min() == -180
     assert feature["properties"]["held"] == 0.8
     write(tmp_path / "t.csv", "phi,psi,chi", rng.vonmises(0, 1, (90, 3)))
-    fit = orbiflow(
+    orbiflow.done(
         "density", "fit", tmp_path / "t.csv", "--space", "torus", "--unit", "radians", *QUICK,
         "--out", tmp_path / "t",
     )  # fmt: skip
-    assert fit.status == 0, fit.err
-    done = orbiflow("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.json")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.json")
     found = json.loads((tmp_path / "t.json").read_text())
     assert found["size_unit"] == "radians^3"
     assert "polygons" not in found["regions"][0]
-    refused = orbiflow("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.csv2")
-    assert refused.status == 2
+    orbiflow.refused("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.csv2")
 
 
 def test_score_refuses_other_columns(folder: Path, orbiflow: Any) -> None:
     other = write(folder / "other.csv", "chi1,chi2", angles(4))
     score = ("density", "score", other, "--model", folder / "good", "--out", folder / "s.csv")
-    refused = orbiflow(*score)
-    assert refused.status == 2
+    refused = orbiflow.refused(*score)
     names(refused.err, "phi, psi", "chi1, chi2", "--columns")
     assert not (folder / "s.csv").exists()
-    assert orbiflow(*score, "--columns", "chi1,chi2").status == 0
+    orbiflow.done(*score, "--columns", "chi1,chi2")
     half = write(folder / "half.csv", "phi,chi2", angles(4))
     assert "no psi among phi, chi2" in orbiflow("density", "score", half, "-m", folder / "good").err
     bare = folder / "bare.csv"
     bare.write_text("\n".join(f"{a},{b}" for a, b in angles(4)) + "\n")
-    done = orbiflow("density", "score", bare, "-m", folder / "good", "--out", folder / "b.csv")
-    assert done.status == 0, done.err
+    done = orbiflow.done("density", "score", bare, "-m", folder / "good", "--out", folder / "b.csv")
     names(done.out, "phi, psi")
 
 
@@ -269,9 +247,8 @@ MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
 def test_mistakes(folder: Path, orbiflow: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     write(folder / "odd.csv", "phi,chi", angles(4))
-    for case, (arguments, about) in MISTAKES.items():
-        done = orbiflow("density", *arguments)
-        assert done.status == 2, case
+    for arguments, about in MISTAKES.values():
+        done = orbiflow.refused("density", *arguments)
         names(done.err, *about.split())
 
 
@@ -280,12 +257,10 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
     one = write(tmp_path / "one.csv", "x,y", places[:40])
     other = write(tmp_path / "other.csv", "x,y", places[40:])
     command = ("density", "compare-data", "-d", one, "-d", other, "--permutations", 19, "--space")
-    done = orbiflow(*command, "4*2", "--cell", "10,10")
-    assert done.status == 0, done.err
+    done = orbiflow.done(*command, "4*2", "--cell", "10,10")
     assert "no cell was given" not in done.out
     fit = ("density", "fit", one, *QUICK, "--space", "p4gm", "--out", tmp_path / "m")
-    fitted = orbiflow(*fit, "--cell", "10,10")
-    assert fitted.status == 0, fitted.err
+    fitted = orbiflow.done(*fit, "--cell", "10,10")
     assert "-0.0000" not in fitted.out + done.out
     report = json.loads((tmp_path / "m" / "report.json").read_text())
     assert report["log_likelihood"]["uniform"] == pytest.approx(-np.log(12.5))
@@ -297,10 +272,8 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
         (("p5",), "--space"),
         (("p4g", "--cell", "1e308,1e308"), "1e-50 1e+50 1e+308"),
     ):
-        refused = orbiflow(*command, *given)
-        assert refused.status == 2
+        refused = orbiflow.refused(*command, *given)
         names(refused.err, *about.split())
     for words in (("plot",), ("score", one)):
-        refused = orbiflow("density", *words, "-m", tmp_path / "m", "--measure", "square")
-        assert refused.status == 2
+        refused = orbiflow.refused("density", *words, "-m", tmp_path / "m", "--measure", "square")
         names(refused.err, "--measure square", "torus", "sphere")

@@ -1,7 +1,5 @@
 """`orbiflow density cv`: what a user sees, and mistakes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +15,10 @@ QUICK = HOW.split()
 def test_twice(tmp_path: Path, orbiflow: Any) -> None:
     data, out = table_of(tmp_path, 40, protein=[f"p{k // 4}" for k in range(40)]), tmp_path / "out"
     command = ("density", "cv", data, "--out", out, "--columns", "protein=group", *QUICK)
-    first = orbiflow(*command)
-    assert first.status == 0, first.err
+    first = orbiflow.done(*command)
     names(first.out, "folds/mixture-1-01", 40, 10, "mixture", "uniform", out / "index.html")
     done = {path: path.stat().st_mtime_ns for path in out.glob("folds/**/*")}
-    second = orbiflow(*command)
-    assert second.status == 0
+    second = orbiflow.done(*command)
     names(second.out, "mixture", "uniform")
     assert {path: path.stat().st_mtime_ns for path in out.glob("folds/**/*")} == done
 
@@ -40,17 +36,14 @@ def test_twice(tmp_path: Path, orbiflow: Any) -> None:
         (("--out", "diary"), "page.txt"),
     ],
 )
-def test_mistakes(
-    arguments: tuple[str, ...], about: str, tmp_path: Path, orbiflow: Any, monkeypatch: Any
-) -> None:
+def test_mistakes(arguments: tuple[str, ...], about: str, tmp_path, orbiflow, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     table_of(tmp_path, 40, protein=[f"p{k // 4}" for k in range(40)])
     (tmp_path / "diary").mkdir()
     (tmp_path / "diary" / "page.txt").touch()
     usual = dict(zip(QUICK[::2], QUICK[1::2], strict=True))
     others = [word for name in usual if name not in arguments for word in (name, usual[name])]
-    outcome = orbiflow("density", "cv", "angles.csv", *others, *arguments)
-    assert outcome.status == 2
+    outcome = orbiflow.refused("density", "cv", "angles.csv", *others, *arguments)
     assert outcome.err.startswith("error: ")
     names(outcome.err, *about.split())
     assert not (tmp_path / "cv").exists()

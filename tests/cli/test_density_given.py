@@ -1,7 +1,5 @@
 """The commands of densities where covariates are known: fit, score, sample, conditional and trend."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -49,19 +47,18 @@ def test_the_report_says_what_is_gained(model: Path) -> None:
 
 def test_rows_are_scored_where_all_is_known(model: Path, orbiflow, tmp_path: Path) -> None:
     ask = ("density", "score", model / "rows.csv", "-m", model / "fit", "-o", tmp_path / "s.csv")
-    assert orbiflow(*ask, "--given", "warm,hour,residue").status == 0
+    orbiflow.done(*ask, "--given", "warm,hour,residue")
     known = [
         float(row["log_prob_given"])
         for row in csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
     ]
-    assert orbiflow(*ask).status == 0
+    orbiflow.done(*ask)
     alone = [
         float(row["log_prob"])
         for row in csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
     ]
     assert np.mean(known) > np.mean(alone) + 0.7
-    done = orbiflow(*ask, "--given", "warm")
-    assert done.status == 2
+    done = orbiflow.refused(*ask, "--given", "warm")
     names(done.err, "--given", "residue", "warm", "hour")
     done = orbiflow(*ask, "--given", "warm=linear,hour=cycle:12,residue=word")
     names(done.err, "--given", "hour", "cycle:12", "cycle:24")
@@ -75,13 +72,11 @@ def test_rows_are_scored_where_all_is_known(model: Path, orbiflow, tmp_path: Pat
 
 def test_samples_and_models_are_where_covariates_are(model: Path, orbiflow, tmp_path: Path) -> None:
     at = ("--at", "warm=25,hour=6,residue=PRO")
-    done = orbiflow("density", "sample", "-m", model / "fit", *at, "-o", tmp_path / "s.csv")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "sample", "-m", model / "fit", *at, "-o", tmp_path / "s.csv")
     drawn = np.radians(np.loadtxt(tmp_path / "s.csv", skiprows=1))
     truth = 90 + np.degrees(0.5)
     assert np.degrees(np.angle(np.exp(1j * drawn).mean())) == pytest.approx(truth, abs=10)
-    done = orbiflow("density", "conditional", "-m", model / "fit", *at, "-o", tmp_path / "part")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "conditional", "-m", model / "fit", *at, "-o", tmp_path / "part")
     table = np.loadtxt(tmp_path / "part" / "density.csv", delimiter=",", skiprows=1)
     assert table[table[:, 1].argmax(), 0] == pytest.approx(truth, abs=12)
     given = json.loads((tmp_path / "part" / "report.json").read_text())["given"]
@@ -91,10 +86,9 @@ def test_samples_and_models_are_where_covariates_are(model: Path, orbiflow, tmp_
         ("warm=hot,hour=6,residue=PRO", "warm hot"),
         ("warm=25,hour=6,residue=PRO,speed=3", "speed"),
     ):
-        done = orbiflow(
+        done = orbiflow.refused(
             "density", "sample", "-m", model / "fit", "--at", wrong, "-o", tmp_path / "no.csv"
         )
-        assert done.status == 2
         names(done.err, *words.split())
     far = orbiflow(
         *("density", "sample", "-m", model / "fit", "-o", tmp_path / "far.csv"),
@@ -105,8 +99,7 @@ def test_samples_and_models_are_where_covariates_are(model: Path, orbiflow, tmp_
 
 def test_trends_are_along_covariates(model: Path, orbiflow, tmp_path: Path) -> None:
     ask = ("density", "trend", "-m", model / "fit", "--of", "phi", "--at", "hour=6")
-    done = orbiflow(*ask, "--along", "warm", "-n", 5, "-o", tmp_path / "t.csv")
-    assert done.status == 0, done.err
+    orbiflow.done(*ask, "--along", "warm", "-n", 5, "-o", tmp_path / "t.csv")
     rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
     assert [row["residue"] for row in rows] == ["GLY"] * 5 + ["PRO"] * 5
     assert float(rows[7]["phi_low_50"]) < float(rows[7]["phi"]) < float(rows[7]["phi_high_50"])
@@ -121,8 +114,7 @@ def test_trends_are_along_covariates(model: Path, orbiflow, tmp_path: Path) -> N
 def test_a_slip_is_refused_and_a_number_asked_for(orbiflow, tmp_path: Path) -> None:
     (tmp_path / "rows.csv").write_text("phi,warm\n" + "1,2\n" * 20 + "2,3O\n")
     how = ["--space", "torus", "--unit", "degrees", "--columns", "phi", "--given", "warm=linear"]
-    done = orbiflow("density", "fit", tmp_path / "rows.csv", *how, "-o", tmp_path / "fit")
-    assert done.status == 2
+    done = orbiflow.refused("density", "fit", tmp_path / "rows.csv", *how, "-o", tmp_path / "fit")
     names(done.err, "warm", "3O", 22)
     (tmp_path / "rows.csv").write_text("phi,warm\n" + "1,2\n" * 20 + "2,3\n")
     how[-1] = "warm"

@@ -1,7 +1,5 @@
 """What columns of files are taken for is what `ConditionalEstimator` takes them for, and as refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -27,14 +27,12 @@ def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
     fit = ("density", "fit", table(tmp_path, 1.0), "--space", "torus", "--out", out, *SMALL)
     for scale, unit in ((1.0, "radians"), (50.0, "degrees")):
         table(tmp_path, scale)
-        asked = orbiflow(*fit)
-        assert asked.status == 2
+        asked = orbiflow.refused(*fit)
         words = f"phi angle=angle:{unit},psi angle=angle:{unit}"
         names(asked.err, f"--columns '{words}'")
-        said = orbiflow(*fit, "--columns", words)
-        assert said.status == 0, said.err
+        said = orbiflow.done(*fit, "--columns", words)
         names(said.out, words)
-        assert orbiflow(*fit, "--unit", unit).status == 0
+        orbiflow.done(*fit, "--unit", unit)
     report = json.loads((out / "report.json").read_text())
     assert report["space"]["unit"] == "degrees"
     assert report["columns"] == ["phi angle", "psi angle"]
@@ -46,12 +44,11 @@ def test_columns_that_number_the_rows_are_left_out(space: str, tmp_path: Path, o
     data, out = table(tmp_path, 1.0, first="id,"), tmp_path / "model"
     how = ("--space", space, "--unit", "radians", "--out", out)
     columns = ("--columns", "phi angle,psi angle") if space == "klein-bottle" else ()
-    fitted = orbiflow("density", "fit", data, *how, *columns, *SMALL)
-    assert fitted.status == 0, fitted.err
+    fitted = orbiflow.done("density", "fit", data, *how, *columns, *SMALL)
     assert bool(columns) or "left out id" in fitted.out
     assert json.loads((out / "report.json").read_text())["columns"] == ["phi angle", "psi angle"]
     scores = tmp_path / "scores.csv"
-    assert orbiflow("density", "score", data, "--model", out, "--out", scores).status == 0
+    orbiflow.done("density", "score", data, "--model", out, "--out", scores)
     assert scores.read_text().startswith("id,phi angle,psi angle,log_prob")
 
 
@@ -62,23 +59,20 @@ def test_missing_values_and_no_header(tmp_path: Path, orbiflow) -> None:
     both = "x=angle:radians,1.0=angle:radians"
     fit = ("density", "fit", data, "--space", "torus", "--columns", both, "--out", out, *SMALL)
     assert "--drop-missing" in orbiflow(*fit).err
-    fitted = orbiflow(*fit, "--drop-missing")
-    assert fitted.status == 0, fitted.err
+    fitted = orbiflow.done(*fit, "--drop-missing")
     names(fitted.out, 1)
     scores = tmp_path / "scores.csv"
     score = ("density", "score", data, "--model", out, "--out", scores, "--drop-missing")
-    assert orbiflow(*score).status == 0
+    orbiflow.done(*score)
     assert scores.read_text().splitlines()[-1] == "0.5,,"
     data.write_text("\n".join(["a,0.1,0.2", *(f"b,{row}" for row in rows)]) + "\n")
     fit = ("density", "fit", data, "--space", "torus", "--out", out, *SMALL)
     assert "--header" in orbiflow(*fit).err
     names(orbiflow(*fit, "--no-header").err, "--columns 2=angle:radians,3=angle:radians")
-    assert orbiflow(*fit, "--no-header", "--unit", "radians").status == 0
+    orbiflow.done(*fit, "--no-header", "--unit", "radians")
 
 
-def test_the_mean_says_of_how_many_rows_it_is(
-    tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_mean_says_of_how_many_rows_it_is(tmp_path, orbiflow, monkeypatch) -> None:
     data, out = table(tmp_path, 1.0, count=60), tmp_path / "model"
     fit = ("density", "fit", data, "--space", "torus", "--unit", "radians", "--out", out, *SMALL)
     values = np.loadtxt(data, delimiter=",", skiprows=1, encoding="utf-8-sig")

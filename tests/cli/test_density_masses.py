@@ -31,8 +31,7 @@ def test_a_mass_gets_the_samples_that_it_needs(folder: Path, orbiflow) -> None:
         ("0.5,0.9995", (), 200_000),
         ("0.5,0.9995", ("--samples", 20_000), 20_000),
     ):
-        done = orbiflow(*region, "--mass", mass, *options)
-        assert done.status == 0, done.err
+        orbiflow.done(*region, "--mass", mass, *options)
         assert json.loads((folder / "r.json").read_text())["samples"] == count
 
 
@@ -41,8 +40,7 @@ def test_rows_far_out_are_told_apart_by_more_samples(folder: Path, orbiflow) -> 
     score = ("density", "score", folder / "data.csv", "-m", folder, "--region", "--out", out)
     done = orbiflow(*score)
     names(done.out, 20000, "0.0035", "0.0005", "0.9995")
-    done = orbiflow(*score, "--samples", 200_000)
-    assert done.status == 0, done.err
+    done = orbiflow.done(*score, "--samples", 200_000)
     names(done.out, 200000, "0.0011", "5e-05", "0.99995")
     density, _ = read_density(folder / "density.safetensors")
     with out.open() as file:
@@ -55,8 +53,7 @@ def test_rows_far_out_are_told_apart_by_more_samples(folder: Path, orbiflow) -> 
 
 def test_lines_far_out(folder: Path, orbiflow) -> None:
     plot = ("density", "plot", "-m", folder, "--out", folder / "plots", "--format", "svg")
-    done = orbiflow(*plot, "--regions", "0.5,0.9995", "--region-samples", 20_000)
-    assert done.status == 0, done.err
+    done = orbiflow.done(*plot, "--regions", "0.5,0.9995", "--region-samples", 20_000)
     names(done.out, "50 %", "99.95 %")
 
 
@@ -75,7 +72,6 @@ def test_mistakes(words: str, about: str, folder: Path, orbiflow) -> None:
     command, *options = (str(folder / word) if ".csv" in word else word for word in words.split())
     before = sorted(folder.iterdir())
     out = {"region": "x.json", "score": "x.csv", "plot": "x"}[command]
-    done = orbiflow("density", command, *options, "-m", folder, "--out", folder / out)
-    assert done.status == 2, done.out
+    done = orbiflow.refused("density", command, *options, "-m", folder, "--out", folder / out)
     names(done.err, *about.split())
     assert sorted(folder.iterdir()) == before

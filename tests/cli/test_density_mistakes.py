@@ -68,28 +68,21 @@ def test_mistakes(words: str, about: str, folder: Path, orbiflow) -> None:
     )
     before = sorted(folder.rglob("*"))
     out = () if command == "compare-data" else ("--out", folder / "out")
-    done = orbiflow("density", command, *options, *out)
-    assert done.status == 2, done.out
+    done = orbiflow.refused("density", command, *options, *out)
     names(done.err, *about.split())
     assert sorted(folder.rglob("*")) == before
 
 
-def test_rows_that_lack_a_value_can_be_left_out_of_pictures(
-    folder: Path, tmp_path: Path, orbiflow
-) -> None:
+def test_rows_that_lack_a_value_can_be_left_out_of_pictures(folder, tmp_path, orbiflow) -> None:
     plot = ("density", "plot", "-m", folder / "model2", "--out", tmp_path / "plots", "--data")
-    done = orbiflow(*plot, folder / "gaps.csv", "--drop-missing")
-    assert done.status == 0, done.err
+    done = orbiflow.done(*plot, folder / "gaps.csv", "--drop-missing")
     names(done.out, 1, 9)
     bare = tmp_path / "bare.csv"
     bare.write_text("".join((folder / "two.csv").read_text().splitlines(keepends=True)[1:]))
-    done = orbiflow(*plot, bare, "--no-header", "--columns", "1,2")
-    assert done.status == 0, done.err
+    orbiflow.done(*plot, bare, "--no-header", "--columns", "1,2")
 
 
-def test_a_flow_that_was_meant_and_not_tried_is_said(
-    tmp_path: Path, folder: Path, orbiflow
-) -> None:
+def test_a_flow_that_was_meant_and_not_tried_is_said(tmp_path, folder: Path, orbiflow) -> None:
     how = ("--space", "torus", "--unit", "radians", "--out", tmp_path / "m")
     fit = ("density", "fit", folder / "two.csv", *how)
     said = "no flow was tried: with fewer than 300 rows, here 40, none gains anything"
@@ -99,6 +92,5 @@ def test_a_flow_that_was_meant_and_not_tried_is_said(
         (("--components", "kernels"), False),
         ((), False),
     ):
-        done = orbiflow(*fit, *options)
-        assert done.status == 0, done.err
+        done = orbiflow.done(*fit, *options)
         assert (said in done.out) == told, options

@@ -1,7 +1,5 @@
 """The commands of densities, of a table whose columns are not angles alone."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -19,50 +17,42 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     Path("rows.csv").write_text(text)
     declared = "phi=angle:degrees,length=positive,temperature=linear"
     how = ["--space", "torus", "--columns", declared]
-    done = orbiflow("density", "fit", "rows.csv", *how, "--components", "kernels", "-o", "fit")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "fit", "rows.csv", *how, "--components", "kernels", "-o", "fit")
     report = json.loads(Path("fit/report.json").read_text())
     assert report["space"]["name"] == "torus"
     assert report["log_likelihood"]["natural"] > report["log_likelihood"]["uniform"] > -30
-    assert orbiflow("density", "score", "rows.csv", "-m", "fit", "-o", "s.csv").status == 0
-    done = orbiflow("density", "conditional", "-m", "fit", "--at", "length=1.51", "-o", "part")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "score", "rows.csv", "-m", "fit", "-o", "s.csv")
+    orbiflow.done("density", "conditional", "-m", "fit", "--at", "length=1.51", "-o", "part")
     table = np.loadtxt("part/density.csv", delimiter=",", skiprows=1)
     assert table[:, 1].min() < 288 < 294 < table[:, 1].max()
     cell = 3.0 * np.diff(np.unique(table[:, 1])[:2])[0]
     assert table[:, 2].sum() * cell == pytest.approx(1, abs=0.03)
-    assert orbiflow("density", "plot", "-m", "part", "--data", "rows.csv", "-o", "p").status == 0
+    orbiflow.done("density", "plot", "-m", "part", "--data", "rows.csv", "-o", "p")
     assert {path.name for path in Path("p").iterdir()} >= {"density.png"}
     assert not Path("p/surface.html").exists()
-    done = orbiflow("density", "region", "-m", "part", "--mass", "0.5", "-o", "r.json")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "region", "-m", "part", "--mass", "0.5", "-o", "r.json")
     (half,) = json.loads(Path("r.json").read_text())["regions"]
     inside = table[:, 2] >= np.exp(half["log_prob"])
     assert table[inside, 2].sum() * cell == pytest.approx(0.5, abs=0.03)
     assert half["size"] == pytest.approx(inside.sum() * cell, rel=0.1)
     assert half["fraction"] is None
-    done = orbiflow("density", "score", "rows.csv", "-m", "fit", "--given", "phi", "-o", "g.csv")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "score", "rows.csv", "-m", "fit", "--given", "phi", "-o", "g.csv")
     joint, given = (
         np.loadtxt(name, delimiter=",", skiprows=1, usecols=3) for name in ("s.csv", "g.csv")
     )
-    alone = orbiflow("density", "marginal", "-m", "fit", "--columns", "phi", "-o", "phi")
-    assert alone.status == 0
-    done = orbiflow("density", "score", "rows.csv", "-m", "phi", "-o", "p.csv")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "marginal", "-m", "fit", "--columns", "phi", "-o", "phi")
+    orbiflow.done("density", "score", "rows.csv", "-m", "phi", "-o", "p.csv")
     less = np.loadtxt("p.csv", delimiter=",", skiprows=1, usecols=3)
     assert np.allclose(joint - less, given, atol=1e-6)
-    done = orbiflow(
+    orbiflow.done(
         "density", "trend", "-m", "fit", "--of", "length", "--along", "phi", "-n", 5, "-o", "t.csv"
     )
-    assert done.status == 0, done.err
     table = np.loadtxt("t.csv", delimiter=",", skiprows=1)
     assert table.shape == (5, 7)
     assert (table[:, 2] < table[:, 1]).all()
     assert Path("t.png").read_bytes()[:4] == b"\x89PNG"
     cv = ["--components", "kernels", "--folds", 2, "-o", "cv"]
-    done = orbiflow("density", "cv", "rows.csv", *how, *cv)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "cv", "rows.csv", *how, *cv)
     found = json.loads(Path("cv/report.json").read_text())
     assert found["uniform"] < 0
     for words, about in (
@@ -77,8 +67,7 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
         ("torus --columns length=linear,length=cycle:2", "length"),
         ("torus --columns phi=positive", "phi line"),
     ):
-        done = orbiflow("density", "fit", "rows.csv", "--space", *words.split(), "-o", "no")
-        assert done.status == 2
+        done = orbiflow.refused("density", "fit", "rows.csv", "--space", *words.split(), "-o", "no")
         names(done.err, *about.split())
 
 
@@ -91,38 +80,29 @@ def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
     np.savetxt("rows.csv", rows, delimiter=",", header="day,lon,lat,depth", comments="")
     how = ["--space", "sphere", "--columns", "lat,lon,day=cycle:365,depth=positive"]
     how += ["--components", "mixture"]
-    done = orbiflow("density", "fit", "rows.csv", *how, "-o", "fit")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "fit", "rows.csv", *how, "-o", "fit")
     report = json.loads(Path("fit/report.json").read_text())
     assert report["columns"] == ["lat", "lon", "day", "depth"]
     assert report["space"]["base"]["name"] == "sphere"
-    done = orbiflow("density", "score", "rows.csv", "-m", "fit", "--given", "day", "-o", "g.csv")
-    assert done.status == 0, done.err
-    done = orbiflow("density", "conditional", "-m", "fit", "--at", "day=91", "-o", "spring")
-    assert done.status == 0, done.err
-    done = orbiflow("density", "marginal", "-m", "spring", "--columns", "lat,lon", "-o", "place")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "score", "rows.csv", "-m", "fit", "--given", "day", "-o", "g.csv")
+    orbiflow.done("density", "conditional", "-m", "fit", "--at", "day=91", "-o", "spring")
+    orbiflow.done("density", "marginal", "-m", "spring", "--columns", "lat,lon", "-o", "place")
     assert Path("place/density.png").exists()
     done = orbiflow("density", "marginal", "-m", "fit", "--columns", "lat", "-o", "half")
     assert done.status != 0
     names(done.err, "sphere")
     pictures = ["--data", "rows.csv", "--along", "depth", "--slices", "3,4", "-o", "p"]
-    done = orbiflow("density", "plot", "-m", "fit", *pictures)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "plot", "-m", "fit", *pictures)
     assert {path.name for path in Path("p").iterdir()} >= {"series.png", "beside.png"}
-    done = orbiflow("density", "plot", "-m", "fit", "--along", "lat", "-o", "q")
-    assert done.status == 2
+    done = orbiflow.refused("density", "plot", "-m", "fit", "--along", "lat", "-o", "q")
     names(done.err, "--along", "day", "depth")
-    done = orbiflow("density", "plot", "-m", "place", "--along", "day", "-o", "q")
-    assert done.status == 2
+    orbiflow.refused("density", "plot", "-m", "place", "--along", "day", "-o", "q")
     trend = ["--of", "depth", "--along", "day", "-n", 5, "-o", "t.csv"]
-    done = orbiflow("density", "trend", "-m", "fit", *trend)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "trend", "-m", "fit", *trend)
     table = np.loadtxt("t.csv", delimiter=",", skiprows=1)
     assert table[[0, -1], 0].tolist() == [0, 365]
     assert table[1, 1] > table[3, 1] + 0.5
-    done = orbiflow("density", "summary", "rows.csv", *how[:-2], "-o", "s.json")
-    assert done.status == 2
+    orbiflow.refused("density", "summary", "rows.csv", *how[:-2], "-o", "s.json")
 
 
 def test_hours_on_a_torus(tmp_path: Path, orbiflow, monkeypatch) -> None:
@@ -132,15 +112,13 @@ def test_hours_on_a_torus(tmp_path: Path, orbiflow, monkeypatch) -> None:
     rows = np.column_stack([hour, np.degrees(rng.vonmises(0, 1, 80))])
     np.savetxt("rows.csv", rows, delimiter=",", header="hour,heading", comments="")
     how = ["--space", "torus", "--unit", "degrees"]  # an hour is a cycle by its name
-    done = orbiflow("density", "fit", "rows.csv", *how, "--components", "mixture", "-o", "fit")
-    assert done.status == 0, done.err
-    assert orbiflow("density", "sample", "-m", "fit", "-n", 200, "-o", "s.csv").status == 0
+    orbiflow.done("density", "fit", "rows.csv", *how, "--components", "mixture", "-o", "fit")
+    orbiflow.done("density", "sample", "-m", "fit", "-n", 200, "-o", "s.csv")
     drawn = np.loadtxt("s.csv", delimiter=",", skiprows=1)
     assert ((drawn[:, 0] >= 0) & (drawn[:, 0] < 24)).all()
     assert np.median(drawn[:, 0]) == pytest.approx(11.5, abs=1.5)
-    done = orbiflow("density", "conditional", "-m", "fit", "--at", "heading=0", "-o", "c")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "conditional", "-m", "fit", "--at", "heading=0", "-o", "c")
     table = np.loadtxt("c/density.csv", delimiter=",", skiprows=1)
     assert table[0, 0] == 0
     assert table[:, 1].sum() * 24 / len(table) == pytest.approx(1, abs=1e-6)
-    assert orbiflow("density", "plot", "-m", "fit", "-o", "p").status == 0
+    orbiflow.done("density", "plot", "-m", "fit", "-o", "p")

@@ -58,8 +58,7 @@ def test_models_that_are_none(
         "marginal": ("--columns", "phi", "--out", tmp_path / "x"),
         "compare": ("-m", folder / "torus", "-d", folder / "torus.csv"),
     }[command]
-    done = orbiflow("density", command, "-m", folder / model, *options)
-    assert done.status == 2
+    done = orbiflow.refused("density", command, "-m", folder / model, *options)
     names(done.err, *about.split())
     assert not list(tmp_path.iterdir())
 
@@ -76,8 +75,7 @@ def test_another_number_of_columns(command: str, folder: Path, tmp_path: Path, o
     other.mkdir(exist_ok=True)
     model = folder / "torus" / "density.safetensors"
     (other / model.name).write_bytes(model.read_bytes())
-    done = orbiflow("density", command, *options, "--columns", "phi")
-    assert done.status == 2
+    done = orbiflow.refused("density", command, *options, "--columns", "phi")
     names(done.err, "1", "phi", "phi, psi")
 
 
@@ -86,17 +84,15 @@ def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, or
 
     def said(data: str, model: str, *options: str) -> str:
         given = ("-m", folder / model, "--out", out, *options)
-        done = orbiflow("density", "score", folder / data, *given)
-        assert done.status == 0, done.err
+        done = orbiflow.done("density", "score", folder / data, *given)
         return done.out
 
     assert "WARNING" not in said("torus.csv", "torus")
     assert "WARNING" not in said("degrees.csv", "degrees")
     assert "WARNING" not in said("sphere.csv", "sphere")
-    refused = orbiflow(
+    refused = orbiflow.refused(
         "density", "score", folder / "degrees.csv", "-m", folder / "torus", "-o", out
     )
-    assert refused.status == 2
     names(refused.err, "degrees.csv", "turn", "line")
     names(said("torus.csv", "degrees"), "WARNING", "radians", "phi", "psi")
     names(said("torus.csv", "sphere", "--columns", "1,2"), "WARNING", "radians")
@@ -117,7 +113,6 @@ def test_where_a_table_goes_is_looked_at_first(
         "sample": ("-m", folder / "torus"),
     }[command]
     before = sorted(folder.rglob("*"))
-    done = orbiflow("density", command, *options, "--out", folder / out)
-    assert done.status == 2
+    done = orbiflow.refused("density", command, *options, "--out", folder / out)
     names(done.err, *about.split())
     assert sorted(folder.rglob("*")) == before

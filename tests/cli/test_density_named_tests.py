@@ -31,26 +31,21 @@ FEW = ("--permutations", "99")
 @pytest.mark.usefixtures("folder")
 def test_tables_and_parts_of_one_give_the_same(orbiflow) -> None:
     tables = ("-d", "a.csv", "-d", "b.csv", "-d", "c.csv")
-    done = orbiflow("density", "test", *tables, *HOW, *FEW, "--out", "t.json")
-    assert done.status == 0, done.err
+    done = orbiflow.done("density", "test", *tables, *HOW, *FEW, "--out", "t.json")
     found = json.loads(Path("t.json").read_text())
     by_name = {(one["name"], one["column"]): one for one in found["tests"]}
     assert by_name["watson-williams", "phi"]["p"] < 0.001
     assert by_name["watson-williams", "psi"]["p"] > 0.01
     assert ("kuiper", "phi") not in by_name  # it is of two samples
     names(done.out, "watson-williams", "Fisher, 1993")
-    done = orbiflow(
-        "density", "test", "-d", "all.csv", "--by", "kind", *HOW, *FEW, "--out", "u.json"
-    )
-    assert done.status == 0, done.err
+    orbiflow.done("density", "test", "-d", "all.csv", "--by", "kind", *HOW, *FEW, "--out", "u.json")
     assert json.loads(Path("u.json").read_text())["tests"] == found["tests"]
 
 
 @pytest.mark.usefixtures("folder")
 def test_some_tests_of_two_tables_as_csv(orbiflow) -> None:
     call = ("density", "test", "-d", "a.csv", "-d", "b.csv", *HOW, *FEW)
-    done = orbiflow(*call, "--tests", "kuiper,common-median", "--out", "t.csv")
-    assert done.status == 0, done.err
+    orbiflow.done(*call, "--tests", "kuiper,common-median", "--out", "t.csv")
     rows = list(csv.DictReader(Path("t.csv").read_text().splitlines()))
     assert [row["name"] for row in rows] == ["common-median"] * 2 + ["kuiper"] * 2
     assert float(rows[2]["p"]) < 0.05
@@ -74,8 +69,7 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
         "groups": ("phi,nest=group", "-d", "nests.csv", "--by", "kind"),
         "files": ("phi,nest=group", "-d", "a.csv", "-d", "b.csv"),
     }.items():
-        done = orbiflow("density", "test", *how, *options, "--out", f"{name}.json")
-        assert done.status == 0, done.err
+        done = orbiflow.done("density", "test", *how, *options, "--out", f"{name}.json")
         found[name] = json.loads(Path(f"{name}.json").read_text())["tests"]
     assert min(one["p"] for one in found["rows"]) < 0.01
     assert min(one["p"] for one in found["groups"]) > 0.05
@@ -103,6 +97,5 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
     ],
 )
 def test_mistakes(options: tuple[str, ...], about: str, orbiflow) -> None:
-    done = orbiflow("density", "test", *options)
-    assert done.status == 2
+    done = orbiflow.refused("density", "test", *options)
     names(done.err, *about.split())

@@ -1,7 +1,5 @@
 """`density marginal` and `conditional`, weights and missing angles, by the public command."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -41,8 +39,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_marginal_and_conditional(tmp_path: Path, model: Path, orbiflow: Run) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
-    done = orbiflow("density", "marginal", "--model", model, "--columns", "PSI", "--out", one)
-    assert done.status == 0, done.err
+    done = orbiflow.done("density", "marginal", "--model", model, "--columns", "PSI", "--out", one)
     names(done.out, "psi")
     left = {path.name for path in one.iterdir()}
     assert left == {"density.csv", "density.png", "density.safetensors", "report.json"}
@@ -51,21 +48,17 @@ def test_marginal_and_conditional(tmp_path: Path, model: Path, orbiflow: Run) ->
     assert values[:, 1].sum() * 0.5 == pytest.approx(1, abs=1e-4)  # steps of half a degree
 
     given = ("density", "conditional", "--model", model, "--at", "chi=-100")
-    assert orbiflow(*given, "--out", two).status == 0
+    orbiflow.done(*given, "--out", two)
     values = np.loadtxt(two / "density.csv", delimiter=",", skiprows=1)
     assert values[:, 2].sum() * 9 == pytest.approx(1, abs=1e-3)
     report = json.loads((two / "report.json").read_text())
     assert report["given"] == {"chi": -100.0}
     assert report["columns"] == ["phi", "psi"]
-    done = orbiflow(*given, "--columns", "psi", "--out", two)  # over what was there
-    assert done.status == 0, done.err
+    orbiflow.done(*given, "--columns", "psi", "--out", two)  # over what was there
     drawn = tmp_path / "drawn.csv"
-    assert orbiflow("density", "sample", "--model", two, "-n", 5, "--out", drawn).status == 0
+    orbiflow.done("density", "sample", "--model", two, "-n", 5, "--out", drawn)
     assert drawn.read_text().startswith("psi\n")
-    scored = orbiflow(
-        *("density", "score", drawn, "--model", two, "--out", tmp_path / "scores.csv")
-    )
-    assert scored.status == 0, scored.err
+    orbiflow.done(*("density", "score", drawn, "--model", two, "--out", tmp_path / "scores.csv"))
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +74,7 @@ def test_samples_of_three_angles(tmp_path: Path, blend: Path, orbiflow: Run) -> 
     asked = ("density", "conditional", "-m", blend, "--at", "b=100", "--sample", 400)
     texts: list[str] = []
     for name, seed in (("one", 3), ("two", 3), ("three", 4)):
-        done = orbiflow(*asked, "--seed", seed, "--out", tmp_path / name)
-        assert done.status == 0, done.err
+        orbiflow.done(*asked, "--seed", seed, "--out", tmp_path / name)
         texts.append((tmp_path / name / "samples.csv").read_text())
     assert texts[0] == texts[1] != texts[2]
     assert texts[0].startswith("a,c,d\n")
@@ -97,8 +89,7 @@ def test_accuracy_is_what_was_asked_for(tmp_path: Path, blend: Path, orbiflow: R
     errors: list[float] = []
     for accuracy in (0.2, 0.0005, 1e-6):
         asked = ("--columns", "d", "--accuracy", accuracy, "--out", tmp_path / "out")
-        done = orbiflow("density", "marginal", "-m", blend, *asked)
-        assert done.status == 0, done.err
+        done = orbiflow.done("density", "marginal", "-m", blend, *asked)
         errors.append(json.loads((tmp_path / "out" / "report.json").read_text())["report"]["error"])
         warned = (
             f"WARNING: the density cannot be approximated to within {accuracy:g} nats"
@@ -127,23 +118,19 @@ def test_it_can_be_cancelled_in_the_middle(tmp_path: Path, blend: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "about"),
     [
-        ("conditional --at chi", "psi=-45 chi"),
-        ("conditional --at chi=much", "psi=-45"),
-        ("conditional --at chi=nan", "chi"),
-        ("conditional --at omega=3", "omega phi psi chi"),
-        ("conditional --at chi=3,chi=4", "chi"),
-        ("conditional --at phi=1,psi=2,chi=3", ""),
-        ("conditional --at chi=3 --columns chi", "--columns --at"),
-        ("conditional --at ,", "--at"),
-        ("marginal --columns ,", "--columns"),
-        ("marginal --columns 4", "4"),
+        ("conditional --at chi", "psi=-45 chi"), ("conditional --at chi=much", "psi=-45"),
+        ("conditional --at chi=nan", "chi"), ("conditional --at omega=3", "omega phi psi chi"),
+        ("conditional --at chi=3,chi=4", "chi"), ("conditional --at phi=1,psi=2,chi=3", ""),
+        ("conditional --at chi=3 --columns chi", "--columns --at"), ("conditional --at ,", "--at"),
+        ("marginal --columns ,", "--columns"), ("marginal --columns 4", "4"),
         ("marginal --columns phi,1", "phi"),
     ],
-)
+)  # fmt: skip
 def test_mistakes(words: str, about: str, tmp_path: Path, model: Path, orbiflow: Run) -> None:
     command, *options = words.split()
-    done = orbiflow("density", command, "--model", model, *options, "--out", tmp_path / "out")
-    assert done.status == 2
+    done = orbiflow.refused(
+        "density", command, "--model", model, *options, "--out", tmp_path / "out"
+    )
     names(done.err, *about.split())
     assert not (tmp_path / "out").exists()
 
@@ -152,15 +139,13 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     data, model, out = table(tmp_path / "gaps.csv", gaps=True), tmp_path / "m", tmp_path / "s.csv"
     weight = ("--columns", "count=weight")
     fit = ("density", "fit", data, *QUICK, *weight, "--space", "torus", "--out", model)
-    done = orbiflow(*fit, "--missing", "marginalise")
-    assert done.status == 0, done.err
+    done = orbiflow.done(*fit, "--missing", "marginalise")
     names(done.out, "2 of 59", "1 row")
     assert json.loads((model / "report.json").read_text())["columns"] == ["phi", "psi", "chi"]
-    done = orbiflow(
+    done = orbiflow.done(
         *("density", "score", data, "--model", model, "--out", out),
         *("--missing", "marginalise", *weight),
     )
-    assert done.status == 0, done.err
     names(done.out, "3 of 60")
     header, *rows = out.read_text().splitlines()
     assert header == "phi,psi,chi,count,log_prob_marginal"
@@ -171,7 +156,7 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     names(done.out, f"{mean:.4f}", 57, "weighted")
     refused = orbiflow(*fit)
     names(refused.err, "line 5", "psi", "--drop-missing")
-    assert orbiflow(*fit, "--missing", "drop").status == 0
+    orbiflow.done(*fit, "--missing", "drop")
 
 
 @pytest.mark.parametrize(
@@ -187,6 +172,5 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
 def test_mistakes_of_rows(options: str, about: str, tmp_path: Path, orbiflow: Run) -> None:
     data = table(tmp_path / "data.csv", gaps="sphere" in options)
     words = options.split() if "--space" in options else ["--space", "torus", *options.split()]
-    done = orbiflow(*("density", "fit", data, *QUICK, "--out", tmp_path / "m", *words))
-    assert done.status == 2
+    done = orbiflow.refused(*("density", "fit", data, *QUICK, "--out", tmp_path / "m", *words))
     names(done.err, *about.split())

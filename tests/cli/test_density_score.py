@@ -29,8 +29,7 @@ def columns(path: Path) -> tuple[str, np.ndarray]:
 def test_the_gradient_is_that_of_the_scores(fitted, tmp_path: Path, orbiflow) -> None:
     data, model = fitted
     out = tmp_path / "out.csv"
-    done = orbiflow("density", "score", data, "--model", model, "--gradient", "--out", out)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "score", data, "--model", model, "--gradient", "--out", out)
     header, found = columns(out)
     assert header == "lat,lon,log_prob,log_prob_by_lat,log_prob_by_lon"
     for axis, step in enumerate(1e-3 * np.eye(2)):

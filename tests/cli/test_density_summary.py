@@ -1,7 +1,5 @@
 """`orbiflow density summary`: tables, files and mistakes."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -27,8 +25,7 @@ def test_angles(angles: Path, tmp_path: Path, orbiflow) -> None:
     out, picture = tmp_path / "s.json", tmp_path / "roses.png"
     command = ("density", "summary", angles, "--space", "torus", "--unit", "radians")
     command = (*command, "--missing", "marginalise", "--columns")
-    done = orbiflow(*command, "phi,wind direction", "--out", out, "--picture", picture)
-    assert done.status == 0, done.err
+    done = orbiflow.done(*command, "phi,wind direction", "--out", out, "--picture", picture)
     for text in ("Tests of uniformity", "Fisher-Lee", "± (95 %)", f"written to {out}"):
         assert text in " ".join(done.out.split())
     document = json.loads(out.read_text())
@@ -50,8 +47,7 @@ def test_directions_and_axes(space: str, tmp_path: Path, orbiflow) -> None:
     places = np.random.default_rng(0).normal([30, 140], 8, (20, 2))
     np.savetxt(tmp_path / "p.csv", places, delimiter=",", header="lat,lon", comments="")
     command = ("density", "summary", tmp_path / "p.csv", "--space", space)
-    done = orbiflow(*command, "--out", tmp_path / "s.csv")
-    assert done.status == 0, done.err
+    done = orbiflow.done(*command, "--out", tmp_path / "s.csv")
     names(done.out, 25, 20)
     (row,) = csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
     name = "mean" if space == "sphere" else "principal"
@@ -63,11 +59,10 @@ def test_what_little_tells_is_said(tmp_path: Path, orbiflow) -> None:
     for rows, said in ((["10,20", "10,90", "10,5"], "phi"), (["10,20"], "phi")):
         (tmp_path / "few.csv").write_text("\n".join(["phi,psi", *rows]) + "\n")
         out = ("--out", tmp_path / "s.json")
-        done = orbiflow(
+        done = orbiflow.done(
             "density", "summary", tmp_path / "few.csv", "--space", "torus", "--unit", "degrees",
             *out,
         )  # fmt: skip
-        assert done.status == 0, done.err
         assert said in " ".join(done.out.split())
         (first, _) = json.loads((tmp_path / "s.json").read_text())["columns"]
         assert "-" not in str(first["deviation"]).partition("e")[0]
@@ -88,6 +83,5 @@ def test_what_little_tells_is_said(tmp_path: Path, orbiflow) -> None:
 )
 def test_mistakes(options: tuple[str, ...], about: str, angles: Path, orbiflow) -> None:
     columns = () if "--columns" in options else ("--columns", "phi")
-    done = orbiflow("density", "summary", angles, *columns, *options)
-    assert done.status == 2
+    done = orbiflow.refused("density", "summary", angles, *columns, *options)
     names(done.err, *about.split())

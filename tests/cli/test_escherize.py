@@ -1,7 +1,5 @@
 """Real runs, with few iterations."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil
@@ -98,8 +96,7 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
     options = ["--classes", "28", "--figures", *FEW]
-    outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
-    assert outcome.status == 0
+    outcome = orbiflow.done("escherize", path, "-o", tmp_path / "o", *options)
     document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
     assert document["input"]["y_down"] is False
     (entry,) = document["tiles"]
@@ -111,8 +108,7 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
         image.load()
         assert min(image.size) >= 400
     # a run without figures takes the place of one with them
-    again = orbiflow("escherize", path, "-o", tmp_path / "o", *options[:2], "--verbose", *FEW)
-    assert again.status == 0
+    again = orbiflow.done("escherize", path, "-o", tmp_path / "o", *options[:2], "--verbose", *FEW)
     assert "★" in outcome.out
     assert entry["arrangement"] == "four around a point"
     assert entry["arrangement"] in outcome.out
@@ -130,9 +126,7 @@ def test_stars_are_written_in_any_encoding(monkeypatch: pytest.MonkeyPatch) -> N
         assert stars in file.read()
 
 
-def test_no_tile_is_status_one(
-    folder: Path, tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_tile_is_status_one(folder: Path, tmp_path, orbiflow, monkeypatch) -> None:
     path, out = tmp_path / "boot.json", tmp_path / "o"
     path.write_text(json.dumps(BOOT))
     monkeypatch.setattr(overlap_search, "fit_occupancy", lambda *_, **__: crossed())

@@ -1,7 +1,5 @@
 """`orbiflow export`: files written, mistakes answered with status 2 and one sentence."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -27,8 +25,7 @@ def test_a_figure_for_a_paper_is_as_wide_as_its_column(
     options: tuple[str, ...], size: tuple[int, int], result: Path, tmp_path: Path, orbiflow
 ) -> None:
     out = tmp_path / "figure.pdf"
-    outcome = orbiflow("export", result, "--for", "paper", *options, "--out", out)
-    assert outcome.status == 0, outcome.err
+    orbiflow.done("export", result, "--for", "paper", *options, "--out", out)
     page = pypdfium2.PdfDocument(out)[0]
     millimetres = (page.get_width() * 25.4 / 72, page.get_height() * 25.4 / 72)
     assert millimetres == pytest.approx(size, abs=0.01)
@@ -68,8 +65,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
 @pytest.mark.parametrize("case", MISTAKES)
 def test_mistakes(case: str, result: Path, tmp_path: Path, orbiflow) -> None:
     options, about = MISTAKES[case]
-    outcome = orbiflow("export", result, "--out", tmp_path / "a.svg", *options)
-    assert outcome.status == 2
+    outcome = orbiflow.refused("export", result, "--out", tmp_path / "a.svg", *options)
     names(outcome.err, *about.split())
     assert not list(tmp_path.iterdir())
 
@@ -101,8 +97,7 @@ def test_bad_results(case: str, tmp_path: Path, orbiflow) -> None:
     text, about = BAD_RESULTS[case]
     if text is not None:
         (tmp_path / "result.json").write_text(text)
-    outcome = orbiflow("export", tmp_path, "--out", tmp_path / "a.svg")
-    assert outcome.status == 2
+    outcome = orbiflow.refused("export", tmp_path, "--out", tmp_path / "a.svg")
     names(outcome.err, *about.split())
     assert not (tmp_path / "a.svg").exists()
 
@@ -124,9 +119,9 @@ def runs_fixture(result: Path, tmp_path: Path) -> Path:
 def test_the_folder_of_a_tile(place: str, tile: str | None, runs: Path, orbiflow) -> None:
     own, whole = runs / "own.json", runs / "whole.json"
     choice = () if tile is None else ("--tile", tile)
-    assert orbiflow("export", runs / place, *choice, "--out", own).status == 0
+    orbiflow.done("export", runs / place, *choice, "--out", own)
     rank = {"IH6": 1, "IH4": 2, "IH6-2": 3}[Path(place).name]
-    assert orbiflow("export", runs / "boot", "--tile", rank, "--out", whole).status == 0
+    orbiflow.done("export", runs / "boot", "--tile", rank, "--out", whole)
     assert own.read_bytes() == whole.read_bytes()
 
 
@@ -137,8 +132,7 @@ SILHOUETTES = {"picture.png": b"\x89PNG\r\n\x1a\n", "polygon.dat": b"3\n0 0\n1 0
 def test_a_silhouette_is_escherized_first(name: str, tmp_path: Path, orbiflow) -> None:
     file = tmp_path / name
     file.write_bytes(SILHOUETTES[name])
-    outcome = orbiflow("export", file, "--out", tmp_path / "a.svg")
-    assert outcome.status == 2
+    outcome = orbiflow.refused("export", file, "--out", tmp_path / "a.svg")
     names(outcome.err, f"orbiflow escherize {file}")
 
 
@@ -155,22 +149,19 @@ def test_folders_in_which_no_tile_is_meant(
     place: str, tile: str | None, about: str, runs: Path, orbiflow
 ) -> None:
     choice = () if tile is None else ("--tile", tile)
-    outcome = orbiflow("export", runs / place, *choice, "--out", runs / "a.svg")
-    assert outcome.status == 2
+    outcome = orbiflow.refused("export", runs / place, *choice, "--out", runs / "a.svg")
     names(outcome.err, *about.format(runs).split())
 
 
 @pytest.mark.parametrize("where", ["", "none/a.svg"])
 def test_places_that_cannot_be_written(where: str, result: Path, tmp_path: Path, orbiflow) -> None:
-    outcome = orbiflow("export", result, "--out", tmp_path / where)
-    assert outcome.status == 2
+    outcome = orbiflow.refused("export", result, "--out", tmp_path / where)
     names(outcome.err, where or tmp_path)
     assert not list(tmp_path.iterdir())
 
 
 def test_an_ending_of_no_format_needs_the_format(result: Path, tmp_path: Path, orbiflow) -> None:
-    outcome = orbiflow("export", result, "--out", tmp_path / "boot.eps")
-    assert outcome.status == 2
+    outcome = orbiflow.refused("export", result, "--out", tmp_path / "boot.eps")
     names(outcome.err, "--out", ".eps", "--format", ".svg")
     assert not list(tmp_path.glob("boot*"))
-    assert orbiflow("export", result, "--format", "svg", "--out", tmp_path / "boot.eps").status == 0
+    orbiflow.done("export", result, "--format", "svg", "--out", tmp_path / "boot.eps")

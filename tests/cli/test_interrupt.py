@@ -1,7 +1,5 @@
 """Ctrl-C or SIGTERM during a run, and what is told of progress meanwhile."""
 
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -180,9 +178,7 @@ def test_what_was_done_before_does_not_count_as_speed(capsys: pytest.CaptureFixt
     ]
 
 
-def test_a_terminal_has_its_bar_alone(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_terminal_has_its_bar_alone(capsys, monkeypatch) -> None:
     screen = Console(file=io.StringIO(), force_terminal=True)
     monkeypatch.setattr(terminal, "output", screen)
     clock = Clock()
@@ -193,9 +189,7 @@ def test_a_terminal_has_its_bar_alone(
     assert not capsys.readouterr().err
 
 
-def test_work_that_says_nothing_is_told_of_too(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_work_that_says_nothing_is_told_of_too(capsys, monkeypatch, tmp_path) -> None:
     """Whoever works looks at the token: a step may take minutes without an event."""
     clock = Clock()
     monkeypatch.setattr(terminal, "Terminal", lambda named: Terminal(named, clock))

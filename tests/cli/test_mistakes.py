@@ -1,7 +1,5 @@
 """A user's mistakes: status 2, one message that says what is wrong, nothing written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -47,8 +45,7 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
 def test_bad_options(case: str, tmp_path: Path, orbiflow) -> None:
     options, about = BAD_OPTIONS[case]
     out = tmp_path / "out"
-    outcome = orbiflow("escherize", disc(tmp_path), "--out", out, *options)
-    assert outcome.status == 2
+    outcome = orbiflow.refused("escherize", disc(tmp_path), "--out", out, *options)
     names(outcome.err, *about.split())
     assert not out.exists()
 
@@ -57,8 +54,9 @@ def test_bad_options(case: str, tmp_path: Path, orbiflow) -> None:
 def test_a_file_in_the_way_of_the_folder(below: str, tmp_path: Path, orbiflow) -> None:
     wall = tmp_path / "wall"
     wall.write_text("keep me")
-    outcome = orbiflow("escherize", disc(tmp_path), "--out", wall / below, "--classes", "IH4")
-    assert outcome.status == 2
+    outcome = orbiflow.refused(
+        "escherize", disc(tmp_path), "--out", wall / below, "--classes", "IH4"
+    )
     names(outcome.err, wall / below)
     assert wall.read_text() == "keep me"
 
@@ -77,14 +75,12 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, orbiflow_process) -> 
 
 
 def test_a_missing_argument(orbiflow) -> None:
-    outcome = orbiflow("escherize")
-    assert outcome.status == 2
+    outcome = orbiflow.refused("escherize")
     names(outcome.err, "IMAGE")
 
 
 @pytest.mark.parametrize("words", ["--out --force", "--seed --out x", "--for -o x.svg"])
 def test_an_option_is_not_taken_for_the_value_of_another(words: str, orbiflow) -> None:
     command = "export" if words.startswith("--for") else "escherize"
-    outcome = orbiflow(command, "silhouette.png", *words.split())
-    assert outcome.status == 2
+    outcome = orbiflow.refused(command, "silhouette.png", *words.split())
     assert outcome.err.startswith(f"error: {words.split()[0]} needs a value; give ")

@@ -3,8 +3,6 @@
 Nor do they write a file that its name's ending belies.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -93,8 +91,7 @@ def test_what_is_read_stays(words: str, here: Path, orbiflow: Run) -> None:
     (here / "cv").mkdir()
     shutil.copy(here / "data.csv", here / "cv" / "rows.csv")
     before, out = contents(here), Path(words.split()[-1])
-    done = orbiflow(*words.split())
-    assert done.status == 2, done.out
+    done = orbiflow.refused(*words.split())
     assert any(part in done.err for part in (out.name, out.parent.name)), done.err
     assert contents(here) == before
 
@@ -117,14 +114,12 @@ def test_other_places_are_fine(words: str, here: Path, orbiflow: Run) -> None:
     shutil.copy(here / "r" / "result.json", here / "copy")
     for path in (here / "m").iterdir():
         shutil.copy(path, here / "copy")
-    done = orbiflow(*words.split())
-    assert done.status == 0, done.err
+    orbiflow.done(*words.split())
 
 
 def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
-    assert orbiflow("density", "plot", "-m", "m", "--out", "m").status == 0
-    done = orbiflow("density", "fit", "data.csv", *QUICK, "--out", "m")
-    assert done.status == 0, done.err
+    orbiflow.done("density", "plot", "-m", "m", "--out", "m")
+    orbiflow.done("density", "fit", "data.csv", *QUICK, "--out", "m")
     assert json.loads((here / "m" / "report.json").read_text())["columns"] == ["phi", "psi"]
 
 
@@ -139,12 +134,9 @@ def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
         ("classes --out c.jpg", ".png"),
     ],
 )
-def test_an_ending_of_another_format_is_refused(
-    words: str, endings: str, here: Path, orbiflow: Run
-) -> None:
+def test_an_ending_of_another_format_is_refused(words: str, endings: str, here, orbiflow) -> None:
     before = contents(here)
-    done = orbiflow(*words.split())
-    assert done.status == 2
+    done = orbiflow.refused(*words.split())
     names(done.err, "--out", *endings.split(", "), words.split()[-1])
     assert not done.out
     assert contents(here) == before
@@ -152,11 +144,10 @@ def test_an_ending_of_another_format_is_refused(
 
 @pytest.mark.parametrize("name", ["s", "s.txt", "s.tsv", "s.dat", "run-1.5"])
 def test_text_may_be_called_otherwise(name: str, here: Path, orbiflow: Run) -> None:
-    done = orbiflow("density", "sample", "-m", "m", "-n", 2, "--out", name)
-    assert done.status == 0, done.err
+    orbiflow.done("density", "sample", "-m", "m", "-n", 2, "--out", name)
     assert (here / name).read_text().startswith("phi,psi\n")
 
 
 def test_a_picture_without_an_ending(here: Path, orbiflow: Run) -> None:
-    assert orbiflow("classes", "--out", "c").status == 0
+    orbiflow.done("classes", "--out", "c")
     assert (here / "c").read_bytes().startswith(b"\x89PNG")

@@ -1,7 +1,5 @@
 """Small inputs built after bug reports of other tools: each is read right, or refused by its cause."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable
@@ -153,16 +151,15 @@ def test_towns_are_told_apart_and_close_rows_are_not_called_the_same(
 ) -> None:
     kernels = ("--components", "kernels")
     fit = ("density", "fit", TRIALS / "town.csv", "--space", "sphere", *kernels)
-    assert orbiflow(*fit, "--out", tmp_path / "town").status == 0
+    orbiflow.done(*fit, "--out", tmp_path / "town")
     score = ("density", "score", TRIALS / "probes.csv", "--model", tmp_path / "town")
-    assert orbiflow(*score, "--out", tmp_path / "scores.csv").status == 0
+    orbiflow.done(*score, "--out", tmp_path / "scores.csv")
     table = np.loadtxt(tmp_path / "scores.csv", delimiter=",", skiprows=1)
     first, between, second, near, far = table[:, 2]
     assert min(first, second) > between + 5 > near > far - 1e-9
     space = ("--space", "torus", "--unit", "radians")
     close = ("density", "fit", TRIALS / "close.csv", *space, *kernels)
-    done = orbiflow(*close, "--out", tmp_path / "close")
-    assert done.status == 0
+    done = orbiflow.done(*close, "--out", tmp_path / "close")
     assert "same value" not in done.out
     assert "repeat" not in done.out
 

@@ -1,7 +1,5 @@
 """Random densities on tori, of all parts that a fit may find."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 

@@ -1,7 +1,5 @@
 """Fits that try less, for tests of what is done with a fit and not of what a fit finds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

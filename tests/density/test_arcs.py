@@ -1,6 +1,5 @@
 """Quantiles, medians and intervals on a circle, wherever the data are and however they are written."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,9 +28,7 @@ def kernels(space: Space, means: Any, kappas: Any, weights: Any) -> Density:
 @example(180.0, 2.0, 0.9, False)
 @example(0.0, 2.0, 0.9, True)
 @settings(max_examples=8, deadline=None)
-def test_figures_of_a_circle_turn_with_it(
-    mean: float, power: float, mass: float, from_zero: bool
-) -> None:
+def test_figures_of_a_circle_turn_with_it(mean, power, mass, from_zero) -> None:
     """Those of a von Mises density are scipy's about its mean, written as the data are."""
     kappa, first = 10.0**power, 0.0 if from_zero else -180.0
     space = Torus(1, unit="degrees", from_zero=[0] if from_zero else [])
@@ -96,9 +93,7 @@ def test_intervals_are_of_a_mass_and_of_one_column() -> None:
 
 
 @pytest.mark.parametrize("shift", [0.0, 260.0])
-def test_data_come_back_as_they_were_given(
-    shift: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_data_come_back_as_they_were_given(shift: float, tmp_path, capsys) -> None:
     """In Python and in files: samples, means, trends; a pair of which one column is from 0."""
     rng = np.random.default_rng(1)
     signed = rng.normal(0, 25, (150, 1))

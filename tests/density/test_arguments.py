@@ -7,21 +7,15 @@ import numpy as np
 import pytest
 import torch
 
+from orbiflow import density
 from orbiflow.density import (
-    AdaptiveKernels,
     DensityEstimator,
-    DensitySettings,
     FlowDensity,
     FlowSettings,
-    Mixture,
     Sphere,
     Torus,
-    UniformDensity,
-    VonMisesChains,
-    density_to_bytes,
     fit_density,
     make_space,
-    read_density,
 )
 from orbiflow.density.models import kl_by_quadrature, midpoints
 from orbiflow.density.spaces import clear_rotation
@@ -30,10 +24,11 @@ from orbiflow.flows import Flow
 from refusals import refused
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-torus, sphere = Torus(2), Sphere()
+torus: Any = Torus(2)
+sphere: Any = Sphere()
 
 
-def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> FlowDensity:
+def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> Any:
     field = SplineField(space.group, 2, dtype=dtype)
     with torch.no_grad():
         field.parameters_.normal_(std=0.02)
@@ -44,88 +39,71 @@ POINTS = torch.rand(30, 2, dtype=torch.float64)
 HALVES = torch.full((4,), 0.25)
 QUICK: Any = {"max_frequency": 1, "segments": 1, "iterations": 1}
 
+od: Any = density  # its arguments are wrong on purpose
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "a name for a space": (
-        lambda: FlowDensity("torus", Flow(lambda x: x)),  # type: ignore[arg-type]
+        lambda: od.FlowDensity("torus", Flow(lambda x: x)),
         "torus `make_space`",
     ),
-    "no flow": (lambda: FlowDensity(torus, None), "flow Flow"),  # type: ignore[arg-type]
-    "no base": (
-        lambda: FlowDensity(torus, Flow(lambda x: x), "uniform"),  # type: ignore[arg-type]
-        "base Density",
-    ),
+    "no flow": (lambda: od.FlowDensity(torus, None), "flow Flow"),
+    "no base": (lambda: od.FlowDensity(torus, Flow(lambda x: x), "uniform"), "base Density"),
     "three columns": (lambda: a_density().log_prob(torch.rand(5, 3)), "5 3"),
     "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), ""),
-    "text": (lambda: a_density().log_prob("points"), "points"),  # type: ignore[arg-type]
+    "text": (lambda: a_density().log_prob("points"), "points"),
     "complex": (
         lambda: a_density().log_prob(torch.rand(2, 2, dtype=torch.complex64)),
         "points numbers",
     ),
     "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points finite"),
-    "measure": (
-        lambda: a_density().log_prob(POINTS, measure=3),  # type: ignore[arg-type]
-        "measure",
-    ),
+    "measure": (lambda: a_density().log_prob(POINTS, measure=3), "measure"),
     "sample text": (lambda: a_density().sample("five"), "number samples"),
     "sample less": (lambda: a_density().sample(-1), "number samples"),
     "midpoints": (lambda: midpoints(torus, 2.5), "resolution number"),  # type: ignore[arg-type]
     "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), "3 4"),
-    "a base's space": (lambda: UniformDensity("sphere"), "space Space"),  # type: ignore[arg-type]
+    "a base's space": (lambda: od.UniformDensity("sphere"), "space Space"),
     "kernels": (
-        lambda: AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),  # type: ignore[arg-type]
+        lambda: od.AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),
         "centers numbers",
     ),
     "kernels' shapes": (
-        lambda: AdaptiveKernels(torus, torch.tensor(1.0), torch.ones(1), torch.ones(1)),
+        lambda: od.AdaptiveKernels(torus, torch.tensor(1.0), torch.ones(1), torch.ones(1)),
         "fit",
     ),
-    "chains": (lambda: VonMisesChains(sphere, HALVES, HALVES, HALVES), "Mises chains"),
-    "chains' shapes": (
-        lambda: VonMisesChains(torus, [0.0], HALVES, HALVES),  # type: ignore[arg-type]
-        "log_weights",
-    ),
+    "chains": (lambda: od.VonMisesChains(sphere, HALVES, HALVES, HALVES), "Mises chains"),
+    "chains' shapes": (lambda: od.VonMisesChains(torus, [0.0], HALVES, HALVES), "log_weights"),
     "a mixture of nothing": (
-        lambda: Mixture([a_density(), None], [0.5, 0.5]),  # type: ignore[list-item]
+        lambda: od.Mixture([a_density(), None], [0.5, 0.5]),
         "components Density",
     ),
-    "fit: a name": (lambda: fit_density("torus", POINTS), "space Space"),  # type: ignore[arg-type]
-    "fit: columns": (lambda: fit_density(sphere, torch.rand(30, 3)), "2 30 3"),
-    "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), "2"),
-    "fit: nan": (lambda: fit_density(sphere, POINTS / 0 * 0), "points finite"),
-    "fit: settings": (
-        lambda: fit_density(sphere, POINTS, {"max_frequency": 2}),  # type: ignore[arg-type]
-        "FlowSettings",
-    ),
+    "fit: a name": (lambda: od.fit_density("torus", POINTS), "space Space"),
+    "fit: columns": (lambda: od.fit_density(sphere, torch.rand(30, 3)), "2 30 3"),
+    "fit: one row": (lambda: od.fit_density(sphere, torch.rand(2)), "2"),
+    "fit: nan": (lambda: od.fit_density(sphere, POINTS / 0 * 0), "points finite"),
+    "fit: settings": (lambda: od.fit_density(sphere, POINTS, {"max_frequency": 2}), "FlowSettings"),
     "fit: other settings": (
-        lambda: fit_density(sphere, POINTS, DensitySettings()),  # type: ignore[arg-type]
+        lambda: od.fit_density(sphere, POINTS, od.DensitySettings()),
         "FlowSettings",
     ),
-    "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "dimensions 3"),
-    "max_frequency": (
-        lambda: FlowSettings(max_frequency=2.5),  # type: ignore[arg-type]
-        "max_frequency 1 64",
-    ),
-    "frequency text": (
-        lambda: FlowSettings(max_frequency="8"),  # type: ignore[arg-type]
-        "max_frequency",
-    ),
-    "seed": (lambda: FlowSettings(seed=None), "seed"),  # type: ignore[arg-type]
-    "roughness": (lambda: FlowSettings(roughness=1e-3), "roughness"),  # type: ignore[arg-type]
-    "weights": (lambda: FlowSettings(roughness=("a",)), "roughness 1"),  # type: ignore[arg-type]
-    "validation": (lambda: FlowSettings(validation="a"), "validation 1"),  # type: ignore[arg-type]
-    "dim": (lambda: Torus("2"), "number 1 64"),  # type: ignore[arg-type]
-    "unit": (lambda: Torus(2, unit=None), "unit"),  # type: ignore[arg-type]
-    "form": (lambda: Sphere(form=["latlon"]), "form latlon"),  # type: ignore[arg-type]
-    "rotation": (lambda: Sphere(rotation="none"), "rotation"),
-    "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "RoundSpace"),  # type: ignore[arg-type]
-    "make_space": (lambda: make_space(torus), "unknown space"),  # type: ignore[arg-type]
+    "fit: four angles": (lambda: od.fit_density(od.Torus(4), torch.rand(30, 4)), "dimensions 3"),
+    "max_frequency": (lambda: od.FlowSettings(max_frequency=2.5), "max_frequency 1 64"),
+    "frequency text": (lambda: od.FlowSettings(max_frequency="8"), "max_frequency"),
+    "seed": (lambda: od.FlowSettings(seed=None), "seed"),
+    "roughness": (lambda: od.FlowSettings(roughness=1e-3), "roughness"),
+    "weights": (lambda: od.FlowSettings(roughness=("a",)), "roughness 1"),
+    "validation": (lambda: od.FlowSettings(validation="a"), "validation 1"),
+    "dim": (lambda: od.Torus("2"), "number 1 64"),
+    "unit": (lambda: od.Torus(2, unit=None), "unit"),
+    "form": (lambda: od.Sphere(form=["latlon"]), "form latlon"),
+    "rotation": (lambda: od.Sphere(rotation="none"), "rotation"),
+    "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "RoundSpace"),
+    "make_space": (lambda: od.make_space(torus), "unknown space"),
     "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), "3"),
     "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), "3 1"),
     "project": (lambda: sphere.project(torch.rand(3, 5)), "3 5"),
-    "to bytes": (lambda: density_to_bytes("density"), "density"),  # type: ignore[arg-type]
-    "read": (lambda: read_density(3), "file 3"),  # type: ignore[arg-type]
-    "estimator": (lambda: DensityEstimator(3).fit(POINTS), "takes 3"),  # type: ignore[arg-type]
-    "estimator's data": (lambda: DensityEstimator().fit([1.0]), "shape"),
+    "to bytes": (lambda: od.density_to_bytes("density"), "density"),
+    "read": (lambda: od.read_density(3), "file 3"),
+    "estimator": (lambda: od.DensityEstimator(3).fit(POINTS), "takes 3"),
+    "estimator's data": (lambda: od.DensityEstimator().fit([1.0]), "shape"),
 }
 
 

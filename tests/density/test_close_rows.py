@@ -1,7 +1,5 @@
 """Rows that are close together are told apart, down to some metres on the earth and less."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

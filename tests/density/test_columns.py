@@ -1,7 +1,5 @@
 """Names of columns say which they are and in which order, for all doors alike."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """What docs/comparing.md says in Python runs."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

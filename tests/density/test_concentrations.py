@@ -91,9 +91,7 @@ def test_concentrations_come_back_from_their_means(width: int, kappa: float) -> 
 @example(65, 1, math.log(56.23))
 @example(65, 64, math.log(562.3))
 @settings(max_examples=80, deadline=None)
-def test_constants_of_repeated_eigenvalues_are_kummers_function(
-    width: int, repeats: int, log: float
-) -> None:
+def test_constants_of_repeated_eigenvalues_are_kummers_function(width, repeats, log: float) -> None:
     """Many low eigenvalues lift the integrand on a contour about the highest alone."""
     size, repeats = math.exp(log), 1 + repeats % (width - 1)
     values = torch.zeros(width, dtype=torch.float64)
@@ -107,9 +105,7 @@ def test_constants_of_repeated_eigenvalues_are_kummers_function(
 
 
 @pytest.mark.parametrize("width", [48, 60])
-def test_rows_of_many_coordinates_have_a_von_mises_fisher_density(
-    width: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_of_many_coordinates_have_a_von_mises_fisher_density(width: int, monkeypatch) -> None:
     monkeypatch.setattr(parametric, "DRAWS", 500)
     monkeypatch.setattr(goodness, "RESAMPLES", 19)
     rng = np.random.default_rng(width)

@@ -1,7 +1,5 @@
 """Draws of samplers in xarray's and ArviZ's containers: the same rows, by chains and draws."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any

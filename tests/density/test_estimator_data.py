@@ -1,7 +1,5 @@
 """What an estimator takes: frames by the names of their columns, units, and what may be doubted."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -64,9 +62,7 @@ def test_frames_are_scored_by_name(fitted: DensityEstimator) -> None:
 @pytest.mark.parametrize(
     ("names", "words"), [("phi,chi", "phi chi"), ("a,b", "phi psi"), ("phi,phi", "psi")]
 )
-def test_frames_of_other_columns_are_refused(
-    names: str, words: str, fitted: DensityEstimator
-) -> None:
+def test_frames_of_other_columns_are_refused(names: str, words: str, fitted) -> None:
     with refused(*words.split()):
         fitted.score_samples(frame(ANGLES, names))
 

@@ -1,7 +1,5 @@
 """Marginal and conditional estimators, in the data's unit and by its columns."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

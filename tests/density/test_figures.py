@@ -1,7 +1,5 @@
 """Means, modes, masses, entropies and divergences of densities, against closed forms and draws."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

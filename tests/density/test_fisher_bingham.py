@@ -114,9 +114,7 @@ def test_constant_of_any_density_on_the_sphere(shares: list[float], power: float
 
 @given(st.lists(st.floats(-50, 50), min_size=3, max_size=5), st.floats(-100, 100), st.floats(0, 20))
 @settings(max_examples=30, deadline=None)
-def test_constant_moves_with_its_eigenvalues(
-    values: list[float], shift: float, length: float
-) -> None:
+def test_constant_moves_with_its_eigenvalues(values: list[float], shift, length) -> None:
     own = numbers(*values)
     vector = torch.full_like(own, length)
     found = log_fisher_bingham(own, vector)

@@ -177,16 +177,10 @@ def test_held_out_scores_are_of_the_points_themselves() -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"max_frequency": 0},
-        {"max_frequency": 65},
-        {"segments": 0},
-        {"iterations": -1},
-        {"validation": 0.0},
-        {"validation": 1.0},
-        {"roughness": ()},
-        {"roughness": (-1.0,)},
+        {"max_frequency": 0}, {"max_frequency": 65}, {"segments": 0}, {"iterations": -1},
+        {"validation": 0.0}, {"validation": 1.0}, {"roughness": ()}, {"roughness": (-1.0,)},
     ],
-)
+)  # fmt: skip
 def test_settings_out_of_range(changes) -> None:
     with refused(*changes):
         FlowSettings(**changes)

@@ -77,9 +77,7 @@ def tried(
 
 
 @pytest.mark.parametrize("tenths", [1, 2])
-def test_progress_goes_on_from_one_tenth_to_the_next(
-    tenths: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_progress_goes_on_from_one_tenth_to_the_next(tenths: int, monkeypatch) -> None:
     monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
     monkeypatch.setattr("orbiflow.density.fitting.flow_trial._is_worth_it", lambda _: True)
     said: list[tuple[float, str]] = []
@@ -176,9 +174,7 @@ def test_an_outdone_flow_is_refined_no_further() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_who_waits_for_rivals_that_fail_waits_no_longer(
-    count: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_waits_for_rivals_that_fail_waits_no_longer(count: int, monkeypatch) -> None:
     def failing(*_: Any) -> None:
         raise OrbiflowError("no kernels today")
 

@@ -1,7 +1,5 @@
 """Data in any container: frames of all libraries, masked arrays, what is no number."""
 
-from __future__ import annotations
-
 from decimal import Decimal
 from typing import Any
 
@@ -99,17 +97,12 @@ def test_xarray() -> None:
     [
         (np.array([[1j, 2]]), "numpy.angle"),
         (np.array([[1, 2 + 1j]], dtype=object), "1 numpy.angle"),
-        (np.array([["1", "2"]]), "numbers 1"),
-        (np.array([[True, False]]), "numbers Booleans"),
+        (np.array([["1", "2"]]), "numbers 1"), (np.array([[True, False]]), "numbers Booleans"),
         (np.array([["2020-01-01"]], dtype="M8[D]"), "numbers dates"),
-        ([[1, 2], [3]], "rows length"),
-        ({"phi": [1, 2]}, "numbers 1"),
-        ("phi", "phi"),
-        (None, "array numbers"),
-        (object(), "object"),
-        ([[1, [2]]], "numbers"),
+        ([[1, 2], [3]], "rows length"), ({"phi": [1, 2]}, "numbers 1"), ("phi", "phi"),
+        (None, "array numbers"), (object(), "object"), ([[1, [2]]], "numbers"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_number_is_refused(wrong: Any, words: str) -> None:
     with refused(*words.split()):
         as_data(wrong)

@@ -1,7 +1,5 @@
 """What covariates and columns are by their types and names: categories, cycles, dates, words."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Any
 

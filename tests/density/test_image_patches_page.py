@@ -1,7 +1,5 @@
 """The Python blocks of docs/examples/image-patches.md find the nearest points of the Klein bottle."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

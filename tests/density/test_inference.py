@@ -1,7 +1,5 @@
 """Marginal and conditional densities: how exact, derived twice, of three angles and more, stopped."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -64,9 +62,7 @@ def off(found: Density, density: Density, kept: list[int], known: dict[int, floa
 
 @given(seeds, st.sampled_from(["chains", "network"]), st.integers(0, 1), st.data())
 @settings(deadline=None, max_examples=6)
-def test_tables_are_the_integral_at_every_level(
-    seed: int, kind: str, known: int, data: st.DataObject
-) -> None:
+def test_tables_are_the_integral_at_every_level(seed, kind, known, data: st.DataObject) -> None:
     """What is kept and given together: its density, and so what the given angle says of components.
 
     What is stated is a root mean square over the density's own rows, found from the change between two
@@ -106,9 +102,7 @@ def test_even_chains_need_no_fine_grid() -> None:
 
 @given(seeds, st.sampled_from([{}, {3: 0.1}]))
 @settings(deadline=None, max_examples=3)
-def test_few_nodes_do_where_hidden_angles_move_others_far(
-    seed: int, known: dict[int, float]
-) -> None:
+def test_few_nodes_do_where_hidden_angles_move_others_far(seed, known: dict[int, float]) -> None:
     """By six deviations of their own noise, so that the nodes alone leave bumps apart."""
     rng = np.random.default_rng(seed)
     means = torch.zeros(1, 4, 9).double()

@@ -1,7 +1,5 @@
 """Real columns as lines: no mass where nothing can be, tails that decay, a cdf up to the last float."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows that lack angles: they count by what they have, and are scored by it."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers that stand for missing values: refused in every column, and what is data is taken."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Angles beside real columns: exactly normalised, in the data's own units, whatever is asked."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Densities on another device, and in another precision."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -49,9 +49,7 @@ def of_two(rng: np.random.Generator, spread: float, ties: bool) -> tuple[np.ndar
 
 @given(st.integers(0, 10**6), st.booleans(), st.floats(0.3, 3.0))
 @settings(max_examples=30, deadline=None)
-def test_statistics_of_distributions_by_their_definitions(
-    seed: int, ties: bool, spread: float
-) -> None:
+def test_statistics_of_distributions_by_their_definitions(seed, ties, spread) -> None:
     angles, labels = of_two(np.random.default_rng(seed), spread, ties)
     vectors, table = vectors_of(angles), labels[:, None]
     turns = np.round(np.mod(angles / (2 * np.pi), 1), 11) % 1

@@ -1,7 +1,5 @@
 """Bayesian networks of angles: exact, normalised, found where there is one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -171,9 +169,7 @@ def test_what_is_no_network_is_refused() -> None:
 
 @given(seeds, st.integers(2, 4), st.data())
 @few
-def test_some_angles_without_hidden_parents_are_exact(
-    seed: int, dim: int, data: st.DataObject
-) -> None:
+def test_some_angles_without_hidden_parents_are_exact(seed, dim, data: st.DataObject) -> None:
     network = network_of(seed, dim)
     order = [axes[-1] for axes, _ in network.factors]
     seen = order[: data.draw(st.integers(1, dim))]

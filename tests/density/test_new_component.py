@@ -1,7 +1,5 @@
 """A new kind of component needs one class in one file: here, in a test's own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Summaries of orientations: means modulo symmetry, and their cones."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Paired comparisons: standard errors, intervals that keep their promise, groups, and mistakes."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Marginal and conditional densities: against the joint density, integrated on a grid."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Chains on products: normalised whatever their slopes, with marginals by nodes that resolve them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

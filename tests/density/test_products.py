@@ -1,7 +1,5 @@
 """Spaces beside real and periodic columns: normalised, with closed marginals and conditionals."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Any

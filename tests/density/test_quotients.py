@@ -1,7 +1,5 @@
 """R^d modulo any crystallographic group: plane orbifolds, flat manifolds, crystals."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Regions of highest density: known caps, edges that are glued, islands, and mistakes."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

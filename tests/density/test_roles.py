@@ -1,7 +1,5 @@
 """Columns are what is declared, or what their names say; other columns are asked for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -268,9 +266,7 @@ def test_two_columns_of_one_side_are_refused(kind: str, space: Any, tmp_path: Pa
 
 
 @pytest.mark.parametrize(("kind", "wrong"), [("weight", -1.0), ("count", -1), ("count", 1.5)])
-def test_weights_and_counts_are_refused_by_their_row(
-    kind: str, wrong: float, tmp_path: Path
-) -> None:
+def test_weights_and_counts_are_refused_by_their_row(kind: str, wrong: float, tmp_path) -> None:
     frame = pandas.DataFrame({"phi_deg": DEGREES, "n": np.where(np.arange(60) == 3, wrong, 1)})
     columns = f"phi_deg,n={kind}"
     with refused("n", kind, "row 4", kind=SettingError):

@@ -1,7 +1,5 @@
 """Rotations and orientations: forms and conventions against SciPy, symmetries, names of columns."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -113,14 +111,8 @@ def test_names_of_symmetries_stand_for_groups_of_rotations(name: str) -> None:
 
 
 AXES_OF_ORDER_TWO = {
-    "C2": "z",
-    "C2x": "x",
-    "C2y": "y",
-    "D2": "xyz",
-    "D3": "x",
-    "D3y": "y",
-    "D6": "xyz",
-}
+    "C2": "z", "C2x": "x", "C2y": "y", "D2": "xyz", "D3": "x", "D3y": "y", "D6": "xyz",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", AXES_OF_ORDER_TWO)

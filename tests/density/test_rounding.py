@@ -1,7 +1,5 @@
 """Rounded values are no spikes: the fit finds the rounding, undoes it, and says so."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 
@@ -151,14 +149,10 @@ def test_rows_are_moved_by_half_a_step_at_most(name: str) -> None:
 @pytest.mark.parametrize(
     ("parts", "unit", "digits"),
     [
-        (16, "degrees", 0),
-        (32, "degrees", 0),
-        (36, "radians", 4),
-        (16, "radians", 2),
-        (24, "turns", 3),
-        (2160, "degrees", 4),
+        (16, "degrees", 0), (32, "degrees", 0), (36, "radians", 4), (16, "radians", 2),
+        (24, "turns", 3), (2160, "degrees", 4),
     ],
-)
+)  # fmt: skip
 def test_directions_that_were_rounded_twice(parts: int, unit: str, digits: int) -> None:
     """Points of the compass in whole degrees: 0, 23, 45, 68 and so on."""
     turn = {"degrees": 360.0, "radians": 2 * np.pi, "turns": 1.0}[unit]

@@ -1,7 +1,5 @@
 """Rows that belong together are found by their labels, or by place; what has no label is refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows that count more than others: as repeated rows where the method allows, else close."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -189,15 +187,11 @@ def test_the_score_is_the_weighted_mean() -> None:
 @pytest.mark.parametrize(
     ("weights", "message"),
     [
-        (np.ones(7), "weight 60"),
-        (np.ones((60, 1)), "weight 60"),
-        (-np.eye(60)[3], "4 -1"),
-        (np.where(np.arange(60) == 5, np.nan, 1.0), "6 nan"),
-        (np.full(60, np.inf), "1 inf"),
-        (np.zeros(60), "weights 0"),
-        (["much"] * 60, "weights"),
+        (np.ones(7), "weight 60"), (np.ones((60, 1)), "weight 60"), (-np.eye(60)[3], "4 -1"),
+        (np.where(np.arange(60) == 5, np.nan, 1.0), "6 nan"), (np.full(60, np.inf), "1 inf"),
+        (np.zeros(60), "weights 0"), (["much"] * 60, "weights"),
     ],
-)
+)  # fmt: skip
 def test_weights_that_are_none_are_refused(weights: object, message: str) -> None:
     points = np.random.default_rng(0).uniform(size=(60, 2))
     with refused(*message.split()):

@@ -1,7 +1,5 @@
 """Scoring asks the same of columns as fitting, and finds names in any case."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -89,9 +87,7 @@ def test_one_flat_row_is_refused_with_its_cure() -> None:
     assert model.score_samples([[-60, -40]]).shape == (1,)
 
 
-def test_what_is_given_may_have_a_typographic_minus(
-    models: dict[str, Path], tmp_path: Path
-) -> None:
+def test_what_is_given_may_have_a_typographic_minus(models: dict[str, Path], tmp_path) -> None:
     found = [
         conditional(model=models["angles"], at=(text,), out=tmp_path / str(k)).summary
         for k, text in enumerate(("psi=−45", "psi = -45"))

@@ -1,7 +1,5 @@
 """Scoring and conditionals refuse codes, and warn of data in another unit than the model's."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from typing import Any
@@ -52,15 +50,11 @@ def test_radians_in_the_place_of_degrees_are_doubted(
 @pytest.mark.parametrize(
     ("model", "data"),
     [
-        ("radians", np.degrees(ANGLES)),
-        ("turns", ANGLES),
-        ("turns", np.degrees(ANGLES)),
-        ("degrees", np.vstack([np.degrees(ANGLES), [[999, 1.0]]])),
-        ("degrees", [[999, 1.0]]),
-        ("sphere", np.vstack([PLACES, [[48, -9999]]])),
-        ("radians", ANGLES + 20 * math.pi),
+        ("radians", np.degrees(ANGLES)), ("turns", ANGLES), ("turns", np.degrees(ANGLES)),
+        ("degrees", np.vstack([np.degrees(ANGLES), [[999, 1.0]]])), ("degrees", [[999, 1.0]]),
+        ("sphere", np.vstack([PLACES, [[48, -9999]]])), ("radians", ANGLES + 20 * math.pi),
     ],
-)
+)  # fmt: skip
 def test_data_beyond_a_turn_are_refused(
     model: str, data: Any, method: str, models: dict[str, DensityEstimator]
 ) -> None:

@@ -24,16 +24,12 @@ from strategies import random_field
 
 TURN = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 SPACES: dict[str, Space] = {
-    "one angle": Torus(1),
-    "degrees": Torus(2, unit="degrees"),
-    "three turns": Torus(3, unit="turns"),
-    "bottle": KleinBottle(),
-    "bottle in degrees": KleinBottle(unit="degrees"),
-    "lat, lon": Sphere(rotation=TURN),
-    "vectors": Sphere(form="vector", rotation=TURN),
-    "axes": ProjectivePlane(rotation=TURN),
+    "one angle": Torus(1), "degrees": Torus(2, unit="degrees"),
+    "three turns": Torus(3, unit="turns"), "bottle": KleinBottle(),
+    "bottle in degrees": KleinBottle(unit="degrees"), "lat, lon": Sphere(rotation=TURN),
+    "vectors": Sphere(form="vector", rotation=TURN), "axes": ProjectivePlane(rotation=TURN),
     "axes as vectors": ProjectivePlane(form="vector", rotation=TURN),
-}
+}  # fmt: skip
 
 
 def density_on(space: Space, seed: int, share: float) -> Density:

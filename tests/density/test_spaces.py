@@ -23,15 +23,10 @@ from refusals import refused
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
 SPACES = (
-    Torus(2),
-    Torus(2, unit="degrees"),
-    KleinBottle(),
-    KleinBottle(unit="turns"),
-    Sphere(),
-    Sphere(form="vector", rotation=TURN),
-    ProjectivePlane(rotation=TURN),
+    Torus(2), Torus(2, unit="degrees"), KleinBottle(), KleinBottle(unit="turns"), Sphere(),
+    Sphere(form="vector", rotation=TURN), ProjectivePlane(rotation=TURN),
     ProjectivePlane(form="vector"),
-)
+)  # fmt: skip
 seeds = st.integers(0, 2**32 - 1)
 every = pytest.mark.parametrize("space", SPACES, ids=repr)
 

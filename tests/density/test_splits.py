@@ -1,7 +1,5 @@
 """Splits of a cross-validation: partitions that keep together what belongs together."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -146,9 +146,7 @@ def test_kernel_estimates_are_normalised(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "images"), [("sphere", 1), ("projective-plane", 2)])
-def test_as_many_rows_have_kernels_as_images_allow(
-    name: str, images: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_as_many_rows_have_kernels_as_images_allow(name: str, images: int, monkeypatch) -> None:
     monkeypatch.setattr("orbiflow.density.fitting.kernels.MOST_IMAGES", 40)
     found = kernel_estimates(make_space(name), Rows(clustered(name, 60, 0)))
     assert {len(part.weights) for part in found.values()} == {40 // images}

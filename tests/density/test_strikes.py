@@ -1,7 +1,5 @@
 """Strikes beside dips are directions of dip by the right-hand rule, on every path."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Summaries: published worked examples, closed forms, and levels of tests by simulation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -39,9 +39,7 @@ from table_files import PROPERTY, refuse, rows_of_file, values_of, write
     ],
 )
 @pytest.mark.parametrize("name", ["a.csv", "a.TSV"])
-def test_text(
-    tmp_path: Path, content: str, delimiter: str, columns: tuple[str, ...], name: str
-) -> None:
+def test_text(tmp_path, content: str, delimiter: str, columns: tuple[str, ...], name: str) -> None:
     table = read_table(write(tmp_path, content, name))
     assert table.text is not None
     assert values_of(table).tolist() == [[1, 2], [3, 4]]

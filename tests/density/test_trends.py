@@ -1,7 +1,5 @@
 """Trends: means and intervals of one column where another one is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

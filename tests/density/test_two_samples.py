@@ -1,7 +1,5 @@
 """Two data sets: a test that is exact, powerful and mindful of groups; divergences; row sketches."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any
@@ -111,18 +109,12 @@ def test_a_difference_between_groups_of_different_sizes_is_found() -> None:
 @pytest.mark.parametrize(
     ("own", "other", "both", "enough"),
     [
-        ([4] * 3, [4] * 3, [], False),
-        ([4] * 4, [4] * 4, [], True),
-        ([4] * 3, [4] * 4, [], True),
-        ([4] * 2, [4] * 40, [], False),
-        ([4] * 5, [2] * 50, [], False),
-        ([4] * 6, [2] * 6, [], True),
-        ([], [], [(3, 3)] * 5, False),
-        ([], [], [(3, 1)] * 5, False),
-        ([], [], [(3, 1)] * 6, True),
-        ([4] * 2, [3] * 2, [(2, 1)] * 4, True),
+        ([4] * 3, [4] * 3, [], False), ([4] * 4, [4] * 4, [], True), ([4] * 3, [4] * 4, [], True),
+        ([4] * 2, [4] * 40, [], False), ([4] * 5, [2] * 50, [], False),
+        ([4] * 6, [2] * 6, [], True), ([], [], [(3, 3)] * 5, False), ([], [], [(3, 1)] * 5, False),
+        ([], [], [(3, 1)] * 6, True), ([4] * 2, [3] * 2, [(2, 1)] * 4, True),
     ],
-)
+)  # fmt: skip
 def test_too_few_groups_are_refused(
     own: list[int], other: list[int], both: list[tuple[int, int]], enough: bool
 ) -> None:

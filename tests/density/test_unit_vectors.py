@@ -45,16 +45,10 @@ from refusals import refused
 from strategies import seeds
 
 SPACES: tuple[UnitVectorSpace, ...] = (
-    Hypersphere(1),
-    Hypersphere(2),
-    Hypersphere(3),
-    Hypersphere(9),
-    ProjectiveSpace(1),
-    ProjectiveSpace(4),
-    RotationSpace(),
-    RotationSpace(form="ZXZ", unit="degrees", symmetry="D6"),
+    Hypersphere(1), Hypersphere(2), Hypersphere(3), Hypersphere(9), ProjectiveSpace(1),
+    ProjectiveSpace(4), RotationSpace(), RotationSpace(form="ZXZ", unit="degrees", symmetry="D6"),
     CubicOrientations(form="vector"),
-)
+)  # fmt: skip
 every = pytest.mark.parametrize("space", SPACES, ids=repr)
 spaces = st.sampled_from(SPACES)
 dims = st.integers(1, 64)
@@ -270,9 +264,7 @@ def _other(space: Space) -> dict[str, object]:
         ({"name": "rotation-space", "symmetry": "C999999"}, "symmetry"),
     ],
 )
-def test_hostile_files_are_refused(
-    options: dict[str, object], message: str, tmp_path: Path
-) -> None:
+def test_hostile_files_are_refused(options: dict[str, object], message: str, tmp_path) -> None:
     header = {
         "format": "orbiflow-density/6",
         "space": options,

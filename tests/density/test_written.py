@@ -1,7 +1,5 @@
 """Angles, longitudes and hours come back as they were written: from 0, or from minus half a turn."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Curves along which a grid crosses a level part its nodes as they should."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

@@ -1,7 +1,5 @@
 """Palettes keep their colours apart, for colour-blind eyes too."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures for print: their size, their texts, and that nothing is cut off or written over."""
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import replace

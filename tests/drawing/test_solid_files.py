@@ -1,7 +1,5 @@
 """Files of solids: parts, colours and copies in their places."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from pathlib import Path

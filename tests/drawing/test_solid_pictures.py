@@ -1,7 +1,5 @@
 """Pictures of solids: what is in front is seen, shaded, from the side that was asked for."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pages come from templates, and show what users wrote as text."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

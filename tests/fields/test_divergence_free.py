@@ -1,7 +1,5 @@
 """Fields without divergence: symmetric, complete, saved, and flows that keep volumes."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from hypothesis import given

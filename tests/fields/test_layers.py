@@ -1,7 +1,5 @@
 """Networks on periodic features: symmetry, bounds by their layers, and bijective flows."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The bound of a field's Jacobian: it holds, and the group's factor is what can be reached."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -81,8 +79,6 @@ def test_the_factor_of_a_space_group_is_at_most_the_root_of_its_orbits(name: str
 
 
 @given(st.sampled_from(sorted(WALLPAPER_GROUPS)), st.integers(1, 3), seeds)
-def test_the_bound_is_near_what_is_reached_in_the_plane(
-    name: str, max_frequency: int, seed: int
-) -> None:
+def test_the_bound_is_near_what_is_reached_in_the_plane(name, max_frequency, seed) -> None:
     field = random_field(wallpaper_group(name), max_frequency, seed)
     assert float(field.lipschitz_bound()) <= 1.35 * steepest(field, seed, 4000)

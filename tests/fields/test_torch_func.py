@@ -1,7 +1,5 @@
 """Fields under `torch.func`: vmap, grad, jacrev, jacfwd, hessian, against closed forms and numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """Parameters that come from elsewhere, or are made under inference mode."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

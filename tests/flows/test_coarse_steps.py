@@ -1,7 +1,5 @@
 """Runge-Kutta tables, their order, and steps that are too coarse: a flow says so once."""
 
-from __future__ import annotations
-
 import re
 import warnings
 

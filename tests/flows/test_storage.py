@@ -1,7 +1,5 @@
 """Flows saved and loaded: the same map, bit for bit, and nothing else from a hostile file."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Flows under `torch.func`, against finite differences, the log-determinant and each other."""
 
-from __future__ import annotations
-
 import warnings
 
 import pytest

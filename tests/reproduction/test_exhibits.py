@@ -1,7 +1,5 @@
 """What each exhibit measures, at tiny settings."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The runner and the page: shared work is done once, failures are shown and lose nothing else."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """To be imported by processes of tests: searches never end, but for the small one of IH1."""
 
-from __future__ import annotations
-
 import math
 import time
 from typing import Any

@@ -1,7 +1,5 @@
 """Small searches, and the order that events must come in."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Answers that show themselves, and dataclasses as JSON and back."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -104,17 +102,12 @@ def test_dataclasses_come_back() -> None:
 @pytest.mark.parametrize(
     ("change", "about"),
     [
-        ({"more": 1}, "unknown more"),
-        ({"name": 3}, "name str 3"),
-        ({"heights": [1.0, "x"]}, "heights float"),
-        ({"heights": [True]}, "heights float"),
-        ({"heights": [math.nan]}, "heights float"),
-        ({"heights": 1.0}, "heights"),
-        ({"step": [1.0]}, "step"),
-        ({"by": "z"}, "by"),
-        ({"counts": {"b": 0.5}}, "counts int"),
+        ({"more": 1}, "unknown more"), ({"name": 3}, "name str 3"),
+        ({"heights": [1.0, "x"]}, "heights float"), ({"heights": [True]}, "heights float"),
+        ({"heights": [math.nan]}, "heights float"), ({"heights": 1.0}, "heights"),
+        ({"step": [1.0]}, "step"), ({"by": "z"}, "by"), ({"counts": {"b": 0.5}}, "counts int"),
     ],
-)
+)  # fmt: skip
 def test_other_documents_are_refused(change: dict[str, Any], about: str) -> None:
     with refused(*about.split()):
         from_json(Part, to_json(PART) | change)

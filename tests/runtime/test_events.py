@@ -1,7 +1,5 @@
 """Events go to JSON and back."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Calls in this process: order of events, files, cancelling, failures."""
 
-from __future__ import annotations
-
 import json
 import threading
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Derived commands: options, help, mistakes in one line, exit statuses."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from typing import Any
@@ -105,9 +103,7 @@ def test_mistakes_are_one_line_with_status_2(line: str, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("made", list(map(find, OPERATIONS)), ids=lambda made: made.name)
-def test_help_names_every_option(
-    made: Operation, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_help_names_every_option(made: Operation, capsys, monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     assert app.run([*made.name.split(), "--help"]) == 0
     text = capsys.readouterr().out

@@ -1,7 +1,5 @@
 """Operations: their arguments, events, JSON forms and schemas."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import subprocess

@@ -1,7 +1,5 @@
 """Settings classes: the same from Python, JSON and the command line, and every bound kept."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

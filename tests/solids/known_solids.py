@@ -1,7 +1,5 @@
 """Groups, functions, bodies and solids for the tests of what fills space."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 from manifold3d import Manifold
@@ -14,21 +12,14 @@ from orbiflow.solids.complexes import cell_complex
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, space_group
 
 CELLS = {
-    "P 1": (1.0, 1.1, 0.9, 80, 95, 100),
-    "P -1": (1.0, 1.2, 0.9, 85, 100, 95),
-    "P 1 21 1": (1.0, 1.2, 0.9, 90, 105, 90),
-    "P 1 21/c 1": (1.0, 1.1, 1.2, 90, 100, 90),
-    "C 1 2 1": (1.4, 1.0, 0.9, 90, 100, 90),
-    "P 21 21 21": (1.0, 1.2, 0.9, 90, 90, 90),
-    "P c a 21": (1.2, 1.0, 0.9, 90, 90, 90),
-    "I 21 21 21": (1.0, 1.2, 0.9, 90, 90, 90),
-    "P 41": (1.0, 1.0, 1.3, 90, 90, 90),
-    "P 3": (1.0, 1.0, 0.8, 90, 90, 120),
-    "P 31": (1.0, 1.0, 1.2, 90, 90, 120),
-    "P 61": (1.0, 1.0, 1.6, 90, 90, 120),
-    "R 3": (1.0, 1.0, 1.4, 90, 90, 120),
-    "P 21 3": (1.0, 1.0, 1.0, 90, 90, 90),
-}
+    "P 1": (1.0, 1.1, 0.9, 80, 95, 100), "P -1": (1.0, 1.2, 0.9, 85, 100, 95),
+    "P 1 21 1": (1.0, 1.2, 0.9, 90, 105, 90), "P 1 21/c 1": (1.0, 1.1, 1.2, 90, 100, 90),
+    "C 1 2 1": (1.4, 1.0, 0.9, 90, 100, 90), "P 21 21 21": (1.0, 1.2, 0.9, 90, 90, 90),
+    "P c a 21": (1.2, 1.0, 0.9, 90, 90, 90), "I 21 21 21": (1.0, 1.2, 0.9, 90, 90, 90),
+    "P 41": (1.0, 1.0, 1.3, 90, 90, 90), "P 3": (1.0, 1.0, 0.8, 90, 90, 120),
+    "P 31": (1.0, 1.0, 1.2, 90, 90, 120), "P 61": (1.0, 1.0, 1.6, 90, 90, 120),
+    "R 3": (1.0, 1.0, 1.4, 90, 90, 120), "P 21 3": (1.0, 1.0, 1.0, 90, 90, 90),
+}  # fmt: skip
 """Cells of groups of all kinds: without rotations, with axes of all orders, centred ones."""
 
 names = st.sampled_from(sorted(CELLS))

@@ -1,7 +1,5 @@
 """Meshes to try things with, and their files as other programs write them."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Callable

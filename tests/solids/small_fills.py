@@ -1,7 +1,5 @@
 """Searches for solids that fill space, made small, and what one finds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache

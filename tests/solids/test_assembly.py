@@ -1,7 +1,5 @@
 """What comes apart, and what is interlocked: found from contacts, checked by moving bodies."""
 
-from __future__ import annotations
-
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -230,9 +228,7 @@ def test_labels_are_sorted_as_well_as_can_be(count: int, length: int, seed: int)
         assert line[own, range(length)].sum() == pytest.approx(best)
 
 
-def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted(monkeypatch) -> None:
     monkeypatch.setattr(separable, "FINE", 0.05)
     monkeypatch.setattr(separable, "DIRECTIONS", 16)
     group, body = group_named("P -1"), creature()

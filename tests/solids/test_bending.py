@@ -1,7 +1,5 @@
 """Groups with a free lattice, poses, and bodies that bend until their copies meet."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

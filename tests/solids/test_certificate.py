@@ -1,7 +1,5 @@
 """Proofs that copies fill space, and refusals."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

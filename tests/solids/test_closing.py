@@ -1,7 +1,5 @@
 """Balls of cells on which a function is almost largest."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

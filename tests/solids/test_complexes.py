@@ -1,7 +1,5 @@
 """Partitions of space into cells that a group maps to one another."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The whole way from a mesh to solids that fill space, their folder and what is made of them."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import shutil
@@ -77,9 +75,7 @@ def test_solids_are_certified_and_come_best_first() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
-def test_the_same_seed_gives_the_same_solids_in_any_number_of_processes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_same_seed_gives_the_same_solids_in_any_number_of_processes(monkeypatch) -> None:
     # after a test that has left a thread, workers would come from a server and not know what is small
     monkeypatch.setattr(team, "process_context", lambda _: multiprocessing.get_context("fork"))
     with small_fills():
@@ -139,9 +135,7 @@ def test_the_document_is_valid_and_says_whether_solids_leave(run: Path) -> None:
     assert (shared < 1e-4) == entry["leaves"]
 
 
-def test_what_was_found_is_kept_where_a_search_is_stopped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_found_is_kept_where_a_search_is_stopped(tmp_path, monkeypatch) -> None:
     first = found()[0]
     monkeypatch.setattr(search, "_solid", lambda *_: first)
     cancel, notes = Cancel(), list[str]()
@@ -171,9 +165,7 @@ def test_what_was_found_is_kept_where_a_search_is_stopped(
     assert differing.min() > 0.9 * 210  # words below the stack, and no more
 
 
-def test_what_to_do_is_said_where_no_body_closes(
-    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_to_do_is_said_where_no_body_closes(run: Path, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(search, "_solid", lambda *_: None)
     out, notes = tmp_path / "out", list[str]()
     shutil.copytree(run, out)

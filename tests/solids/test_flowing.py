@@ -1,7 +1,5 @@
 """Tiles by a symmetric flow: faces stay in pairs, volumes exact, and bodies are fitted."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from hypothesis import given, settings

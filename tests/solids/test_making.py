@@ -1,7 +1,5 @@
 """Things to hold in the hand: closed, with gaps, flat below, and pieces that sit in their box."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is painted on a mesh: read in each format, kept where it is mended, and what it matters."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -164,9 +162,7 @@ def test_paint_is_kept_where_a_mesh_is_mended(tmp_path: Path) -> None:
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.02, 0.45), st.floats(0.3, 0.9))
-def test_the_rarer_colour_is_paint_whatever_the_colours(
-    seed: int, share: float, apart: float
-) -> None:
+def test_the_rarer_colour_is_paint_whatever_the_colours(seed, share, apart) -> None:
     rng = np.random.default_rng(seed)
     mesh = ball(1.0, segments=48)
     usual = rng.uniform(size=3)

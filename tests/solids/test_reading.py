@@ -1,7 +1,5 @@
 """Meshes from files: read, mended and said, or refused by name."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stacks of copies, their pictures, and the page that turns them."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -1,7 +1,5 @@
 """Smooth surfaces of tiles, whose faces match under the group."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

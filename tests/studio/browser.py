@@ -1,7 +1,5 @@
 """A studio that runs as the real command, and a browser that looks at it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

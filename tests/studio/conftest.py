@@ -1,7 +1,5 @@
 """One server and one browser for all tests of pages, and an application that answers without them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

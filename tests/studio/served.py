@@ -1,7 +1,5 @@
 """A studio for tests: the real application, with tasks that run in this very process."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import queue

@@ -1,7 +1,5 @@
 """The page of one tile in a real browser: look, pull, undo, draw, and what is in the file then."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any
@@ -216,9 +214,7 @@ def test_the_inside_is_pulled_and_the_outline_stays(closeup, studio, searched: s
     studio.client.patch(f"projects/{searched}", json={"view": {"closeup": {}}})
 
 
-def test_lines_and_eyes_repeat_and_are_in_the_file(
-    closeup, studio: RunningStudio, searched, tile
-) -> None:
+def test_lines_and_eyes_repeat_and_are_in_the_file(closeup, studio, searched, tile) -> None:
     page = closeup
     before = picture(page)
     choose(page, "Draw")

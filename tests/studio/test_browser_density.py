@@ -1,7 +1,5 @@
 """The density page in a real browser: from a table to files, by mouse and by keys."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
@@ -90,9 +88,7 @@ def test_all_is_done_by_keys_and_fits_a_phone(page: Any, fitted: str) -> None:
     assert serious_issues(page) == []
 
 
-def test_regions_and_conditionals_are_those_of_the_density(
-    page: Any, studio: RunningStudio, fitted: str
-) -> None:
+def test_regions_and_conditionals_are_those_of_the_density(page, studio, fitted) -> None:
     fit = studio.client.get(f"projects/{fitted}/density").json()["fit"]
     (file,) = studio.folder.glob(f"projects/{fitted}/fits/*/model/density.safetensors")
     density = read_density(file)[0]

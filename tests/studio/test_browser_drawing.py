@@ -1,7 +1,5 @@
 """Drawing on a tile in a real browser: straight lines, parts that are filled, mirror images, sizes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from itertools import pairwise
@@ -68,9 +66,7 @@ def drawn(studio: RunningStudio, own: str, strokes: int, eyes: int = 0) -> dict[
     return studio.until(found)
 
 
-def test_a_box_of_straight_lines_is_filled_to_its_lines(
-    pen: Any, studio: RunningStudio, searched: str
-) -> None:
+def test_a_box_of_straight_lines_is_filled_to_its_lines(pen, studio, searched) -> None:
     pen.get_by_role("radio", name="Line", exact=True).check()
     pen.get_by_role("radio", name="Black").check()
     corners = [(-30, -30), (30, -30), (30, 30), (-30, 30), (-30, -30)]

@@ -1,7 +1,5 @@
 """Two animals in one tiling, in a real browser: a second picture, and the pages of a tile of both."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -64,9 +62,7 @@ def with_pair(studio: RunningStudio, pair: EscherTile, tmp_path: Path) -> dict[s
     return studio.client.post("projects/open", content=content).json()
 
 
-def test_a_second_picture_is_added_seen_and_taken_away(
-    page, drawing, studio: RunningStudio
-) -> None:
+def test_a_second_picture_is_added_seen_and_taken_away(page, drawing, studio) -> None:
     own = begun(page, drawing)
     page.get_by_role("button", name="Add a second picture").click()
     page.get_by_role("dialog").get_by_role("button", name="Bat", exact=True).click()
@@ -124,9 +120,7 @@ def test_a_pair_is_drawn_as_the_library_has_it(page, pair: EscherTile) -> None:
     assert window.difference(shapely.union_all(seen, grid_size=1e-6)).area < 0.01
 
 
-def test_both_figures_are_shown_pulled_drawn_on_and_taken_away(
-    page, project, studio: RunningStudio
-) -> None:
+def test_both_figures_are_shown_pulled_drawn_on_and_taken_away(page, project, studio) -> None:
     own, tile = project["id"], project["tiles"][0]["id"]
     page.goto(f"/#/p/{own}")
     page.locator(".card canvas").wait_for()

@@ -1,7 +1,5 @@
 """The user's own picture on the tiles: on cards, close up and in what is taken away, tinted alike."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from typing import Any
@@ -90,9 +88,7 @@ def test_what_is_added_of_the_background_is_no_colour(studio: RunningStudio) -> 
     assert studio.project(plain)["silhouette"]["coloured"] is False
 
 
-def test_it_is_there_by_default_and_no_seam_shows(
-    browser: Any, studio: RunningStudio, coloured: str, tile: int
-) -> None:
+def test_it_is_there_by_default_and_no_seam_shows(browser, studio, coloured, tile) -> None:
     for ratio in (1, 1.5):
         context = browser.new_context(
             base_url=studio.address,

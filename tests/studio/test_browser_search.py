@@ -1,7 +1,5 @@
 """The pages of the search and of what is taken away, in a real browser."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
@@ -132,9 +130,7 @@ def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
         page.close()
 
 
-def test_tiles_of_an_outline_since_changed_are_marked_and_searched_anew(
-    page, studio: RunningStudio
-) -> None:
+def test_tiles_of_an_outline_since_changed_are_marked_and_searched_anew(page, studio) -> None:
     own = studio.with_tiles()
     small_searches(page, "IH4")
     page.goto(f"/#/p/{own}")

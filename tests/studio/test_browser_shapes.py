@@ -1,7 +1,5 @@
 """Begin with a shape that fits: each type is shown, opens as a tile, and is pulled."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from orbiflow.tiles import CLASSES, ISOHEDRAL_TYPES

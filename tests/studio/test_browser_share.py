@@ -1,7 +1,5 @@
 """What is shared of a tile, in a real browser: the page without an end, opened from a disk."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -236,9 +234,7 @@ def clipboard(page: Any) -> str:
     return page.evaluate("navigator.clipboard.readText()")
 
 
-def test_copied_link_opens_the_tile_in_a_studio(
-    taking: Any, studio: RunningStudio, searched: str
-) -> None:
+def test_copied_link_opens_the_tile_in_a_studio(taking, studio, searched) -> None:
     taking.get_by_role("button", name="Copy link").click()
     taking.get_by_text("without your picture and what you drew").wait_for()
     link = clipboard(taking)

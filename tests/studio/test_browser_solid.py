@@ -1,7 +1,5 @@
 """The page of a mesh in a real browser: from a mesh to a solid that fills space, and to files."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The first page and the page of the picture, in a real browser."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any
@@ -164,9 +162,7 @@ def test_marks_are_kept_and_only_on_the_animal(page, drawing, studio: RunningStu
     studio.until(lambda: studio.project(own)["pins"] is None)
 
 
-def test_sliders_and_starting_over_can_be_undone_and_done_again(
-    page, drawing, studio: RunningStudio
-) -> None:
+def test_sliders_and_starting_over_can_be_undone_and_done_again(page, drawing, studio) -> None:
     own = begun(page, drawing)
     page.get_by_role("radio", name="Matters most").check()
     stroke(page, "canvas.reading", (0.2, 0.3), (0.3, 0.4))
@@ -322,9 +318,7 @@ def test_a_project_is_duplicated_with_all_that_is_in_it(page, studio: RunningStu
     assert one["silhouette"]["outline"] == other["silhouette"]["outline"]
 
 
-def test_a_project_is_deleted_when_the_page_is_left_unless_that_is_taken_back(
-    page, studio: RunningStudio
-) -> None:
+def test_a_project_is_deleted_when_the_page_is_left_unless_that_is_taken_back(page, studio) -> None:
     def there(own: str) -> bool:
         return studio.client.get(f"projects/{own}").status_code == 200
 

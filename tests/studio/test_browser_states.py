@@ -3,13 +3,10 @@
 `docs/gallery/studio_states.py` takes pictures of them, and of the others.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
 
-from studio.browser import RunningStudio
 from studio_checks import serious_issues, untidy_parts
 
 pytest.importorskip("playwright", reason="playwright is not installed: no browser tests")
@@ -24,18 +21,14 @@ PASSING = [
 
 
 @pytest.mark.parametrize("name", PASSING)
-def test_nothing_is_cut_off_and_nobody_kept_out(
-    page: Any, studio: RunningStudio, searched: str, name: str
-) -> None:
+def test_nothing_is_cut_off_and_nobody_kept_out(page, studio, searched, name: str) -> None:
     page.emulate_media(color_scheme="dark")
     STATES[name](Visit(page, studio.project(searched), density=""))
     assert untidy_parts(page, 1440, 360) == []
     assert serious_issues(page) == []
 
 
-def test_a_thousand_projects_are_shown_when_they_are_asked_for(
-    page: Any, studio: RunningStudio, searched: str
-) -> None:
+def test_a_thousand_projects_are_shown_when_they_are_asked_for(page, studio, searched) -> None:
     STATES["start-many"](Visit(page, studio.project(searched), density=""))
     assert page.locator(".project").count() == 10
     page.get_by_role("button", name="Show all 1000").click()

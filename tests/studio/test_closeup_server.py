@@ -1,7 +1,5 @@
 """What the server does for the page of one tile: how it can be pulled, the pulled tile, the drawing."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -59,9 +57,7 @@ def test_what_cannot_be_is_refused_in_plain_words(
 
 
 @pytest.mark.parametrize(("name", "near"), [("IH4", 0.97), ("IH5", 0.8), ("IH6", 0.8)])
-def test_a_tile_is_laid_in_another_class(
-    client: Client, address: str, name: str, near: float
-) -> None:
+def test_a_tile_is_laid_in_another_class(client, address, name: str, near: float) -> None:
     card = client.post(f"{address}/by-hand/class", json={"name": name}).json()
     project, number = address.split("/tiles/")
     assert (card["class_name"], card["parent"], card["certified"]) == (name, int(number), True)

@@ -1,7 +1,5 @@
 """Densities in the studio: tables that are uploaded, fits, what pages are shown of them, and files."""
 
-from __future__ import annotations
-
 import base64
 import csv
 import io
@@ -151,9 +149,7 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_hostile_tables_are_refused_in_words(
-    client: Client, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hostile_tables_are_refused_in_words(client: Client, name: str, monkeypatch) -> None:
     monkeypatch.setattr(density_tasks, "MAX_ROWS", 50)
     own, task = uploaded(client, HOSTILE[name], name)
     assert task["state"] == "failed"

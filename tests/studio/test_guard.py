@@ -1,7 +1,5 @@
 """Attacks on the studio: each is refused, in words, and leaves nothing behind."""
 
-from __future__ import annotations
-
 import asyncio
 import io
 import itertools
@@ -179,9 +177,7 @@ DRAWINGS = {
 
 
 @pytest.mark.parametrize("drawing", DRAWINGS)
-def test_drawings_of_others_are_never_served(
-    client: Client, monkeypatch: pytest.MonkeyPatch, drawing: str
-) -> None:
+def test_drawings_of_others_are_never_served(client: Client, monkeypatch, drawing: str) -> None:
     def refused(*_args: Any) -> None:
         raise AssertionError("a drawing reached for the network")
 

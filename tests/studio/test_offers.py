@@ -1,7 +1,5 @@
 """What is offered of a tile is what it can do, and the tile that can is one click away."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

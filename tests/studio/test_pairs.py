@@ -1,7 +1,5 @@
 """Two pictures in one project: read, searched, saved, pulled and taken away together."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path
@@ -169,9 +167,7 @@ def saved(client: Client, home: Path, pair: EscherTile) -> bytes:
     return client.get(f"{address}/file").content
 
 
-def test_a_project_of_two_is_saved_opened_and_taken_away(
-    client: Client, home: Path, pair: EscherTile, tmp_path: Path
-) -> None:
+def test_a_project_of_two_is_saved_opened_and_taken_away(client, home, pair, tmp_path) -> None:
     content = saved(client, home, pair)
     (tmp_path / "both.orbiflow").write_bytes(content)
     project = open_project(tmp_path / "both.orbiflow")

@@ -1,7 +1,5 @@
 """What the page of take-aways shows before anything is made: the same that is made then."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json
@@ -91,9 +89,7 @@ def test_a_world_is_made_to_be_turned(client: Client, address: str) -> None:
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_mp4_is_offered_where_it_can_be_made(
-    client: Client, monkeypatch: pytest.MonkeyPatch, there: bool
-) -> None:
+def test_mp4_is_offered_where_it_can_be_made(client: Client, monkeypatch, there: bool) -> None:
     monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/ffmpeg" if there else None)
     schema = client.get("/api/operations/animate/schema").json()
     assert ("mp4" in json.dumps(schema["properties"]["format"])) is there

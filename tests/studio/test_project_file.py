@@ -1,7 +1,5 @@
 """A project's file: what was saved comes back, and a file from others does no harm."""
 
-from __future__ import annotations
-
 import io
 import json
 import re
@@ -58,12 +56,7 @@ def changed(saved: bytes, **entries: bytes | None) -> bytes:
     return data.getvalue()
 
 
-def test_what_the_page_of_docs_says_of_it_runs(
-    saved: bytes,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_the_page_of_docs_says_of_it_runs(saved: bytes, tmp_path, monkeypatch, capsys) -> None:
     page = (Path(__file__).parents[2] / "docs" / "studio.md").read_text(encoding="utf-8")
     [snippet] = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
@@ -105,9 +98,7 @@ def test_what_is_no_project(content: bytes, tmp_path: Path) -> None:
         json.dumps({**DOCUMENT, "format": FORMAT, "reading": {"no such": 1}}).encode(),
     ],
 )
-def test_what_is_said_of_a_project_is_checked(
-    saved: bytes, document: bytes, tmp_path: Path
-) -> None:
+def test_what_is_said_of_a_project_is_checked(saved: bytes, document: bytes, tmp_path) -> None:
     with pytest.raises(OrbiflowError):
         opened(tmp_path, changed(saved, **{PROJECT: document}))
 
@@ -122,9 +113,7 @@ def test_entries_lead_nowhere(saved: bytes, tmp_path: Path) -> None:
     assert not list(tmp_path.parent.rglob("evil"))
 
 
-def test_a_bomb_is_not_unpacked(
-    saved: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bomb_is_not_unpacked(saved: bytes, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(project_file, "MAX_ENTRY_BYTES", 20_000)
     data = io.BytesIO(saved)
     with zipfile.ZipFile(data, "a", zipfile.ZIP_DEFLATED) as archive:

@@ -1,7 +1,5 @@
 """Modules of the browser run by node: pulls stay in the space and follow; the true size."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

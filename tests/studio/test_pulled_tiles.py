@@ -1,7 +1,5 @@
 """A tile that was pulled by hand tiles still, keeps its map, and is refused in plain words."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

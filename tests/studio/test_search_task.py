@@ -1,7 +1,5 @@
 """A search in the studio: tiles appear stage by stage, and a search that was killed goes on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -73,9 +71,7 @@ def test_tiles_appear_stage_by_stage(home: Path) -> None:
     assert not list((home / "tiles").glob(".*"))
 
 
-def test_the_first_tile_waits_for_nothing_twice(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_first_tile_waits_for_nothing_twice(home: Path, monkeypatch) -> None:
     asked, threads = list[object](), set[int]()
     near, put = escherizing.near_symmetry, tasks.put_tile
 

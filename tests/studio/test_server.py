@@ -1,7 +1,5 @@
 """The way of a project through the server: from an upload to what is taken away."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path
@@ -79,9 +77,7 @@ def test_an_eye_that_is_a_hole_is_something_to_see(client: Client) -> None:
 
 
 @pytest.mark.parametrize("name", ["turtle", "frog", "barbet"])
-def test_an_animal_that_was_drawn_is_one_shape_with_something_in_it(
-    client: Client, name: str
-) -> None:
+def test_an_animal_that_was_drawn_is_one_shape_with_something_in_it(client, name: str) -> None:
     address = new_project(client)
     done(client, client.post(f"{address}/animal", json={"name": name}))
     own = client.get(address).json()["silhouette"]

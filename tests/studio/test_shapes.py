@@ -1,7 +1,5 @@
 """Shapes that fit, to begin with: each type is a certified tile, clear of itself, and can be pulled."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

@@ -1,7 +1,5 @@
 """The text of a link: the tile comes back from it, certified; what others wrote does no harm."""
 
-from __future__ import annotations
-
 import base64
 import json
 import zlib

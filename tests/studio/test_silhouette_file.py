@@ -1,7 +1,5 @@
 """What the studio remembers of a silhouette."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

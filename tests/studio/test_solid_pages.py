@@ -1,7 +1,5 @@
 """Solids in the studio: meshes that are uploaded, searches, what pages are shown of them, and files."""
 
-from __future__ import annotations
-
 import io
 import json
 import re
@@ -186,9 +184,7 @@ def test_a_tile_has_no_mesh(client: Client) -> None:
 
 
 @pytest.mark.parametrize("package", ["skimage", "trimesh", "gemmi"])
-def test_what_to_install_is_said(
-    client: Client, monkeypatch: pytest.MonkeyPatch, package: str
-) -> None:
+def test_what_to_install_is_said(client: Client, monkeypatch, package: str) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     answer = client.post("/api/projects", json={"kind": "solid"})
     assert answer.status_code == 422
@@ -210,9 +206,7 @@ def test_a_search_takes_the_settings_of_the_command(client: Client, search: Sear
         assert client.post(f"{own}/tasks", json=body).status_code == 422
 
 
-def test_solids_come_best_first_and_those_that_are_too_many_go(
-    client: Client, search: Search
-) -> None:
+def test_solids_come_best_first_and_those_that_are_too_many_go(client, search: Search) -> None:
     own, _ = uploaded(client, obj(BUMPY), "thing.obj")
     before = client.get(f"{own}/backdrop.png").content
     task = search(own, [solid_of(0.5), solid_of(0.7), solid_of(0.6)], tiles=2)

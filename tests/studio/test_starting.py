@@ -1,7 +1,5 @@
 """Starting the studio: mistakes are told before anything is begun."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 import subprocess

@@ -1,7 +1,5 @@
 """What the studio remembers, and its queue of tasks."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import threading
@@ -182,9 +180,7 @@ def test_cancelling(bench: Bench) -> None:
     assert bench.states(running) == ["cancelled"]
 
 
-def test_what_goes_on_while_it_is_cancelled_ends(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_goes_on_while_it_is_cancelled_ends(bench: Bench, monkeypatch) -> None:
     task = bench.search(bench.project())
     bench.queue.pause(task)
     asked, cancelling = bench.store.task, threading.Thread(target=bench.queue.cancel, args=[task])

@@ -1,7 +1,5 @@
 """Groups are equal, and hashed, by the isometries that they consist of."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The check for users' own tests: passes what commutes, names what fails."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

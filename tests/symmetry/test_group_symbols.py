@@ -1,7 +1,5 @@
 """Names of space groups in every way that people write them: the right group, or none."""
 
-from __future__ import annotations
-
 import re
 
 import gemmi

@@ -1,7 +1,5 @@
 """Isometries of R^d as a group acting on points and vectors; centres and lines of groups."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

@@ -1,7 +1,5 @@
 """The space groups with two origins, typed from the International Tables: a name says which one."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

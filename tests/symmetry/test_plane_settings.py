@@ -1,7 +1,5 @@
 """Plane groups by all their symbols, against the International Tables; the paper's isometries."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Space groups by name, on the cells that they fit."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 

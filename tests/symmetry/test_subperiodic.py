@@ -1,7 +1,5 @@
 """Friezes, rods, layers and point groups: groups that are periodic along some axes alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

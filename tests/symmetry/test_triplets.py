@@ -1,7 +1,5 @@
 """Operators as text: read, written, and refused."""
 
-from __future__ import annotations
-
 import gemmi
 import numpy as np
 import pytest

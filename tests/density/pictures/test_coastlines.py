@@ -1,7 +1,5 @@
 """Lines of a user's own for the globe: GeoJSON and tables, and files that are neither."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -110,9 +108,7 @@ def test_other_files_are_refused(tmp_path: Path, content: Any, message: str) -> 
         read_coastlines(written(tmp_path, content))
 
 
-def test_places_that_are_no_files_and_files_that_are_too_large(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_places_that_are_no_files_and_files_that_are_too_large(tmp_path, monkeypatch) -> None:
     with refused("read", kind=InputFileError):
         read_coastlines(tmp_path / "none.geojson")
     for place in (tmp_path, Path("/dev/zero")):

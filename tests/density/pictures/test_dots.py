@@ -32,9 +32,7 @@ SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
 
 
 @given(st.integers(0, 2**31), st.integers(2, 60), st.floats(0.01, 100), st.integers(2, 3))
-def test_widths_are_in_the_points_unit_and_repeated_points_are_one(
-    seed: int, count: int, scale: float, dim: int
-) -> None:
+def test_widths_are_in_the_points_unit_and_repeated_points_are_one(seed, count, scale, dim) -> None:
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(count, dim))
     places, widths = uncrowded(points)
@@ -89,9 +87,7 @@ def pixels(picture: Picture) -> np.ndarray:
     ("name", "count"),
     [("torus", 20_000), ("klein-bottle", 100), ("sphere", 2000), ("projective-plane", 100)],
 )
-def test_a_peak_is_seen_through_its_dots(
-    name: str, count: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_peak_is_seen_through_its_dots(name: str, count: int, monkeypatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 120)
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 20_000)
     density = peaked(name)

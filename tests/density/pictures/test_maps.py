@@ -1,7 +1,5 @@
 """Densities on maps: what is seen where, what the words say, nothing cut off."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

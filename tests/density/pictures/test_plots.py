@@ -1,7 +1,5 @@
 """All pictures of a density: a folder of them, or one PDF; in memory and from folders."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -134,9 +132,7 @@ def test_settings_are_checked(settings: dict[str, Any], message: str) -> None:
         PlotSettings(**settings)
 
 
-def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
-    tmp_path: Path,
-) -> None:
+def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(tmp_path) -> None:
     out = tmp_path / "plots"
     for space, settings, message in (
         (Torus(2), PlotSettings(coastlines=Path("lines.csv")), "coastlines"),

@@ -1,7 +1,5 @@
 """Projections of the sphere: both ways, areas, angles, where they are cut; and which one suits."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Lines about regions of highest density: where they are, and what is said of them."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Roses, whose areas are shares; corner plots with as many of each, whose ticks do not touch."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

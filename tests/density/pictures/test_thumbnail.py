@@ -1,7 +1,5 @@
 """Small pictures of densities for pages of many."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np
@@ -13,14 +11,9 @@ from orbiflow.density.pictures import density_thumbnail
 from orbiflow.density.pictures.plots import SIZE
 
 SPACES = {
-    "one angle": ("torus", 1),
-    "two": ("torus", 2),
-    "three": ("torus", 3),
-    "eight": ("torus", 8),
-    "sphere": ("sphere", 2),
-    "axes": ("projective-plane", 2),
-    "bottle": ("klein-bottle", 2),
-}
+    "one angle": ("torus", 1), "two": ("torus", 2), "three": ("torus", 3), "eight": ("torus", 8),
+    "sphere": ("sphere", 2), "axes": ("projective-plane", 2), "bottle": ("klein-bottle", 2),
+}  # fmt: skip
 
 
 def data_of(count: int) -> np.ndarray:

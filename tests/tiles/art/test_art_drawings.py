@@ -1,7 +1,5 @@
 """Drawings in curves: vector and raster agree, the drawing is there once, paints are kept."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

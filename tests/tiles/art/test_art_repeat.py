@@ -1,7 +1,5 @@
 """Cells that repeat: laid side by side they are the plane itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs read back with their maps, or with one from the outlines; copies that cannot be told apart."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

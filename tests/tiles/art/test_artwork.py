@@ -1,7 +1,5 @@
 """Pictures on tilings: every pixel covered, nothing bleeds, mirrored tiles are mirrored."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A new format of files is one function and its entry in the table of writers: see CONTRIBUTING.md."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

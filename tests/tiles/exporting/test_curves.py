@@ -1,7 +1,5 @@
 """Fits keep their tolerance and their corners; a smooth tile tiles as its polygon does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

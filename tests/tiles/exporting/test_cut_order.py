@@ -1,7 +1,5 @@
 """Lines are followed from the inside out, and otherwise from the nearest to the nearest."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 
@@ -76,9 +74,7 @@ def assert_inside_out(curves: list[Curve]) -> None:
         {"cut": "template"},
     ],
 )
-def test_every_cut_goes_inside_out_and_loses_no_line(
-    given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_cut_goes_inside_out_and_loses_no_line(given: dict[str, Any], monkeypatch) -> None:
     chosen = ExportSettings(
         **{"purpose": "laser", "area": (110.0, 95.0), "tile_size": 40.0, "eyes": (EYE,), **given}
     )

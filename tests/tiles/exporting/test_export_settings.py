@@ -1,7 +1,5 @@
 """Settings that cannot be met are refused by their names, presets give way, lengths have units."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -174,9 +172,7 @@ def test_posts_are_pixels_whatever_the_resolution() -> None:
 
 
 @given(st.floats(0.01, 1e3), st.floats(1, 1e4))
-def test_pixels_have_a_size_where_their_number_in_an_inch_is_known(
-    number: float, dpi: float
-) -> None:
+def test_pixels_have_a_size_where_their_number_in_an_inch_is_known(number, dpi) -> None:
     assert math.isclose(length(f"{number!r}px", dpi), number * 25.4 / dpi)
     assert size(f"{number!r}x3px", dpi)[1] == pytest.approx(3 * 25.4 / dpi)
     assert length_or_none("None", dpi) == 0

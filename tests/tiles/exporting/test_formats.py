@@ -1,7 +1,5 @@
 """Each format is what its readers expect: sizes, layers, units, and that it is sound."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """Jigsaws measured in the files: faces between the lines, crumbs, thin strips, and the tray."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Literal
 

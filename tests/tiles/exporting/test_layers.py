@@ -1,7 +1,5 @@
 """Cut and engraving in one file lie where the tiles lie, whatever program reads it."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections import defaultdict

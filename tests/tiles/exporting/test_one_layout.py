@@ -1,7 +1,5 @@
 """A tile lies in the same place whether it is cut, printed or painted."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

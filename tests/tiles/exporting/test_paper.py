@@ -1,7 +1,5 @@
 """What is made for paper: margins that stay empty, pages to colour."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

@@ -1,7 +1,5 @@
 """Pieces measured in the files: width when the beam has been, distance, number, allowance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

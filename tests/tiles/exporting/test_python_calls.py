@@ -1,7 +1,5 @@
 """What Python calls take: result folders, tiles in memory; and what decides a file's format."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path
@@ -62,9 +60,7 @@ def sources(folder: Path, found: EscherTile) -> list[Any]:
     return [folder, str(folder), folder / "result.json", read_result(folder), found]
 
 
-def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(
-    tmp_path: Path, found: EscherTile
-) -> None:
+def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(tmp_path, found) -> None:
     target, out = animal("squirrel.dat"), tmp_path / "out"
     for figures in (True, False):
         write_folder(SearchResult(target, [found]), out, figures=figures)
@@ -84,9 +80,7 @@ def test_a_run_without_a_tile_says_why_and_replaces_none(tmp_path: Path, found: 
     assert read_result(out).isohedral_class == "IH4"
 
 
-def test_everything_that_holds_a_tile_is_exported_alike(
-    tmp_path: Path, folder: Path, found: EscherTile
-) -> None:
+def test_everything_that_holds_a_tile_is_exported_alike(tmp_path, folder, found) -> None:
     settings = ExportSettings(tile_size=30, area=(90, 60))
     files = [
         export(source, tmp_path / f"{k}.json", settings).files[0]

@@ -1,7 +1,5 @@
 """Sheets for a bed: together they are the page, once; their crosses agree."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

@@ -1,7 +1,5 @@
 """Skeletons measured in the files: no line twice, none missing, none beyond the page; and trails."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import pairwise
 from typing import Any

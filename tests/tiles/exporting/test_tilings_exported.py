@@ -1,7 +1,5 @@
 """Tilings measured in the files: areas, edges, sizes, layers, and the ground below them."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

@@ -120,9 +120,7 @@ def started(name: str, seed: int, *, from_template: bool) -> TileModel:
 
 @settings(max_examples=20)
 @given(st.sampled_from(list(CLASSES)), casts, seeds, st.booleans())
-def test_no_cast_loses_the_certificate(
-    name: str, steps: list[str], seed: int, from_template: bool
-) -> None:
+def test_no_cast_loses_the_certificate(name, steps: list[str], seed, from_template) -> None:
     model = started(name, seed, from_template=from_template)
     exact = None if model.vertices is None else model.vertices.clone()
     for step in steps:

@@ -1,7 +1,5 @@
 """Tiles by a loss of one's own: whatever the loss asks for, what comes out tiles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

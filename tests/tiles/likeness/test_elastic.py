@@ -55,9 +55,7 @@ def test_moving_costs_nothing(name: str, turn: float, shift: complex) -> None:
 
 
 @given(names, seeds, angles, st.complex_numbers(max_magnitude=5))
-def test_it_does_not_matter_where_and_how_a_shape_lies(
-    name: str, seed: int, turn: float, shift: complex
-) -> None:
+def test_it_does_not_matter_where_and_how_a_shape_lies(name, seed, turn, shift: complex) -> None:
     own = body(name)
     z = shapes(own, seed)
     moved = z * np.exp(1j * turn) + shift

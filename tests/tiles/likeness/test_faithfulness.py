@@ -1,7 +1,5 @@
 """Faithfulness: any shape against a silhouette, wherever it lies and its limbs point."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -29,9 +27,7 @@ def _one_turn() -> Iterator[None]:
 
 @settings(max_examples=4, deadline=None)  # half a second each: both hands, every turn
 @given(st.floats(0.1, 10), st.floats(-3.2, 3.2), st.booleans(), st.integers(0, len(SQUIRREL) - 1))
-def test_motions_mirrors_and_scale_cost_nothing(
-    scale: float, turn: float, mirrored: bool, first: int
-) -> None:
+def test_motions_mirrors_and_scale_cost_nothing(scale, turn, mirrored, first) -> None:
     z = np.roll(SQUIRREL, first, axis=0) @ [1, 1j] * scale * np.exp(1j * turn) + 3
     found = faithfulness(SQUIRREL, plane_points(np.conj(z) if mirrored else z))
     assert found.score > 0.995
@@ -43,9 +39,7 @@ def test_a_mirror_image_may_be_asked_to_count() -> None:
 
 
 @pytest.mark.parametrize("name", ["IH4", "IH28"])
-def test_a_tile_is_judged_as_by_the_points_that_it_was_bent_by(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_tile_is_judged_as_by_the_points_that_it_was_bent_by(name: str, monkeypatch) -> None:
     monkeypatch.setattr(bending_onto, "STARTS", ALL_STARTS)
     case = bent_squirrel(name, False)
     known = case.bent.fidelity

@@ -1,7 +1,5 @@
 """Fidelity: blind to motions and scale, strict on notches, threads, lost parts and lost corners."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Metrics against closed forms, each other and a dense sampling; gradients of what is kept."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

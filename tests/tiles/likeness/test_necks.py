@@ -1,7 +1,5 @@
 """The narrowest places of polygons, how much of an outline is hair, and gaps between parts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings

@@ -60,9 +60,7 @@ def test_range_and_identity(a: Ring, b: Ring) -> None:
     st.booleans(),
 )  # fmt: skip
 @settings(max_examples=20, deadline=None)
-def test_similarities_of_both_change_nothing(
-    a: Ring, b: Ring, angle: float, scale: float, shift: float, mirror: bool
-) -> None:
+def test_similarities_of_both_change_nothing(a: Ring, b: Ring, angle, scale, shift, mirror) -> None:
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     linear = scale * turn @ np.diag([1, -1 if mirror else 1])
     moved = recognisability(a @ linear.T + shift, b @ linear.T + shift)

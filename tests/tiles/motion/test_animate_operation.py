@@ -1,7 +1,5 @@
 """The operation `animate`: files written, events told, mistakes said before the work."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Animations: loops of the length asked for, full of tiles, in files that programs open."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import re
@@ -55,9 +53,7 @@ def bent_fixture() -> EscherTile:
 @given(
     swirled, st.floats(0, 1), st.booleans(), st.sampled_from(["90x160px", "150x150px", "150x100px"])
 )
-def test_every_picture_of_a_morph_is_full(
-    tile: Tile, share: float, steady: bool, area: Any
-) -> None:
+def test_every_picture_of_a_morph_is_full(tile: Tile, share, steady, area) -> None:
     assume(is_sound(tile))
     moving = motion(as_tile(tile), AnimationSettings(area=area, format="svg" if steady else None))
     own = palette("lagoon")._replace(paper="#ff00ff")
@@ -160,9 +156,7 @@ def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:
 
 @pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
 @pytest.mark.parametrize("share", [0.2, 0.45, 0.8, 1.0])
-def test_what_lies_on_the_tiles_goes_where_their_bodies_go(
-    bent: EscherTile, kind: Any, share: float
-) -> None:
+def test_what_lies_on_the_tiles_goes_where_their_bodies_go(bent, kind: Any, share: float) -> None:
     low, high = bent.covered.low, bent.covered.high
     shades = np.stack(np.meshgrid(*[np.linspace(0, 255, 64)] * 2), axis=-1)
     image = np.dstack([shades, np.full((64, 64), 128.0), np.full((64, 64), 255.0)])
@@ -251,9 +245,7 @@ for last; do :; done
 """
 
 
-def test_an_mp4_is_what_ffmpeg_makes_of_all_frames(
-    bent: EscherTile, tmp_path: Path, monkeypatch
-) -> None:
+def test_an_mp4_is_what_ffmpeg_makes_of_all_frames(bent: EscherTile, tmp_path, monkeypatch) -> None:
     fake = tmp_path / "bin" / "ffmpeg"
     fake.parent.mkdir()
     fake.write_text(FFMPEG)

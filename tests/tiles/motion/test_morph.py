@@ -1,7 +1,5 @@
 """From template to tile: every frame tiles the plane, whichever way is taken."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

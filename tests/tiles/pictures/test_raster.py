@@ -1,7 +1,5 @@
 """The PNG pictures have their size and show what they should."""
 
-from __future__ import annotations
-
 import io
 from typing import Any
 

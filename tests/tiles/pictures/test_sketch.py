@@ -1,7 +1,5 @@
 """Sketches draw shapes where they are, whatever the bands, and its PNGs keep their colours."""
 
-from __future__ import annotations
-
 import io
 import math
 

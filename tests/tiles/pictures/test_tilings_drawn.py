@@ -1,7 +1,5 @@
 """Pictures of tilings with symmetric tiles and several prototiles; the example and its page."""
 
-from __future__ import annotations
-
 import io
 import re
 import runpy

@@ -1,7 +1,5 @@
 """The overview and the page of a run: complete, self-contained, and proof against odd names."""
 
-from __future__ import annotations
-
 import io
 import re
 import shlex
@@ -126,9 +124,7 @@ def test_a_page_names_everything_and_refers_to_what_is_there(
     assert {"IH4-2/tile.svg", "overview.png", "index.html"} <= written
 
 
-def test_commands_of_a_page_can_be_copied_into_a_shell(
-    target: Target, bent: EscherTile, flowed: EscherTile
-) -> None:
+def test_commands_of_a_page_can_be_copied_into_a_shell(target, bent, flowed) -> None:
     out, names = "-my <b> $(out)/it's", ["IH4", "IH6", "IH4-2"]
     refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
     page = Page(index_page([bent, refused, bent], [target], names, out=out))

@@ -1,9 +1,5 @@
 """A run says what makes its best likeness poor, in the terminal and on the page."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -61,9 +57,7 @@ def test_it_is_said_on_the_page(kept: Fidelity) -> None:
 
 
 @pytest.mark.parametrize("kept", [GOOD, STRETCHED])
-def test_it_is_said_after_the_table(
-    kept: Fidelity, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_is_said_after_the_table(kept: Fidelity, tmp_path, monkeypatch) -> None:
     found = SearchResult(TARGET, [tile(kept)])
     monkeypatch.setattr(search, "escherize", lambda *_args, **_settings: found)
     monkeypatch.setattr(run_folder, "write_run", lambda *_args, **_settings: True)

@@ -1,7 +1,5 @@
 """`read.png`: what was read, in the folder before the search and after it."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 
@@ -79,9 +77,7 @@ def test_another_read_png_is_not_replaced(picture: Path, tmp_path: Path) -> None
         show_reading(Target.read(picture), b"", tmp_path / "out")
 
 
-def test_a_failed_search_leaves_the_earlier_run(
-    picture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failed_search_leaves_the_earlier_run(picture: Path, tmp_path, monkeypatch) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "result.json").write_text('{"schema_version": 2, "tiles": []}')

@@ -1,7 +1,5 @@
 """A search method of one's own, in one file: templates laid over the silhouette, none moved."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

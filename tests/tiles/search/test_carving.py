@@ -1,7 +1,5 @@
 """Tiles that climb to a higher mark."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """From a fit, by any method, to certified polygons."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

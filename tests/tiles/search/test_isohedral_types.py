@@ -158,9 +158,7 @@ def test_symmetric_silhouettes_are_told_from_others() -> None:
     assert turned.stabiliser == "C2"
 
 
-def test_a_silhouette_near_to_symmetric_gets_classes_of_symmetric_tiles(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_silhouette_near_to_symmetric_gets_classes_of_symmetric_tiles(monkeypatch) -> None:
     asked: list[str] = []
 
     def failing(*arguments: Any) -> None:

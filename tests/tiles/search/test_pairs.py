@@ -1,7 +1,5 @@
 """Two silhouettes in one tiling: glues, placements, bodies of two parts, and certified pairs."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 

@@ -1,7 +1,5 @@
 """A search with pins, from a call to its `result.json`."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The choice among finalists, and stars of what the user brought."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A class that has no tile with all thin parts of a silhouette gets one without them, and says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tiles of two figures: found, measured, saved, drawn, cut, printed and animated as those of one."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

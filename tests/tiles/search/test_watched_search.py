@@ -1,7 +1,5 @@
 """A search that somebody watches: its tiles come early, and get better."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

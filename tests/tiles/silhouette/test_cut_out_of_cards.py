@@ -1,7 +1,5 @@
 """A card with a hole in the shape of an animal: it is said, and `invert` takes the hole."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

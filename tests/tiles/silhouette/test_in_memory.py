@@ -1,7 +1,5 @@
 """Silhouettes from what is in memory: arrays, bytes and streams."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

@@ -76,14 +76,10 @@ def test_an_unknown_column_in_runs_is_asked_about() -> None:
 @pytest.mark.parametrize(
     ("header", "row"),
     [
-        ("id,x,y", "{k},{x},{y}"),
-        (",x,y", "{k},{x},{y}"),
-        ("part,x,y", "1,{x},{y}"),
-        ("x,y,z", "{x},{y},0"),
-        ("x,y,z", "{x},{y},{y}"),
-        ("x,y,name", "{x},{y},corner {k}"),
+        ("id,x,y", "{k},{x},{y}"), (",x,y", "{k},{x},{y}"), ("part,x,y", "1,{x},{y}"),
+        ("x,y,z", "{x},{y},0"), ("x,y,z", "{x},{y},{y}"), ("x,y,name", "{x},{y},corner {k}"),
     ],
-)
+)  # fmt: skip
 def test_other_columns_stay_unread(header: str, row: str) -> None:
     target = table(header, (row, SHAPE))
     assert iou(target.outline, SHAPE) == pytest.approx(1)
@@ -108,18 +104,14 @@ def test_three_columns_that_nothing_names_are_refused() -> None:
 @pytest.mark.parametrize(
     ("content", "y_down"),
     [
-        ([SHAPE], False),
-        ([SHAPE, INNER], False),
-        ([[SHAPE, INNER], [OTHER]], False),
-        ([OTHER, SHAPE], False),
-        ([{"x": x, "y": y} for x, y in SHAPE], False),
+        ([SHAPE], False), ([SHAPE, INNER], False), ([[SHAPE, INNER], [OTHER]], False),
+        ([OTHER, SHAPE], False), ([{"x": x, "y": y} for x, y in SHAPE], False),
         ([[{"x": x, "y": y} for x, y in ring] for ring in (OTHER, SHAPE)], False),
         (dict(zip("xy", np.transpose(SHAPE).tolist(), strict=True)), False),
-        ({"points": SHAPE}, False),
-        ({"vertices": SHAPE, "y_down": True}, True),
+        ({"points": SHAPE}, False), ({"vertices": SHAPE, "y_down": True}, True),
         ({"outline": [{"x": x, "y": y} for x, y in SHAPE], "y_down": True}, True),
     ],
-)
+)  # fmt: skip
 def test_json_of_other_programs(content: Any, y_down: bool) -> None:
     target = read(content)
     assert iou(target.outline, SHAPE) == pytest.approx(1)

@@ -18,15 +18,8 @@ from orbiflow.tiles.silhouette import doubts
 SIZE = (300, 240)
 # an animal with four legs and a tail, in pixels
 LEGS = [
-    [235, 85],
-    [205, 110],
-    [200, 170],
-    [185, 170],
-    [180, 130],
-    [110, 135],
-    [105, 170],
-    [90, 170],
-]
+    [235, 85], [205, 110], [200, 170], [185, 170], [180, 130], [110, 135], [105, 170], [90, 170],
+]  # fmt: skip
 BACK = [[85, 120], [60, 95], [48, 62], [60, 60], [75, 90], [180, 90], [200, 60], [215, 60]]
 ANIMAL = np.array([*LEGS, *BACK], dtype=float)
 EXAMPLES = Path(__file__).parents[3] / "examples" / "silhouettes"

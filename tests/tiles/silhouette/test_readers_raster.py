@@ -234,9 +234,7 @@ def test_outline_is_simple_where_pixels_meet_at_corners(tmp_path: Path) -> None:
         (lambda: draw().resize((8, 8)), "covers only .* pixels"),
     ],
 )
-def test_images_without_a_shape(
-    tmp_path: Path, make: Callable[[], Image.Image], message: str
-) -> None:
+def test_images_without_a_shape(tmp_path, make: Callable[[], Image.Image], message: str) -> None:
     path = save(tmp_path, make())
     with pytest.raises(InputFileError, match=message) as caught:
         read_outline(path)

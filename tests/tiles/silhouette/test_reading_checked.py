@@ -1,7 +1,5 @@
 """What is said of a reading before a search, and silhouettes smoothed alike from any kind of file."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -62,9 +60,7 @@ def test_smoothing_does_the_same_to_pictures_drawings_and_polygons(tmp_path: Pat
 
 @settings(max_examples=12)
 @given(st.floats(0.005, 0.1), st.floats(0, 8))
-def test_smoothed_outlines_are_simple_and_smooth_to_their_width(
-    share: float, ripple: float
-) -> None:
+def test_smoothed_outlines_are_simple_and_smooth_to_their_width(share, ripple) -> None:
     target = Target.from_polygon(wavy(120, ripple))
     shape = shapely.Polygon(target.smoothed(share).outline)
     assert shape.is_valid

@@ -1,7 +1,5 @@
 """What was seen of a picture covers the outline, whatever the level that parts shape and ground."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -35,9 +33,7 @@ def filled(target: Target) -> BaseGeometry:
 
 @settings(max_examples=40)
 @given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.0, 0.02, 0.06]))
-def test_what_was_seen_covers_the_outline(
-    picture: np.ndarray, threshold: int, thicken: float
-) -> None:
+def test_what_was_seen_covers_the_outline(picture: np.ndarray, threshold, thicken) -> None:
     try:
         target = Target.from_mask(picture, threshold=threshold / STEPS, invert=False)
     except InputFileError:  # specks alone
@@ -53,9 +49,7 @@ def test_what_was_seen_covers_the_outline(
 
 @settings(max_examples=40)
 @given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.02, 0.05]))
-def test_smoothing_keeps_the_shape_that_was_read(
-    picture: np.ndarray, threshold: int, share: float
-) -> None:
+def test_smoothing_keeps_the_shape_that_was_read(picture: np.ndarray, threshold, share) -> None:
     try:
         target = Target.from_mask(picture, threshold=threshold / STEPS, invert=False)
     except InputFileError:
@@ -70,9 +64,7 @@ def test_smoothing_keeps_the_shape_that_was_read(
 
 @settings(max_examples=20)
 @given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.01, 0.05, 0.15]))
-def test_smoothing_counts_the_parts_that_it_left_out(
-    picture: np.ndarray, threshold: int, share: float
-) -> None:
+def test_smoothing_counts_the_parts_that_it_left_out(picture: np.ndarray, threshold, share) -> None:
     try:
         target = Target.from_mask(picture, threshold=threshold / STEPS, invert=False)
         smooth = target.smoothed(share)

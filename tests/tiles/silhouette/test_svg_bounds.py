@@ -71,9 +71,7 @@ def body(text: str) -> Reading:
         ),
     ],
 )
-def test_what_would_take_too_long_is_refused(
-    text: str, message: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_would_take_too_long_is_refused(text: str, message: str, monkeypatch) -> None:
     monkeypatch.setattr(svg_css, "MAX_STEPS", 100_000)
     monkeypatch.setattr(svg_drawing, "MAX_DRAWN", 1000)
     closed = text + "</g>" * (text.count("<g>") + text.count("<g style") - text.count("</g>"))

@@ -1,7 +1,5 @@
 """Local thickness; thin parts grow to a width, bodies and gaps stay; too thin ones are said at once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Balls, their pieces and lamps: closed, of the right size, and the pieces are the ball."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Solids: closed, of the right volume, mirrored where need be, and refused where they cannot be."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 

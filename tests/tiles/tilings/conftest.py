@@ -1,7 +1,5 @@
 """Tiles to test with: templates, stretched and perturbed, of every class."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeAlias
 

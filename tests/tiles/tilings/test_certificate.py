@@ -1,7 +1,5 @@
 """What is a tile is certified, what is not is refused and says why."""
 
-from __future__ import annotations
-
 import cProfile
 import itertools
 import json

@@ -1,7 +1,5 @@
 """The table of nine classes against the geometry, what is free in a lattice, and how tiles lie."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Colourings are proper, periodic and small."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Neighbours by edge and by point; patches that cover a window with nothing too much."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Edges, their classes and the skeleton, of tilings with symmetric tiles and several prototiles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

@@ -1,7 +1,5 @@
 """Tilings by several prototiles and by tiles with a symmetry: certified, or refused."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The maps of patterns to other worlds: elliptic functions, triangles by mpmath, turns."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mpmath
@@ -65,9 +63,7 @@ def test_weierstrass_keeps_its_equation_and_its_periods(drawn: Any, z: complex) 
 
 @settings(max_examples=12)
 @given(st.sampled_from(["p3", "p4", "p6"]), triples, st.complex_numbers(max_magnitude=4))
-def test_the_map_is_a_quotient_of_hypergeometric_functions(
-    name: str, orders: Any, w: complex
-) -> None:
+def test_the_map_is_a_quotient_of_hypergeometric_functions(name, orders, w: complex) -> None:
     assume(w.imag > 0.05)
     assume(abs(w - 1) > 0.05)
     assume(abs(w) > 0.05)

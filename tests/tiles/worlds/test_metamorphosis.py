@@ -1,7 +1,5 @@
 """A sheet on which polygons become tiles: full, without overlaps, one curve along each edge."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A world as a page of its own, turned without a network; which tile goes to which world."""
 
-from __future__ import annotations
-
 import io
 from itertools import permutations
 from pathlib import Path

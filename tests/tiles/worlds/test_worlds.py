@@ -1,7 +1,5 @@
 """Other worlds: maps agree with mpmath, edges match, copies cover, pages are as asked for."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from pathlib import Path
