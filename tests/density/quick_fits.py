@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import pytest
 
 FITTING = "orbiflow.density.fitting"
-COVARIATES = "orbiflow.density.covariates"
 
 
 def quick_fits(patch: pytest.MonkeyPatch) -> None:
@@ -15,7 +14,6 @@ def quick_fits(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{FITTING}.families.SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.families.MIXTURE_SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.held_out.USED", ())
-    patch.setattr(f"{COVARIATES}.fit.USED", ((10**9, 2),))
     patch.setattr("orbiflow.density.models.figures.DRAWS", 2**13)
     patch.setattr("orbiflow.density.regions.boundaries.CHECKED", 20_000)
 

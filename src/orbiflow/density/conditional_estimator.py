@@ -21,6 +21,7 @@ from orbiflow.density.covariates import (
 )
 from orbiflow.density.data import (
     Asked,
+    TableRows,
     alongside,
     as_data,
     as_numbers,
@@ -69,7 +70,7 @@ class ConditionalEstimator(DensityEstimator):
 
     def fit(  # pyright: ignore[reportIncompatibleMethodOverride]
         self,
-        X: ArrayLike,
+        X: ArrayLike | TableRows,
         given: Any,
         sample_weight: ArrayLike | None = None,
         *,
@@ -107,10 +108,10 @@ class ConditionalEstimator(DensityEstimator):
         sample_weight, groups = read.beside(sample_weight, groups)
         are_asked = declared is not None or is_frame(given)
         covariates = self._covariates(cells, declared or {}, are_asked)
-        self._fit(read, sample_weight, groups, progress)
+        pooled = self._fit(read, sample_weight, groups, progress)
         points = self._chart(read.values)
         self.conditional_density_, self.conditional_report_ = fit_conditional(
-            self._fitted(),
+            pooled,
             points,
             _features(covariates, cells, len(points)),
             covariates,

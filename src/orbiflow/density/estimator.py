@@ -26,6 +26,7 @@ from orbiflow.density.data import (
     runs_of_draws,
 )
 from orbiflow.density.fitting import (
+    ChosenFit,
     DensitySettings,
     FitReport,
     Parameter,
@@ -184,7 +185,8 @@ class DensityEstimator(FittedFigures):
         sample_weight, groups = rows.beside(sample_weight, groups)
         if groups is None and not self.settings().flow_alone:
             groups = runs_of_draws(X)
-        return self._fit(rows, sample_weight, groups, progress)
+        self._fit(rows, sample_weight, groups, progress)
+        return self
 
     def _read(self, X: Any, others: Sequence[str] = (), apart: Sequence[str] = ()) -> TableRows:
         """Return the rows of a fit; set their space.
@@ -202,7 +204,7 @@ class DensityEstimator(FittedFigures):
         sample_weight: ArrayLike | None,
         groups: ArrayLike | None,
         progress: Progress | None,
-    ) -> Self:
+    ) -> ChosenFit:
         """Fit to data that were read."""
         settings, points = self.settings(), self._chart(read.values)
         if flow_obstacle(self.space_):
@@ -213,11 +215,11 @@ class DensityEstimator(FittedFigures):
         how |= {"missing": self.missing, "columns": names}
         found = fit_chosen(self.space_, points, settings, **how)
         self._keep(found, read)
-        return self
+        return found
 
-    def _keep(self, found: tuple[Density, FitReport], read: TableRows) -> None:
+    def _keep(self, found: ChosenFit, read: TableRows) -> None:
         """Set what there is after a fit to data."""
-        self.density_, self.report_ = found
+        self.density_, self.report_ = found.density, found.report
         self.n_features_in_ = read.values.shape[1]
         if read.source.is_named:
             self.feature_names_in_ = np.array(read.columns, dtype=object)

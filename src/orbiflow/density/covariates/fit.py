@@ -16,6 +16,7 @@ from orbiflow.density.covariates.density import ConditionalDensity, Unconditiona
 from orbiflow.density.covariates.joint import (
     JointDensity,
     covariate_turns,
+    for_conditionals,
     is_joint_possible,
     joint_torus,
 )
@@ -25,17 +26,17 @@ from orbiflow.density.covariates.parts import Part
 from orbiflow.density.covariates.regression import CircularRegression, fit_regression
 from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting import (
+    ChosenFit,
     DensitySettings,
     Folds,
     Progress,
     Rows,
     fit_chosen,
+    fit_in_folds,
     folds_of,
     gain_of,
-    repeats_of,
     silent,
     sparse_weights,
-    spread_evenly,
     stacked,
     weighed,
 )
@@ -48,11 +49,8 @@ from orbiflow.typed_torch import listed
 LEAST_ROWS = 30
 """The fewest rows of which a tenth can be held out, and a tenth kept apart."""
 
-USED = ((600, 5), (10**9, 3))
-"""The number of tenths that are held out in turn, for up to so many rows."""
-
 NETWORKS = 2
-"""Networks for each tenth that is held out: the mean of several is better than each."""
+"""Networks for each fold that is held out: the mean of several is better than each."""
 
 MOST_CHAINED = 3
 """The most columns of joint densities with chains."""
@@ -124,15 +122,13 @@ class ConditionalReport:
 class _Task:
     """Rows in random order, their features, and their folds.
 
-    - `order`: The numbers (N,) that they had.
     - `number`: The number (m,) of the covariate of each feature.
-    - `settings`: Those of densities of all rows but some.
+    - `settings`: Those of joint densities.
     """
 
     space: Space
     folds: Folds
     x: Tensor
-    order: Tensor
     number: Tensor
     settings: DensitySettings
 
@@ -140,6 +136,12 @@ class _Task:
     def rows(self) -> Rows:
         """All rows."""
         return self.folds.rows
+
+    @property
+    def numbers(self) -> Tensor:
+        """The places (N,) of the rows before."""
+        assert self.rows.numbers is not None
+        return self.rows.numbers
 
     def where(self, fold: int) -> Tensor:
         """Return the numbers of the rows of a fold."""
@@ -155,17 +157,6 @@ class _Task:
         own = self.held(fold)
         return part.log_prob(self.rows.points[own], self.x[own])
 
-    def fitted(
-        self, space: Space, points: Tensor, chosen: Tensor, settings: DensitySettings | None = None
-    ) -> Density:
-        """Return what suits some of the points (N, d), of all rows, in a space."""
-        counts = None if self.rows.weights is None else self.rows.weights[chosen].numpy()
-        labels = None if self.rows.groups is None else self.rows.groups[chosen].numpy()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DataWarning)  # the fit to all rows has said them
-            how: dict[str, Any] = {"weights": counts, "groups": labels}
-            return fit_chosen(space, points[chosen], settings or self.settings, **how)[0]
-
 
 def check_complete(missing: str) -> None:
     """Refuse to fit rows that lack angles, of which no density is known where covariates are."""
@@ -177,7 +168,7 @@ def check_complete(missing: str) -> None:
 
 @one_thread()
 def fit_conditional(
-    pooled: Density,
+    pooled: ChosenFit,
     points: Tensor,
     x: Tensor,
     covariates: Covariates,
@@ -190,12 +181,13 @@ def fit_conditional(
     """Fit a density of points where the features of covariates are known.
 
     Conditional kernels, a neural mixture, the density of all rows and, on tori, a linear-circular
-    regression and, beside numbers, a joint density are fitted without a tenth of the rows, for several
-    tenths in turn, and weighed by the conditional log densities of what is held out (stacking). If all
-    of them gain nothing sure on the density of all rows, that is what is left.
+    regression and, beside numbers, a joint density are fitted without a tenth of the rows, for the
+    tenths by which the density of all rows was chosen, and weighed by the conditional log densities of
+    what is held out (stacking). If all of them gain nothing sure on the density of all rows, that is
+    what is left.
 
     Args:
-        pooled: The density of all rows.
+        pooled: The fit of the density of all rows.
         points: Points (N, d) of its space's chart.
         x: Features (N, m) of the covariates.
         covariates: What these are.
@@ -208,11 +200,11 @@ def fit_conditional(
         OrbiflowError: For fewer than `LEAST_ROWS` rows.
     """
     say = progress or silent
-    task = _task(pooled.space, points, x, covariates.number, settings, weights, groups)
+    task, without = _task(pooled, points, x, covariates.number, settings, weights, groups)
     say(0.0, "conditional kernels")
     kernels = fit_kernels(task.space, task.rows, task.x, task.number)
     networks = _networks(task, lambda share: say(0.1 + 0.4 * share, "neural mixtures"))
-    fits = _fits(task, kernels, networks)
+    fits = _fits(task, without, kernels, networks)
     table: list[Tensor] = []
     used = range(task.folds.used)
     for fold in used:
@@ -225,23 +217,28 @@ def fit_conditional(
     say(0.9, "putting together")
     every = torch.ones_like(task.folds.fold, dtype=torch.bool)
     done: dict[str, Part] = {
-        Unconditional.kind: Unconditional(pooled), kernels.kind: kernels, networks.kind: networks
-    }  # fmt: skip
+        Unconditional.kind: Unconditional(pooled.density),
+        kernels.kind: kernels,
+        networks.kind: networks,
+    }
     some = [(kind, w) for kind, w in zip(fits, listed(shares), strict=True) if w > 0]
+    if JointDensity.kind in fits:
+        done[JointDensity.kind] = fits[JointDensity.kind](every, -1)
     parts = [done.get(kind) or fits[kind](every, 0) for kind, _ in some]
     density = ConditionalDensity(covariates, parts, [w for _, w in some])
-    return density, _report(list(fits), logs, shares, task.order[held], counts)
+    return density, _report(list(fits), logs, shares, task.numbers[held], counts)
 
 
 def _fits(
-    task: _Task, kernels: ConditionalKernels, networks: NeuralMixture
+    task: _Task,
+    without: Callable[[int], Density],
+    kernels: ConditionalKernels,
+    networks: NeuralMixture,
 ) -> dict[str, Callable[[Tensor, int], Part]]:
     """Return by its kind how each part is fitted to some rows (N,), without a fold."""
     space = task.space
     found: dict[str, Callable[[Tensor, int], Part]] = {
-        Unconditional.kind: lambda rest, _: Unconditional(
-            task.fitted(space, task.rows.points, rest)
-        ),
+        Unconditional.kind: lambda _, fold: Unconditional(without(fold)),
         ConditionalKernels.kind: lambda rest, _: kernels.with_rows(task.rows[rest], task.x[rest]),
         NeuralMixture.kind: lambda _, fold: networks.alone(NETWORKS * fold, NETWORKS),
     }
@@ -249,46 +246,63 @@ def _fits(
         found[CircularRegression.kind] = lambda rest, _: fit_regression(
             space, task.rows[rest], task.x[rest]
         )
-    if is_joint_possible(space, task.number):
-        found[JointDensity.kind] = lambda rest, _: _joint(task, rest)
+    if isinstance(space, Torus) and is_joint_possible(space, task.number):
+        torus, joint = space, _joint(task)
+        found[JointDensity.kind] = lambda _, fold: JointDensity(
+            torus, joint.density if fold < 0 else joint.without(fold), task.number
+        )
     return found
 
 
 def _task(
-    space: Space,
+    pooled: ChosenFit,
     points: Tensor,
     x: Tensor,
     number: Tensor,
     settings: DensitySettings,
     weights: Any,
     groups: ArrayLike | None,
-) -> _Task:
+) -> tuple[_Task, Callable[[int], Density]]:
+    """Return rows in the folds of the density of all of them, and what that density is without each."""
+    space = pooled.density.space
     if len(points) < LEAST_ROWS:
         raise OrbiflowError(
             f"a density where covariates are known needs {LEAST_ROWS} rows or more, got {len(points)}"
         )
-    found = repeats_of(space, points)
-    if found.taken_for(settings.repeats) == "rounding" and found.can_be_undone:
-        noise = torch.Generator().manual_seed(settings.seed)
-        points = spread_evenly(space, points, found, noise)
-    weights, groups = alongside(weights=weights, groups=groups)
-    labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(points)))
-    place = torch.arange(len(points), dtype=torch.float64)[:, None]
-    rows = weighed(torch.cat([points, x, place], dim=1), weights, labels)
-    generator = torch.Generator().manual_seed(settings.seed)
-    folds = folds_of(rows, together=False, generator=generator)
-    own, seen, order = folds.rows.points.split([points.shape[1], x.shape[1], 1], dim=1)
-    most = next(count for rows, count in USED if len(points) <= rows)
-    folds = replace(folds, rows=replace(folds.rows, points=own), used=min(folds.used, most))
+    how: dict[str, Any] = {"weights": weights, "groups": groups}
     if not settings.parametric:
         chosen = [name for name in settings.allowed if name != "flow"] or ["kernels", "mixture"]
-        how: dict[str, Any] = {"components": tuple(chosen), "repeats": settings.repeats}
-        settings = DensitySettings(**how, seed=settings.seed)
-    return _Task(space, folds, seen, order[:, 0].long(), number, settings)
+        kept: dict[str, Any] = {"components": tuple(chosen), "repeats": settings.repeats}
+        joint = DensitySettings(**kept, seed=settings.seed)
+        if settings.flow_alone:
+            pooled = _quietly(lambda: fit_in_folds(space, points, joint, **how))
+        folds, without = pooled.folds, pooled.without
+        settings = joint
+    else:
+        _, weights, groups = alongside(points=points, **how)
+        labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(points)))
+        generator = torch.Generator().manual_seed(settings.seed)
+        folds = folds_of(weighed(points, weights, labels), together=False, generator=generator)
+
+        def without(fold: int) -> Density:
+            rest = folds.train(fold)
+            own = None if rest.weights is None else rest.weights.numpy()
+            return _quietly(lambda: fit_chosen(space, rest.points, settings, weights=own)).density
+
+    assert folds is not None
+    assert folds.rows.numbers is not None
+    return _Task(space, folds, x[folds.rows.numbers], number, settings), without
+
+
+def _quietly(fit: Callable[[], ChosenFit]) -> ChosenFit:
+    """Return what a fit returns, without the warnings that the fit to all rows has given."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)
+        return fit()
 
 
 def _networks(task: _Task, tell: Callable[[float], None]) -> NeuralMixture:
-    """Return neural mixtures without each tenth and the next, by which their best step is chosen."""
+    """Return neural mixtures without each fold and the next, by which their best step is chosen."""
     fold, count = task.folds.fold, int(task.folds.fold.max()) + 1
     used = [fold for fold in range(task.folds.used) for _ in range(NETWORKS)]
     apart = [(number + 1) % count for number in used]
@@ -313,8 +327,8 @@ def _sure_shares(logs: Tensor, counts: Tensor | None) -> Tensor:
     return first.to(logs)
 
 
-def _joint(task: _Task, chosen: Tensor) -> JointDensity:
-    """Return the joint density of some rows (N,) and their covariates.
+def _joint(task: _Task) -> ChosenFit:
+    """Return the fit of the joint density of rows and their covariates, in the same folds.
 
     Integrals of chains over what is not a covariate take long where there are many angles, of networks
     they do not.
@@ -323,11 +337,17 @@ def _joint(task: _Task, chosen: Tensor) -> JointDensity:
     assert isinstance(space, Torus)
     torus = joint_torus(space, int(task.number.max()) + 1)
     points = torch.cat([task.rows.points, covariate_turns(task.x, task.number)], dim=1)
-    some = torch.nonzero(chosen)[:MOST_JOINT_ROWS, 0]
+    some = slice(MOST_JOINT_ROWS)
+    folds = replace(task.folds, rows=task.rows[some], fold=task.folds.fold[some])
     without = "network" if torus.dim <= MOST_CHAINED else "chains"
     components = [name for name in task.settings.allowed if name != without]
     settings = task.settings.replace(components=tuple(components))
-    return JointDensity(space, task.fitted(torus, points, some, settings), task.number)
+    found = _quietly(lambda: fit_in_folds(torus, points[some], settings, folds=folds))
+    evidence, folds = found.evidence, found.folds
+    assert evidence is not None
+    assert folds is not None
+    evidence = for_conditionals(evidence, folds, space.dim)
+    return replace(found, density=evidence.assembled(), evidence=evidence)
 
 
 def _report(

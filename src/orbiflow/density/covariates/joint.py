@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Self
 
 import torch
+from scipy import optimize
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.density.covariates.columns import SPREAD
 from orbiflow.density.covariates.parts import Part
+from orbiflow.density.fitting import Evidence, Folds
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import (
     Density,
@@ -23,6 +27,9 @@ from orbiflow.density.models import (
 from orbiflow.density.spaces import Space, Torus, turns_at
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
+
+SHARE_RIDGE = 1e-3
+"""Weight of the mean square of the logarithms by which shares are changed for what is asked."""
 
 MOST_DIM = 6
 """The most angles and covariates together."""
@@ -89,6 +96,61 @@ class JointDensity(Part):
             raise OrbiflowError("a joint density that cannot be")
         joint = joint_torus(space, int(number.max()) + 1)
         return cls(space, density_from(joint, header["density"], tensors), number)
+
+
+def for_conditionals(evidence: Evidence, folds: Folds, dim: int) -> Evidence:
+    """Return evidence with shares that suit the first `dim` columns best where the others are known.
+
+    Those of a joint density make all columns likeliest, and how covariates are spread does not count.
+    """
+    tables: list[Tensor] = []
+    for fold in range(folds.used):
+        whole = folds.held(fold).points
+        known = torch.cat([whole.new_full((len(whole), dim), math.nan), whole[:, dim:]], dim=1)
+        parts = evidence.parts(fold)
+        tables.append(
+            torch.stack(
+                [torch.stack([at_observed(own, at) for own in parts]) for at in (whole, known)]
+            )
+        )
+    table, candidates = torch.cat(tables, dim=2), evidence.candidates
+    counts = candidates.row_weights
+    counts = torch.ones_like(table[0, 0]) if counts is None else counts
+    folds_of_rows = candidates.fold
+
+    def shares(some: Tensor) -> Tensor:
+        every = torch.zeros_like(evidence.shares)
+        chosen = evidence.chosen
+        every[chosen] = _conditional_shares(
+            table[:, :, some], counts[some], evidence.shares[chosen], candidates.floor[chosen]
+        )
+        return every
+
+    apart = [shares(folds_of_rows != fold) for fold in range(folds.used)]
+    return replace(evidence, shares=shares(folds_of_rows >= 0), apart=apart)
+
+
+def _conditional_shares(table: Tensor, counts: Tensor, start: Tensor, floor: Tensor) -> Tensor:
+    """Return shares (P,) by log densities (2, P, n) of whole rows and of covariates alone.
+
+    The search begins at a start, and a ridge holds what few rows decide. Those of the `floor` (P,) do
+    not fall: nothing is impossible.
+    """
+    both, alone = table
+    row_shares = counts / counts.sum()
+
+    def loss(values: Array) -> tuple[float, Array]:
+        logits = torch.tensor(values, requires_grad=True)
+        weights = torch.log_softmax(logits, dim=0)[:, None]
+        gains = (both + weights).logsumexp(dim=0) - (alone + weights).logsumexp(dim=0)
+        value = SHARE_RIDGE * (logits - start.log()).square().mean() - row_shares @ gains
+        (gradient,) = torch.autograd.grad(value, logits)
+        return float(value.detach()), gradient.numpy()
+
+    found = optimize.minimize(loss, start.log().numpy(), jac=True, method="L-BFGS-B").x
+    best = torch.softmax(torch.tensor(found), dim=0)
+    best[floor] = best[floor].maximum(start[floor])
+    return best / best.sum()
 
 
 def is_joint_possible(space: Space, number: Tensor) -> bool:

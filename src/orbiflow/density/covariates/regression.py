@@ -22,6 +22,9 @@ from orbiflow.typed_torch import special
 RIDGE = 1e-3
 """Weight of the mean square of slopes: of words, features are linearly dependent."""
 
+STEPS, LEAST_GAIN = 200, 1e-6
+"""The most steps, and the least relative gain of one: rare words make thousands that gain nothing."""
+
 LOG_KAPPA = (-6.0, 12.0)
 """Logarithms of the least and the largest concentration."""
 
@@ -116,7 +119,9 @@ def fit_regression(space: Torus, rows: Rows, x: Tensor) -> CircularRegression:
     found: list[CircularRegression] = []
     for start in (mean, mean + math.pi):
         first = np.concatenate([start.numpy(), np.zeros(d * k + d * (1 + k))])
-        best = optimize.minimize(loss, first, jac=True, method="L-BFGS-B").x
+        best = optimize.minimize(
+            loss, first, jac=True, method="L-BFGS-B", options={"maxiter": STEPS, "ftol": LEAST_GAIN}
+        ).x
         found.append(made(torch.tensor(best)))
     logs = torch.stack([shares @ own.logs(rows.points, x) for own in found])
     better = logs.argmax(dim=0)

@@ -1,5 +1,8 @@
+from .automatic import ChosenFit as ChosenFit
 from .automatic import fit_automatic as fit_automatic
 from .automatic import fit_chosen as fit_chosen
+from .automatic import fit_in_folds as fit_in_folds
+from .evidence import Evidence as Evidence
 from .flow import fit_density as fit_density
 from .flow import refuse_flow_settings as refuse_flow_settings
 from .held_out import LEAST_PLACES as LEAST_PLACES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,7 +16,7 @@ from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting.evidence import (
     Candidates,
     Course,
-    assembled,
+    Evidence,
     candidates_of,
     judged,
     without_idle,
@@ -97,6 +97,25 @@ BEFORE_END = 0.95
 """Of the work told, before all is put together."""
 
 
+@dataclass(frozen=True)
+class ChosenFit:
+    """A density, the report of its fit, and what held-out rows were judged by.
+
+    - `folds`: The rows in random order; None of a parametric family or a flow alone, which have none.
+    - `evidence`: What was fitted to all folds but one, for each of them.
+    """
+
+    density: Density
+    report: FitReport
+    folds: Folds | None = None
+    evidence: Evidence | None = None
+
+    def without(self, fold: int) -> Density:
+        """Return what the density is, without a flow, of all rows but those of a fold."""
+        assert self.evidence is not None
+        return self.evidence.without(fold)
+
+
 def fit_chosen(
     space: Space,
     points: Tensor,
@@ -107,21 +126,22 @@ def fit_chosen(
     groups: ArrayLike | None = None,
     columns: Sequence[str] | None = None,
     progress: Progress | None = None,
-) -> tuple[Density, FitReport]:
+) -> ChosenFit:
     """Fit what the settings ask for: a parametric family, a flow alone, or what suits the data best.
 
     Arguments are those of `fit_automatic`, and `columns` those of `fit_parametric`.
     """
     if settings.parametric:
         how: dict[str, Any] = {"groups": groups, "columns": columns, "seed": settings.seed}
-        return fit_parametric(space, points, settings.parametric, weights=weights, **how)
+        found = fit_parametric(space, points, settings.parametric, weights=weights, **how)
+        return ChosenFit(*found)
     if settings.flow_alone:
-        return fit_density(space, points, settings.flow, weights=weights, progress=progress)
+        found = fit_density(space, points, settings.flow, weights=weights, progress=progress)
+        return ChosenFit(*found)
     how = {"missing": missing, "weights": weights, "groups": groups, "progress": progress}
-    return fit_automatic(space, points, settings, **how)
+    return fit_in_folds(space, points, settings, **how)
 
 
-@training()
 def fit_automatic(
     space: Space,
     points: Tensor,
@@ -151,9 +171,33 @@ def fit_automatic(
     """
     settings = DensitySettings() if settings is None else settings
     as_instance(settings, DensitySettings, "settings")
+    how: dict[str, Any] = {"weights": weights, "groups": groups, "progress": progress}
+    found = fit_in_folds(space, points, settings, missing=missing, **how)
+    assert isinstance(found.density, Mixture)
+    return found.density, found.report
+
+
+@training()
+def fit_in_folds(
+    space: Space,
+    points: Tensor,
+    settings: DensitySettings,
+    *,
+    missing: str = "refuse",
+    weights: Any = None,
+    groups: ArrayLike | None = None,
+    folds: Folds | None = None,
+    progress: Progress | None = None,
+) -> ChosenFit:
+    """Fit as `fit_automatic`; return also what held-out rows were judged by.
+
+    With `folds` the points are of their rows, in their order, and are weighed and held out alike.
+    """
     say = progress or silent
     budget = Budget(seconds=settings.seconds)
     rows, settings, notes = _rows(space, points, weights, groups, settings, check_missing(missing))
+    if folds is not None:
+        rows = replace(folds.rows, points=rows.points)
     found = repeats_of(space, rows[is_whole(rows)].points)
     whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
     taken_for = found.taken_for(settings.repeats)
@@ -166,8 +210,11 @@ def fit_automatic(
     if taken_for == "rounding" and found.can_be_undone:  # as they may have been before
         noise = torch.Generator().manual_seed(settings.seed)
         rows = replace(rows, points=spread_evenly(space, rows.points, found, noise))
-    generator = torch.Generator().manual_seed(settings.seed)
-    folds = folds_of(rows, together=together, generator=generator)
+    if folds is None:
+        generator = torch.Generator().manual_seed(settings.seed)
+        folds = folds_of(rows, together=together, generator=generator)
+    else:
+        folds = replace(folds, rows=rows)
     narrowest, crowded = narrowest_for(space, rows[is_whole(rows)].points)
     limited = limit_notes(space, crowded)
     if together and found.step is not None:  # a deviation of one step
@@ -189,12 +236,13 @@ def fit_automatic(
         if fitted is not None:
             tried = try_flow(folds, candidates, weights, fitted)
     say(BEFORE_END, "putting together")
-    density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
+    evidence = Evidence.of(space, families, candidates, folds.rows, weights)
+    density = evidence.assembled(tried.flow, tried.share)
     rest = 1 - tried.share
     parts = (*tried.evidence, *(replace(one, share=one.share * rest) for one in others))
     report = _report(density, folds, candidates, weights, tried, parts, found)
     for note in (*found.warnings(settings.repeats), *limited):
-        warnings.warn(note, DataWarning, stacklevel=6)
+        warnings.warn(note, DataWarning, stacklevel=7)
     after = (
         *weights_note(folds.rows),
         *lone_groups_note(folds.rows.groups),
@@ -205,7 +253,9 @@ def fit_automatic(
         *budget.notes(),
         *steps_note(report.steps, report.integration_error),
     )
-    return density, replace(report, notes=(*notes, *after))
+    report = replace(report, notes=(*notes, *after))
+    done = min((len(own) for own in candidates.fitted.values()), default=0)
+    return ChosenFit(density, report, replace(folds, used=done), evidence)
 
 
 def _flow_fits(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
@@ -35,14 +35,21 @@ class Candidates:
 
     - `keys`: family and name of each row of `table` (P, N); the last is the uniform floor.
     - `fitted`: of each family, what was fitted to each fold.
+    - `sizes`: how many of the rows are of each fold, one after the other.
     - `row_weights`: of the rows (N,), None where all weigh the same.
     """
 
     keys: list[tuple[str, str]]
     table: Tensor
     fitted: dict[str, list[dict[str, Density]]]
+    sizes: tuple[int, ...] = ()
     row_weights: Tensor | None = None
     _best: dict[tuple[bool, ...], Tensor] = field(default_factory=dict[tuple[bool, ...], Tensor])
+
+    @property
+    def fold(self) -> Tensor:
+        """The fold (N,) of each row."""
+        return torch.arange(len(self.sizes)).repeat_interleave(torch.tensor(self.sizes))
 
     @property
     def floor(self) -> Tensor:
@@ -146,7 +153,8 @@ def candidates_of(
     keys = [key for key in blocks[-1] if all(key in block for block in blocks)]
     table = torch.cat([torch.stack([block[key] for key in keys]) for block in blocks], dim=1)
     known = [own for own in weights if own is not None]
-    return Candidates(keys, table, fitted, torch.cat(known) if known else None)
+    sizes = tuple(len(block[FLOOR, FLOOR]) for block in blocks)
+    return Candidates(keys, table, fitted, sizes, torch.cat(known) if known else None)
 
 
 def _fitted(family: Family, folds: Folds, number: int, budget: Budget, say: Tell) -> Fitted | None:
@@ -222,29 +230,82 @@ def judged(
     return found
 
 
-def assembled(
-    space: Space,
-    families: list[Family],
-    candidates: Candidates,
-    weights: Tensor,
-    rows: Rows,
-    flow: Density | None,
-    share: float,
-) -> Mixture:
-    """Return the candidates in proportions (P,), made final with all rows, beside a flow's share."""
-    before: list[tuple[float, Density]] = []
-    after: list[tuple[float, Density]] = []
-    for family in families:
-        chosen = [
-            (name, float(weight))
-            for (own, name), weight in zip(candidates.keys, weights, strict=True)
-            if own == family.name and weight > 0
+@dataclass(frozen=True)
+class Evidence:
+    """Candidates and their shares of a density of all rows, which are in random order.
+
+    - `shares`: Of all candidates (P,).
+    - `apart`: For each fold the shares (P,) by the rows held out with the others: those by its own rows
+      would be too good to judge by these.
+    """
+
+    space: Space
+    families: Sequence[Family]
+    candidates: Candidates
+    rows: Rows
+    shares: Tensor
+    apart: Sequence[Tensor]
+
+    @classmethod
+    def of(
+        cls,
+        space: Space,
+        families: Sequence[Family],
+        candidates: Candidates,
+        rows: Rows,
+        shares: Tensor,
+    ) -> Evidence:
+        """Return the evidence for shares (P,), with what other folds say of the same candidates."""
+        live = shares > 0
+        apart: list[Tensor] = []
+        for fold in range(len(candidates.sizes)):
+            rest = candidates.fold != fold
+            counts = None if candidates.row_weights is None else candidates.row_weights[rest]
+            own = torch.zeros_like(shares)
+            own[live] = shares[live]
+            if bool(rest.any()):
+                table, floor = candidates.table[live][:, rest], candidates.floor[live]
+                own[live] = sparse_weights(table, floor, counts)
+            apart.append(own)
+        return cls(space, families, candidates, rows, shares, apart)
+
+    @property
+    def chosen(self) -> Tensor:
+        """The numbers of the candidates that have a share."""
+        return torch.nonzero(self.shares > 0)[:, 0]
+
+    def parts(self, fold: int) -> list[Density]:
+        """Return those that have a share, as they were fitted to all rows but those of a fold."""
+        numbers: list[int] = listed(self.chosen)
+        keys = [self.candidates.keys[k] for k in numbers]
+        return [
+            UniformDensity(self.space)
+            if family == FLOOR
+            else self.candidates.fitted[family][fold][name]
+            for family, name in keys
         ]
-        final = family.final(rows, candidates.fitted[family.name], [name for name, _ in chosen])
-        found = before if family.precedes_floor else after
-        found += [(weight, part) for (_, weight), part in zip(chosen, final, strict=True)]
-    floor = float(weights[candidates.floor].sum())
-    found = [*before, (floor, UniformDensity(space)), *after]
-    total = sum(weight for weight, _ in found)
-    others = [((1 - share) * weight / total, part) for weight, part in found]
-    return mixture_of(others if flow is None else [(share, flow), *others])
+
+    def without(self, fold: int) -> Mixture:
+        """Return the density of all rows but those of a fold."""
+        shares: list[float] = listed(self.apart[fold][self.chosen])
+        return mixture_of(list(zip(shares, self.parts(fold), strict=True)))
+
+    def assembled(self, flow: Density | None = None, share: float = 0.0) -> Mixture:
+        """Return the candidates in their shares, made final with all rows, beside a flow's share."""
+        before: list[tuple[float, Density]] = []
+        after: list[tuple[float, Density]] = []
+        for family in self.families:
+            chosen = [
+                (name, float(weight))
+                for (kind, name), weight in zip(self.candidates.keys, self.shares, strict=True)
+                if kind == family.name and weight > 0
+            ]
+            fitted = self.candidates.fitted[family.name]
+            final = family.final(self.rows, fitted, [name for name, _ in chosen])
+            found = before if family.precedes_floor else after
+            found += [(weight, part) for (_, weight), part in zip(chosen, final, strict=True)]
+        floor = float(self.shares[self.candidates.floor].sum())
+        found = [*before, (floor, UniformDensity(self.space)), *after]
+        total = sum(weight for weight, _ in found)
+        others = [((1 - share) * weight / total, part) for weight, part in found]
+        return mixture_of(others if flow is None else [(share, flow), *others])

@@ -25,24 +25,25 @@ class Rows:
 
     - `groups`: Whole numbers (N,), from 0; rows of one group are held out together. None: each row is a
       group.
+    - `numbers`: The places (N,) that they had among all rows, if these are known.
     """
 
     points: Tensor
     weights: Tensor | None = None
     groups: Tensor | None = None
+    numbers: Tensor | None = None
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __getitem__(self, chosen: Tensor | slice) -> Rows:
-        weights = None if self.weights is None else self.weights[chosen]
-        groups = None if self.groups is None else self.groups[chosen]
-        return Rows(self.points[chosen], weights, groups)
+        beside = (self.weights, self.groups, self.numbers)
+        return Rows(self.points[chosen], *(None if own is None else own[chosen] for own in beside))
 
     def to(self, dtype: torch.dtype) -> Rows:
         """Return the rows with points and weights in a dtype."""
         weights = None if self.weights is None else self.weights.to(dtype)
-        return Rows(self.points.to(dtype), weights, self.groups)
+        return Rows(self.points.to(dtype), weights, self.groups, self.numbers)
 
     def mean(self, values: Tensor) -> float:
         """Return the mean of values (N,), weighted as the rows are."""
@@ -131,8 +132,9 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
 
     Rows of weight 0 are left out; equal weights are none.
     """
+    numbers = torch.arange(len(points))
     if weights is None:
-        return Rows(points, None, groups)
+        return Rows(points, None, groups, numbers)
     own = weights_of(weights, len(points))
     bad = torch.nonzero(~(own.isfinite() & (own >= 0)))[:, 0]
     if len(bad):
@@ -142,7 +144,7 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
         )
     if not bool((own > 0).any()):
         raise OrbiflowError("all weights are 0: no row is left to fit to")
-    kept = Rows(points, own, groups)[own > 0]
+    kept = Rows(points, own, groups, numbers)[own > 0]
     assert kept.weights is not None
     own = kept.weights / kept.weights.max()
     return replace(kept, weights=None if bool((own == own[0]).all()) else own / own.mean())

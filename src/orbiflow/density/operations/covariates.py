@@ -13,13 +13,8 @@ from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
-    from orbiflow.density.covariates import (
-        ConditionalDensity,
-        ConditionalReport,
-        Covariates,
-        Values,
-    )
-    from orbiflow.density.data import Asked, TableRows
+    from orbiflow.density.covariates import ConditionalDensity, ConditionalReport, Values
+    from orbiflow.density.data import Asked, Role, TableRows
     from orbiflow.density.estimator import DensityEstimator
     from orbiflow.density.fitting import Progress
     from orbiflow.density.models import Density
@@ -42,48 +37,38 @@ def asked_columns(given: Sequence[str], reading: RowSettings) -> Asked:
 
 def known_in(
     rows: TableRows, asked: Asked, unit: str | None, tell: runtime.Sink
-) -> tuple[Covariates, str]:
-    """Return what is known of rows, and its declaration, before anything is fitted.
+) -> dict[str, Role]:
+    """Return what is known of rows, by its name, before anything is fitted.
 
     `unit` is that of angles that name none.
     """
     roles = data.given_roles(list(rows.given), rows.given, asked, unit, where=rows.source.where)
     try:
-        known = covariates.Covariates.of(rows.given, roles)
-        doubts = known.fit_doubts(rows.given)
+        doubts = covariates.Covariates.of(rows.given, roles).fit_doubts(rows.given)
     except SettingError as error:
         refusal = data.in_file(error, rows.source.where)
         refusal.template = refusal.template.replace("{columns}", "{given}")
         raise refusal from error
-    declared = ",".join(f"{name}={role}" for name, role in roles.items())
-    tell(runtime.Note(f"given: {declared}"))
+    tell(runtime.Note(f"given: {_declaration(roles)}"))
     for doubt in doubts:
         tell(runtime.Note(f"WARNING: {doubt}"))
-    return known, declared
+    return roles
 
 
-def fit_given(
-    estimator: DensityEstimator,
-    rows: TableRows,
-    known: Covariates,
-    declared: str,
-    tell: runtime.Sink,
-    cancel: runtime.Cancel,
+def _declaration(roles: Mapping[str, Role]) -> str:
+    return ",".join(f"{name}={role}" for name, role in roles.items())
+
+
+def told(
+    estimator: DensityEstimator, rows: TableRows, tell: runtime.Sink
 ) -> tuple[dict[str, bytes], dict[str, Any]]:
     """Return the file of the density where covariates are known, and what the report says of it."""
-    density, report = covariates.fit_conditional(
-        estimator.density_,
-        estimator.points_of(rows.values),
-        known.features(rows.given),
-        known,
-        estimator.settings(),
-        weights=rows.weights,
-        groups=rows.labels,
-        progress=runtime.progress_events(tell, cancel),
-    )
+    density: ConditionalDensity = estimator.conditional_density_
+    report: ConditionalReport = estimator.conditional_report_
     columns, kept = list(rows.columns), [role and str(role) for role in rows.roles]
+    known = density.covariates
     said: dict[str, Any] = {
-        "declaration": declared,
+        "declaration": _declaration({own.name: own.role for own in known.columns}),
         "covariates": known.to_json(),
         **report.to_json(),
     }

@@ -22,7 +22,7 @@ from orbiflow.settings import DefaultText, Hidden, Option
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
-    from orbiflow.density.data import TableRows
+    from orbiflow.density.data import Role, TableRows
     from orbiflow.density.estimator import DensityEstimator
     from orbiflow.density.fitting import ParametricFit
     from orbiflow.density.spaces import Space
@@ -72,14 +72,14 @@ def fit(
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
         on_event(runtime.Note(f"columns: {rows.declaration}"))
-        known = covariates.known_in(rows, asked, where.unit, on_event) if given else None
-        estimator = fit_rows(rows, where, settings, reading, on_event, cancel)
+        roles = covariates.known_in(rows, asked, where.unit, on_event) if given else None
+        estimator = fit_rows(rows, where, settings, reading, on_event, cancel, roles)
         document = _document(
             estimator, rows, {**settings.values(), **reading.values()}, settings.seed
         )
         others: dict[str, bytes] = {}
-        if known is not None:
-            others, said = covariates.fit_given(estimator, rows, *known, on_event, cancel)
+        if roles is not None:
+            others, said = covariates.told(estimator, rows, on_event)
             document |= said
         document["seconds"] = time.perf_counter() - begin
         sketch = comparing.RowSketch.of(estimator.space_, values[rows.whole])
@@ -146,18 +146,20 @@ def fit_rows(
     reading: RowSettings,
     tell: runtime.Sink,
     cancel: runtime.Cancel,
+    given: Mapping[str, Role] | None = None,
 ) -> DensityEstimator:
-    """Fit a density to the rows of a table."""
+    """Fit a density to the rows of a table; where columns are `given`, also by what they are."""
+    from orbiflow.density.conditional_estimator import ConditionalEstimator
     from orbiflow.density.estimator import DensityEstimator
 
-    given: dict[str, Any] = {name: getattr(settings, name) for name in settings.fields_given}
-    estimator = DensityEstimator(
-        columns_of(where, rows).space, missing=reading.kept_missing, **given
-    )
+    own: dict[str, Any] = {name: getattr(settings, name) for name in settings.fields_given}
+    own |= {"space": columns_of(where, rows).space, "missing": reading.kept_missing}
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # notes say the same
-        return estimator.fit(rows, progress=progress)
+        if given is None:
+            return DensityEstimator(**own).fit(rows, progress=progress)
+        return ConditionalEstimator(**own).fit(rows, given, progress=progress)
 
 
 def _check(where: SpaceSettings, settings: DensitySettings, reading: RowSettings) -> None:
