@@ -19,7 +19,7 @@ test: lint
 # What a change in one part needs: its tests and examples, with the lint of its part. The core is all
 # that is of no other part, so that no test is forgotten.
 TILES := src/orbiflow/tiles tests/tiles tests/test_awkward_calls.py tests/test_gallery.py \
-	$(patsubst %,tests/cli/test_%.py,art batch escherize export mistakes)
+	$(patsubst %,tests/cli/test_%.py,batch escherize export mistakes)
 DENSITY := src/orbiflow/density tests/density tests/cli/test_orientations.py \
 	$(wildcard tests/cli/test_density*.py)
 SOLIDS := src/orbiflow/solids tests/solids

@@ -96,7 +96,7 @@ PAST_DOORS = {
     ),
     "tiles/search/test_carried.py: tiles.silhouette.bending": "the most points of a map",
     "tiles/search/test_two_figures.py: tiles.motion.kinds": "every frame, not the file",
-    "tiles/silhouette/test_sampling.py: tiles.search.co_deformation": "bodies sampled for it",
+    "tiles/silhouette/test_mesh.py: tiles.search.co_deformation": "bodies sampled for it",
     "tiles/exporting/test_export_settings.py: settings.kinds": "how lengths are read",
     "tiles/exporting/test_export_settings.py: settings.units": "how lengths are read",
     "test_without_extras.py: settings.extras": "what is said where an extra is missing",

@@ -1,14 +1,20 @@
-"""The benchmarks of the nine goals run from the repository alone; others say what they miss."""
+"""The benchmarks: what they need, rivals' densities in our unit, and published figures."""
 
 import importlib
+import itertools
 import json
+import math
 import runpy
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.stats
+from scipy.spatial.transform import Rotation
 
+from density.quick_fits import quick_fits
+from orbiflow.density import DensityEstimator, Mixture
 from orbiflow.tiles import signed_area
 
 ROOT = Path(__file__).parents[2]
@@ -80,3 +86,179 @@ def test_the_page_names_every_benchmark() -> None:
     helpers |= {"density_limits", "rivals"}
     for path in BENCHMARKS.glob("*.py"):
         assert path.stem in helpers or f"benchmarks/{path.name}" in page
+
+
+RIVALS_BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+MODULES = ("rivals", "density_known", "density_data", "common")
+
+
+@pytest.fixture(autouse=True)
+def _modules(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(RIVALS_BENCHMARKS))
+    yield
+    for name in MODULES:
+        sys.modules.pop(name, None)
+
+
+def uniform_rows(space: str, count: int) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    if space == "torus":
+        return rng.uniform(-10, 10, (count, 3))
+    if space == "rotation-space":
+        return Rotation.random(count, rng=rng).as_quat()
+    lat = np.degrees(np.arcsin(rng.uniform(-1, 1, count)))
+    return np.stack([lat, rng.uniform(-180, 540, count)], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("space", "volume"),
+    [("torus", (2 * math.pi) ** 3), ("sphere", 4 * math.pi), ("rotation-space", 1.0)],
+)
+def test_what_is_even_is_even_in_the_box(space: str, volume: float) -> None:
+    rivals = importlib.import_module("rivals")
+    box = rivals.box_of(space, 3)
+    rows = box.lay(uniform_rows(space, 4000))
+    assert rows.shape == (4000, box.dim)
+    assert (abs(rows) <= math.pi + 1e-12).all()
+    even = (rows + math.pi) / (2 * math.pi)
+    for axis in range(box.dim):
+        if space != "torus":
+            assert scipy.stats.kstest(even[:, axis], "uniform").pvalue > 1e-3
+    # the even density of the box is the even density of the space
+    assert box.shift - box.dim * math.log(2 * math.pi) == pytest.approx(-math.log(volume))
+
+
+def test_the_true_density_of_mixtures_of_rotations_has_the_mean_one() -> None:
+    rows, _, log_density, *_ = importlib.import_module("density_known").turned(16, 2000)
+    other = Rotation.random(50_000, rng=np.random.default_rng(1)).as_quat()
+    ratio = np.exp(log_density(other))
+    assert ratio.mean() == pytest.approx(1, abs=5 * ratio.std() / len(ratio) ** 0.5)
+    assert log_density(rows) == pytest.approx(log_density(-rows))
+    # by Jensen's inequality, and by three nats
+    assert log_density(rows).mean() > 3
+
+
+@pytest.mark.parametrize("space", ["torus", "sphere", "rotation-space"])
+def test_kernels_of_scikit_learn_integrate_to_one(space: str) -> None:
+    rivals = importlib.import_module("rivals")
+    rng = np.random.default_rng(2)
+    if space == "torus":
+        angle = rng.normal(0, 0.6, (60, 2))
+        line = (np.arange(200) + 0.5) / 200 * 2 * math.pi
+        grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+        rows, points = (
+            np.stack([np.cos(own), np.sin(own)], axis=2).reshape(len(own), 4)
+            for own in (angle, grid)
+        )
+        volume = (2 * math.pi) ** 2
+    else:
+        # many even points of a sphere, with an error of one over the root of their number
+        width = 3 if space == "sphere" else 4
+        rows, points = (rng.normal(size=(count, width)) for count in (60, 40_000))
+        rows[:, 0] = 2 * abs(rows[:, 0])
+        rows, points = (own / np.linalg.norm(own, axis=1, keepdims=True) for own in (rows, points))
+        volume = 4 * math.pi if space == "sphere" else 1.0
+    log, _ = rivals.scikit_learn(rows[:40], rows[40:], signed=space != "rotation-space")
+    density = np.exp(log(points)) * volume
+    error = 0 if space == "torus" else density.std() / len(density) ** 0.5
+    assert density.mean() == pytest.approx(1, abs=5 * error + 2e-3)
+
+
+LIMITS_BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture(name="module")
+def module_fixture(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(LIMITS_BENCHMARKS))
+    return importlib.import_module
+
+
+@pytest.mark.parametrize("dim", range(4, 15))
+def test_side_chains_of_all_dimensions_are_in_the_repository(module, dim: int) -> None:
+    drawn = module("density_data").sidechains(dim)
+    assert drawn.data.shape[1] == dim
+    assert len(drawn.data) == len(drawn.group) > 1_000
+    assert abs(drawn.data).max() <= math.pi
+    assert len(np.unique(drawn.data, axis=0)) > 0.99 * len(drawn.data)
+
+
+def test_the_known_density_is_a_sum_over_paths(module) -> None:
+    drawn = module("density_known").hidden_markov_chain(2)
+    grid = (np.arange(96) + 0.5) / 96 * 2 * np.pi - np.pi
+    points = np.array(list(itertools.product(grid, grid)))
+    assert np.exp(drawn.log_density(points)).mean() * 4 * np.pi**2 == pytest.approx(1, abs=1e-6)
+    shares = np.exp(drawn.log_density(points)).reshape(96, 96).sum(axis=1)
+    counts = np.histogram(drawn.data[:, 0], 96, (-np.pi, np.pi))[0]
+    assert abs(shares / shares.sum() - counts / counts.sum()).sum() < 0.2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_groups_stay_on_one_side(module, seed: int) -> None:
+    halves, drawn = module("density_default").halves, module("density_data").Drawn
+    group = np.random.default_rng(seed).integers(60, size=900)
+    rows = np.stack([np.arange(900.0), group], axis=1)
+    train, test = halves(drawn(rows, "torus"), seed, group)
+    assert len(train) + len(test) == 900
+    assert 90 <= len(test) < 150
+    assert not set(train[:, 1]) & set(test[:, 1])
+
+
+def test_narrow_kernels_are_those_of_the_kernel_estimate(module) -> None:
+    limits, kde = module("density_limits"), module("density_kde")
+    rng = np.random.default_rng(0)
+    train = rng.vonmises(0.0, 3e4, (400, 3))
+    test = rng.vonmises(0.0, 3e4, (50, 3))
+    for round_, rows, places in (
+        (False, train, test),
+        (True, np.degrees(train[:, :2]), np.degrees(test[:, :2])),
+    ):
+        own = limits.narrow_log_density(rows, places, 1e5, round_=round_)
+        other = kde.KernelDensity(rows, 1e5, round_=round_).score_samples(places)
+        assert own == pytest.approx(other, abs=1e-3)
+
+
+def test_repeated_rows_are_worth_any_number_of_nats(module) -> None:
+    limits = module("density_limits")
+    rng = np.random.default_rng(1)
+    places = rng.uniform(-np.pi, np.pi, (300, 2))
+    parts = [places[rng.integers(300, size=n)] for n in (600, 200, 200)]
+    kappas = np.array([1e6, 1e10])
+    _, found = limits.with_narrow(*parts, kappas, round_=False)
+    assert found[1][0] < found[0][0] - 1
+    parts = [rng.uniform(-np.pi, np.pi, (n, 2)) for n in (600, 200, 200)]
+    bare, found = limits.with_narrow(*parts, kappas, round_=False)
+    assert [nll for nll, _ in found] == pytest.approx([bare, bare], abs=0.02)
+
+
+def test_entropy_by_neighbours(module) -> None:
+    rng = np.random.default_rng(2)
+    found = module("density_limits").neighbour_entropy(rng.uniform(-9, 9, (20_000, 2)) * np.pi / 9)
+    assert found == pytest.approx(2 * math.log(2 * math.pi), abs=0.05)
+
+
+@pytest.mark.parametrize("dim", [2, 4])
+def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
+    quick_fits(monkeypatch)
+    monkeypatch.setattr(module("density_integral"), "GRID", 128)
+    monkeypatch.setattr(module("density_integral"), "LOOKED_AT", 20)
+    integral = module("density_integral").integral
+    rng = np.random.default_rng(4)
+    rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=240)], 20.0)
+    rows[:40] = rows[40:80]  # so that there are narrow kernels
+    density = (
+        DensityEstimator("torus", components="kernels,mixture,chains", seed=0).fit(rows).density_
+    )
+    assert isinstance(density, Mixture)
+    found = integral(density)
+    assert found.value == pytest.approx(1, abs=1e-4)
+    assert found.worst < 1e-6
+    # and it would be seen if a constant were wrong
+    for part, weight in zip(density.components, density.weights.tolist(), strict=True):
+        if part.kind == "uniform" or weight < 0.01:
+            continue
+        method = "log_chart" if part.kind == "chains" else "log_density"
+        right = getattr(type(part), method)
+        with monkeypatch.context() as patched:
+            patched.setattr(type(part), method, lambda self, *x, own=right: own(self, *x) + 0.1)
+            off = 0.1 * weight
+            assert integral(density).value - found.value == pytest.approx(off, rel=0.1)

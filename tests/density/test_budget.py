@@ -1,6 +1,7 @@
-"""What a fit may spend: evaluations decide, the clock only ends, and the integral is 1 in any case."""
+"""What a fit may spend, and whether a flow belongs beside other parts."""
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,36 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import FlowDensity, FlowSettings, fit_density, make_space
-from orbiflow.density.fitting import Rows
+from orbiflow.density import (
+    DensitySettings,
+    FlowDensity,
+    FlowSettings,
+    Torus,
+    fit_automatic,
+    fit_density,
+    make_space,
+    weighed,
+)
+from orbiflow.density.fitting import COMPONENTS, Folds, Rows, folds_of, stacked
+from orbiflow.density.fitting.automatic import BEFORE_END
+from orbiflow.density.fitting.evidence import Candidates, Course, candidates_of, judged
+from orbiflow.density.fitting.families import KernelFamily
+from orbiflow.density.fitting.flow_trial import (
+    FIRST_TENTH_SHARE,
+    Rivals,
+    TriedFlow,
+    flow_beside,
+    try_flow,
+)
+from orbiflow.density.fitting.held_out import supported_weights
 from orbiflow.density.fitting.likelihood import ITERATIONS_PER_SCORE, Budget, Spent, refine
+from orbiflow.density.fitting.report import ComponentEvidence
+from orbiflow.density.fitting.rows import Gain
+from orbiflow.density.fitting.settings import Component
+from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
+from orbiflow.runtime import SideBySide, one_core
 from refusals import refused
 
 SMALL: dict[str, Any] = {"max_frequency": 2, "segments": 2, "roughness": (1e-3,)}
@@ -127,3 +153,151 @@ def test_no_iteration_changes_nothing() -> None:
     done = refine(density, rows, rows, iterations=0)
     assert (done.best, len(done.validation)) == (0, 1)
     assert not bool(next(iter(density.flow.parameters())).any())
+
+
+QUICK: dict[str, Any] = {
+    "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)
+}  # fmt: skip
+SPACE = Torus(2)
+
+
+def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torch.Tensor]:
+    """Kernels of two broad clusters, judged by a fifth of 700 rows."""
+    rng = np.random.default_rng(0)
+    points = torch.tensor(np.where(rng.random((700, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]]))
+    points = SPACE.project(points + 0.1 * torch.tensor(rng.normal(size=(700, 2))))
+    folds = folds_of(
+        weighed(points, weights), together=False, generator=torch.Generator().manual_seed(0)
+    )
+    with one_core():
+        course = Course(lambda *_: None, 1.0)
+        candidates = candidates_of(
+            SPACE, [KernelFamily(SPACE)], folds, course, Budget(), SideBySide(), Rivals().meet
+        )
+    return (
+        folds,
+        candidates,
+        supported_weights(candidates.table, candidates.floor, candidates.row_weights),
+    )
+
+
+def tried(
+    folds: Folds, candidates: Candidates, weights: torch.Tensor, told=lambda *_: None
+) -> TriedFlow:
+    settings = FlowSettings(**QUICK)
+    return try_flow(
+        folds,
+        candidates,
+        weights,
+        lambda k: flow_beside(SPACE, folds, k, settings, Budget(), None, told),
+    )
+
+
+@pytest.mark.parametrize("tenths", [1, 2])
+def test_progress_goes_on_from_one_tenth_to_the_next(tenths: int, monkeypatch) -> None:
+    monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
+    monkeypatch.setattr("orbiflow.density.fitting.flow_trial._is_worth_it", lambda _: True)
+    said: list[tuple[float, str]] = []
+    tried(*evidence(), told=lambda done, what: said.append((done, what)))
+    shares = [done for done, _ in said]
+    assert shares == sorted(shares)
+    assert [done for done, what in said if what == "flow: matching"] == [0, FIRST_TENTH_SHARE][
+        :tenths
+    ]
+    assert max(shares) <= (FIRST_TENTH_SHARE, 1)[tenths - 1]
+
+
+@pytest.mark.usefixtures("whole_fits")
+@pytest.mark.parametrize("parts", [COMPONENTS, ("kernels",)])
+def test_no_step_of_a_fit_is_half_of_it(parts: tuple[Component, ...]) -> None:
+    rng, shares = np.random.default_rng(0), [0.0]
+    points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(300, 2))))
+    settings = DensitySettings(components=parts, **(QUICK if "flow" in parts else {}))
+    fit_automatic(SPACE, points, settings, progress=lambda done, _: shares.append(done))
+    assert shares == sorted(shares)
+    assert shares[-1] == BEFORE_END
+    assert max(np.diff(shares)) < 0.35
+
+
+def test_a_flow_that_has_no_time_is_none() -> None:
+    folds, candidates, weights = evidence()
+    spent = Budget(seconds=0)
+    none = flow_beside(SPACE, folds, 0, FlowSettings(**QUICK), spent, None, lambda *_: None)
+    assert none is None
+    assert try_flow(folds, candidates, weights, lambda _: none) == TriedFlow()
+
+
+@pytest.mark.parametrize(("tenths", "weighted"), [(1, False), (2, True)])
+def test_a_flow_is_compared_at_the_rows_that_it_was_tried_on(
+    tenths: int, weighted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # sure at once, or never: then a second tenth is asked
+    monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
+    monkeypatch.setattr("orbiflow.density.fitting.flow_trial._is_worth_it", lambda _: True)
+    own = np.random.default_rng(1).uniform(0.5, 2.0, 700) if weighted else None
+    folds, candidates, weights = evidence(own)
+    (flow,) = tried(folds, candidates, weights).evidence
+    assert flow.rows == 70 * tenths
+    above = (stacked(candidates.table, weights) - candidates.table[-1])[: flow.rows]
+    row_weights = None if own is None else candidates.row_weights
+    expected = np.average(above, weights=None if row_weights is None else row_weights[: flow.rows])
+    assert flow.others == pytest.approx(expected, abs=1e-12)
+    assert flow.alone < expected + 0.1
+    assert ComponentEvidence(**asdict(flow)) == flow
+    (kernels,) = judged(candidates, weights)
+    assert kernels.others is None
+    assert kernels.rows == 140
+
+
+def test_it_is_said_of_which_rows_a_figure_is() -> None:
+    flow = ComponentEvidence("flow", 0.0, 1.5264, 0.0, 0.0, 233, 1.529)
+    assert str(flow) == (
+        "flow: 0.0%, would add nothing; alone 1.5264 over uniform at 233 of these rows, where the "
+        "others have 1.5290"
+    )
+    kernels = ComponentEvidence("kernels", 0.5, 1.5, 0.01, 0.002, 699)
+    assert str(kernels) == "kernels: 50.0%, worth 0.0100 ± 0.0020 nats; alone 1.5000 over uniform"
+
+
+@pytest.mark.parametrize(
+    ("above", "hope", "given_up"), [(0.5, 0.4, True), (0.5, 0.6, False), (-0.5, 0.0, False)]
+)
+def test_a_flow_is_outdone_that_gains_nothing_and_cannot_catch_up(
+    above: float, hope: float, given_up: bool
+) -> None:
+    folds, _, _ = evidence()
+    held = folds.held(0)
+    even = torch.zeros(len(held), dtype=torch.float64)
+    flow = FlowDensity(SPACE, Flow([SplineField(SPACE.group, 1)], steps=1))  # which moves nothing
+    with Rivals() as rivals:
+        rivals.meet(even + above, even, held)
+        assert rivals.outdo(flow, hope) is given_up
+
+
+def test_an_outdone_flow_is_refined_no_further() -> None:
+    points = SPACE.project(0.1 * torch.randn(300, 2, generator=torch.Generator().manual_seed(0)))
+    settings = FlowSettings(**QUICK | {"iterations": 8, "roughness": (1e-3, 1e-4)})
+
+    def fitted(outdone) -> list[tuple[str, int]]:
+        stages = fit_density(SPACE, points.double(), settings, outdone=outdone)[1].stages
+        return [(stage.stopped, len(stage.validation)) for stage in stages]
+
+    for times in (1, 2):  # after a quarter of the first stage, and halfway
+        hopes: list[float] = []
+        given_up = fitted(lambda _, hope, own=hopes, n=times: own.append(hope) or len(own) == n)
+        assert given_up == [("outdone", 1 + times)]
+    assert fitted(lambda _, hope: hope == 0) == fitted(None)[:1]
+    assert fitted(lambda *_: False) == fitted(None)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_who_waits_for_rivals_that_fail_waits_no_longer(count: int, monkeypatch) -> None:
+    def failing(*_: Any) -> None:
+        raise OrbiflowError("no kernels today")
+
+    monkeypatch.setattr("orbiflow.runtime.side_by_side.cores", lambda: count)
+    monkeypatch.setattr(KernelFamily, "fitted", failing)
+    points = SPACE.project(0.1 * torch.randn(400, 2, generator=torch.Generator().manual_seed(0)))
+    settings = DensitySettings(components=("flow", "kernels"), **QUICK)
+    with refused("kernels", "today"):
+        fit_automatic(SPACE, points.double(), settings)

@@ -1,6 +1,7 @@
-"""The estimator: scikit-learn's conventions, the user's units, samples anew at every call."""
+"""The estimator: scikit-learn's conventions, the user's units, marginals, and many angles."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,16 @@ import torch
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 
-from orbiflow.density import DensityEstimator, Sphere
+from orbiflow.density import (
+    DensityEstimator,
+    Mixture,
+    Sphere,
+    Torus,
+    density_to_bytes,
+    read_density,
+)
 from orbiflow.density.models import midpoints
+from orbiflow.errors import InputFileError
 from refusals import refused
 
 
@@ -122,3 +131,106 @@ def test_clones_are_unfitted_and_equal(fitted: DensityEstimator) -> None:
         again = clone(estimator)
         assert repr(again) == repr(estimator)
         assert not hasattr(again, "density_")
+
+
+class Frame:
+    """As a data frame is seen: an array with names of columns."""
+
+    def __init__(self, values: np.ndarray, columns: list[str]) -> None:
+        self.values, self.columns = values, columns
+
+    def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+        return self.values
+
+
+@pytest.fixture(scope="module")
+def fitted_of_parts() -> DensityEstimator:
+    rng = np.random.default_rng(0)
+    first = rng.vonmises(0.5, 3.0, 150)
+    angles = np.degrees(np.stack([first, first + rng.vonmises(0, 9.0, 150)], axis=1))
+    return DensityEstimator("torus", unit="degrees", components="kernels,chains").fit(
+        Frame(angles, ["phi", "psi"])
+    )
+
+
+def test_conditional_times_marginal_is_joint_per_degree(fitted_of_parts: DensityEstimator) -> None:
+    phi = np.linspace(-170, 170, 9)
+    slice_ = fitted_of_parts.conditional(psi=-45)
+    joint = fitted_of_parts.score_samples(np.stack([phi, np.full(9, -45.0)], axis=1))
+    at = fitted_of_parts.marginal("psi").score_samples([[-45.0]])
+    assert slice_.score_samples(phi[:, None]) + at == pytest.approx(joint, abs=1e-3)
+    assert list(slice_.feature_names_in_) == ["phi"]
+    assert slice_.conditional is not None
+    line = np.arange(-180, 180, 0.5)[:, None]
+    assert np.exp(slice_.score_samples(line)).sum() * 0.5 == pytest.approx(1, abs=1e-6)
+    assert slice_.sample(5, random_state=0).shape == (5, 1)
+
+
+def test_columns_by_name_number_or_case(fitted_of_parts: DensityEstimator) -> None:
+    same = [
+        fitted_of_parts.marginal(column).score_samples([[10.0]])[0] for column in ("psi", "PSI", 1)
+    ]
+    assert len(set(same)) == 1
+    turned = fitted_of_parts.marginal("psi", "phi")
+    assert turned.score_samples([[20.0, 10.0]]) == pytest.approx(
+        fitted_of_parts.score_samples([[10.0, 20.0]]), abs=1e-4
+    )
+
+
+def test_mistakes_are_named(fitted_of_parts: DensityEstimator) -> None:
+    with refused("chi"):
+        fitted_of_parts.marginal("chi")
+    with refused("twice"):
+        fitted_of_parts.conditional({1: 3.0}, psi=2.0)
+    with refused("number"):
+        fitted_of_parts.conditional(psi="left")  # type: ignore[arg-type]
+    with refused("fitted"):
+        DensityEstimator("torus").marginal("phi")
+    sphere = DensityEstimator("sphere", components="kernels").fit(
+        np.random.default_rng(0).uniform(-60, 60, (40, 2))
+    )
+    with refused("sphere"):
+        sphere.conditional(lat=3.0)
+
+
+def data(count: int = 400) -> np.ndarray:
+    """Five angles in degrees, the fourth and fifth tied to the first."""
+    rng = np.random.default_rng(0)
+    x = rng.vonmises([0.0, 1.0, -2.0, 0.0, 0.0], [2.0, 4.0, 8.0, 20.0, 20.0], (count, 5))
+    x[:, 3:] += 0.7 * np.sin(x[:, :1])
+    return np.degrees(x)
+
+
+def test_five_angles(tmp_path: Path) -> None:
+    points = data()
+    estimator = DensityEstimator("torus", unit="degrees").fit(points[:200])
+    assert isinstance(estimator.density_, Mixture)
+    assert "chains" in estimator.density_.weight_of_kind
+    assert estimator.score(points[200:]) > -5 * np.log(360) + 3
+    assert estimator.sample(7, random_state=1).shape == (7, 5)
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(estimator.density_, columns=list("abcde")))
+    back, extra = read_density(path)
+    assert extra == {"columns": list("abcde")}
+    chart = estimator.space_.to_chart(points)
+    with torch.no_grad():
+        assert torch.equal(back.log_prob(chart), estimator.density_.log_prob(chart))
+    broken = bytearray(path.read_bytes())
+    broken[-100:] = b"\xff" * 100
+    path.write_bytes(bytes(broken))
+    with refused("damaged", kind=InputFileError):
+        read_density(path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"segments": 2, "max_frequency": 16}, "max_frequency segments"),
+        ({"iterations": 3}, "iterations"),
+    ],
+)
+def test_settings_without_a_meaning_are_refused(settings: dict, named: str) -> None:
+    with refused(*named.split(), "torus", 5):
+        DensityEstimator("torus", unit="degrees", **settings).fit(data(20))
+    with refused(*named.split()):
+        DensityEstimator(Torus(5, unit="degrees"), **settings).fit(data(20))

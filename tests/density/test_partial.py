@@ -1,6 +1,7 @@
-"""Marginal and conditional densities: against the joint density, integrated on a grid."""
+"""Marginal and conditional densities against the joint one, how exact, saved and stopped."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,13 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from density.blends import even_grid, identity_flow, kernels_of, random_blend
+from density.blends import (
+    even_grid,
+    identity_flow,
+    kernels_of,
+    random_blend,
+    random_chains,
+    random_network,
+)
 from orbiflow.density import (
     Density,
     DensityEstimator,
     FlowDensity,
     Mixture,
     Torus,
+    VonMisesChains,
     conditional,
     density_to_bytes,
     make_space,
@@ -23,6 +32,7 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.density.inference import log_prob_observed
+from orbiflow.density.models import LEVELS, Split, kernels_for
 from refusals import refused
 
 seeds = st.integers(0, 2**31)
@@ -218,3 +228,191 @@ def test_mistakes_are_named() -> None:
         conditional(density, {0: math.nan})
     with refused("infinite"):
         log_prob_observed(density, torch.tensor([[0.1, math.inf, 0.2]]))
+
+
+SHARP_GRID = 48
+"""Points an angle that resolve what `sharp` makes."""
+
+
+def sharp(seed: int, dim: int, kind: str) -> Density:
+    """Chains in any order, or a network, of deviations down to a sixth of a radian."""
+    rng, space = np.random.default_rng(seed), Torus(dim)
+    if kind == "network":
+        return random_network(rng, space)
+    own = random_chains(rng, space, 4)
+    sharper = own.concentrations * (3 if dim < 4 else 1)
+    return VonMisesChains(space, own.log_weights, own.means, sharper, own.order)
+
+
+def true_log(
+    density: Density, points: torch.Tensor, kept: list[int], known: dict[int, float]
+) -> torch.Tensor:
+    """Log density of what is kept, at points (N, k), and of what is known, by quadrature."""
+    hidden = [axis for axis in range(density.space.dim) if axis not in kept and axis not in known]
+    nodes = even_grid(SHARP_GRID, len(hidden)) if hidden else torch.zeros(1, 0).double()
+    whole = points.new_empty(len(points), len(nodes), density.space.dim)
+    whole[:, :, kept], whole[:, :, hidden] = points[:, None], nodes
+    for axis, value in known.items():
+        whole[:, :, axis] = value
+    return density.log_prob(whole).logsumexp(dim=1) - math.log(len(nodes))
+
+
+def off(found: Density, density: Density, kept: list[int], known: dict[int, float]) -> float:
+    """Root mean square error of a derived density, in nats, at its own samples."""
+    points = found.sample(60, torch.Generator().manual_seed(7))
+    none = torch.zeros(1, 0, dtype=torch.float64)
+    evidence = true_log(density, none, [], known) if known else 0.0
+    truth = true_log(density, points, kept, known) - evidence
+    return float((found.log_prob(points) - truth).square().mean().sqrt())
+
+
+@given(seeds, st.sampled_from(["chains", "network"]), st.integers(0, 1), st.data())
+@settings(deadline=None, max_examples=6)
+def test_tables_are_the_integral_at_every_level(seed, kind, known, data: st.DataObject) -> None:
+    """What is kept and given together: its density, and so what the given angle says of components.
+
+    What is stated is a root mean square over the density's own rows, found from the change between two
+    levels; places in tails, which few rows meet, may be off by several times that.
+    """
+    density = sharp(seed, 3, kind)
+    one, other, _ = data.draw(st.permutations(range(3)))
+    values = {other: 0.37} if known else {}
+    split = Split(3, (one,), tuple(values), tuple(values.values()))
+    points = even_grid(SHARP_GRID, 1)
+    truth = true_log(density, points, [one], values)
+    found: list[torch.Tensor] = []
+    for level in range(LEVELS - 1):
+        parts = kernels_for(density, split, Torus(1), level, lambda: None)
+        found.append(
+            torch.stack([log + own.log_prob(points) for log, own in parts]).logsumexp(dim=0)
+        )
+
+    def nats(change: torch.Tensor) -> float:
+        return float((torch.softmax(truth, dim=0) @ change.square()).sqrt())
+
+    errors = [nats(logs - truth) for logs in found]
+    for error, before, after in zip(errors[1:], found, found[1:], strict=False):
+        assert error < 1.1 * nats(after - before) + 5e-4
+    assert errors[0] < 0.2
+    assert errors[-1] < 0.01
+
+
+def test_even_chains_need_no_fine_grid() -> None:
+    logs, means = torch.full((1, 3), -math.log(3)).double(), torch.zeros(1, 3, 7).double()
+    even = VonMisesChains(Torus(3), logs, means, torch.zeros(1, 3).double())
+    split = Split(3, (1, 2), (), ())
+    ((log, found),) = even.approximated(split, Torus(2), 0, lambda: None)
+    assert log == pytest.approx(0, abs=1e-6)
+    assert len(found.centers) <= 24**2  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@given(seeds, st.sampled_from([{}, {3: 0.1}]))
+@settings(deadline=None, max_examples=3)
+def test_few_nodes_do_where_hidden_angles_move_others_far(seed, known: dict[int, float]) -> None:
+    """By six deviations of their own noise, so that the nodes alone leave bumps apart."""
+    rng = np.random.default_rng(seed)
+    means = torch.zeros(1, 4, 9).double()
+    means[0, 2, 1:3] = means[0, 3, 1:3] = torch.tensor(rng.uniform(0.7, 1.3, 2))
+    means[0, 3, 1] *= -1
+    kappa = torch.tensor([[30.0, 30.0, 900.0, 900.0]]).double()
+    logs = torch.tensor([[0.98, 0.01, 0.01]]).double().log()
+    chains = VonMisesChains(Torus(4), logs, means, kappa)
+    kept = [axis for axis in (2, 3) if axis not in known]
+    split = Split(4, tuple(kept), tuple(known), tuple(known.values()))
+    parts = chains.approximated(split, Torus(len(kept)), 1, lambda: None)
+    points = chains.sample(10, torch.Generator().manual_seed(seed % 100))[:, kept]
+    found = torch.stack([log + own.log_prob(points) for log, own in parts]).logsumexp(dim=0)
+    line = torch.arange(240, dtype=torch.float64) / 240
+    nodes = torch.cartesian_prod(line, line)
+    whole = points.new_empty(len(points), len(nodes), 4)
+    whole[:, :, :2], whole[:, :, kept] = nodes, points[:, None]
+    for axis, value in known.items():
+        whole[:, :, axis] = value
+    truth = chains.log_prob(whole).logsumexp(dim=1) - math.log(len(nodes))
+    assert float((found - truth).square().mean().sqrt()) < 0.8  # nodes alone: 1 to 5
+
+
+@given(seeds, st.data())
+@settings(deadline=None, max_examples=4)
+def test_an_error_is_at_least_the_true_one(seed: int, data: st.DataObject) -> None:
+    """Also that of a density which is derived from a derived one, where both are asked for roughly."""
+    kind, dim = data.draw(st.sampled_from([("chains", 4), ("chains", 4), ("network", 3)]))
+    density = sharp(seed, dim, kind)
+    first, second, third, *_ = data.draw(st.permutations(range(dim)))
+    at, accuracy = data.draw(st.floats(0, 1)), data.draw(st.sampled_from([0.3, 0.02]))
+    both = marginal(density, [first, second], accuracy=accuracy)
+    for found, kept, known in (
+        (both, [first, second], {}),
+        (marginal(both, 1, accuracy=accuracy), [second], {}),
+        (conditional(both, {0: at}, accuracy=accuracy), [second], {first: at}),
+        (conditional(density, {third: at}, first, accuracy=accuracy), [first], {third: at}),
+    ):
+        assert found.error < accuracy * (1 + 2 * (kept == [second]))
+        if dim == 3 or [*kept, *known] != [second]:  # no quadrature over three hidden angles
+            assert off(found, density, kept, known) < 1.1 * found.error + 5e-4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rough_error_is_seen(seed: int) -> None:
+    """Quasi-random nodes of two hidden angles are few at first."""
+    density = sharp(seed, 4, "chains")
+    found = marginal(density, [0, 1], accuracy=0.3)
+    assert 1e-3 < found.error < 0.3
+    assert 0.1 * found.error < off(found, density, [0, 1], {}) < 1.1 * found.error
+
+
+def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:
+    first = marginal(random_blend(1, 3, network=False), [0, 1])
+    first.error = 0.02
+    assert marginal(first, 0).error >= 0.02
+    assert conditional(first, {1: 0.3}).error > 0.01
+    (tmp_path / "d").write_bytes(density_to_bytes(first))
+    assert read_density(tmp_path / "d")[0].error == 0.02
+
+
+@pytest.mark.parametrize("given", [None, {1: 0.3}])
+def test_three_angles_ask_the_whole(tmp_path: Path, given: dict[int, float] | None) -> None:
+    density = random_blend(2, 4, network=True)
+    found = marginal(density, [0, 2, 3]) if given is None else conditional(density, given)
+    (tmp_path / "d").write_bytes(density_to_bytes(found))
+    again = read_density(tmp_path / "d")[0]
+    drawn = again.sample(200, torch.Generator().manual_seed(0))
+    assert torch.equal(again.log_prob(drawn[:5]), found.log_prob(drawn[:5]))
+    assert drawn.shape == (200, 3)
+    axis = marginal(density, 2) if given is None else conditional(density, given, 2)
+    twice, line = marginal(again, 1), even_grid(16, 1)
+    assert float((twice.log_prob(line) - axis.log_prob(line)).abs().max()) < 0.05
+
+
+def test_samples_are_of_what_is_given() -> None:
+    """They are chosen among weighed draws: mean sines and cosines against quadrature."""
+    network = random_network(np.random.default_rng(4), Torus(3))
+    density = Mixture([network, sharp(4, 3, "chains")], [0.5, 0.5])
+    last = network.factors[-1].axes[-1]  # so that neither has a closed form
+    kept = [axis for axis in range(3) if axis != last]
+    drawn = conditional(density, {last: 0.6}).sample(4000, torch.Generator().manual_seed(1))
+    grid = even_grid(SHARP_GRID, 2)
+    weights = torch.softmax(true_log(density, grid, kept, {last: 0.6}), dim=0)
+    for function in (torch.sin, torch.cos):
+        expected = weights @ function(2 * math.pi * grid)
+        found = function(2 * math.pi * drawn)
+        assert (
+            (found.mean(dim=0) - expected).abs() < 4 * found.std(dim=0) / 4000**0.5 + 0.01
+        ).all()
+
+
+def test_it_can_be_stopped_in_the_middle() -> None:
+    class Stopped(Exception):
+        pass
+
+    told: list[float] = []
+
+    def progress(share: float, what: str) -> None:
+        told.append(share)
+        if share > 0.2:
+            raise Stopped(what)
+
+    with refused("integrating", "2", kind=Stopped):
+        marginal(sharp(0, 3, "chains"), [0, 1], accuracy=1e-6, progress=progress)
+    assert len(told) > 2
+    assert told == sorted(told)

@@ -1,5 +1,7 @@
-"""Scoring asks the same of columns as fitting, and finds names in any case."""
+"""Scoring asks the same of columns as fitting, and refuses or doubts what the fit would."""
 
+import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +12,10 @@ import pytest
 from orbiflow.density import DensityEstimator
 from orbiflow.density.operations.queries import conditional, score
 from orbiflow.density.tables import RowSettings
+from orbiflow.errors import DataWarning, SettingError
 from orbiflow.loading import save
 from orbiflow.runtime import Event, Note
-from refusals import refused
+from refusals import refused, warned
 
 RNG = np.random.default_rng(0)
 PLACES = np.stack([RNG.normal(30, 8, 60), RNG.uniform(5, 350, 60)], axis=1)
@@ -95,3 +98,104 @@ def test_what_is_given_may_have_a_typographic_minus(models: dict[str, Path], tmp
     assert found[0]["columns"] == found[1]["columns"] == ["phi"]
     one, other = ((tmp_path / name / "density.csv").read_text() for name in "01")
     assert one == other
+
+
+TURNING = RNG.vonmises([-1.1, 2.0], 6.0, (60, 2))
+SPOTS = np.stack([RNG.normal(48, 3, 60), RNG.normal(10, 3, 60)], axis=1)
+
+
+def made(space: str, data: np.ndarray, **settings: Any) -> DensityEstimator:
+    return DensityEstimator(space, components="mixture", **settings).fit(data)
+
+
+@pytest.fixture(scope="module")
+def models_of_doubts() -> dict[str, DensityEstimator]:
+    turns = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}
+    found = {
+        unit: made("torus", TURNING * turn / turns["radians"], unit=unit)
+        for unit, turn in turns.items()
+    }
+    return {**found, "sphere": made("sphere", SPOTS), "plane": made("projective-plane", SPOTS)}
+
+
+METHODS = ["score_samples", "score", "score_gradient"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("model", "data"),
+    [("degrees", TURNING), ("sphere", np.radians(SPOTS)), ("plane", np.radians(SPOTS))],
+)
+def test_radians_in_the_place_of_degrees_are_doubted(
+    model: str, data: np.ndarray, method: str, models_of_doubts: dict[str, DensityEstimator]
+) -> None:
+    with warned("radians", kind=DataWarning) as caught:
+        getattr(models_of_doubts[model], method)(data)
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("model", "data"),
+    [
+        ("radians", np.degrees(TURNING)), ("turns", TURNING), ("turns", np.degrees(TURNING)),
+        ("degrees", np.vstack([np.degrees(TURNING), [[999, 1.0]]])), ("degrees", [[999, 1.0]]),
+        ("sphere", np.vstack([SPOTS, [[48, -9999]]])), ("radians", TURNING + 20 * math.pi),
+    ],
+)  # fmt: skip
+def test_data_beyond_a_turn_are_refused(
+    model: str, data: Any, method: str, models_of_doubts: dict[str, DensityEstimator]
+) -> None:
+    with refused("turn", kind=SettingError):
+        getattr(models_of_doubts[model], method)(data)
+
+
+EDGE = np.linspace(-5, 5, 50)
+RIGHT = {
+    "one small row": ("degrees", np.array([[-1.1, 2.0]])),
+    "a small place": ("sphere", np.array([[0.8, 0.2]])),
+    "its own data": ("degrees", np.degrees(TURNING)),
+    "few of them": ("degrees", np.degrees(TURNING[:3])),
+    "those of a compass": ("degrees", np.degrees(TURNING) % 360),
+    "radians": ("radians", TURNING),
+    "places": ("sphere", SPOTS),
+    "a profile": ("sphere", np.stack([48 + 0 * EDGE, 10 + EDGE], axis=1)),
+}
+
+
+@pytest.mark.parametrize("case", RIGHT)
+def test_usual_data_are_not_doubted(
+    case: str, models_of_doubts: dict[str, DensityEstimator]
+) -> None:
+    model, data = RIGHT[case]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        models_of_doubts[model].score_samples(data)
+
+
+def test_small_angles_in_degrees_are_not_doubted() -> None:
+    tilts = RNG.uniform(-2, 2, (60, 2))
+    model = made("torus", tilts, unit="degrees")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.score_samples(tilts)
+        model.score_samples(np.stack([EDGE, EDGE], axis=1))
+
+
+@pytest.mark.parametrize(
+    ("model", "value"), [("degrees", 400), ("degrees", 999), ("radians", 45), ("turns", 1.5)]
+)
+def test_known_angles_beyond_a_turn_are_refused(
+    model: str, value: float, models_of_doubts: dict[str, DensityEstimator]
+) -> None:
+    with refused("turn", value, kind=SettingError):
+        models_of_doubts[model].conditional({1: value})
+
+
+@pytest.mark.parametrize(("model", "value"), [("degrees", -45), ("radians", 6.2), ("turns", 0.9)])
+def test_known_angles_within_a_turn_are_not_doubted(
+    model: str, value: float, models_of_doubts: dict[str, DensityEstimator]
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        models_of_doubts[model].conditional({1: value})

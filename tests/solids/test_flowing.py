@@ -1,6 +1,7 @@
-"""Tiles by a symmetric flow: faces stay in pairs, volumes exact, and bodies are fitted."""
+"""Tiles by a symmetric flow, and smooth surfaces whose faces match under the group."""
 
 import numpy as np
+import pytest
 import torch
 from hypothesis import given, settings
 
@@ -17,8 +18,9 @@ from orbiflow.solids.flowing import (
     uncrossed,
 )
 from orbiflow.solids.matched import MatchedSurface
+from orbiflow.solids.surfaces import tile_surface
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
-from solids.known_solids import group_named, names, seeds
+from solids.known_solids import group_named, names, random_tile, seeds
 
 QUICK = (Stage(0.6, 4, 0.25),)
 
@@ -104,3 +106,52 @@ def test_what_no_ball_is_like_starts_as_a_dirichlet_cell(monkeypatch):
     assert certify_solid(group, tile).is_ball
     start = dirichlet_cell(group, best_site(body, group)).mesh
     assert mean_overlap(tile, body) > mean_overlap(start, body) + 0.02
+
+
+@given(names, seeds)
+@settings(max_examples=6)
+def test_a_surface_is_certified_and_knows_what_is_behind_each_face(name, seed):
+    tile, function = random_tile(name, seed)
+    surface = tile_surface(tile, function)
+    group, mesh = tile.complex.group, surface.mesh
+    certificate = certify_solid(group, mesh)
+    assert certificate.is_ball, certificate.reasons
+    assert certificate.pair_error < 1e-12
+    assert certificate.volume_error < 1e-12
+    partners, corners = surface.partners, mesh.corners
+    np.testing.assert_array_equal(partners[partners], np.arange(len(partners)))
+    linear = group.linear_parts[surface.cosets]
+    moves = group.translations[surface.cosets] + surface.shifts @ group.lattice.T
+    images = np.einsum("nij,nkj->nki", linear, corners[partners]) + moves[:, None]
+    distances = np.linalg.norm(images[:, :, None] - corners[:, None], axis=3)
+    assert distances.min(axis=2).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["P 1", "P 21 21 21", "P 31", "P 21 3"])
+def test_points_lie_where_the_function_is_the_same_on_both_sides(name):
+    tile, function = random_tile(name, 5, cubes=1000)
+    surface = tile_surface(tile, function)
+    rough = tile_surface(tile)
+    group, spacing = tile.complex.group, tile.complex.spacing
+
+    def excess(own):
+        x = own.mesh.corners.mean(axis=1)
+        moves = group.translations[own.cosets] + own.shifts @ group.lattice.T
+        back = np.einsum("nji,nj->ni", group.linear_parts[own.cosets], x - moves)
+        return np.abs(function(x) - function(back))
+
+    assert np.median(excess(surface)) < 0.05 * spacing
+    assert np.median(excess(surface)) < 0.5 * np.median(excess(rough))
+    assert surface.taken_back < 0.5
+
+
+def test_smoothing_takes_the_steps_of_the_grid_away():
+    tile, function = random_tile("P 21 21 21", 3, cubes=4000)
+    mesh = tile_surface(tile, function).mesh
+    normals = mesh.face_vectors / np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
+    half = np.sort(mesh.half_edges, axis=1)
+    order = np.lexsort(half.T)
+    first, second = order[::2] // 3, order[1::2] // 3
+    turns = np.degrees(np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1)))
+    assert np.median(turns) < 4
+    assert np.mean(turns > 30) < 0.08

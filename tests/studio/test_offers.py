@@ -1,10 +1,14 @@
-"""What is offered of a tile is what it can do, and the tile that can is one click away."""
+"""What is offered of a tile is what it can do, and previews are what is made."""
 
+import base64
+import io
 import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from bent_tiles import bent_tile
 from orbiflow.errors import SettingError
@@ -13,7 +17,7 @@ from orbiflow.studio.project_file import write_project
 from orbiflow.studio.tile_files import put_tile, tile_number
 from orbiflow.tiles import ArtSettings, EscherTile, why_not_in
 from studio.browser import RunningStudio
-from studio.served import Client, new_project
+from studio.served import Client, done, house_tile, new_project
 
 CLASSES = ["IH1", "IH2", "IH4", "IH6", "IH7", "IH21", "IH28"]
 
@@ -146,3 +150,96 @@ def test_back_leads_to_the_place_and_to_what_was_chosen(page: Any, project: dict
     page.go_back()
     page.wait_for_selector(".form")
     assert (value(page, "purpose"), value(page, "tile_size")) == ("stickers", "33")
+
+
+STROKE = {"colour": "#d02030", "width": 1.5, "points": [[0.0, 0.0], [4.0, 2.0]]}
+
+
+@pytest.fixture(scope="module")
+def address(client: Client) -> str:
+    """The address of a tile of a project that was drawn on."""
+    tile = house_tile(client)
+    project = tile.partition("/tiles/")[0]
+    client.patch(project, json={"view": {"drawing": {"strokes": [STROKE], "eyes": []}}})
+    return tile
+
+
+def preview(client: Client, address: str, operation: str, **settings: Any) -> Any:
+    """Ask for a preview; return the server's answer."""
+    number = int(address.rsplit("/", 1)[1])
+    body = {"operation": operation, "settings": {"tile": number, **settings}}
+    return client.post(f"{address}/preview", json=body)
+
+
+def image_of(answer: Any) -> Image.Image:
+    assert answer.status_code == 200, answer.text
+    return Image.open(io.BytesIO(base64.b64decode(answer.json()["image"])))
+
+
+def test_it_is_what_is_made_and_nothing_is_left_of_it(client: Client, address: str) -> None:
+    project, number = address.split("/tiles/")
+    known = client.get(project).json()["tasks"]
+    settings = {
+        **{"drawing": True, "purpose": "print", "area": "120x80mm", "format": "png", "dpi": 100}
+    }
+    shown = np.asarray(image_of(preview(client, address, "export", **settings)).convert("RGB"))
+    assert client.get(project).json()["tasks"] == known
+    body = {"operation": "export", "settings": {"tile": int(number), **settings}}
+    task = done(client, client.post(f"{project}/tasks", json=body))
+    [file] = task["result"]["files"]
+    made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").content
+    wanted = np.asarray(Image.open(io.BytesIO(made)).convert("RGB"))
+    assert shown.shape == wanted.shape
+    assert (shown == wanted).all()
+    plain = image_of(preview(client, address, "export", **{**settings, "drawing": False}))
+    assert (np.asarray(plain.convert("RGB")) != wanted).any()
+
+
+@pytest.mark.parametrize(
+    ("operation", "settings"),
+    [
+        ("export", {"purpose": "laser", "format": "dxf"}),
+        ("export", {"cut": "pieces", "kerf": 0.2, "bed": "100x100mm", "area": "200x200mm"}),
+        ("art", {"area": "3000x2000px"}),
+        ("solid", {"kind": "cutter"}),
+        ("animate", {"kind": "grow"}),
+        ("art", {"world": "spiral"}),
+        ("art", {"world": "disc", "format": "html"}),
+    ],
+)
+def test_all_that_can_be_made_is_shown_small(
+    client: Client, address: str, operation: str, settings: dict[str, Any]
+) -> None:
+    assert 200 < max(image_of(preview(client, address, operation, **settings)).size) <= 1200
+
+
+def test_a_world_is_made_to_be_turned(client: Client, address: str) -> None:
+    project, _, number = address.rpartition("/tiles/")
+    body = {
+        "operation": "art",
+        "settings": {"tile": int(number), "world": "disc", "format": "html"},
+    }
+    task = done(client, client.post(f"{project}/tasks", json=body))
+    [file] = task["result"]["files"]
+    assert file["name"].endswith(".html")
+    made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}")
+    assert "showWorld" in made.text
+    assert made.headers["content-type"].startswith("text/html")
+    assert "content-disposition" not in made.headers
+    assert "sandbox allow-scripts" in made.headers["content-security-policy"]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_mp4_is_offered_where_it_can_be_made(client: Client, monkeypatch, there: bool) -> None:
+    monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/ffmpeg" if there else None)
+    schema = client.get("/api/operations/animate/schema").json()
+    assert ("mp4" in json.dumps(schema["properties"]["format"])) is there
+    assert "gif" in json.dumps(schema["properties"]["format"])
+
+
+def test_what_cannot_be_made_is_refused_beside_its_setting(client: Client, address: str) -> None:
+    answer = preview(client, address, "export", tile_size="99999mm")
+    assert (answer.status_code, answer.json()["setting"]) == (422, "tile_size")
+    assert preview(client, address, "search").status_code == 422
+    missing = client.post(f"{address}7/preview", json={"operation": "export", "settings": {}})
+    assert missing.status_code == 404

@@ -1,16 +1,41 @@
-"""Names of space groups in every way that people write them: the right group, or none."""
+"""Space groups by name, by operators as text, and with two origins."""
 
 import re
+from pathlib import Path
 
 import gemmi
+import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from orbiflow.errors import GroupError
-from orbiflow.symmetry import space_group
-from orbiflow.symmetry.group_symbols import USUAL, find_hall, find_setting, plain
+from orbiflow.density import QuotientSpace
+from orbiflow.errors import GroupError, InputFileError, LatticeMismatchError
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    Isometry,
+    group_by_name,
+    group_from_cif,
+    group_from_operators,
+    is_group_name,
+    operators,
+    space_group,
+    translation,
+    wallpaper_group,
+)
+from orbiflow.symmetry.group import generated
+from orbiflow.symmetry.group_symbols import (
+    USUAL,
+    find_hall,
+    find_setting,
+    has_two_origins,
+    plain,
+    settings_named,
+    settings_numbered,
+)
+from orbiflow.symmetry.triplets import parse_operator
 from refusals import refused
+from strategies import groups, random_orthogonal, seeds
 
 TABLE = list(gemmi.spacegroup_table())
 SCREW = re.compile(r"\b([2346])([1-5])\b")
@@ -206,3 +231,184 @@ def test_no_symbol_of_hall_is_taken_for_another_group() -> None:
         found = find_hall(gemmi, row.hall)
         if found is not None:
             assert gemmi.GroupOps(found) == row.operations(), row.hall
+
+
+# centres of inversion nearly at 0, at distances that equality of groups tells apart
+near = [generated(np.eye(1), [Isometry(-np.eye(1), np.array([x]))]) for x in (2.4e-7, 1.003e-9)]
+
+
+@settings(max_examples=7)
+@given(groups, seeds)
+@example(near[0], 0)
+def test_any_group_is_that_of_its_operators(group, seed):
+    rng = np.random.default_rng(seed)
+    # turned, and about a point at no simple fraction
+    turned = group.conjugate(random_orthogonal(rng, group.dim), rng.uniform(-1, 1, group.dim))
+    for there in (group, turned):
+        assert group_from_operators(operators(there), there.lattice) == there
+
+
+@settings(max_examples=7)
+@given(groups)
+@example(near[1])
+def test_operators_of_a_coarser_cell_have_the_centring(group):
+    coarse = operators(group, 2 * group.lattice)
+    assert len(coarse) == len(set(coarse)) == group.order * 2**group.dim
+    again = group_from_operators(coarse, 2 * group.lattice)
+    assert again.order == group.order
+    assert again.cell_volume == pytest.approx(group.cell_volume)
+    # what is rounded is a share of the cell's size, and this cell is twice as large
+    assert all(group.contains(element, 4e-9) for element in again.cosets)
+
+
+entries = st.sampled_from([-2, -1, 1, 2])
+shifts = st.fractions(0, 1, max_denominator=24).filter(lambda x: 24 % x.denominator == 0)
+
+
+@given(st.lists(st.tuples(entries, entries, entries, shifts), min_size=3, max_size=3))
+def test_operators_are_read_as_another_program_reads_them(rows):
+    text = ",".join(f"{a:+d}*x{b:+d}*y {c:+d}*z+{w}" for a, b, c, w in rows)
+    read = gemmi.Op(text)
+    table = parse_operator(text, 3)
+    np.testing.assert_array_equal(table[:, :3], np.array(read.rot) / read.DEN)
+    np.testing.assert_allclose(table[:, 3], np.array(read.tran) / read.DEN, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "x", "x,y", "x,y,z,x", "x,y,w", "x,y,+", "x,y,*z", "x,y,z*", "x,y,1/0", "x,y,z+-1"),
+        *(
+            *("x,y,1e9", "x,y," + "1" * 300, "x,y,z" * 99, "x,y,1/2/3", "x,y,.", "x,y,z\0"),
+            *("xy,y,z", "x++y,y,z", "x,y,z" + " " * 200),
+        ),
+        "x,y,__import__('os')",
+    ],
+)
+def test_texts_that_are_no_operators_are_refused(text):
+    with refused("3 dimensions", kind=GroupError):
+        group_from_operators([text], np.eye(3))
+
+
+def test_too_many_operators_are_refused():
+    with refused(2048, kind=GroupError):
+        group_from_operators(("x" for _ in range(10**9)), [[1.0]])
+
+
+def test_an_operator_that_does_not_fit_names_a_cell_that_does():
+    with refused("74.744881", "90.0", kind=LatticeMismatchError) as caught:
+        group_from_operators(["-x,-y", "-y,x"], [[1.0, 0.3], [0.0, 1.1]])
+    side = float(str(caught.value).split("fits has [")[1].split(",")[0])
+    assert group_from_operators(["-y,x"], side * np.eye(2)).order == 4
+    with refused("[1.0, 1.0, 90.0]", kind=LatticeMismatchError):
+        group_from_operators(["x+y,y"], np.eye(2))
+
+
+def test_a_lattice_of_no_translations_is_refused():
+    group = wallpaper_group("p4")
+    with refused("lattice", kind=GroupError):
+        operators(group, np.eye(2) / 2)
+    with refused(3, 4, kind=GroupError):
+        operators(CrystallographicGroup.generate(np.eye(4)))
+
+
+def test_the_primitive_lattice_of_a_primitive_group_is_its_own():
+    group = wallpaper_group("p4g")
+    assert group.primitive() is group
+
+
+@given(st.integers(1, 3), st.integers(2, 4), seeds)
+def test_the_primitive_lattice_is_that_of_all_translations(dim, fold, seed):
+    rng = np.random.default_rng(seed)
+    lattice = rng.uniform(-0.3, 0.3, (dim, dim)) + np.eye(dim)
+    shift = translation(lattice @ rng.integers(0, fold, dim) / fold)
+    group = CrystallographicGroup.generate(lattice, [shift])
+    fine = group.primitive()
+    assert fine.order == 1
+    assert fine == group
+    assert (
+        np.linalg.norm(fine.lattice, axis=0).min() <= np.linalg.norm(lattice, axis=0).min() + 1e-9
+    )
+
+
+# number: short symbol, and where origin 2 lies from origin 1, in the conventional cell
+ORIGINS = {
+    **{48: ("P n n n", (1 / 4, 1 / 4, 1 / 4)), 50: ("P b a n", (1 / 4, 1 / 4, 0))},
+    **{59: ("P m m n", (1 / 4, 1 / 4, 0)), 68: ("C c c a", (0, 1 / 4, 1 / 4))},
+    **{70: ("F d d d", (1 / 8, 1 / 8, 1 / 8)), 85: ("P 4/n", (-1 / 4, 1 / 4, 0))},
+    **{86: ("P 42/n", (1 / 4, 1 / 4, 1 / 4)), 88: ("I 41/a", (0, 1 / 4, 1 / 8))},
+    **{125: ("P 4/n b m", (1 / 4, 1 / 4, 0)), 126: ("P 4/n n c", (1 / 4, 1 / 4, 1 / 4))},
+    **{129: ("P 4/n m m", (-1 / 4, 1 / 4, 0)), 130: ("P 4/n c c", (-1 / 4, 1 / 4, 0))},
+    133: ("P 42/n b c", (-1 / 4, 1 / 4, -1 / 4)),
+    134: ("P 42/n n m", (-1 / 4, 1 / 4, -1 / 4)),
+    137: ("P 42/n m c", (-1 / 4, 1 / 4, -1 / 4)),
+    **{138: ("P 42/n c m", (-1 / 4, 1 / 4, -1 / 4)), 141: ("I 41/a m d", (0, -1 / 4, 1 / 8))},
+    **{142: ("I 41/a c d", (0, -1 / 4, 1 / 8)), 201: ("P n -3", (1 / 4, 1 / 4, 1 / 4))},
+    **{203: ("F d -3", (1 / 8, 1 / 8, 1 / 8)), 222: ("P n -3 n", (1 / 4, 1 / 4, 1 / 4))},
+    **{224: ("P n -3 m", (1 / 4, 1 / 4, 1 / 4)), 227: ("F d -3 m", (1 / 8, 1 / 8, 1 / 8))},
+    228: ("F d -3 c", (3 / 8, 3 / 8, 3 / 8)),
+}
+
+
+def test_only_those_names_are_asked_for_their_origin() -> None:
+    for number in range(1, 231):
+        assert has_two_origins(settings_numbered(gemmi, str(number))) == (number in ORIGINS)
+    # in other cells than the usual one, too
+    for row in gemmi.spacegroup_table():
+        is_one_of_two = row.ext in ("1", "2")
+        assert has_two_origins(settings_named(gemmi, row.hm)) == is_one_of_two
+        assert not is_one_of_two or row.number in ORIGINS
+    assert space_group("P n c b", origin=2).name == "P n c b:2"
+    assert space_group("R -3 m", origin=2) == space_group("R -3 m")
+
+
+@pytest.mark.parametrize("number", ORIGINS)
+def test_the_error_has_the_words_that_answer_it(number: int) -> None:
+    symbol, shift = ORIGINS[number]
+    cell = (1.0, 1.1, 1.3) if number < 75 else (1.0, 1.0, 1.3) if number < 195 else (1.0, 1.0, 1.0)
+    for name in (number, symbol.replace(" ", "")):
+        with pytest.raises(GroupError) as caught:
+            space_group(name)
+        first, second = (
+            space_group(word, cell) for word in re.findall("'(.*?)'", str(caught.value))[-2:]
+        )
+        assert (first.name, second.name) == (f"{symbol}:1", f"{symbol}:2")
+    centre = Isometry(-np.eye(3), np.zeros(3))
+    assert second.contains(centre)
+    assert not first.contains(centre)
+    assert first.conjugate(np.eye(3), -np.diag(cell) @ shift) == second
+    assert space_group(number, cell, origin=1) == first
+    assert group_by_name(f"{number}:2", cell) == second
+    assert is_group_name(f"{number}:2")
+
+
+def test_a_density_is_asked_too() -> None:
+    with refused("227:1", "227:2", kind=GroupError):
+        QuotientSpace("227")
+    with refused("Fd-3m:1", "Fd-3m:2", kind=GroupError):
+        QuotientSpace("Fd-3m", cell=(3, 3, 3))
+    assert QuotientSpace("227:1") != QuotientSpace("227:2")
+
+
+def test_a_cif_without_operators_says_its_origin(tmp_path: Path) -> None:
+    path, cell = (
+        tmp_path / "a.cif",
+        "data_a\n_cell_length_a 3\n_cell_length_b 3\n_cell_length_c 3\n",
+    )
+    cell += "_cell_angle_alpha 90\n_cell_angle_beta 90\n_cell_angle_gamma 90\n"
+    bare = "_space_group_IT_number 227\n_space_group_name_H-M_alt 'F d -3 m'\n"
+    path.write_text(cell + bare)
+    with refused("origin", kind=InputFileError):
+        group_from_cif(path)
+    for more in (
+        "_space_group_name_H-M_full 'F 41/d -3 2/m :2'",
+        "_space_group_name_Hall '-F 4vw 2vw 3'",
+    ):
+        path.write_text(cell + bare + more + "\n")
+        assert group_from_cif(path) == space_group("227:2", (3, 3, 3))
+
+
+def test_there_is_no_third_origin() -> None:
+    for name in (227, 19):
+        with refused("origin", 3):
+            space_group(name, origin=3)  # pyright: ignore[reportArgumentType]

@@ -1,6 +1,10 @@
-"""Pictures on tilings: every pixel covered, nothing bleeds, mirrored tiles are mirrored."""
+"""Pictures on tilings: every pixel covered, cells that repeat, runs read back with their maps."""
 
 import io
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,13 +21,35 @@ from artworks import (
     size_of,
     squirrel,
     upside_down,
+    write_run,
 )
-from orbiflow.drawing import palette
-from orbiflow.tiles import ArtSettings, Artwork, Over, artwork, render_artwork
+from orbiflow.drawing import PALETTES, palette
+from orbiflow.errors import InputFileError
+from orbiflow.symmetry import rotation_matrix
+from orbiflow.tiles import (
+    ArtSettings,
+    Artwork,
+    FileContent,
+    Over,
+    Page,
+    Target,
+    are_told_apart,
+    artwork,
+    page_picture,
+    read_result,
+    render_artwork,
+    signed_area,
+    with_map,
+)
 from orbiflow.tiles.make import art_scene
+from orbiflow.tiles.make.repeats import rectangle
 from orbiflow.tiles.motifs import NOWHERE, runs
 from orbiflow.tiles.motifs.raster import region_sides
+from orbiflow.tiles.page import Box
+from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import triangulate
+from outlines import FOLDER, animal, bent_squirrel
+from refusals import refused
 
 PAGE = art_settings(area="240x160px", tile_size="95px", outline=0.0, dpi=25.4)  # a pixel is 1 mm
 
@@ -203,3 +229,187 @@ def test_tint_is_glass_of_each_tiles_colour_in_pixels_and_curves() -> None:
     assert {tuple(image[40, 40, :3].tolist()) for image in images} == {*glass}
     plain = artwork(tile, given.replace(tint=0.0), over)
     assert grey in {tuple(own) for own in render_artwork(plain).reshape(-1, 3).tolist()}
+
+
+def two_by_two(page: Page) -> Page:
+    """The same tiling on a page twice as wide and high."""
+    width, height = page.size
+    return replace(page, size=(2 * width, 2 * height), box=Box(0.0, 0.0, 2 * width, 2 * height))
+
+
+@pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
+def test_two_by_two_is_the_same_plane(name: str, how) -> None:
+    tile = squirrel(name)
+    settings = art_settings(repeat="basic", tile_size="60px", colour=how, stretch=0.05)
+    art = artwork(tile, settings, None if how == "one" else Over(checkerboard(tile)))
+    cell = render_artwork(art)
+    twice = render_artwork(replace(art, page=two_by_two(art.page)))
+    apart = np.abs(np.tile(cell, (2, 2, 1)).astype(int) - twice)
+    assert apart.max() <= 1
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH5"])
+@pytest.mark.parametrize("repeat", ["brick", "half-drop"])
+def test_rows_or_columns_moved_by_half_are_the_same_plane(repeat, name: str) -> None:
+    tile = squirrel(name)
+    settings = art_settings(repeat=repeat, tile_size="60px", stretch=0.05)
+    art = artwork(tile, settings, Over(checkerboard(tile)))
+    cell = render_artwork(art)
+    height, width = cell.shape[:2]
+    if repeat == "brick":
+        moved = np.roll(cell, width // 2, axis=1)
+        pasted = np.vstack([np.hstack([cell, cell]), np.hstack([moved, moved])])
+    else:
+        moved = np.roll(cell, height // 2, axis=0)
+        pasted = np.hstack([np.vstack([cell, cell]), np.vstack([moved, moved])])
+    twice = render_artwork(replace(art, page=two_by_two(art.page)))
+    assert np.abs(pasted.astype(int) - twice).max() <= 1
+
+
+@pytest.mark.parametrize("repeat", ["brick", "half-drop"])
+@pytest.mark.parametrize("turn", [0.0, 0.3, -1.2])
+def test_half_the_cell_where_the_lattice_has_it(turn: float, repeat) -> None:
+    basis = rotation_matrix(turn) @ np.array([[1.0, 0.5], [0.0, 0.9]])
+    basic = rectangle(basis, 100.0, 0.0, flipped=False)
+    found = rectangle(basis, 100.0, 0.0, flipped=False, repeat=repeat)
+    assert (basic.cells, found.cells) == (2, 1)
+    assert found.exact
+    # what repeats are vectors of the lattice: a side, and the other with half of it
+    width, height = found.width, found.height
+    assert (width if repeat == "brick" else height) % 2 == 0
+    brick, drop = [[width, 0], [width / 2, height]], [[0, height], [width, height / 2]]
+    ways = np.array(brick if repeat == "brick" else drop, dtype=float)
+    steps = np.linalg.solve(basis, np.linalg.solve(found.linear, ways.T))
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+    assert abs(round(np.linalg.det(steps))) == 1
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, -1.2])
+@pytest.mark.parametrize(
+    ("lattice", "cells"),
+    [
+        ([[1.0, 0.0], [0.0, 0.7]], 1),
+        ([[1.0, 0.5], [0.0, 0.75**0.5]], 2),
+        ([[2.0, 1.0], [0, 0.4]], 2),
+    ],
+)
+def test_known_lattices(lattice, cells: int, turn: float) -> None:
+    basis = rotation_matrix(turn) @ np.array(lattice)
+    found = rectangle(basis, 200.0, 0.0, flipped=False)
+    assert found.cells == cells
+    assert abs(found.turn) <= 45
+    corners = np.linalg.inv(found.linear) @ np.diag([found.width, found.height])
+    steps = np.linalg.solve(basis, corners)
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+    assert abs(round(np.linalg.det(steps))) == cells
+
+
+def test_oblique_lattices_need_a_tolerance() -> None:
+    lattice = np.array([[1.0, 0.331], [0.0, 1.0]])
+    with refused("tolerance"):
+        rectangle(lattice, 100.0, 0.0, flipped=False)
+    found = rectangle(lattice, 100.0, 0.02, flipped=True)
+    assert found.strain < 0.021
+    assert not found.exact
+    assert np.linalg.det(found.linear) < 0
+
+
+def test_the_map_of_a_run(tmp_path: Path) -> None:
+    tile = with_map(read_result(write_run(tmp_path / "run", "IH6"), "IH6"))
+    assert tile.name == "squirrel-IH6"
+    assert tile.notes == ()
+    there = squirrel("IH6").forward(np.array(EYE))
+    np.testing.assert_allclose(tile.forward(np.array(EYE)), there, atol=1e-9)
+    # the outline is the silhouette's, as fine as it was bent
+    outline = animal("squirrel.dat").outline
+    np.testing.assert_allclose(tile.silhouette_outline.min(axis=0), outline.min(axis=0), atol=4)
+    np.testing.assert_allclose(tile.covered.high, outline.max(axis=0), atol=4)
+
+
+def test_without_a_map_outlines_are_matched(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", "IH6", model=False)
+    tile = with_map(run)
+    assert "its outline was matched" in tile.notes[0]
+    moved = tile.forward(np.array(EYE))
+    known = squirrel("IH6").forward(np.array(EYE))
+    # the bent head and the matched one are near each other
+    assert np.hypot(*(moved - known)) < 0.15 * np.sqrt(abs(tile.tile.signed_area))
+    assert artwork(tile, art_settings(area="60x40px", eyes=(EYE,))).motifs[0].parts
+
+
+def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", "IH6", model=False)
+    document = json.loads((run / "result.json").read_text())
+    document["input"]["source"] = "gone.dat"
+    (run / "result.json").write_text(json.dumps(document))
+    tile = with_map(run)
+    assert artwork(tile, art_settings(area="60x40px", strokes="hatch")).motifs[0].parts
+    with refused("gone.dat"):
+        artwork(tile, art_settings(area="60x40px", eyes=(EYE,)))
+    document["input"]["source"] = str(FOLDER / "nagata" / "bat_60.dat")
+    (run / "result.json").write_text(json.dumps(document))
+    with refused("bat_60.dat"):
+        with_map(run).require_map()
+
+
+def test_a_model_of_another_tile_is_refused(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", "IH6")
+    other = write_run(tmp_path / "other", "IH4")
+    shutil.copy(other / "IH4" / "model.safetensors", run / "IH6" / "model.safetensors")
+    with refused("model.safetensors", kind=InputFileError):
+        with_map(run)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
+def test_matched_maps_have_no_fold_and_keep_the_outlines(name: str) -> None:
+    target, polygon = animal("squirrel.dat"), bent_squirrel(name).tile.polygon
+    bending = matched(target.normal, polygon)
+    for points in (bending.rest, bending.images):
+        corners = points[bending.triangles]
+        areas = signed_area(corners)
+        assert (areas > 0).all()
+    whole = signed_area(bending.rest[bending.triangles]).sum()
+    assert whole == pytest.approx(1, abs=1e-12)
+    ring = np.asarray(target.normal)
+    dense = np.concatenate([ring + t * (np.roll(ring, -1, axis=0) - ring) for t in (0, 0.3, 0.8)])
+    for there, end in ((bending.forward(dense), polygon), (bending.inverse(polygon), ring)):
+        assert shapely.distance(shapely.points(there), shapely.LinearRing(end)).max() < 1e-9
+    np.testing.assert_allclose(
+        bending.inverse(bending.forward(target.normal)), target.normal, atol=0.06
+    )
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 1.0])
+@pytest.mark.parametrize("name", sorted({*PALETTES} - {"pastel"}))  # its lines are not dark
+def test_light_ink_is_told_apart_from_dark_lines(share: float, name: str) -> None:
+    colours, inside = np.full((40, 40, 3), 0.08), np.ones((40, 40), dtype=bool)
+    colours[:, : round(40 * share)] = 0.8
+    outline = PALETTES[name].outline
+    # an eye on a black icon is not enough; lines that are light themselves are
+    assert are_told_apart(colours, inside, outline) == (share > 0.25)
+    assert are_told_apart(colours, inside, "#ffffff") == (share < 0.75)
+
+
+@pytest.mark.parametrize(
+    ("colour", "palette", "is_said"),
+    [("#101010", "delft", True), ("#c0a040", "delft", False), ("#101010", "delft-light", False)],
+)
+def test_a_dark_picture_that_is_asked_for_is_laid_and_said(
+    colour: str, palette: str, is_said: bool
+) -> None:
+    tile = squirrel("IH4")
+    chosen = palette if palette in PALETTES else "1d4e79,f4ecdc,outline=ffffff"
+    made = artwork(tile, art_settings(palette=chosen), Over(flat(tile, colour)))
+    assert made.pictures[0] is not None
+    assert any("told apart" in note for note in made.notes) == is_said
+
+
+def test_a_drawing_in_its_own_ink_is_shown_black() -> None:
+    drawing = FileContent(
+        b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9">'
+        b'<path d="M0 0h9v9H0z" fill="currentColor"/></svg>',
+        "ink.svg",
+    )
+    shown = page_picture(drawing, Target.from_bytes(drawing.data, drawing.name).covered, (9, 9))
+    assert shown.getpixel((4, 4)) == (0, 0, 0, 255)

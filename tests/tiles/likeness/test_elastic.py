@@ -1,16 +1,19 @@
-"""The silhouette as an elastic body."""
+"""The silhouette as an elastic body, with parts that keep their shape, laid onto outlines."""
 
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array, Complex
-from orbiflow.tiles import resampled
-from orbiflow.tiles.likeness import Elastic, Stiffness
+from orbiflow.tiles import arc_lengths, plane_points, resampled
+from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness, bent_onto, mutual_iou
+from orbiflow.tiles.likeness.bending_onto import _separated, corresponding
+from orbiflow.tiles.likeness.rigid_parts import SHAPE_WEIGHT
 from outlines import ANIMALS, SHAPES, animal
 from refusals import refused
 from strategies import angles, seeds
@@ -192,3 +195,163 @@ def test_a_body_without_points_inside() -> None:
     own = Elastic(SHAPES["triangle"])
     assert own.energy(own.rest[:, None] * 1j).max() < 1e-20
     assert own.condensed.outline.shape == (own.size, own.size)
+
+
+RING = resampled(animal("squirrel.dat").normal, 60)
+PLAIN = Elastic(RING)
+NEAR = abs(PLAIN.rest - PLAIN.rest[3]) < 0.35
+PARTS = [np.flatnonzero(NEAR), np.flatnonzero(abs(PLAIN.rest - PLAIN.rest[30]) < 0.25)]
+
+
+def body_of_rigid(keep_angle: bool = False) -> Pinned:
+    return Pinned(RING, PARTS, keep_angle=keep_angle)
+
+
+def shapes_of_rigid(count: int, seed: int = 0) -> Complex:
+    noise = np.random.default_rng(seed).normal(size=(len(PLAIN), count, 2))
+    moved = 0.03 * (noise[..., 0] + 1j * noise[..., 1])
+    return PLAIN.rest[:, None] * np.exp(0.2j) + moved
+
+
+def whole_matrix(pinned: Pinned) -> Complex:
+    taken: Complex = pinned._low @ pinned._low.conj().T
+    return pinned.matrix.astype(complex) - taken
+
+
+@pytest.mark.parametrize("keep_angle", [False, True])
+def test_the_matrix_and_the_forces_are_the_energy(keep_angle: bool) -> None:
+    """z^H A z - 2 Re b^H z differs from the energy and the pose's by what does not depend on z."""
+    pinned, z = body_of_rigid(keep_angle), shapes_of_rigid(1)
+    rotations, goals = pinned.rotations(z), pinned._goals(z)
+    copy, _ = pinned.copies(z)
+
+    def energy(y: Complex) -> float:
+        strain, bent = pinned._misfits(y, rotations)
+        total = pinned._w @ abs(strain) ** 2 + pinned._rod_cost @ abs(bent) ** 2
+        total += sum(p.cost(y, goal) for p, goal in zip(pinned.parts, goals, strict=True))
+        return float((total + pinned.stiffness.pose * (abs(y - copy) ** 2).mean(axis=0))[0])
+
+    def quadratic(y: Complex) -> float:
+        return float(np.vdot(y, whole_matrix(pinned) @ y - 2 * force).real)
+
+    force = pinned.forces(z)
+    y, other = shapes_of_rigid(1, 1), shapes_of_rigid(1, 2)
+    assert quadratic(y) - quadratic(other) == pytest.approx(energy(y) - energy(other), rel=1e-9)
+
+
+def test_the_whole_matrix_has_a_minimum() -> None:
+    values = np.linalg.eigvalsh(whole_matrix(body_of_rigid()))
+    assert values[0] > 0
+
+
+def test_condensed_is_the_whole_solved_for_the_inside() -> None:
+    pinned, z = body_of_rigid(), shapes_of_rigid(2)
+    matrix, n, forces = whole_matrix(pinned), pinned.size, pinned.forces(z)
+    condensed = pinned.condensed
+    assert condensed.low is not None
+    outline = condensed.outline - condensed.low @ condensed.low.conj().T
+    inner = np.linalg.inv(matrix[n:, n:])
+    schur = matrix[:n, :n] - matrix[:n, n:] @ inner @ matrix[n:, :n]
+    assert outline == pytest.approx(schur, rel=1e-6, abs=1e-6)
+    expected = inner @ (forces[n:] - matrix[n:, :n] @ z[:n])
+    assert condensed.whole(z[:n], forces)[n:] == pytest.approx(expected, abs=1e-7)
+    on_outline = forces[:n] - matrix[:n, n:] @ inner @ forces[n:]
+    assert condensed.forces(forces) == pytest.approx(on_outline, rel=1e-6, abs=1e-5)
+
+
+def test_similar_copies_cost_what_their_size_does() -> None:
+    pinned = body_of_rigid()
+    turned = 1.3 * pinned.rest[:, None] * np.exp(0.7j) + 2
+    assert pinned.energy(turned) == pytest.approx(PLAIN.energy(turned), rel=1e-9)
+    assert pinned.misfit(turned[: pinned.size, 0]) == pytest.approx(0, abs=1e-6)
+    bent = turned.copy()
+    bent[PARTS[0][0]] += 0.1
+    assert pinned.energy(bent)[0] > PLAIN.energy(bent)[0] + 0.001 * SHAPE_WEIGHT / len(pinned)
+
+
+def test_a_part_follows_at_once() -> None:
+    """A single step turns a pinned part: stiffness alone would let it turn by a share."""
+    pinned = body_of_rigid()
+    towards = pinned.rest[:60, None].copy()
+    on = PARTS[0][PARTS[0] < 60]
+    middle = towards[on].mean()
+    towards[on] = middle + (towards[on] - middle) * np.exp(0.4j)
+    z = pinned.pulled(pinned.rest[:, None], towards, 3000.0, 1)
+    turn = np.angle(pinned.parts[0].factor(z)[0])
+    assert 0.2 < turn < 0.4
+    held = body_of_rigid(keep_angle=True).pulled(pinned.rest[:, None], towards, 3000.0, 1)
+    assert abs(np.angle(pinned.parts[0].factor(held)[0])) < 0.1
+
+
+def test_small_parts_are_left_out_and_misfits_need_an_outline() -> None:
+    inner = np.flatnonzero(abs(PLAIN.rest) < 0.2)
+    inner = inner[inner >= 60]
+    assert len(inner) >= 3
+    pinned = Pinned(RING, [np.array([0, 1]), inner])
+    assert len(pinned.parts) == 1
+    assert pinned.misfit(pinned.rest[:60]) is None
+
+
+def test_what_is_stiff_all_over_holds_its_parts_no_less() -> None:
+    soft, stiff = body_of_rigid(), Pinned(RING, PARTS, stiff=np.full(60, 100.0))
+    assert stiff.parts[0].weight > 5 * soft.parts[0].weight
+    ring = plane_points(soft.rest[:60])
+    assert Pinned(ring, PARTS, stiff=np.full(60, 1e6)).pulled(
+        soft.rest[:, None], soft.rest[:60, None], 1.0, 2
+    ) == pytest.approx(soft.rest[:, None], abs=1e-6)
+
+
+BENT_RING = resampled(animal("squirrel.dat").normal, 120)
+BODY = Elastic(BENT_RING)
+
+
+def waved(amount: float) -> np.ndarray:
+    x, y = BENT_RING.T
+    return np.stack([x + amount * np.sin(5 * y), y + amount * np.cos(4 * x)], axis=-1)
+
+
+@pytest.mark.parametrize("shift", [0, 7, 61])
+def test_an_outline_corresponds_to_itself(shift: int) -> None:
+    at = corresponding(BENT_RING, np.roll(BENT_RING, shift, axis=0))
+    size = arc_lengths(BENT_RING)[-1]
+    expected = arc_lengths(np.roll(BENT_RING, shift, axis=0))[(np.arange(120) + shift) % 120]
+    apart = (at - expected + size / 2) % size - size / 2
+    assert abs(apart).max() < 0.03 * size
+
+
+def test_points_lie_on_the_ring_in_order() -> None:
+    ring = resampled(waved(0.1), 90)
+    z = bent_onto(BODY, ring)
+    outline = plane_points(z[:120])
+    scale = np.sqrt(shapely.Polygon(outline).area / shapely.Polygon(ring).area)
+    line = shapely.LinearRing(ring * scale)
+    assert shapely.distance(shapely.points(outline), line).max() < 0.03
+    assert shapely.is_valid(shapely.Polygon(outline))
+
+
+def test_it_costs_no_more_than_the_known_way_and_less_for_less() -> None:
+    costs = []
+    for amount in (0.02, 0.05, 0.1):
+        ring = waved(amount)
+        known = BODY.pulled(BODY.rest[:, None], (ring @ [1, 1j])[:, None], 1e6, 60)
+        laid = bent_onto(BODY, ring)[:, None]
+        costs.append(float(BODY.forgiving_energy(laid)[0]))
+        assert costs[-1] < 1.05 * BODY.forgiving_energy(known)[0]
+    assert costs == sorted(costs)
+
+
+def test_places_moved_apart_keep_their_order_and_stay_where_they_are_if_they_can() -> None:
+    at = np.array([0.0, 1.0, 2.0, 3.0])
+    assert _separated(at, 4.0) == pytest.approx(at)
+    mixed = _separated(np.array([0.0, 2.5, 1.5, 5.0]), 4.0)
+    assert (np.diff(np.append(mixed, mixed[0] + 4.0)) > 0).all()
+
+
+def test_mutual_iou_is_that_of_the_best_overlay() -> None:
+    turned = BENT_RING @ np.array([[np.cos(0.15), -np.sin(0.15)], [np.sin(0.15), np.cos(0.15)]])
+    alike = mutual_iou([BENT_RING, 2 * turned + 3, waved(0.15)])
+    assert alike(0, 1) == pytest.approx(1, abs=1e-3)
+    assert alike(1, 0) == alike(0, 1)
+    assert alike(0, 2) < 0.9
+    plain = shapely.Polygon(BENT_RING), shapely.Polygon(waved(0.15))
+    assert alike(0, 2) > plain[0].intersection(plain[1]).area / plain[0].union(plain[1]).area - 0.1

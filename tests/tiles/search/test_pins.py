@@ -1,14 +1,19 @@
 """Searches for likeness with parts that must not bend."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 import shapely
 
+from orbiflow.runtime import Call, Event, call_from_json
 from orbiflow.tiles import Emphasis, EscherTile, LikenessSearch, OverlapSearch, Pins
 from outlines import animal, searched
 from refusals import refused
+from runtime.searches import check_order, run
 
 SQUIRREL = animal("squirrel.dat")
 HEAD = (230, 190, 140)
@@ -129,3 +134,36 @@ def test_emphasis_of_any_strength_can_be_searched_with(
     hasty = LikenessSearch(placements=20, held=4, starts=1, finalists=1, rounds=4, multiples=(2,))
     results, _ = searched(target, ["IH7"], hasty, emphasis=emphasis)
     assert all(result.certificate.valid for result in results)
+
+
+DOCS = Path(__file__).parents[3] / "docs"
+SQUIRREL_FILE = Path(__file__).parents[3] / "examples" / "silhouettes" / "squirrel.dat"
+HEAD_SPOT = "230,190,140"
+
+
+def pinned_call(folder: Path, pin: str) -> Call:
+    document = {
+        **{"schema_version": 2, "operation": "escherize", "image": str(SQUIRREL_FILE)},
+        **{"out": str(folder / "out"), "classes": ["IH4"], "effort": "fast", "workers": 1},
+        "pin": [pin],
+    }
+    return call_from_json(document)
+
+
+@pytest.mark.usefixtures("small_searches")
+def test_what_was_pinned_is_told(tmp_path: Path) -> None:
+    events: list[Event] = []
+    run(pinned_call(tmp_path, HEAD_SPOT), events.append)
+    check_order(events, "IH4")
+    document = json.loads((tmp_path / "out" / "result.json").read_text())
+    jsonschema.validate(document, json.loads((DOCS / "result.schema.json").read_text()))
+    assert document["pins"] == {"sources": [HEAD_SPOT], "keep_angle": False, "notes": []}
+    (tile,) = document["tiles"]
+    assert tile["metrics"]["deformation"] > 0
+    assert tile["metrics"]["pinned"] is not None
+
+
+def test_a_pin_outside_is_refused_before_any_work(tmp_path: Path) -> None:
+    with refused("900,20"):
+        run(pinned_call(tmp_path, "900,20"))
+    assert not (tmp_path / "out").exists()
