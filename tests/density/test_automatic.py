@@ -90,7 +90,8 @@ def test_it_is_invariant_and_has_gradients(name: str) -> None:
 
 def test_the_same_seed_gives_the_same_density() -> None:
     space, at = make_space("sphere"), smooth("sphere", 50, 9)
-    settings = [DensitySettings(**QUICK, seed=seed) for seed in (1, 1, 2)]
+    small = {**QUICK, "iterations": 2, "segments": 1}
+    settings = [DensitySettings(**small, seed=seed) for seed in (1, 1, 2)]
     with torch.no_grad():
         one, same, other = (
             fit_automatic(space, smooth("sphere", 60), s)[0].log_prob(at) for s in settings
@@ -154,20 +155,6 @@ def test_any_number_of_samples(count: int, of_the_torus: Density) -> None:
     drawn = density.sample((count,), generator)
     assert drawn.shape == (count, 2)
     assert bool(((drawn >= 0) & (drawn <= 1)).all())
-
-
-def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
-    angles = rng.vonmises(0, 4, (100, 5))
-    estimator = DensityEstimator("torus").fit(angles)
-    assert isinstance(estimator.density_, Mixture)
-    assert estimator.report_.mass is None
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(estimator.density_))
-    back, _ = read_density(path)
-    at = estimator.space_.to_chart(angles[:40])
-    with torch.no_grad():
-        assert torch.equal(back.log_prob(at), estimator.density_.log_prob(at))
 
 
 @pytest.mark.usefixtures("whole_fits")

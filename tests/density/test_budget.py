@@ -97,8 +97,7 @@ def test_without_a_limit_no_clock_is_asked(striking_after) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "looks"),
-    [("torus", 1), ("torus", 60), ("sphere", 20), ("klein-bottle", 60), ("projective-plane", 20)],
+    ("name", "looks"), [("torus", 1), ("klein-bottle", 60), ("projective-plane", 20)]
 )
 def test_the_integral_does_not_depend_on_the_clock(name: str, looks: int, striking_after) -> None:
     clock = striking_after(looks)

@@ -72,7 +72,7 @@ def test_the_mass_tells_what_the_integrator_lost(space, seed: int) -> None:
 
 
 @every
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(seed=seeds)
 def test_log_prob_is_invariant_under_the_group(space, seed: int) -> None:
     density, points = make(space, seed), square(seed)
@@ -100,7 +100,7 @@ def test_it_is_continuous_over_every_edge(space, seed: int, side: int, t: float)
 
 
 @every
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(seed=seeds)
 def test_the_flow_and_back(space, seed: int) -> None:
     density = make(space, seed)

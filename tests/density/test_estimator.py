@@ -206,6 +206,7 @@ def test_five_angles(tmp_path: Path) -> None:
     estimator = DensityEstimator("torus", unit="degrees").fit(points[:200])
     assert isinstance(estimator.density_, Mixture)
     assert "chains" in estimator.density_.weight_of_kind
+    assert estimator.report_.mass is None
     assert estimator.score(points[200:]) > -5 * np.log(360) + 3
     assert estimator.sample(7, random_state=1).shape == (7, 5)
     path = tmp_path / "density.safetensors"

@@ -213,7 +213,7 @@ def test_fractions_are_doubted_or_read() -> None:
         QuotientSpace("p4g", fractional=True)
 
 
-@pytest.mark.parametrize("number", [2, -1, 7])
+@pytest.mark.parametrize("number", [2, -1, 10**9])
 def test_numbers_of_columns_that_there_are_not(number: int, fitted: DensityEstimator) -> None:
     with refused("column", number, "phi", "psi"):
         fitted.conditional({number: 1.0})

@@ -167,7 +167,7 @@ def test_merging_keeps_mean_and_mass(seed: int, cells: int, crowd: int, dim: int
 
 def test_held_out_scores_are_of_the_points_themselves() -> None:
     rng = np.random.default_rng(3)
-    sharp = np.where(rng.random((1500, 1)) < 0.5, 0.3, 0.7) + 0.01 * rng.normal(size=(1500, 2))
+    sharp = np.where(rng.random((700, 1)) < 0.5, 0.3, 0.7) + 0.01 * rng.normal(size=(700, 2))
     settings = FlowSettings(max_frequency=3, segments=2, iterations=8)
     _, report = fit_density(Torus(2), torch.tensor(sharp), settings)
     stage = report.stages[-1]

@@ -34,15 +34,6 @@ def kernels_of_places(
     )
 
 
-def clustered(name: str, count: int = 600) -> torch.Tensor:
-    """Points in tight clusters, canonical."""
-    torch.manual_seed(3)
-    space = make_space(name)
-    centers = torch.rand(40, 2, dtype=torch.float64)
-    noise = 0.003 * torch.randn(count, 2, dtype=torch.float64)
-    return space.project(centers[torch.randint(40, (count,))] + noise)
-
-
 @given(names, seeds)
 @settings(max_examples=10, deadline=None)
 def test_kernels_integrate_to_one_and_are_invariant(name: str, seed: int) -> None:

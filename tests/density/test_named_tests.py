@@ -73,7 +73,7 @@ def test_statistics_of_distributions_by_their_definitions(seed, ties, spread) ->
 
 
 @given(st.integers(0, 10**6), st.floats(-3, 3))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_rotations_change_no_statistic(seed: int, turn: float) -> None:
     angles, labels = of_two(np.random.default_rng(seed), 0.8, False)
     for test in (

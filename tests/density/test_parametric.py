@@ -106,7 +106,7 @@ def drawn(name: str, space_name: str, rows: int, seed: int) -> tuple[Space, torc
 
 
 @given(st.sampled_from([(n, s) for n, own in SPACES.items() for s in own]), st.integers(0, 10**6))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_parameters_are_found_again(which: tuple[str, str], seed: int) -> None:
     name, where = which
     space, points, truth = drawn(name, where, 800, seed)

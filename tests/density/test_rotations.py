@@ -140,7 +140,7 @@ def test_monoclinic_symmetries_must_say_their_axis(name: str) -> None:
         RotationSpace(specimen="cubes")
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(crystal=small, specimen=small, seed=seeds)
 def test_densities_are_invariant_under_both_symmetries_and_integrate_to_one(
     crystal: str, specimen: str, seed: int

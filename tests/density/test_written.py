@@ -43,7 +43,7 @@ def space_of(name: str, values: Array, **how: Any) -> Space:
 
 
 @given(SHIFTS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_values_come_back_as_they_were(shift: tuple[float, bool, int]) -> None:
     angles, latitudes = column(*shift), np.linspace(1, 80, 201)
     hours = column(*shift, period=24.0)

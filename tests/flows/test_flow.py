@@ -52,7 +52,7 @@ def test_the_flow_agrees_with_an_adaptive_integrator(name):
     np.testing.assert_allclose(moved.numpy().ravel(), solution.y[:, -1], rtol=0, atol=1e-10)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(groups, seeds, st.sampled_from([("rk4", 64), ("rk5", 24)]))
 def test_the_inverse_undoes_the_flow(group, seed, scheme):
     method, steps = scheme
@@ -106,7 +106,7 @@ def test_a_linear_field_gives_the_truncated_exponential(name, steps):
     torch.testing.assert_close(moved, expected, rtol=1e-13, atol=1e-13)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(groups, seeds)
 def test_the_log_determinant_is_that_of_the_jacobian_of_the_flow(group, seed):
     flow = Flow(gentle_field(group, 1, seed), steps=32, method="rk5")

@@ -58,7 +58,7 @@ FLOWS = {
 every_kind = pytest.mark.parametrize("kind", FLOWS)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(groups, seeds)
 def test_jacobians_are_those_of_finite_differences(group, seed):
     flow = Flow(gentle_field(group, 2, seed), steps=4, warn=False)

@@ -229,15 +229,15 @@ def test_labels_are_sorted_as_well_as_can_be(count: int, length: int, seed: int)
 
 
 def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted(monkeypatch) -> None:
-    monkeypatch.setattr(separable, "FINE", 0.05)
+    monkeypatch.setattr(separable, "FINE", 0.08)
     monkeypatch.setattr(separable, "DIRECTIONS", 16)
     group, body = group_named("P -1"), creature()
-    distance = SignedDistance.of_mesh(body, 0.05)
+    distance = SignedDistance.of_mesh(body, 0.08)
 
     def depth(points: Array) -> Array:
         return -distance(points)
 
-    tile = separable_tile(5000, depth, body, group)
+    tile = separable_tile(3000, depth, body, group)
     assert tile is not None
     assert certify_solid(group, tile).valid
     size = float(np.ptp(tile.points, axis=0).max())

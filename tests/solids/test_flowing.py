@@ -43,7 +43,7 @@ def ellipsoid(center: np.ndarray) -> Mesh:
 
 
 @given(names, seeds)
-@settings(max_examples=5)
+@settings(max_examples=3)
 def test_a_divided_surface_that_a_flow_moves_fills_space(name, seed):
     group, random = group_named(name), np.random.default_rng(seed)
     own = cell_of(group)
@@ -65,7 +65,7 @@ def test_a_divided_surface_that_a_flow_moves_fills_space(name, seed):
 
 
 @given(names, seeds)
-@settings(max_examples=5)
+@settings(max_examples=3)
 def test_parts_of_divided_faces_are_partners_as_the_certificate_finds_them(name, seed):
     group, random = group_named(name), np.random.default_rng(seed)
     own = cell_of(group)

@@ -186,9 +186,9 @@ def test_a_project_of_two_is_saved_opened_and_taken_away(client, home, pair, tmp
     client.patch(address, json={"view": view})
     wishes: list[tuple[str, dict[str, Any]]] = [
         ("export", {"purpose": "web", "drawing": True}),
-        ("art", {"area": "900x600px", "picture": True, "drawing": True}),
+        ("art", {"area": "300x200px", "picture": True, "drawing": True}),
         ("solid", {"kind": "stamp"}),
-        ("animate", {"kind": "bend", "seconds": 1.0, "fps": 5}),
+        ("animate", {"kind": "bend", "seconds": 0.5, "fps": 4, "area": "120x80px"}),
     ]
     texts = list[bytes]()
     for operation, wish in wishes:

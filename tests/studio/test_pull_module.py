@@ -314,7 +314,7 @@ def test_tiles_are_measured_as_files_are() -> None:
     check([*rings, *(ring @ rotation_matrix(0.4).T for ring in rings)])
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_rings_of_any_shape_and_grid(seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -16,7 +16,7 @@ from refusals import refused
 from strategies import groups, plane_groups, random_field, random_tensor, seeds, several
 
 
-@settings(max_examples=7)
+@settings(max_examples=3)
 @given(groups, seeds)
 def test_symmetric_fields_maps_and_densities_pass(group, seed):
     fields = several(group, seed, 2) if group.dim < 3 else [random_field(group, 1, seed, rms=0.02)]

@@ -212,7 +212,7 @@ def test_a_smooth_curve_takes_few_pieces_and_has_no_kinks() -> None:
     assert kinks(curve).max() < 1e-9
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(tiles, st.floats(1e-4, 0.01))
 def test_smooth_tiles_tile_as_exactly_as_polygons(tile: Tile, share: float) -> None:
     tolerance = share * tile.radius

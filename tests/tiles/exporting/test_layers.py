@@ -107,7 +107,7 @@ def test_programs_agree_on_cut_and_engraving() -> None:
     # a renderer of SVG, a reader of PDF and the polygons of the DXF
     places, black = eyes("IH4", scene), 255 - rendered(text, 10).max(axis=2)
     page = pypdfium2.PdfDocument(exported("IH4", "pdf", cut="skeleton")[1])[0]
-    pdf = 255 - np.asarray(page.render(scale=28).to_pil().convert("RGB")).max(axis=2)
+    pdf = 255 - np.asarray(page.render(scale=8).to_pil().convert("RGB")).max(axis=2)
     seen = centres(black, places, 10)
     printed = centres(pdf, places, np.array(pdf.shape[::-1]) / PAGE["area"])
     rings = tuple(Curve.polyline(ring.coords[:-1], closed=True) for ring in flat["engrave"])

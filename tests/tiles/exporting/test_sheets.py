@@ -51,7 +51,7 @@ def sheets_of(area, bed, **options):
     return found
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.floats(120, 320), st.floats(90, 300), st.floats(90, 200), st.floats(80, 200))
 def test_together_they_are_the_page(width, height, bed_width, bed_height) -> None:
     parts = sheets_of((width, height), (bed_width, bed_height), clip=True)

@@ -54,7 +54,7 @@ def drawn_twice(lines: list[Line]) -> int:
     return int((np.abs((way[first] * way[second]).sum(axis=1)) > 0.999).sum())
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(tiles, st.floats(15, 50), st.sampled_from(["svg", "dxf"]), st.booleans())
 def test_no_line_twice_and_nothing_beyond_the_page(tile, size, form, clip) -> None:
     _, lines = lines_of(tile, tile_size=size, format=form, clip=clip)

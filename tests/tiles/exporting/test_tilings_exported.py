@@ -41,7 +41,7 @@ def text_of(tile: Tile | EscherTile, **options) -> str:
     return content
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=7, deadline=None)
 @given(tiles, st.floats(25, 60), st.booleans(), st.just(0.0) | st.floats(-180, 180))
 def test_tiles_cover_the_page_once(tile: Tile, size: float, dxf: bool, angle: float) -> None:
     options = {"tile_size": size, "area": (120.0, 90.0), "clip": True, "rotate": angle}

@@ -79,7 +79,7 @@ def test_starts_from_the_centred_template_of_area_one(name: str) -> None:
     assert largest(area - torch.tensor([1.0, -1.0, 1.0])) < 1e-13
 
 
-@settings(max_examples=9)
+@settings(max_examples=4)
 @given(kinds, seeds)
 def test_tiles_of_any_parameters_are_certified(kind: IsohedralClass, seed: int) -> None:
     model = random_model(kind, seed)

@@ -118,7 +118,7 @@ def started(name: str, seed: int, *, from_template: bool) -> TileModel:
     return model
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(st.sampled_from(list(CLASSES)), casts, seeds, st.booleans())
 def test_no_cast_loses_the_certificate(name, steps: list[str], seed, from_template) -> None:
     model = started(name, seed, from_template=from_template)

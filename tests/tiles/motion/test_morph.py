@@ -14,7 +14,7 @@ from refusals import refused
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(swirled, st.lists(st.floats(0, 1), min_size=2, max_size=4))
 def test_every_frame_tiles(tile: Tile, shares: list[float]) -> None:
     assume(is_sound(tile))

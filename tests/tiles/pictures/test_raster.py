@@ -153,10 +153,6 @@ def pixels_of_sketch(data: bytes) -> Array:
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
 
-def share_of_sketch(image: Array, colour: tuple[int, int, int]) -> float:
-    return float((np.abs(image - colour).max(axis=-1) <= 2).mean())
-
-
 @given(st.floats(-1, 0.5), st.floats(-0.8, 0.2), st.floats(0.3, 1.2), st.floats(0.2, 0.7))
 def test_a_box_covers_its_pixels(x: float, y: float, wide: float, high: float) -> None:
     sketch = Sketch(WINDOW, Sheet.screen(200))

@@ -69,7 +69,7 @@ def edge_error(of: TileSpace, index: int, ring: Complex, linear: Array, offset: 
 
 
 @pytest.mark.parametrize("name", CLASSES)
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(seed=seeds, turn=angles)
 def test_nearest_is_the_projection_by_the_matrices(name: str, seed: int, turn: float) -> None:
     own = space(name)

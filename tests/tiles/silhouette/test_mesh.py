@@ -238,7 +238,7 @@ def test_coarse_and_fine_points_go_together(name: str, phase: float) -> None:
 
 
 @pytest.mark.parametrize("name", THICK)
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(phase=phases)
 def test_corners_stay_where_they_are(name: str, phase: float) -> None:
     ring = RINGS[name]

@@ -47,7 +47,7 @@ def test_what_was_seen_covers_the_outline(picture: np.ndarray, threshold, thicke
     assert filled(target).intersection(outline).area > 0.98 * outline.area
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(pictures(), st.integers(1, STEPS - 1), st.sampled_from([0.02, 0.05]))
 def test_smoothing_keeps_the_shape_that_was_read(picture: np.ndarray, threshold, share) -> None:
     try:

@@ -157,7 +157,7 @@ TENTHS = st.integers(0, 10).map(lambda k: k / 10)
     radial=st.booleans(),
     turn=st.integers(-40, 40),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_any_gradient_that_fades_is_what_a_renderer_draws(
     ends: tuple[float, ...], stops: list[tuple[float, int]], spread: str, radial: bool, turn: int
 ) -> None:

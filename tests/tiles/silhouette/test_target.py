@@ -110,7 +110,7 @@ def test_bad_polygons(points: object, message: str) -> None:
     assert str(caught.value).startswith("my polygon: ")
 
 
-@settings(max_examples=7, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(star_shapes())
 def test_raster_round_trip(tmp_path_factory: pytest.TempPathFactory, points: np.ndarray) -> None:
     low, extent = points.min(axis=0), np.ptp(points, axis=0).max()

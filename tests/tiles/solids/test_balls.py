@@ -63,7 +63,7 @@ def test_the_pieces_of_a_ball_are_the_ball(tile: Any, order: Any) -> None:
     assert apart < 0.004 * shell
 
 
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(tiles)
 def test_joints_of_neighbours_meet(tile: Any) -> None:
     own = EscherTile(tile)

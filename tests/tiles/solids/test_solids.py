@@ -61,7 +61,7 @@ def test_every_solid_is_closed_in_both_files(tile: Tile, kind: Kind) -> None:
 
 
 @given(tiles)
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 def test_the_volume_of_a_tile(tile: Tile) -> None:
     area = in_mm(tile, 50).area
     plain = make_solid(tile, SolidSettings(height=5, chamfer=0, clearance=0))
