@@ -38,6 +38,12 @@ def png(
     return SIGNATURE + chunk(b"IHDR", header) + more + ends
 
 
+def promise(width: int, height: int) -> bytes:
+    """A PNG that promises so many pixels and holds none."""
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return SIGNATURE + chunk(b"IHDR", header) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
+
+
 def saved(image: Image.Image, kind: str = "PNG", **options: Any) -> bytes:
     """The bytes of a picture as Pillow saves it, as a file of any kind."""
     stream = io.BytesIO()

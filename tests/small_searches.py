@@ -17,11 +17,16 @@ FEW: dict[str, Any] = {
 
 @contextmanager
 def small_searches() -> Iterator[None]:
-    """Search for likeness at the effort "fast" from few places, in this process and its forks."""
+    """Search for likeness at the effort "fast" from few places, in this process and its forks.
+
+    What is found is drawn roughly.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(LikenessSearch.efforts, "fast", FEW)  # pyright: ignore[reportArgumentType]
         for name, value in {"placements": 10, "held": 3, "finalists": 1, "rounds": 2}.items():
             patch.setitem(SKETCH, name, value)
+        for module in ("drawing.raster", "tiles.write.png"):
+            patch.setattr(f"orbiflow.{module}.FINER", 1)
         yield
 
 

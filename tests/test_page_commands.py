@@ -86,7 +86,7 @@ OF_A_PAGE = {
     ("docs/summaries.md", "poles"): "plat,plon",
 }
 COAST = {"type": "LineString", "coordinates": [[0, 0], [20, 30], [60, 40]]}
-ROWS = 40
+ROWS = 60
 LENGTHS = {"length", "temperature", "pressure", "depth", "speed", "w", "x", "y", "z"}
 
 

@@ -10,7 +10,6 @@ import pypdfium2
 import pytest
 
 from orbiflow.cli.app import run
-from orbiflow.density import read_density
 from refusals import names
 
 FIT = ["--max-frequency", 1, "--segments", 1]
@@ -155,33 +154,6 @@ def test_measures_differ_by_their_areas(tmp_path: Path, orbiflow, fitted) -> Non
     assert means["natural"] == pytest.approx(means["square"] - 2 * np.log(360), abs=1e-6)
 
 
-MISTAKES = {
-    "no file": ("", "sphere", "nowhere.csv"),
-    "empty": ("", "sphere", "empty"),
-    "header only": ("lat,lon\n", "sphere", "1"),
-    "one row": ("lat,lon\n1,2\n", "sphere", "10 1"),
-    "all equal": ("lat,lon\n" + "1,2\n" * 500, "sphere", "10 1"),
-    "latitude": ("lat,lon\n" + "95,2\n" * 20, "sphere", "95 90"),
-    "not unit": ("1,2,3\n" * 20, "projective-plane", "3.742 1"),
-    "strings": ("lat,lon\n" + "1,2\n" * 20 + "north,3\n", "sphere", "north"),
-    "nan": ("lat,lon\n" + "1,2\n" * 20 + "nan,3\n", "torus", "nan"),
-    "infinite": ("lat,lon\n" + "1,2\n" * 20 + "inf,3\n", "torus", "inf"),
-    "columns": ("a,b,c,d\n" + "1,2,3,4\n" * 20, "klein-bottle", "--columns"),
-    "ragged": ("lat,lon\n1,2\n1\n", "sphere", "3"),
-}
-
-
-@pytest.mark.parametrize("case", MISTAKES)
-def test_mistakes_in_the_data(case: str, tmp_path: Path, orbiflow) -> None:
-    content, space, about = MISTAKES[case]
-    data = tmp_path / ("nowhere.csv" if case == "no file" else "data.csv")
-    if case != "no file":
-        data.write_text(content)
-    outcome = orbiflow.refused("density", "fit", data, "--space", space, "--out", tmp_path / "out")
-    names(outcome.err, *about.split())
-    assert not (tmp_path / "out" / "density.safetensors").exists()
-
-
 def test_mistakes_in_the_options(tmp_path: Path, orbiflow, fitted) -> None:
     data, model = table(tmp_path), fitted("torus")
     fit = ("density", "fit", data, "--space", "torus", "--unit", "degrees")
@@ -195,14 +167,6 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow, fitted) -> None:
     ):
         outcome = orbiflow.refused(*arguments)
         names(outcome.err, *about.split())
-
-
-def test_the_model_is_whole_and_readable(fitted) -> None:
-    model = fitted("sphere")
-    density, extra = read_density(model / "density.safetensors")
-    assert extra["columns"] == ["lat", "lon"]
-    assert extra["fitted_rows"]["rows"] == 100
-    assert density.mass(128) == pytest.approx(1.0, abs=2e-3)
 
 
 def test_a_fit_that_the_limit_ended_says_so(tmp_path: Path, orbiflow) -> None:

@@ -177,16 +177,11 @@ def test_masses_have_errors_that_are_not_zero(folder: Path, orbiflow: Any) -> No
     names(nothing, "0.000000 ± 0.0000")
 
 
-def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orbiflow: Any) -> None:
+def test_geojson_of_directions(tmp_path: Path, orbiflow: Any) -> None:
     rng = np.random.default_rng(0)
-    write(
-        tmp_path / "d.csv",
-        "lat,lon",
-        np.stack([rng.normal(0, 20, 90).clip(-80, 80), rng.normal(170, 30, 90)], axis=1),
-    )
-    orbiflow.done(
-        "density", "fit", tmp_path / "d.csv", "--space", "sphere", *QUICK, "--out", tmp_path / "m"
-    )
+    rows = np.stack([rng.normal(0, 20, 90).clip(-80, 80), rng.normal(170, 30, 90)], axis=1)
+    data = write(tmp_path / "d.csv", "lat,lon", rows)
+    orbiflow.done("density", "fit", data, "--space", "sphere", *QUICK, "--out", tmp_path / "m")
     out = tmp_path / "r.geojson"
     orbiflow.done("density", "region", "-m", tmp_path / "m", "--mass", "0.8", "--out", out)
     (feature,) = json.loads(out.read_text())["features"]
@@ -194,16 +189,6 @@ def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orb
     assert xs.max() == 180
     assert xs.min() == -180
     assert feature["properties"]["held"] == 0.8
-    write(tmp_path / "t.csv", "phi,psi,chi", rng.vonmises(0, 1, (90, 3)))
-    orbiflow.done(
-        "density", "fit", tmp_path / "t.csv", "--space", "torus", "--unit", "radians", *QUICK,
-        "--out", tmp_path / "t",
-    )  # fmt: skip
-    orbiflow.done("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.json")
-    found = json.loads((tmp_path / "t.json").read_text())
-    assert found["size_unit"] == "radians^3"
-    assert "polygons" not in found["regions"][0]
-    orbiflow.refused("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.csv2")
 
 
 def test_score_refuses_other_columns(folder: Path, orbiflow: Any) -> None:

@@ -21,7 +21,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("degrees", "torus", "degrees", np.degrees(angles), ["phi", "psi"]),
         ("sphere", "sphere", None, np.degrees(angles).clip(-80, 80), ["lat", "lon"]),
     ):
-        write(folder / f"{name}.csv", columns, data)
+        write(folder / f"{name}.csv", ",".join(columns), data)
         fitted = DensityEstimator(space, unit=unit, components="mixture").fit(data)
         (folder / name).mkdir()
         (folder / name / "density.safetensors").write_bytes(
@@ -31,12 +31,12 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "damaged").mkdir()
     whole = (folder / "torus" / "density.safetensors").read_bytes()
     (folder / "damaged" / "density.safetensors").write_bytes(whole[:-9])
-    write(folder / "one.csv", ["phi"], angles[:, :1])
+    write(folder / "one.csv", "phi", angles[:, :1])
     return folder
 
 
-def write(path: Path, columns: list[str], values: np.ndarray) -> None:
-    np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="")
+def write(path: Path, header: str, values: np.ndarray) -> None:
+    np.savetxt(path, values, delimiter=",", header=header, comments="")
 
 
 @pytest.mark.parametrize(
@@ -126,15 +126,15 @@ def folder_fixture_of_options(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("mistakes")
     rng = np.random.default_rng(0)
     angles = rng.vonmises([0.0, 1.0, 2.0], 4.0, (40, 3))
-    table(folder / "two.csv", "phi,psi", angles[:, :2])
-    table(folder / "other.csv", "phi,psi", angles[::-1, :2] + 0.01)
-    table(folder / "places.csv", "lat,lon", np.degrees(angles[:, :2]).clip(-80, 80))
-    table(folder / "beyond.csv", "lat,lon", np.full((30, 2), 95.0))
-    table(folder / "weights.csv", "phi,psi,w", np.column_stack([angles[:, :2], -np.eye(1, 40)[0]]))
+    write(folder / "two.csv", "phi,psi", angles[:, :2])
+    write(folder / "other.csv", "phi,psi", angles[::-1, :2] + 0.01)
+    write(folder / "places.csv", "lat,lon", np.degrees(angles[:, :2]).clip(-80, 80))
+    write(folder / "beyond.csv", "lat,lon", np.full((30, 2), 95.0))
+    write(folder / "weights.csv", "phi,psi,w", np.column_stack([angles[:, :2], -np.eye(1, 40)[0]]))
     gaps = angles[:, :2].copy()
     gaps[7, 1] = np.nan
-    table(folder / "gaps.csv", "phi,psi", gaps)
-    table(folder / "nothing.csv", "phi,psi", np.full((12, 2), np.nan))
+    write(folder / "gaps.csv", "phi,psi", gaps)
+    write(folder / "nothing.csv", "phi,psi", np.full((12, 2), np.nan))
     for dim in (2, 3):
         fitted = DensityEstimator("torus", components="mixture").fit(angles[:, :dim])
         model = folder / f"model{dim}"
@@ -143,10 +143,6 @@ def folder_fixture_of_options(tmp_path_factory: pytest.TempPathFactory) -> Path:
             density_to_bytes(fitted.density_, columns=["phi", "psi", "chi"][:dim])
         )
     return folder
-
-
-def table(path: Path, header: str, values: np.ndarray) -> None:
-    np.savetxt(path, values, delimiter=",", header=header, comments="")
 
 
 @pytest.mark.parametrize(
@@ -188,21 +184,12 @@ def test_mistakes(words: str, about: str, folder_of_options: Path, orbiflow) -> 
 def test_rows_that_lack_a_value_can_be_left_out_of_pictures(
     folder_of_options, tmp_path, orbiflow
 ) -> None:
-    plot = (
-        "density",
-        "plot",
-        "-m",
-        folder_of_options / "model2",
-        "--out",
-        tmp_path / "plots",
-        "--data",
-    )
+    model, out = folder_of_options / "model2", tmp_path / "plots"
+    plot = ("density", "plot", "-m", model, "--out", out, "--data")
     done = orbiflow.done(*plot, folder_of_options / "gaps.csv", "--drop-missing")
     names(done.out, 1, 9)
     bare = tmp_path / "bare.csv"
-    bare.write_text(
-        "".join((folder_of_options / "two.csv").read_text().splitlines(keepends=True)[1:])
-    )
+    bare.write_text((folder_of_options / "two.csv").read_text().partition("\n")[2])
     orbiflow.done(*plot, bare, "--no-header", "--columns", "1,2")
 
 
@@ -222,75 +209,35 @@ def test_a_flow_that_was_meant_and_not_tried_is_said(
         assert (said in done.out) == told, options
 
 
-@pytest.fixture(name="folder_of_masses", scope="module")
-def folder_fixture_of_masses(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a model and its data."""
-    folder = tmp_path_factory.mktemp("masses")
-    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
-    np.savetxt(folder / "data.csv", angles, delimiter=",", header="phi,psi", comments="")
-    fitted = DensityEstimator("torus", components="mixture").fit(angles)
-    (folder / "density.safetensors").write_bytes(
-        density_to_bytes(fitted.density_, columns=["phi", "psi"])
-    )
-    return folder
-
-
-def test_a_mass_gets_the_samples_that_it_needs(folder_of_masses: Path, orbiflow) -> None:
-    region = (
-        "density",
-        "region",
-        "-m",
-        folder_of_masses,
-        "--budget",
-        5000,
-        "--out",
-        folder_of_masses / "r.json",
-    )
+def test_a_mass_gets_the_samples_that_it_needs(folder: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "r.json"
+    region = ("density", "region", "-m", folder / "torus", "--budget", 5000, "--out", out)
     for mass, options, count in (
         ("0.5,0.9", (), 20_000),
         ("0.5,0.9995", (), 200_000),
         ("0.5,0.9995", ("--samples", 20_000), 20_000),
     ):
         orbiflow.done(*region, "--mass", mass, *options)
-        assert json.loads((folder_of_masses / "r.json").read_text())["samples"] == count
+        assert json.loads(out.read_text())["samples"] == count
 
 
-def test_rows_far_out_are_told_apart_by_more_samples(folder_of_masses: Path, orbiflow) -> None:
-    out = folder_of_masses / "s.csv"
-    score = (
-        "density",
-        "score",
-        folder_of_masses / "data.csv",
-        "-m",
-        folder_of_masses,
-        "--region",
-        "--out",
-        out,
-    )
+def test_rows_far_out_are_told_apart_by_more_samples(folder: Path, tmp_path, orbiflow) -> None:
+    out, data, model = tmp_path / "s.csv", folder / "torus.csv", folder / "torus"
+    score = ("density", "score", data, "-m", model, "--region", "--out", out)
     done = orbiflow(*score)
     names(done.out, 20000, "0.0035", "0.0005", "0.9995")
     done = orbiflow.done(*score, "--samples", 200_000)
     names(done.out, 200000, "0.0011", "5e-05", "0.99995")
-    density, _ = read_density(folder_of_masses / "density.safetensors")
+    density, _ = read_density(model / "density.safetensors")
     with out.open() as file:
         rows = list(csv.DictReader(file))
-    expected = DensityLevels(density, samples=200_000).hdr(
-        np.loadtxt(folder_of_masses / "data.csv", delimiter=",", skiprows=1)
-    )
+    angles = np.loadtxt(data, delimiter=",", skiprows=1)
+    expected = DensityLevels(density, samples=200_000).hdr(angles)
     assert [float(row["hdr"]) for row in rows] == pytest.approx(expected.tolist(), abs=1e-9)
 
 
-def test_lines_far_out(folder_of_masses: Path, orbiflow) -> None:
-    plot = (
-        "density",
-        "plot",
-        "-m",
-        folder_of_masses,
-        "--out",
-        folder_of_masses / "plots",
-        "--format",
-        "svg",
-    )
+def test_lines_far_out(folder: Path, tmp_path: Path, orbiflow) -> None:
+    plot = ("density", "plot", "-m", folder / "torus", "--out", tmp_path, "--format", "svg")
     done = orbiflow.done(*plot, "--regions", "0.5,0.9995", "--region-samples", 20_000)
     names(done.out, "50 %", "99.95 %")
 
@@ -306,32 +253,14 @@ def test_lines_far_out(folder_of_masses: Path, orbiflow) -> None:
         ("plot --regions abc", "--regions 1 0 abc"),
     ],
 )
-def test_mistakes_of_masses(words: str, about: str, folder_of_masses: Path, orbiflow) -> None:
+def test_mistakes_of_masses(words: str, about: str, folder: Path, tmp_path, orbiflow) -> None:
     command, *options = (
-        str(folder_of_masses / word) if ".csv" in word else word for word in words.split()
+        str(folder / "torus.csv") if word == "data.csv" else word for word in words.split()
     )
-    before = sorted(folder_of_masses.iterdir())
-    out = {"region": "x.json", "score": "x.csv", "plot": "x"}[command]
-    done = orbiflow.refused(
-        "density", command, *options, "-m", folder_of_masses, "--out", folder_of_masses / out
-    )
+    out = tmp_path / {"region": "x.json", "score": "x.csv", "plot": "x"}[command]
+    done = orbiflow.refused("density", command, *options, "-m", folder / "torus", "--out", out)
     names(done.err, *about.split())
-    assert sorted(folder_of_masses.iterdir()) == before
-
-
-@pytest.fixture(name="fitted", scope="module")
-def fitted_fixture(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Directions, and the folder of a density of them."""
-    from orbiflow.density import DensityEstimator, density_to_bytes
-
-    folder = tmp_path_factory.mktemp("score")
-    values = np.random.default_rng(0).normal([20.0, 60.0], 25.0, (100, 2)).clip(-89, 89)
-    data = folder / "data.csv"
-    np.savetxt(data, values, delimiter=",", fmt="%.4f", header="lat,lon", comments="")
-    estimator = DensityEstimator("sphere", components="kernels,mixture").fit(values)
-    model = folder / "density.safetensors"
-    model.write_bytes(density_to_bytes(estimator.density_))
-    return data, model
+    assert not list(tmp_path.iterdir())
 
 
 def columns(path: Path) -> tuple[str, np.ndarray]:
@@ -339,23 +268,17 @@ def columns(path: Path) -> tuple[str, np.ndarray]:
     return header, np.array([row.split(",") for row in rows], dtype=float)
 
 
-def test_the_gradient_is_that_of_the_scores(fitted, tmp_path: Path, orbiflow) -> None:
-    data, model = fitted
-    out = tmp_path / "out.csv"
-    orbiflow.done("density", "score", data, "--model", model, "--gradient", "--out", out)
+def test_the_gradient_is_that_of_the_scores(folder: Path, tmp_path: Path, orbiflow) -> None:
+    out, moved, scored = (tmp_path / f"{name}.csv" for name in ("out", "moved", "scored"))
+    model = ("--model", folder / "sphere", "--out")
+    orbiflow.done("density", "score", folder / "sphere.csv", "--gradient", *model, out)
     header, found = columns(out)
     assert header == "lat,lon,log_prob,log_prob_by_lat,log_prob_by_lon"
     for axis, step in enumerate(1e-3 * np.eye(2)):
         ends = []
         for sign in (1, -1):
-            moved, scored = tmp_path / "moved.csv", tmp_path / "scored.csv"
-            np.savetxt(
-                moved, found[:, :2] + sign * step, delimiter=",", header="lat,lon", comments=""
-            )
-            assert (
-                orbiflow("density", "score", moved, "--model", model, "--out", scored).status == 0
-            )
+            write(moved, "lat,lon", found[:, :2] + sign * step)
+            orbiflow.done("density", "score", moved, *model, scored)
             ends.append(columns(scored)[1][:, 2])
-        np.testing.assert_allclose(
-            found[:, 3 + axis], (ends[0] - ends[1]) / 2e-3, rtol=1e-3, atol=1e-4
-        )
+        slope = (ends[0] - ends[1]) / 2e-3
+        np.testing.assert_allclose(found[:, 3 + axis], slope, rtol=1e-3, atol=1e-4)

@@ -66,26 +66,28 @@ def test_orientations_are_summarised_and_fitted_and_not_drawn(tmp_path, orbiflow
 def test_rotations_of_another_form_than_the_model_are_refused(tmp_path, orbiflow: Any) -> None:
     turns = Rotation.from_rotvec(np.random.default_rng(0).normal(0, 0.5, (60, 3)))
     half = turns.as_quat()[:, :3] / turns.as_quat()[:, 3:]
-    tables = {"phi1,Phi,phi2": turns.as_euler("ZXZ"), "rodrigues1,rodrigues2,rodrigues3": half}
-    for number, (header, values) in enumerate(tables.items()):
+    euler, rodrigues = "phi1,Phi,phi2", "rodrigues1,rodrigues2,rodrigues3"
+    tables = (euler, turns.as_euler("ZXZ")), (rodrigues, half), (euler, turns.inv().as_euler("ZXZ"))
+    for number, (header, values) in enumerate(tables):
         name = tmp_path / f"{number}.csv"
         np.savetxt(name, values, delimiter=",", header=header, comments="")
-    how = ("--space", "rotation-space", "--crystal", "222", "--components", "kernels")
-    how += ("--unit", "radians")
+    how = (
+        "--space",
+        "rotation-space",
+        "--crystal",
+        "222",
+        "--components",
+        "kernels",
+        "--unit",
+        "radians",
+    )
     orbiflow.done("density", "fit", tmp_path / "0.csv", *how, "-o", tmp_path / "m")
     done = orbiflow(
         "density", "score", tmp_path / "1.csv", "-m", tmp_path / "m", "-o", tmp_path / "s.csv",
-        "--columns", "rodrigues1,rodrigues2,rodrigues3",
+        "--columns", rodrigues,
     )  # fmt: skip
     names(done.err, "Rodrigues", "ZXZ")
     both = ("-d", tmp_path / "0.csv", "-d", tmp_path / "2.csv", "--space", "rotation-space")
-    np.savetxt(
-        tmp_path / "2.csv",
-        turns.inv().as_euler("ZXZ"),
-        delimiter=",",
-        header="phi1,Phi,phi2",
-        comments="",
-    )
     symmetry = ("--crystal", "cubic", "--specimen", "222", "-o", tmp_path / "c.json")
     symmetry += ("--unit", "radians")
     orbiflow.done("density", "compare-data", *both, *symmetry)

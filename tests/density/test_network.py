@@ -283,7 +283,7 @@ def test_arrows_are_along_the_chain() -> None:
 
 
 def test_the_default_takes_a_network_where_states_multiply() -> None:
-    angles = states(5, 240, 6)
+    angles = states(5, 240, 8)
     scores = {
         parts: DensityEstimator("torus", components=parts, seed=1)
         .fit(angles[:180])

@@ -50,9 +50,10 @@ SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "solids.schema.json").
 
 @pytest.fixture(scope="module", name="run")
 def run_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a small run of the command."""
-    folder = tmp_path_factory.mktemp("fill")
-    with small_fills():
+    """The folder of a small run of the command, whose search is that of `found`."""
+    folder, solids = tmp_path_factory.mktemp("fill"), list(found())
+    with small_fills(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "fill", lambda *_, **__: solids)
         outcome = fill_operation(creature_file(folder), folder / "out", SMALL)
     assert outcome.state == "done"
     return folder / "out"

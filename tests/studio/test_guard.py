@@ -3,8 +3,6 @@
 import asyncio
 import io
 import itertools
-import struct
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ from PIL import Image
 
 from orbiflow.studio import Limits, guard
 from orbiflow.studio.guard import Guard
+from png_files import promise
 from studio.served import SQUARE, Client, done, new_project, studio
 
 
@@ -138,23 +137,11 @@ def test_what_is_too_large_is_refused_before_it_is_read(client: Client, tmp_path
     assert files(tmp_path) == set()
 
 
-def png_of_size(width: int, height: int) -> bytes:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return (
-            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        )
-
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    rows = zlib.compress(b"\0" * 10_000)
-    parts = chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + parts
-
-
 @pytest.mark.parametrize("mask", ["input?name=bomb.png", "mend"])
 def test_a_bomb_is_refused_before_it_is_decoded(client: Client, tmp_path: Path, mask: str) -> None:
     address = new_project(client)
     done(client, client.put(f"{address}/input?name=a.json", content=SQUARE))
-    task = done(client, client.put(f"{address}/{mask}", content=png_of_size(50_000, 50_000)))
+    task = done(client, client.put(f"{address}/{mask}", content=promise(50_000, 50_000)))
     assert task["state"] == "failed"
     assert "megapixels" in task["error"]
     assert str(tmp_path) not in task["error"]

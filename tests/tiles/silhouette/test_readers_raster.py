@@ -3,8 +3,6 @@
 import hashlib
 import io
 import os
-import struct
-import zlib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -20,6 +18,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import FileContent, Reading, Target, iou, read_outline
 from orbiflow.tiles.silhouette import doubts
+from png_files import promise
 from refusals import refused
 
 # An L whose long arm points down and whose foot points right, in pixels.
@@ -247,15 +246,9 @@ def test_images_without_a_shape(tmp_path, make: Callable[[], Image.Image], messa
 
 
 def test_a_bomb_is_refused_by_its_header(tmp_path: Path) -> None:
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        return (
-            struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-        )
-
+    path = tmp_path / "bomb.png"
     for side, said in ((12_000, "12000 x 12000 pixels"), (60_000, "3600 megapixels")):
-        path = tmp_path / "bomb.png"
-        header = chunk(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0))
-        path.write_bytes(b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", b"") + chunk(b"IEND", b""))
+        path.write_bytes(promise(side, side))
         with pytest.raises(InputFileError, match=f"{said}.*128 megapixels are read"):
             read_outline(path)
 
