@@ -24,13 +24,20 @@ def studio_fixture(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running
         yield own
 
 
-@pytest.fixture(name="page")
-def page_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
-    """A page of the studio that tells of every error, and asks no other host for anything."""
-    context = browser.new_context(
+@pytest.fixture(scope="module", name="context")
+def context_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
+    """What the pages of a module share: files that were fetched."""
+    own = browser.new_context(
         base_url=studio.address, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
     )
-    context.set_default_timeout(120_000)
+    own.set_default_timeout(120_000)
+    yield own
+    own.close()
+
+
+@pytest.fixture(name="page")
+def page_fixture(context: Any, studio: RunningStudio) -> Iterator[Any]:
+    """A page of the studio that tells of every error, and asks no other host for anything."""
     page, wrong = context.new_page(), list[str]()
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("response", lambda got: got.status in (200, 206, 304, 422) or wrong.append(got.url))
@@ -46,7 +53,11 @@ def page_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
     )
     page.wrong = wrong
     yield page
-    context.close()
+    if not page.is_closed() and page.url.startswith(studio.address):
+        page.evaluate("localStorage.clear()")
+    context.clear_permissions()
+    for own in context.pages:
+        own.close()
     assert wrong == []
 
 

@@ -1,4 +1,4 @@
-"""What is shared of a tile, in a real browser: the page without an end, opened from a disk."""
+"""What is shared and taken away of a tile, in a real browser: pages opened from a disk, and offers."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -12,9 +12,21 @@ import shapely
 from PIL import Image
 
 from artworks import EYE, size_of, squirrel
+from bent_tiles import bent_tile
 from exported import tile_of
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import ISOHEDRAL_TYPES, ExportSettings, Tiling, colouring, export, tiling_json
+from orbiflow.runtime import ignore
+from orbiflow.studio.project_file import write_project
+from orbiflow.studio.tile_files import put_tile
+from orbiflow.tiles import (
+    ISOHEDRAL_TYPES,
+    EscherTile,
+    ExportSettings,
+    Tiling,
+    colouring,
+    export,
+    tiling_json,
+)
 from orbiflow.tiles.write import write_scene
 from studio.browser import RunningStudio
 from studio_checks import serious_issues
@@ -273,3 +285,63 @@ def test_drawing_is_copied_and_printed(taking: Any) -> None:
     pixels = np.asarray(document[0].render(scale=0.5).to_pil().convert("L"))
     assert pixels[:, 20:-20].max(axis=1).min() > 100  # no row is dark all along
     assert taking.locator(".share").is_visible()
+
+
+@pytest.fixture(name="project")
+def project_fixture(studio: RunningStudio, tmp_path: Path) -> dict[str, Any]:
+    """A project with eight tiles, of which one goes to a sphere."""
+    every = ["IH6", "IH4", "IH2", "IH1", "IH3", "IH5", "IH28", "IH4"]
+    for place, name in enumerate(every):
+        put_tile(tmp_path, 7000 + place, "final", EscherTile(bent_tile(name, 40.0)), ignore)
+    tiles = [{"id": 7000 + place, "parent": None} for place in range(len(every))]
+    document = {"name": "eight", "kind": "tile", "view": {}, "tiles": tiles}
+    empty = {"input": None, "reading": {}, "second": None}
+    write_project(tmp_path, {**document, **empty}, tmp_path / "eight.orbiflow")
+    content = (tmp_path / "eight.orbiflow").read_bytes()
+    return studio.client.post("projects/open", content=content).json()
+
+
+def value(page: Any, name: str) -> str:
+    return page.locator(f"[name={name}]").input_value()
+
+
+def test_the_tile_that_can_is_one_click_away(page: Any, project: dict[str, Any]) -> None:
+    able = next(own for own in project["tiles"] if own["class_name"] == "IH28")
+    page.goto(f"/#/p/{project['id']}/take/{project['tiles'][0]['id']}")
+    page.locator("label", has_text="Picture").click()
+    offered = page.locator("[name=world] option")
+    offered.first.wait_for(state="attached")
+    assert "sphere" not in [own.get_attribute("value") for own in offered.all()]
+    page.get_by_role("link", name="Take a tile that can").click()
+    page.wait_for_url(f"**/take/{able['id']}")
+    page.locator("[name=world] option[value=sphere]").wait_for(state="attached")
+    assert value(page, "world") == "sphere"
+    page.evaluate("document.querySelectorAll('.form details').forEach((own) => (own.open = true))")
+    size = page.locator("[name=tile_size]")
+    assert not size.is_visible()
+    page.select_option("[name=world]", "")
+    assert size.is_visible()
+
+
+def test_back_leads_to_the_place_and_to_what_was_chosen(page: Any, project: dict[str, Any]) -> None:
+    page.goto(f"/#/p/{project['id']}")
+    card = page.locator(".card a.open").nth(6)
+    card.scroll_into_view_if_needed()
+    top, place = page.evaluate("scrollY"), card.get_attribute("href")
+    assert top > 0
+    card.click()
+    page.wait_for_url(f"**/{place}")
+    page.wait_for_selector("h1:focus")
+    assert page.evaluate("scrollY") == 0
+    page.go_back()
+    page.wait_for_selector(f'a[href="{place}"]:focus')
+    assert page.evaluate("scrollY") == pytest.approx(top, abs=2)
+    page.goto(f"/#/p/{project['id']}/take/{project['tiles'][0]['id']}")
+    page.select_option("[name=purpose]", "stickers")
+    page.locator("[name=tile_size]").fill("33")
+    page.locator("[name=tile_size]").blur()
+    page.goto(f"/#/p/{project['id']}")
+    page.wait_for_selector(".card")
+    page.go_back()
+    page.wait_for_selector(".form")
+    assert (value(page, "purpose"), value(page, "tile_size")) == ("stickers", "33")
