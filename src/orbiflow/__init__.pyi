@@ -11,7 +11,7 @@ from .density.comparing.settings import DataComparisonSettings as DataComparison
 from .density.comparing.settings import NamedTestSettings as NamedTestSettings
 from .density.conditional_estimator import AngleRegressor as AngleRegressor
 from .density.conditional_estimator import ConditionalEstimator as ConditionalEstimator
-from .density.cross_validation.operations import cross_validate as cross_validate
+from .density.cross_validation.estimators import cross_validate as cross_validate
 from .density.estimator import DensityEstimator as DensityEstimator
 from .density.inference.partial import conditional as conditional
 from .density.inference.partial import marginal as marginal

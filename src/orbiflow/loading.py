@@ -190,7 +190,7 @@ def _estimator(path: Path) -> DensityEstimator:
         if "settings" in document:  # a marginal or a conditional was not fitted
             report = from_json(FitReport, document["report"], "report")
             given = dict(document["settings"])
-            settings = {name: given[name] for name in _SETTINGS}
+            settings = {name: given[name] for name in _SETTINGS if name in given}
         if unit := density.space.settings().get("unit"):
             settings["unit"] = unit
         given = file.with_name(CONDITIONAL)
@@ -204,7 +204,7 @@ def _estimator(path: Path) -> DensityEstimator:
         raise InputFileError(f"{beside}: not the report of a density: {error}") from error
 
 
-_SETTINGS = ("components", "repeats", "missing", "max_frequency", "segments", "seed")
+_SETTINGS = ("components", "effort", "repeats", "missing", "max_frequency", "segments", "seed")
 """Those of a fit that the estimator has as well."""
 
 

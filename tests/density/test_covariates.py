@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 from hypothesis import given, settings
@@ -35,6 +36,7 @@ from orbiflow.density.covariates.joint import JointDensity, joint_torus
 from orbiflow.density.covariates.kernels import ConditionalKernels
 from orbiflow.density.covariates.network import NeuralMixture
 from orbiflow.density.covariates.regression import CircularRegression
+from orbiflow.density.cross_validation import cross_validate
 from orbiflow.density.data import given_roles
 from orbiflow.density.fitting import Rows
 from orbiflow.density.models import AdaptiveKernels
@@ -158,6 +160,54 @@ def test_truth_is_found_with_numbers_cycles_and_words_together(fit: ConditionalE
     shares = {one.kind: one.share for one in report.parts}
     assert sum(shares.values()) == pytest.approx(1)
     assert shares["all"] < 0.1
+
+
+def test_densities_take_a_context_as_features_or_by_name(fit: ConditionalEstimator) -> None:
+    angles, cells, _ = drawn(20, seed=2)
+    density, points = fit.conditional_density_, fit.points_of(angles)
+    x = density.covariates.features(cells)
+    logs = density.log_prob(points, cells, measure="natural")
+    assert np.allclose(logs.numpy(), fit.score_samples(angles, cells))
+    assert torch.equal(
+        density.log_prob(points, x[0]), density.log_prob(points, x[:1].expand(20, -1))
+    )
+    one = {name: cell[0] for name, cell in cells.items()}
+    assert torch.equal(density.at(one).log_prob(points), density.at(x[0]).log_prob(points))
+
+
+def test_a_fast_fit_says_what_it_left_out() -> None:
+    rng = np.random.default_rng(1)
+    x = rng.uniform(-1, 1, 200)
+    fit = ConditionalEstimator(unit="radians", effort="fast")
+    fit.fit(rng.vonmises(2 * x, 8.0)[:, None], {"x": x})
+    report = fit.conditional_report_
+    assert {part.kind for part in report.parts} == {"all", "kernels", "regression"}
+    assert report.untried == ("network", "joint")
+    assert set(fit.report_.weights or {}) <= {"kernels", "uniform"}
+    assert any("effort fast" in text for text in report.words())
+    assert any("flow, chains, network" in text for text in fit.report_.notes)
+    with refused("effort", "components"):
+        DensityEstimator(components="flow", effort="fast").fit(rng.vonmises(0, 1, (40, 1)))
+
+
+@pytest.mark.parametrize("declared", [False, True])
+def test_an_estimator_is_cross_validated(declared: bool) -> None:
+    rng = np.random.default_rng(3)
+    x = rng.uniform(-1, 1, 120)
+    angles = rng.vonmises(2 * x, 8.0)
+    estimator = ConditionalEstimator(unit="radians", components="kernels", effort="fast")
+    label = np.arange(120) // 2
+    if declared:
+        frame = pd.DataFrame({"dir": angles, "x": x, "site": label})
+        estimator.columns = {"dir": "angle:radians", "site": "group"}
+        found = cross_validate(estimator, frame, {"x": "linear"}, folds=3)
+    else:
+        found = cross_validate(estimator, angles[:, None], {"x": x}, folds=3, groups=label)
+    assert not hasattr(estimator, "density_")
+    assert np.array_equal(found.fold[::2], found.fold[1::2])
+    assert sorted(np.unique(found.fold)) == [0, 1, 2]
+    plain = cross_validate(DensityEstimator(components="kernels"), angles[:, None], folds=3)
+    assert found.mean > plain.mean + 0.3
 
 
 def test_samples_are_of_the_density_at_the_covariates(fit: ConditionalEstimator) -> None:

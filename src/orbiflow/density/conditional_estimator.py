@@ -100,10 +100,10 @@ class ConditionalEstimator(DensityEstimator):
         check_complete(self.missing)
         if declared is None:
             cells = columns_given(aligned[0])
-            read = self._read(X, apart=list(cells))
+            read = self.read_rows(X, apart=list(cells))
         else:
             names = [str(name) for name in declared]
-            read = self._read(X, others=names, apart=names)
+            read = self.read_rows(X, others=names, apart=names)
             cells = dict(read.given)
         sample_weight, groups = read.beside(sample_weight, groups)
         are_asked = declared is not None or is_frame(given)

@@ -181,15 +181,19 @@ class DensityEstimator(FittedFigures):
         """
         _refuse_targets(y)
         _, sample_weight, groups = alongside(X=X, sample_weight=sample_weight, groups=groups)
-        rows = self._read(X)
+        rows = self.read_rows(X)
         sample_weight, groups = rows.beside(sample_weight, groups)
         if groups is None and not self.settings().flow_alone:
             groups = runs_of_draws(X)
         self._fit(rows, sample_weight, groups, progress)
         return self
 
-    def _read(self, X: Any, others: Sequence[str] = (), apart: Sequence[str] = ()) -> TableRows:
-        """Return the rows of a fit; set their space.
+    def clone(self) -> Self:
+        """An estimator of the same parameters that is not fitted."""
+        return type(self)(**self.get_params())
+
+    def read_rows(self, X: Any, others: Sequence[str] = (), apart: Sequence[str] = ()) -> TableRows:
+        """The rows that `fit` reads; sets their space.
 
         Columns `others` are kept as what is given; roles of the names `apart` are of no data.
         """

@@ -22,7 +22,7 @@ OPERATIONS = {
     "density compare-data": "orbiflow.density.operations.comparison:compare_data",
     "density test": "orbiflow.density.operations.comparison:sample_tests",
     "density region": "orbiflow.density.operations.drawing:region",
-    "density cv": "orbiflow.density.cross_validation.operations:cross_validate",
+    "density cv": "orbiflow.density.cross_validation.operations:cross_validate_table",
     "density batch": "orbiflow.density.operations.fitting:batch",
     "studio": "orbiflow.studio.operations:studio",
 }

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.covariates.columns import Covariates
+from orbiflow.density.covariates.columns import Covariates, Values
 from orbiflow.density.covariates.joint import JointDensity
 from orbiflow.density.covariates.kernels import ConditionalKernels
 from orbiflow.density.covariates.network import NeuralMixture
@@ -17,7 +18,7 @@ from orbiflow.density.covariates.parts import Part
 from orbiflow.density.covariates.regression import CircularRegression
 from orbiflow.density.fitting import stacked
 from orbiflow.density.models import Density, density_from, density_parts, mixture_of, within
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import CHART, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
 
@@ -67,6 +68,10 @@ PARTS: dict[str, type[Part]] = {
 """What a conditional density may be made of, by kind."""
 
 
+Context = Tensor | Mapping[str, Values]
+"""What is known: features, or cells by the names of columns."""
+
+
 class ConditionalDensity:
     """A mixture of conditional densities, exactly normalised wherever the covariates are.
 
@@ -82,21 +87,38 @@ class ConditionalDensity:
         self.covariates, self.parts, self.space = covariates, tuple(parts), parts[0].space
         self.weights = torch.tensor(weights, dtype=torch.float64)
 
-    @torch.no_grad()
-    def log_prob(self, points: Tensor, x: Tensor, *, measure: str = "square") -> Tensor:
-        """Return log densities (N,) at points (N, d) of the chart and features (N, m)."""
-        logs = torch.stack([part.log_prob(points, x) for part in self.parts])
-        return stacked(logs, self.weights) + self.space.log_density_factor(points, measure)
+    def context(self, given: Context) -> Tensor:
+        """Return features (N, m) of what is known: features already, or cells by columns' names."""
+        if isinstance(given, Mapping):
+            given = self.covariates.features({k: np.atleast_1d(v) for k, v in given.items()})
+        return given[None] if given.ndim == 1 else given
 
-    def at(self, x: Tensor) -> Density:
-        """Return the density where the features are x (m,), a mixture that can be saved."""
+    @torch.no_grad()
+    def log_prob(self, value: Tensor, context: Context, *, measure: str = CHART) -> Tensor:
+        """Return log densities (N,) at chart points (N, d), each where its covariates are.
+
+        Args:
+            value: The points.
+            context: Features (N, m) as `covariates.features` makes them, or cells (N,) by the columns'
+                names; a single row is that of all points.
+            measure: As for `Density.log_prob`.
+        """
+        x = self.context(context)
+        x = x.expand(len(value), -1) if len(x) == 1 else x
+        logs = torch.stack([part.log_prob(value, x) for part in self.parts])
+        return stacked(logs, self.weights) + self.space.log_density_factor(value, measure)
+
+    def at(self, context: Context) -> Density:
+        """Return the density where covariates are as one row says, a mixture that can be saved."""
+        (x,) = self.context(context)
         found: list[tuple[float, Density]] = []
         for weight, part in zip(listed(self.weights), self.parts, strict=True):
             found += [(weight * share, own) for share, own in part.at(x).parts()]
         return mixture_of(found)
 
-    def mean_directions(self, x: Tensor) -> Tensor:
-        """Return the mean directions (N, d) of a torus' angles in turns, by features (N, m)."""
+    def mean_directions(self, context: Context) -> Tensor:
+        """Return the mean directions (N, d) of a torus' angles in turns."""
+        x = self.context(context)
         means = torch.stack([part.mean_features(x) for part in self.parts])
         cos, sin = torch.einsum("p,pnk->nk", self.weights, means).chunk(2, dim=1)
         return torch.atan2(sin, cos) / (2 * math.pi)

@@ -84,6 +84,7 @@ class ConditionalReport:
       density of all rows, with the standard error.
     - `parts`: What it is made of, and what was tried.
     - `held`: The number of each row held out (n,) and its own gain (n,), for gains of some of them.
+    - `untried`: The kinds of parts that were left out to save time.
     """
 
     rows: int
@@ -91,6 +92,7 @@ class ConditionalReport:
     error: float
     parts: tuple[PartEvidence, ...]
     held: tuple[Tensor, Tensor]
+    untried: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the report without its rows, ready for JSON."""
@@ -99,6 +101,7 @@ class ConditionalReport:
             "gain": self.gain,
             "error": self.error,
             "parts": [asdict(one) for one in self.parts],
+            "untried": list(self.untried),
         }
 
     def words(self) -> list[str]:
@@ -115,6 +118,8 @@ class ConditionalReport:
             found.append(
                 "the covariates say nothing about the data that is no accident of few rows"
             )
+        if self.untried:
+            found.append(f"effort fast: {' and '.join(self.untried)} not tried")
         return found
 
 
@@ -156,6 +161,10 @@ class _Task:
         """Return what a part says of the rows by which it is judged."""
         own = self.held(fold)
         return part.log_prob(self.rows.points[own], self.x[own])
+
+
+Fit = Callable[[Tensor, int | None], Part]
+"""What fits a part to some rows (N,), which lack a fold or are all."""
 
 
 def check_complete(missing: str) -> None:
@@ -203,8 +212,7 @@ def fit_conditional(
     task, without = _task(pooled, points, x, covariates.number, settings, weights, groups)
     say(0.0, "conditional kernels")
     kernels = fit_kernels(task.space, task.rows, task.x, task.number)
-    networks = _networks(task, lambda share: say(0.1 + 0.4 * share, "neural mixtures"))
-    fits = _fits(task, without, kernels, networks)
+    fits = _fits(task, without, kernels, lambda share: say(0.1 + 0.4 * share, "neural mixtures"))
     table: list[Tensor] = []
     used = range(task.folds.used)
     for fold in used:
@@ -216,41 +224,46 @@ def fit_conditional(
     shares = _sure_shares(logs, counts)
     say(0.9, "putting together")
     every = torch.ones_like(task.folds.fold, dtype=torch.bool)
-    done: dict[str, Part] = {
-        Unconditional.kind: Unconditional(pooled.density),
-        kernels.kind: kernels,
-        networks.kind: networks,
-    }
     some = [(kind, w) for kind, w in zip(fits, listed(shares), strict=True) if w > 0]
-    if JointDensity.kind in fits:
-        done[JointDensity.kind] = fits[JointDensity.kind](every, -1)
-    parts = [done.get(kind) or fits[kind](every, 0) for kind, _ in some]
+    parts = [fits[kind](every, None) for kind, _ in some]
     density = ConditionalDensity(covariates, parts, [w for _, w in some])
-    return density, _report(list(fits), logs, shares, task.numbers[held], counts)
+    report = _report(list(fits), logs, shares, task.numbers[held], counts)
+    untried = [NeuralMixture.kind] + [JointDensity.kind] * is_joint_possible(
+        task.space, task.number
+    )
+    return density, replace(report, untried=tuple(untried)) if settings.is_fast else report
 
 
 def _fits(
     task: _Task,
-    without: Callable[[int], Density],
+    without: Callable[[int | None], Density],
     kernels: ConditionalKernels,
-    networks: NeuralMixture,
-) -> dict[str, Callable[[Tensor, int], Part]]:
-    """Return by its kind how each part is fitted to some rows (N,), without a fold."""
+    tell: Callable[[float], None],
+) -> dict[str, Fit]:
+    """Return by its kind how each part is fitted to rows (N,) that lack a fold, or to all."""
     space = task.space
-    found: dict[str, Callable[[Tensor, int], Part]] = {
+
+    def about(rest: Tensor, fold: int | None) -> Part:
+        return kernels if fold is None else kernels.with_rows(task.rows[rest], task.x[rest])
+
+    found: dict[str, Fit] = {
         Unconditional.kind: lambda _, fold: Unconditional(without(fold)),
-        ConditionalKernels.kind: lambda rest, _: kernels.with_rows(task.rows[rest], task.x[rest]),
-        NeuralMixture.kind: lambda _, fold: networks.alone(NETWORKS * fold, NETWORKS),
+        ConditionalKernels.kind: about,
     }
+    if not task.settings.is_fast:
+        networks = _networks(task, tell)
+        found[NeuralMixture.kind] = lambda _, fold: (
+            networks if fold is None else networks.alone(NETWORKS * fold, NETWORKS)
+        )
     if isinstance(space, Torus):
         found[CircularRegression.kind] = lambda rest, _: fit_regression(
             space, task.rows[rest], task.x[rest]
         )
-    if isinstance(space, Torus) and is_joint_possible(space, task.number):
-        torus, joint = space, _joint(task)
-        found[JointDensity.kind] = lambda _, fold: JointDensity(
-            torus, joint.density if fold < 0 else joint.without(fold), task.number
-        )
+        if not task.settings.is_fast and is_joint_possible(space, task.number):
+            joint = _joint(task)
+            found[JointDensity.kind] = lambda _, fold: JointDensity(
+                space, joint.density if fold is None else joint.without(fold), task.number
+            )
     return found
 
 
@@ -262,8 +275,8 @@ def _task(
     settings: DensitySettings,
     weights: Any,
     groups: ArrayLike | None,
-) -> tuple[_Task, Callable[[int], Density]]:
-    """Return rows in the folds of the density of all of them, and what that density is without each."""
+) -> tuple[_Task, Callable[[int | None], Density]]:
+    """Return rows in the folds of their density, and what that is without a fold, or whole."""
     space = pooled.density.space
     if len(points) < LEAST_ROWS:
         raise OrbiflowError(
@@ -272,26 +285,29 @@ def _task(
     how: dict[str, Any] = {"weights": weights, "groups": groups}
     if not settings.parametric:
         chosen = [name for name in settings.allowed if name != "flow"] or ["kernels", "mixture"]
-        kept: dict[str, Any] = {"components": tuple(chosen), "repeats": settings.repeats}
-        joint = DensitySettings(**kept, seed=settings.seed)
+        kept: dict[str, Any] = {"components": tuple(chosen), "effort": settings.effort}
+        joint = DensitySettings(**kept, repeats=settings.repeats, seed=settings.seed)
+        plain = pooled
         if settings.flow_alone:
-            pooled = _quietly(lambda: fit_in_folds(space, points, joint, **how))
-        folds, without = pooled.folds, pooled.without
+            plain = _quietly(lambda: fit_in_folds(space, points, joint, **how))
+        folds, outside = plain.folds, plain.without
         settings = joint
     else:
         _, weights, groups = alongside(points=points, **how)
         labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(points)))
         generator = torch.Generator().manual_seed(settings.seed)
-        folds = folds_of(weighed(points, weights, labels), together=False, generator=generator)
+        own: dict[str, Any] = {"generator": generator, "fast": settings.is_fast}
+        folds = folds_of(weighed(points, weights, labels), together=False, **own)
 
-        def without(fold: int) -> Density:
+        def outside(fold: int) -> Density:
             rest = folds.train(fold)
             own = None if rest.weights is None else rest.weights.numpy()
             return _quietly(lambda: fit_chosen(space, rest.points, settings, weights=own)).density
 
     assert folds is not None
     assert folds.rows.numbers is not None
-    return _Task(space, folds, x[folds.rows.numbers], number, settings), without
+    task = _Task(space, folds, x[folds.rows.numbers], number, settings)
+    return task, lambda fold: pooled.density if fold is None else outside(fold)
 
 
 def _quietly(fit: Callable[[], ChosenFit]) -> ChosenFit:

@@ -1,1 +1,2 @@
-from .operations import cross_validate as cross_validate
+from .estimators import CrossValidatedRows as CrossValidatedRows
+from .estimators import cross_validate as cross_validate

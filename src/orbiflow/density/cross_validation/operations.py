@@ -13,12 +13,12 @@ from orbiflow.density.cross_validation.settings import (
     REPORT,
     SCORES,
     CrossValidation,
+    CvDensitySettings,
     CvSettings,
     written_files,
 )
-from orbiflow.density.fitting import ComponentSettings
 from orbiflow.density.run_folder import write_files
-from orbiflow.density.tables import RowSettings, SpaceSettings
+from orbiflow.density.tables import RowSettings
 from orbiflow.errors import SettingError, literal
 from orbiflow.settings import Option
 
@@ -27,10 +27,9 @@ if TYPE_CHECKING:
 
 
 @runtime.operation("density cv", keeps_partial=True, starts_processes=True)
-def cross_validate(
+def cross_validate_table(
     data: Path,
-    where: SpaceSettings,
-    density: ComponentSettings = ComponentSettings(),
+    density: CvDensitySettings,
     out: Annotated[Path, Option("-o")] = Path("cv"),
     cv: CvSettings = CvSettings(),
     rows: RowSettings = RowSettings(),
@@ -51,7 +50,7 @@ def cross_validate(
         data: CSV, TSV, NPY or Parquet.
         out: Folder for the results; an earlier cross-validation there is resumed.
     """
-    asked = CrossValidation(data, out, where, density, rows, cv)
+    asked = CrossValidation(data, out, density, rows, cv)
 
     from orbiflow.density.cross_validation.overview import run
 
@@ -62,8 +61,7 @@ def cross_validate(
 @runtime.one_thread()
 def fold(
     data: Path,
-    where: SpaceSettings,
-    density: ComponentSettings = ComponentSettings(),
+    density: CvDensitySettings,
     out: Annotated[Path, Option("-o")] = Path("fold"),
     rows: RowSettings = RowSettings(),
     *,
@@ -86,11 +84,11 @@ def fold(
     import numpy as np
 
     begin = time.perf_counter()
-    read = tables.read_rows(data, rows, on_event, where=where, given=(held,))
+    read = tables.read_rows(data, rows, on_event, where=density, given=(held,))
     out_of_fit = _held(data, next(iter(read.given.values())), fold, held)
     fitted, unseen = read.only(~out_of_fit), read.only(out_of_fit)
     folder = runtime.ResultFolder(out, written_files)
-    estimator = operations.fit_rows(fitted, where, density, rows, on_event, cancel)
+    estimator = operations.fit_rows(fitted, density, density, rows, on_event, cancel)
     scores = estimator.score_samples(unseen.values)
     if not np.isfinite(scores).all():
         raise SettingError(

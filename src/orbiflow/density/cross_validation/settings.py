@@ -54,14 +54,17 @@ class CvSettings(Settings, group="Cross-validation"):
         return dict(_setting_in(text) for text in asked if text != UNIFORM)
 
 
+class CvDensitySettings(SpaceSettings, ComponentSettings, group="Density"):
+    """Where the data live, and which components a density may have."""
+
+
 @dataclass(frozen=True)
 class CrossValidation:
     """The table and the folder for the results, the fit in question, how rows are read and split."""
 
     data: Path
     out: Path
-    where: SpaceSettings
-    density: ComponentSettings
+    density: CvDensitySettings
     rows: RowSettings
     cv: CvSettings
 
@@ -76,7 +79,7 @@ class CrossValidation:
         if self.rows.missing == "marginalise":
             for components in self.settings.values():
                 operations.check_marginalised(
-                    self.where, DensitySettings().replace(components=components)
+                    self.density, DensitySettings().replace(components=components)
                 )
 
     @property

@@ -95,7 +95,7 @@ class Fit:
 
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     """Return the rows of the table that count."""
-    where = asked.where
+    where = asked.density
     rows = read_rows(asked.data, asked.rows, tell, where=where)
     tell(Note(f"columns: {rows.declaration}"))
     if rows.weights is not None:

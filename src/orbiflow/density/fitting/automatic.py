@@ -212,7 +212,8 @@ def fit_in_folds(
         rows = replace(rows, points=spread_evenly(space, rows.points, found, noise))
     if folds is None:
         generator = torch.Generator().manual_seed(settings.seed)
-        folds = folds_of(rows, together=together, generator=generator)
+        how: dict[str, Any] = {"generator": generator, "fast": settings.is_fast}
+        folds = folds_of(rows, together=together, **how)
     else:
         folds = replace(folds, rows=rows)
     narrowest, crowded = narrowest_for(space, rows[is_whole(rows)].points)
@@ -248,6 +249,7 @@ def fit_in_folds(
         *lone_groups_note(folds.rows.groups),
         *report.notes,
         *_untried_note(folds, settings, flows),
+        *settings.left_out,
         *found.notes(taken_for),
         *limited,
         *budget.notes(),

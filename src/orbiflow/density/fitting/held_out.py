@@ -24,6 +24,9 @@ LEAST_PLACES = 10
 USED = ((600, 10), (2_000, 5), (10_000, 3))
 """The number of folds that are used, for up to so many rows; with more rows 2 are enough."""
 
+FAST_USED = 5
+"""The most folds that are used with effort "fast"."""
+
 MOST_HELD = 2_000
 """The most rows of a fold that are scored."""
 
@@ -48,7 +51,9 @@ class Folds:
         return self.rows[self.fold == number][:MOST_HELD]
 
 
-def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds:
+def folds_of(
+    rows: Rows, *, together: bool, generator: torch.Generator, fast: bool = False
+) -> Folds:
     """Return random tenths of the rows, of which 10 or more are different.
 
     A new row of the same source repeats an old one as often as the old ones repeat each other, and so
@@ -73,6 +78,7 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
     else:
         group = torch.arange(len(rows))
     used = next((count for most, count in USED if len(rows) <= most), 2)
+    used = min(used, FAST_USED) if fast else used
     found = Folds(rows, group % folds, min(used, folds))
     if rows.groups is None:
         return found

@@ -28,6 +28,9 @@ KNOWN: tuple[str, ...] = get_args(Component)
 COMPONENTS = KNOWN[:5]
 """What a density may be made of, beside its uniform floor, if nothing else is asked for."""
 
+FAST_COMPONENTS = ("kernels", "mixture")
+"""What it may be made of with effort "fast"."""
+
 PARAMETRIC = KNOWN[5:]
 """Parametric families: alone each is a fit of its own, beside others it is one of the candidates."""
 
@@ -57,13 +60,33 @@ class ComponentSettings(Settings, group="Density"):
     """What rows that repeat another are. Places: new rows repeat them as often. Rounding: an accident,
     and the density has no peaks there. Auto: rounding where it explains the repeats, else places."""
 
+    effort: Literal["fast", "normal"] = "normal"
+    """How much is tried. Fast: kernels and mixtures alone, judged by half of the tenths at most, and
+    where covariates are known no networks and no joint density."""
+
     seed: Seed = 0
     """Seed of the random numbers: the same seed on the same machine gives the same density."""
 
     @property
+    def is_fast(self) -> bool:
+        """Whether little is tried."""
+        return self.effort == "fast"
+
+    @property
     def allowed(self) -> tuple[str, ...]:
         """The components that may be used."""
-        return COMPONENTS if self.components is None else self.components
+        if self.components is None:
+            return FAST_COMPONENTS if self.is_fast else COMPONENTS
+        return self.components
+
+    @property
+    def left_out(self) -> list[str]:
+        """Notes of what the effort leaves out, for the report of a fit."""
+        if not self.is_fast:
+            return []
+        untried = [name for name in COMPONENTS if name not in self.allowed]
+        names = f"; {', '.join(untried)} not tried" if self.components is None else ""
+        return [f"effort fast: judged by half of the tenths at most{names}"]
 
 
 class FlowOptions(Settings, group="Flow"):
@@ -121,7 +144,11 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
     """How a density is fitted."""
 
     def check(self) -> None:
-        """Check that what is set of a flow has one."""
+        """Check that what is set of a flow has one, and that effort leaves anything to fit."""
+        if self.is_fast and self.flow_alone:
+            raise SettingError(
+                "{effort} fast tries no flow: add kernels to {components}, or leave {effort} out"
+            )
         for name in ("max_frequency", "segments"):
             if getattr(self, name) is not None and "flow" not in self.allowed:
                 raise SettingError(

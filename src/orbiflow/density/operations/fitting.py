@@ -18,7 +18,7 @@ from orbiflow.density.operations import covariates
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError
-from orbiflow.settings import DefaultText, Hidden, Option
+from orbiflow.settings import DefaultText, Hidden, Option, fields_of
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
@@ -32,7 +32,7 @@ MOST_SCORED = 20_000
 fit's time at most; of 100,000 rows of six angles it would be two fifths."""
 
 REPORTED = (
-    "components", "repeats", "missing", "max_frequency", "segments", "seed",
+    "components", "effort", "repeats", "missing", "max_frequency", "segments", "seed",
 )  # fmt: skip
 """Settings that the report repeats."""
 
@@ -152,7 +152,11 @@ def fit_rows(
     from orbiflow.density.conditional_estimator import ConditionalEstimator
     from orbiflow.density.estimator import DensityEstimator
 
-    own: dict[str, Any] = {name: getattr(settings, name) for name in settings.fields_given}
+    own: dict[str, Any] = {
+        name: getattr(settings, name)
+        for name in (entry.name for entry in fields_of(DensitySettings))
+        if name in settings.fields_given
+    }
     own |= {"space": columns_of(where, rows).space, "missing": reading.kept_missing}
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
