@@ -18,7 +18,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from cli.conftest import call_main
-from density.quick_fits import quick_fits, quick_pictures
+from density.quick_fits import quick_fits, quick_pictures, small_sheets
 from orbiflow.solids import Mesh
 from orbiflow.solids import search as solid_search
 from orbiflow.tiles import LikenessSearch
@@ -131,6 +131,7 @@ def little_fixture() -> Iterator[pytest.MonkeyPatch]:
         patch.setitem(PairSearch.efforts, "normal", FEW_PAIRS)  # pyright: ignore[reportArgumentType]
         quick_fits(patch)
         quick_pictures(patch)
+        small_sheets(patch)
         stack.enter_context(hasty_nesting())
         yield patch
 

@@ -1,8 +1,12 @@
 """Fits that try less, for tests of what is done with a fit and not of what a fit finds."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
+
+from orbiflow.density.pictures import coastlines
+from orbiflow.drawing import Sheet
 
 FITTING = "orbiflow.density.fitting"
 
@@ -19,7 +23,7 @@ def quick_fits(patch: pytest.MonkeyPatch) -> None:
 
 
 def quick_pictures(patch: pytest.MonkeyPatch) -> None:
-    """Draw densities and fields from fewer values and by shorter lines."""
+    """Draw densities and fields from fewer values and by shorter lines, and few coasts."""
     pictures = "orbiflow.density.pictures"
     patch.setattr(f"{pictures}.square._GRID", 40)
     patch.setattr(f"{pictures}.square._FINE_GRID", 80)
@@ -29,6 +33,14 @@ def quick_pictures(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{pictures}.colours._COARSE", 24)
     patch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
     patch.setattr("orbiflow.drawing.canvas._STEPS", 4)
+    coasts = coastlines.earth()[::8]
+    patch.setattr(f"{pictures}.coastlines.earth", lambda: coasts)
+
+
+def small_sheets(patch: pytest.MonkeyPatch) -> None:
+    """Draw what is for screens with a fourth of the pixels a side."""
+    whole = Sheet.screen
+    patch.setattr(Sheet, "screen", lambda width=1600: replace(whole(width), dpi=50))
 
 
 @pytest.fixture(name="_quick_fits", scope="module", autouse=True)
