@@ -62,6 +62,7 @@ SMALLER = {
     "animate": ("--area", "120x80px"),
     "batch": ("--classes", "IH4"),
     "density cv": ("--folds", "2"),
+    "export out/barbet": ("--area", "120x80mm"),
 }
 """Options of commands that do not have them, so that less is drawn or tried."""
 
