@@ -131,8 +131,6 @@ def test_a_search_that_carves_has_better_tiles() -> None:
     )
     assert best[0].score >= plain[0].score
     assert best[0].fidelity.mark > plain[0].fidelity.mark + 0.1
-    again = bent_tiles(squirrel_orientations()[:1], CLASSES["IH4"], SMALL)[0]
-    assert np.array_equal(again[0].points, best[0].points)
 
 
 def test_parts_that_are_pinned_are_not_carved() -> None:
