@@ -14,7 +14,6 @@ from orbiflow.density import (
     ConditionalEstimator,
     DensityEstimator,
     FitReport,
-    conditional_to_bytes,
     density_to_bytes,
     read_conditional,
     read_density,
@@ -176,7 +175,7 @@ def _save_estimator(estimator: DensityEstimator, path: Path) -> Path:
         write_atomic(staged / MODEL, content)
         write_json(staged / REPORT, document)
         if given is not None:
-            write_atomic(staged / CONDITIONAL, conditional_to_bytes(given, columns=columns))
+            write_atomic(staged / CONDITIONAL, density_to_bytes(given, columns=columns))
     return folder.path
 
 

@@ -25,22 +25,21 @@ from orbiflow.density import (
     UniformDensity,
     make_space,
 )
-from orbiflow.density.covariates import (
-    ConditionalDensity,
-    Covariates,
-    conditional_to_bytes,
-    read_conditional,
-)
-from orbiflow.density.covariates.density import Unconditional
-from orbiflow.density.covariates.joint import JointDensity, joint_torus
-from orbiflow.density.covariates.kernels import ConditionalKernels
-from orbiflow.density.covariates.network import NeuralMixture
-from orbiflow.density.covariates.regression import CircularRegression
 from orbiflow.density.cross_validation import cross_validate
 from orbiflow.density.data import given_roles
-from orbiflow.density.fitting import Rows
-from orbiflow.density.models import AdaptiveKernels
-from orbiflow.density.spaces import ProductSpace, Torus
+from orbiflow.density.models import (
+    AdaptiveKernels,
+    CircularRegression,
+    ConditionalDensity,
+    ConditionalKernels,
+    JointDensity,
+    NeuralMixture,
+    Unconditional,
+    density_to_bytes,
+    joint_torus,
+    read_conditional,
+)
+from orbiflow.density.spaces import Covariates, ProductSpace, Torus
 from orbiflow.errors import DataWarning, InputFileError
 from orbiflow.loading import load, save
 from refusals import refused, warned
@@ -87,7 +86,7 @@ def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
     width = len(space.spheres)
     kappa = torch.tensor(rng.uniform(0.5, 30, width))
     kernels = ConditionalKernels(
-        space, Rows(points), x, covariates.number, wide, kappa, torch.tensor(rng.dirichlet([1] * 3))
+        space, points, None, x, covariates.number, wide, kappa, torch.tensor(rng.dirichlet([1] * 3))
     )
     hidden, out = 8, 3 * (space.features(points).shape[-1] + width + 1)
     shapes = [
@@ -251,7 +250,7 @@ def test_a_file_makes_the_same_density_again(fit: ConditionalEstimator, tmp_path
         fit.conditional_density_, random_density(5, make_space("torus", axes=1), 1)
     )):  # fmt: skip
         path = tmp_path / f"{number}.safetensors"
-        path.write_bytes(conditional_to_bytes(density, columns=["phi"]))
+        path.write_bytes(density_to_bytes(density, columns=["phi"]))
         again, extra = read_conditional(path)
         assert extra == {"columns": ["phi"]}
         points = density.space.midpoints(50)

@@ -15,8 +15,6 @@ from .comparing.settings import DataComparisonSettings as DataComparisonSettings
 from .comparing.settings import NamedTestSettings as NamedTestSettings
 from .conditional_estimator import AngleRegressor as AngleRegressor
 from .conditional_estimator import ConditionalEstimator as ConditionalEstimator
-from .covariates.files import conditional_to_bytes as conditional_to_bytes
-from .covariates.files import read_conditional as read_conditional
 from .data.roles import Role as Role
 from .data.table import TableError as TableError
 from .data.table import UndeclaredError as UndeclaredError
@@ -40,6 +38,7 @@ from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
 from .models.evaluation import log_density_gradient as log_density_gradient
 from .models.files import density_to_bytes as density_to_bytes
+from .models.files import read_conditional as read_conditional
 from .models.files import read_density as read_density
 from .models.fisher_bingham import AngularCentralGaussian as AngularCentralGaussian
 from .models.fisher_bingham import FisherBingham as FisherBingham

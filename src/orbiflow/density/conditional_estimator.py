@@ -11,14 +11,6 @@ import torch
 from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
-from orbiflow.density.covariates import (
-    ConditionalDensity,
-    ConditionalReport,
-    Covariates,
-    Values,
-    check_complete,
-    fit_conditional,
-)
 from orbiflow.density.data import (
     Asked,
     TableRows,
@@ -33,9 +25,17 @@ from orbiflow.density.data import (
     is_declared,
 )
 from orbiflow.density.estimator import DensityEstimator, RandomState, seed_of
-from orbiflow.density.fitting import Progress, mean_of, weighed
+from orbiflow.density.fitting import (
+    ConditionalReport,
+    Progress,
+    check_complete,
+    fit_conditional,
+    mean_of,
+    weighed,
+)
 from orbiflow.density.inference import Trend, axes_named, trend_of
-from orbiflow.density.spaces import Torus, check_measure
+from orbiflow.density.models import ConditionalDensity
+from orbiflow.density.spaces import Covariates, Torus, Values, check_measure
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.settings import as_whole, described, is_a
 

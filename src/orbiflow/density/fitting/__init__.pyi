@@ -2,6 +2,10 @@ from .automatic import ChosenFit as ChosenFit
 from .automatic import fit_automatic as fit_automatic
 from .automatic import fit_chosen as fit_chosen
 from .automatic import fit_in_folds as fit_in_folds
+from .covariates import ConditionalReport as ConditionalReport
+from .covariates import PartEvidence as PartEvidence
+from .covariates import check_complete as check_complete
+from .covariates import fit_conditional as fit_conditional
 from .evidence import Evidence as Evidence
 from .flow import fit_density as fit_density
 from .flow import refuse_flow_settings as refuse_flow_settings

@@ -14,8 +14,6 @@ from .partial import conditional as conditional
 from .partial import marginal as marginal
 from .shortest import shortest_intervals as shortest_intervals
 from .trends import Trend as Trend
-from .trends import cell_masses as cell_masses
-from .trends import cells as cells
 from .trends import pair_alone as pair_alone
 from .trends import trend as trend
 from .trends import trend_of as trend_of

@@ -13,14 +13,11 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.inference.angles import at_observed, check_torus, chosen_columns
 from orbiflow.density.inference.partial import marginal
-from orbiflow.density.models import Density
+from orbiflow.density.models import Density, cell_masses, cells
 from orbiflow.density.spaces import Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.settings import as_array, as_number
-
-CELLS = 720
-"""Cells of the circle of the column whose mean is found: half a degree each."""
 
 TOGETHER = 8
 """Values whose conditional densities are found at a time."""
@@ -64,7 +61,7 @@ def trend(
 ) -> Trend:
     """Return the mean and intervals of one column where another one is known, whatever the rest is.
 
-    They are those of the conditional densities, by the joint density of both on `CELLS` cells.
+    They are those of the conditional densities, by the joint density of both on even `cells`.
 
     Args:
         density: A density of two columns or more on a torus, some of which may be real.
@@ -86,8 +83,10 @@ def trend(
     middles = cells()
     rows = list[tuple[float, Array]]()
     for part in torch.split(turns, TOGETHER):
-        both = torch.cat([middles.repeat(len(part), 1), part.repeat_interleave(CELLS, 0)], dim=1)
-        found = density.log_marginal(both, [of, along]).reshape(-1, CELLS)
+        both = torch.cat(
+            [middles.repeat(len(part), 1), part.repeat_interleave(len(middles), 0)], dim=1
+        )
+        found = density.log_marginal(both, [of, along]).reshape(-1, len(middles))
         rows += [_about_mean(own, weights, masses) for weights in torch.softmax(found, dim=1)]
         tick(len(rows) / len(turns))
     return _of_rows(values, rows, masses, logs.numpy())
@@ -129,18 +128,6 @@ def _checked(at: ArrayLike, levels: Sequence[float]) -> tuple[Array, tuple[float
     return values, masses
 
 
-def cell_masses(density: Density, axis: int) -> Tensor:
-    """Return the masses (CELLS,) of even cells of one column of a density on a torus."""
-    whole = density.space.dim == 1
-    logs = density.log_prob(cells()) if whole else density.log_marginal(cells(), [axis])
-    return torch.softmax(logs, dim=0)
-
-
-def cells() -> Tensor:
-    """Return the middles (CELLS, 1) of even cells of a circle, in turns."""
-    return (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS
-
-
 def _of_rows(
     values: Array,
     rows: Sequence[tuple[float, Array]],
@@ -154,7 +141,7 @@ def _of_rows(
 def _about_mean(space: Torus, weights: Tensor, masses: Sequence[float]) -> tuple[float, Array]:
     """Return the mean of a column and the lower and upper ends (2, L) of intervals, in its unit.
 
-    `weights` (CELLS,) are masses of even cells of its circle.
+    `weights` (n,) are masses of even `cells` of its circle.
     """
     turns = cells()[:, 0]
     tails = np.array([[(1 - m) / 2 for m in masses], [(1 + m) / 2 for m in masses]])

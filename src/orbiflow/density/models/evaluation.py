@@ -78,3 +78,19 @@ def kl_by_quadrature(target: Tensor, log_density: Tensor) -> float:
     log_target = (weight[live] * len(weight)).log()
     value = (weight[live] * (log_target - log_density[live])).sum()
     return float(value) if math.isfinite(float(value)) else math.inf
+
+
+CELLS = 720
+"""Cells of the circle of the column whose mean is found: half a degree each."""
+
+
+def cell_masses(density: Density, axis: int) -> Tensor:
+    """Return the masses (CELLS,) of even cells of one column of a density on a torus."""
+    whole = density.space.dim == 1
+    logs = density.log_prob(cells()) if whole else density.log_marginal(cells(), [axis])
+    return torch.softmax(logs, dim=0)
+
+
+def cells() -> Tensor:
+    """Return the middles (CELLS, 1) of even cells of a circle, in turns."""
+    return (torch.arange(CELLS, dtype=torch.float64)[:, None] + 0.5) / CELLS

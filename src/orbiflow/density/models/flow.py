@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.density.models.density import Density, Restriction, Split, in_order
 from orbiflow.density.models.evaluation import midpoints
-from orbiflow.density.models.files import density_from, density_parts, within
+from orbiflow.density.models.headers import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError

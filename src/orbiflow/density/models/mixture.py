@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
-from orbiflow.density.models.files import density_from, density_parts, within
+from orbiflow.density.models.headers import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import ProductSpace, Space, Torus
 from orbiflow.errors import OrbiflowError

@@ -16,7 +16,7 @@ from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Density, Split, Weighted
 from orbiflow.density.models.elimination import eliminated, grids_for
-from orbiflow.density.models.files import within
+from orbiflow.density.models.headers import within
 from orbiflow.density.models.kernels import AdaptiveKernels, lattice_kernels
 from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orbiflow import runtime
-from orbiflow.density import covariates, data, inference, tables
+from orbiflow.density import data, fitting, inference, models, spaces, tables
 from orbiflow.density.run_folder import CONDITIONAL
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
-    from orbiflow.density.covariates import ConditionalDensity, ConditionalReport, Values
     from orbiflow.density.data import Asked, Role, TableRows
     from orbiflow.density.estimator import DensityEstimator
-    from orbiflow.density.fitting import Progress
-    from orbiflow.density.models import Density
+    from orbiflow.density.fitting import ConditionalReport, Progress
+    from orbiflow.density.models import ConditionalDensity, Density
+    from orbiflow.density.spaces import Values
     from orbiflow.density.tables import RowSettings
 
 MOST_LISTED = 60
@@ -28,7 +28,7 @@ def asked_columns(given: Sequence[str], reading: RowSettings) -> Asked:
     """Return the columns of a table that are given to a fit, which must be one of whole rows."""
     if not given:
         return {}
-    covariates.check_complete(reading.kept_missing)
+    fitting.check_complete(reading.kept_missing)
     try:
         return data.asked_roles(given)
     except SettingError as error:
@@ -44,7 +44,7 @@ def known_in(
     """
     roles = data.given_roles(list(rows.given), rows.given, asked, unit, where=rows.source.where)
     try:
-        doubts = covariates.Covariates.of(rows.given, roles).fit_doubts(rows.given)
+        doubts = spaces.Covariates.of(rows.given, roles).fit_doubts(rows.given)
     except SettingError as error:
         refusal = data.in_file(error, rows.source.where)
         refusal.template = refusal.template.replace("{columns}", "{given}")
@@ -81,7 +81,7 @@ def told(
         tell(_table(name, columns, lines))
     for text in report.words():
         tell(runtime.Note(text))
-    file = covariates.conditional_to_bytes(density, columns=columns, roles=kept)
+    file = models.density_to_bytes(density, columns=columns, roles=kept)
     return {CONDITIONAL: file}, {"given": {**said, "words": words}}
 
 
@@ -145,7 +145,7 @@ def _table(column: str, names: Sequence[str], said: Mapping[str, Any]) -> runtim
 def conditional_in(folder: Path) -> tuple[ConditionalDensity, dict[str, Any]] | None:
     """Return the density where covariates are known that is in the folder of a fit, if there is one."""
     file = folder / CONDITIONAL
-    return covariates.read_conditional(file) if folder.is_dir() and file.exists() else None
+    return models.read_conditional(file) if folder.is_dir() and file.exists() else None
 
 
 def columns_asked(density: ConditionalDensity, given: Sequence[str]) -> list[str]:

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from orbiflow.arrays import Array
-    from orbiflow.density.covariates import ConditionalDensity, Covariate
     from orbiflow.density.fitting import Progress
     from orbiflow.density.inference import Trend
-    from orbiflow.density.spaces import Torus
+    from orbiflow.density.models import ConditionalDensity
+    from orbiflow.density.spaces import Covariate, Torus
     from orbiflow.drawing import Picture
 
 MOST_PANELS = 24

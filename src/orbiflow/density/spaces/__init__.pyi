@@ -3,6 +3,11 @@ from .axes import Line as Line
 from .axes import turns_at as turns_at
 from .axes import whole_turn as whole_turn
 from .checked import row_count as row_count
+from .covariates import SPREAD as SPREAD
+from .covariates import Covariate as Covariate
+from .covariates import Covariates as Covariates
+from .covariates import Values as Values
+from .covariates import is_text as is_text
 from .data_columns import DataColumns as DataColumns
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus

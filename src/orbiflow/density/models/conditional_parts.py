@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
 
-from orbiflow.density.inference import cell_masses, cells
-from orbiflow.density.models import Density
+from orbiflow.density.models.density import Density
+from orbiflow.density.models.evaluation import cell_masses, cells
 from orbiflow.density.spaces import CHART, Space
+from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import special
 
 
-class Part(ABC):
+class ConditionalPart(ABC):
     """A density of points of a space where features of covariates are known.
 
     - `kind`: Its name in files and reports.
@@ -50,7 +51,7 @@ class Part(ABC):
     @abstractmethod
     def from_header(
         cls, space: Space, number: Tensor, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
-    ) -> Part:
+    ) -> ConditionalPart:
         """Make it again; `number` (m,) says of which covariate each feature is.
 
         Raises `OrbiflowError` for what cannot be.
@@ -78,3 +79,16 @@ def _mean_features(density: Density) -> Tensor:
 def mean_cosines(kappa: Tensor) -> Tensor:
     """Return the mean cosines of von Mises densities of concentrations (...)."""
     return special.i1e(kappa) / special.i0e(kappa)
+
+
+def checked(
+    tensors: Mapping[str, Tensor], shapes: Mapping[str, Sequence[int]], what: str
+) -> list[Tensor]:
+    """Return tensors by name, in the order of their shapes; raise `OrbiflowError` for others."""
+    found = [tensors[name] for name in shapes]
+    if not all(
+        own.shape == tuple(shape) and own.dtype == torch.float64 and bool(own.isfinite().all())
+        for own, shape in zip(found, shapes.values(), strict=True)
+    ):
+        raise OrbiflowError(f"{what} of other shapes or values")
+    return found

@@ -11,37 +11,30 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.density.covariates.columns import Covariates
-from orbiflow.density.covariates.density import ConditionalDensity, Unconditional
-from orbiflow.density.covariates.joint import (
+from orbiflow.density.data import alongside, group_numbers
+from orbiflow.density.fitting.automatic import ChosenFit, fit_chosen, fit_in_folds
+from orbiflow.density.fitting.circular_regression import fit_regression
+from orbiflow.density.fitting.conditional_kernels import fit_kernels
+from orbiflow.density.fitting.held_out import Folds, folds_of, sparse_weights, stacked
+from orbiflow.density.fitting.joint import for_conditionals
+from orbiflow.density.fitting.neural_mixture import fit_networks
+from orbiflow.density.fitting.report import Progress, silent
+from orbiflow.density.fitting.rows import Rows, gain_of, weighed
+from orbiflow.density.fitting.settings import DensitySettings
+from orbiflow.density.models import (
+    CircularRegression,
+    ConditionalDensity,
+    ConditionalKernels,
+    ConditionalPart,
+    Density,
     JointDensity,
+    NeuralMixture,
+    Unconditional,
     covariate_turns,
-    for_conditionals,
     is_joint_possible,
     joint_torus,
 )
-from orbiflow.density.covariates.kernels import ConditionalKernels, fit_kernels
-from orbiflow.density.covariates.network import NeuralMixture, fit_networks
-from orbiflow.density.covariates.parts import Part
-from orbiflow.density.covariates.regression import CircularRegression, fit_regression
-from orbiflow.density.data import alongside, group_numbers
-from orbiflow.density.fitting import (
-    ChosenFit,
-    DensitySettings,
-    Folds,
-    Progress,
-    Rows,
-    fit_chosen,
-    fit_in_folds,
-    folds_of,
-    gain_of,
-    silent,
-    sparse_weights,
-    stacked,
-    weighed,
-)
-from orbiflow.density.models import Density
-from orbiflow.density.spaces import Space, Torus
+from orbiflow.density.spaces import Covariates, Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed
@@ -157,13 +150,13 @@ class _Task:
         return self.where(fold)[: len(self.folds.held(fold))]
 
     @torch.no_grad()
-    def logs(self, part: Part, fold: int) -> Tensor:
+    def logs(self, part: ConditionalPart, fold: int) -> Tensor:
         """Return what a part says of the rows by which it is judged."""
         own = self.held(fold)
         return part.log_prob(self.rows.points[own], self.x[own])
 
 
-Fit = Callable[[Tensor, int | None], Part]
+Fit = Callable[[Tensor, int | None], ConditionalPart]
 """What fits a part to some rows (N,), which lack a fold or are all."""
 
 
@@ -243,8 +236,12 @@ def _fits(
     """Return by its kind how each part is fitted to rows (N,) that lack a fold, or to all."""
     space = task.space
 
-    def about(rest: Tensor, fold: int | None) -> Part:
-        return kernels if fold is None else kernels.with_rows(task.rows[rest], task.x[rest])
+    def about(rest: Tensor, fold: int | None) -> ConditionalPart:
+        return (
+            kernels
+            if fold is None
+            else kernels.with_rows(task.rows.points[rest], task.rows[rest].weights, task.x[rest])
+        )
 
     found: dict[str, Fit] = {
         Unconditional.kind: lambda _, fold: Unconditional(without(fold)),

@@ -4,32 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Self
 
 import torch
-from scipy import optimize
 from torch import Tensor
 
-from orbiflow.arrays import Array
-from orbiflow.density.covariates.columns import SPREAD
-from orbiflow.density.covariates.parts import Part
-from orbiflow.density.fitting import Evidence, Folds
-from orbiflow.density.inference import at_observed
-from orbiflow.density.models import (
-    Density,
-    PartialDensity,
-    Split,
-    density_from,
-    density_parts,
-    mixture_of,
-)
-from orbiflow.density.spaces import Space, Torus, turns_at
+from orbiflow.density.models.conditional_parts import ConditionalPart
+from orbiflow.density.models.density import Density, Split
+from orbiflow.density.models.headers import density_from, density_parts
+from orbiflow.density.models.mixture import PartialDensity, mixture_of
+from orbiflow.density.spaces import SPREAD, Space, Torus, turns_at
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
-
-SHARE_RIDGE = 1e-3
-"""Weight of the mean square of the logarithms by which shares are changed for what is asked."""
 
 MOST_DIM = 6
 """The most angles and covariates together."""
@@ -38,7 +24,7 @@ BLOCK_ROWS = 2**12
 """Rows worked on at a time."""
 
 
-class JointDensity(Part):
+class JointDensity(ConditionalPart):
     """p(y, x) / p(x) of a density of data on a torus and of covariates, each of them a circle, too.
 
     A real covariate is a circle that closes at infinity, as one of the torus.
@@ -50,22 +36,16 @@ class JointDensity(Part):
     """
 
     kind = "joint"
-    space: Torus
 
     def __init__(self, space: Torus, density: Density, number: Tensor) -> None:
         self.space, self.density, self.number = space, density, number
 
     @torch.no_grad()
     def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
-        known = covariate_turns(x, self.number)
-        none = points.new_full(points.shape, math.nan)
-        found = [
-            at_observed(self.density, torch.cat([own, at], dim=1))
-            - at_observed(self.density, torch.cat([lack, at], dim=1))
-            for own, lack, at in zip(
-                *(part.split(BLOCK_ROWS) for part in (points, none, known)), strict=True
-            )
-        ]
+        d, found = self.space.dim, list[Tensor]()
+        known = torch.cat([points, covariate_turns(x, self.number)], dim=1)
+        for some in torch.split(known, BLOCK_ROWS):
+            found.append(self.density.log_prob(some) - log_of_covariates(self.density, some, d))
         return torch.cat(found)
 
     @torch.no_grad()
@@ -98,61 +78,6 @@ class JointDensity(Part):
         return cls(space, density_from(joint, header["density"], tensors), number)
 
 
-def for_conditionals(evidence: Evidence, folds: Folds, dim: int) -> Evidence:
-    """Return evidence with shares that suit the first `dim` columns best where the others are known.
-
-    Those of a joint density make all columns likeliest, and how covariates are spread does not count.
-    """
-    tables: list[Tensor] = []
-    for fold in range(folds.used):
-        whole = folds.held(fold).points
-        known = torch.cat([whole.new_full((len(whole), dim), math.nan), whole[:, dim:]], dim=1)
-        parts = evidence.parts(fold)
-        tables.append(
-            torch.stack(
-                [torch.stack([at_observed(own, at) for own in parts]) for at in (whole, known)]
-            )
-        )
-    table, candidates = torch.cat(tables, dim=2), evidence.candidates
-    counts = candidates.row_weights
-    counts = torch.ones_like(table[0, 0]) if counts is None else counts
-    folds_of_rows = candidates.fold
-
-    def shares(some: Tensor) -> Tensor:
-        every = torch.zeros_like(evidence.shares)
-        chosen = evidence.chosen
-        every[chosen] = _conditional_shares(
-            table[:, :, some], counts[some], evidence.shares[chosen], candidates.floor[chosen]
-        )
-        return every
-
-    apart = [shares(folds_of_rows != fold) for fold in range(folds.used)]
-    return replace(evidence, shares=shares(folds_of_rows >= 0), apart=apart)
-
-
-def _conditional_shares(table: Tensor, counts: Tensor, start: Tensor, floor: Tensor) -> Tensor:
-    """Return shares (P,) by log densities (2, P, n) of whole rows and of covariates alone.
-
-    The search begins at a start, and a ridge holds what few rows decide. Those of the `floor` (P,) do
-    not fall: nothing is impossible.
-    """
-    both, alone = table
-    row_shares = counts / counts.sum()
-
-    def loss(values: Array) -> tuple[float, Array]:
-        logits = torch.tensor(values, requires_grad=True)
-        weights = torch.log_softmax(logits, dim=0)[:, None]
-        gains = (both + weights).logsumexp(dim=0) - (alone + weights).logsumexp(dim=0)
-        value = SHARE_RIDGE * (logits - start.log()).square().mean() - row_shares @ gains
-        (gradient,) = torch.autograd.grad(value, logits)
-        return float(value.detach()), gradient.numpy()
-
-    found = optimize.minimize(loss, start.log().numpy(), jac=True, method="L-BFGS-B").x
-    best = torch.softmax(torch.tensor(found), dim=0)
-    best[floor] = best[floor].maximum(start[floor])
-    return best / best.sum()
-
-
 def is_joint_possible(space: Space, number: Tensor) -> bool:
     """Return whether there are so few columns on a torus; `number` is that of `JointDensity`.
 
@@ -177,3 +102,8 @@ def covariate_turns(x: Tensor, number: Tensor) -> Tensor:
         else:
             found.append(turns_at(some[:, 0] / SPREAD))
     return torch.stack(found, dim=1)
+
+
+def log_of_covariates(density: Density, points: Tensor, dim: int) -> Tensor:
+    """Return log densities (N,) of the columns after the first `dim` alone."""
+    return density.log_marginal(points[:, dim:], list(range(dim, points.shape[1])))

@@ -23,7 +23,7 @@ from orbiflow.density.data import (
     refuse_codes,
     word_of,
 )
-from orbiflow.density.spaces import Line
+from orbiflow.density.spaces.axes import Line
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_number
 
@@ -264,7 +264,10 @@ def _numbers(name: str, cells: Values) -> Array:
 
 
 def _checked(name: str, cells: Values) -> Checked:
-    return Checked(name, _numbers(name, cells), lambda row: f"row {row + 1}")
+    def place(row: int) -> str:
+        return f"row {row + 1}"
+
+    return Checked(name, _numbers(name, cells), place)
 
 
 def _refuse_missing(name: str, missing: NDArray[np.bool_]) -> None:

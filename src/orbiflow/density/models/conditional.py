@@ -10,20 +10,20 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.covariates.columns import Covariates, Values
-from orbiflow.density.covariates.joint import JointDensity
-from orbiflow.density.covariates.kernels import ConditionalKernels
-from orbiflow.density.covariates.network import NeuralMixture
-from orbiflow.density.covariates.parts import Part
-from orbiflow.density.covariates.regression import CircularRegression
-from orbiflow.density.fitting import stacked
-from orbiflow.density.models import Density, density_from, density_parts, mixture_of, within
-from orbiflow.density.spaces import CHART, Space
+from orbiflow.density.models.circular_regression import CircularRegression
+from orbiflow.density.models.conditional_kernels import ConditionalKernels
+from orbiflow.density.models.conditional_parts import ConditionalPart
+from orbiflow.density.models.density import Density
+from orbiflow.density.models.headers import density_from, density_parts, within
+from orbiflow.density.models.joint import JointDensity
+from orbiflow.density.models.mixture import mixture_of
+from orbiflow.density.models.neural_mixture import NeuralMixture
+from orbiflow.density.spaces import CHART, Covariates, Space, Values
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
 
 
-class Unconditional(Part):
+class Unconditional(ConditionalPart):
     """The density of all rows, whatever the covariates are.
 
     Args:
@@ -61,7 +61,7 @@ class Unconditional(Part):
         return cls(density_from(space, header["density"], tensors))
 
 
-PARTS: dict[str, type[Part]] = {
+PARTS: dict[str, type[ConditionalPart]] = {
     own.kind: own
     for own in (Unconditional, ConditionalKernels, NeuralMixture, CircularRegression, JointDensity)
 }
@@ -82,7 +82,7 @@ class ConditionalDensity:
     """
 
     def __init__(
-        self, covariates: Covariates, parts: Sequence[Part], weights: Sequence[float]
+        self, covariates: Covariates, parts: Sequence[ConditionalPart], weights: Sequence[float]
     ) -> None:
         self.covariates, self.parts, self.space = covariates, tuple(parts), parts[0].space
         self.weights = torch.tensor(weights, dtype=torch.float64)
@@ -106,7 +106,8 @@ class ConditionalDensity:
         x = self.context(context)
         x = x.expand(len(value), -1) if len(x) == 1 else x
         logs = torch.stack([part.log_prob(value, x) for part in self.parts])
-        return stacked(logs, self.weights) + self.space.log_density_factor(value, measure)
+        logs = (logs + self.weights.log()[:, None]).logsumexp(dim=0)
+        return logs + self.space.log_density_factor(value, measure)
 
     def at(self, context: Context) -> Density:
         """Return the density where covariates are as one row says, a mixture that can be saved."""

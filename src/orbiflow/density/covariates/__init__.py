@@ -1,5 +1,0 @@
-"""Densities where covariates are known: p(data | x)."""
-
-from orbiflow.settings import door
-
-__getattr__, __dir__, __all__ = door(__name__, __file__)

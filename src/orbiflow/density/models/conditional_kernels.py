@@ -1,0 +1,158 @@
+"""Conditional kernel densities: each row of the data counts by how near its covariates are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.models.conditional_parts import (
+    ConditionalPart,
+    checked,
+    mean_cosines,
+    on_chart,
+)
+from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
+from orbiflow.density.spaces import Space
+from orbiflow.errors import OrbiflowError
+
+KERNEL_SCALES = (1.0, 4.0, 16.0)
+"""Each row has a kernel at each scale: concentrations are divided by it."""
+
+MOST_ROWS = 20_000
+"""The most rows that have kernels."""
+
+BLOCK_ENTRIES = 2**21
+"""Rows times kernels worked on at a time."""
+
+LEAST_SHARE = 1e-9
+"""Kernels that weigh less are left out where covariates are known."""
+
+APART_LOG = -1e4
+"""What a row has of kernels that are left out."""
+
+
+class ConditionalKernels(ConditionalPart):
+    """Sum of K(x, x_i) k(y, y_i) over sum of K(x, x_i), over rows i (Hall, Racine and Li, 2004).
+
+    K is a product of one kernel for each covariate: normal in a real column's feature, von Mises in a
+    cyclic one, and the same constant for all words but the row's own. What does not matter gets a wide
+    kernel, and drops out. k is the space's kernel at `KERNEL_SCALES`.
+
+    Args:
+        space: Any space.
+        points: The rows' points (N, d).
+        weights: Their weights (N,); None where all weigh the same.
+        x: Their features (N, m).
+        number: The number (m,) of the covariate of each feature.
+        widths: The widths (c,) of covariates.
+        concentrations: Of the kernels (w,).
+        shares: Those of the scales (L,), of sum 1.
+    """
+
+    kind = "kernels"
+
+    def __init__(
+        self,
+        space: Space,
+        points: Tensor,
+        weights: Tensor | None,
+        x: Tensor,
+        number: Tensor,
+        widths: Tensor,
+        concentrations: Tensor,
+        shares: Tensor,
+    ) -> None:
+        self.space, self.points, self.weights, self.x = space, points, weights, x
+        self.number, self.widths = number, widths
+        self.concentrations, self.shares = concentrations, shares
+
+    def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
+        size = max(1, BLOCK_ENTRIES // len(self.points))
+        blocks = zip(torch.split(points, size), torch.split(x, size), strict=True)
+        logs = [self.logs(part, own) for part, own in blocks]
+        return on_chart(self.space, points, torch.cat(logs))
+
+    def logs(self, points: Tensor, x: Tensor, apart: Tensor | None = None) -> Tensor:
+        """Return log densities (M,) as kernels have them, at points (M, d) and features (M, m).
+
+        Kernels that a mask `apart` (M, N) says are left out.
+        """
+        near = self._near(x)
+        if apart is not None:
+            near = near.masked_fill(apart, APART_LOG)
+        centers = self.space.features(self.points, slice(1))[0]
+        logs: list[Tensor] = []
+        for scale, share in zip(KERNEL_SCALES, self.shares.log(), strict=True):
+            kappa = (self.concentrations / scale).expand(len(centers), -1)
+            rows, offsets = kernel_rows(self.space, centers, kappa)
+            logs += [
+                (image @ rows.mT + (offsets + share) + near).logsumexp(dim=1)
+                for image in self.space.features(points)
+            ]
+        return torch.stack(logs).logsumexp(dim=0) - near.logsumexp(dim=1)
+
+    def _near(self, x: Tensor) -> Tensor:
+        """Return the logarithms (M, N) of how much rows count where features are x (M, m)."""
+        width = self.widths[self.number]
+        one, other = x / width, self.x / width
+        near = one @ other.mT - other.square().sum(dim=1) / 2 - one.square().sum(dim=1)[:, None] / 2
+        return near if self.weights is None else near + self.weights.log()
+
+    @torch.no_grad()
+    def at(self, x: Tensor) -> AdaptiveKernels:
+        weights = torch.softmax(self._near(x[None])[0], dim=0)
+        kept = weights >= LEAST_SHARE * weights.max()
+        weights = weights[kept] / weights[kept].sum()
+        scales = torch.tensor(KERNEL_SCALES, dtype=torch.float64)
+        kappa = self.concentrations / scales[:, None]
+        return AdaptiveKernels(
+            self.space,
+            self.points[kept].repeat(len(KERNEL_SCALES), 1),
+            kappa.repeat_interleave(len(weights), dim=0),
+            (self.shares[:, None] * weights).flatten(),
+        )
+
+    @torch.no_grad()
+    def mean_features(self, x: Tensor) -> Tensor:
+        scales = torch.tensor(KERNEL_SCALES, dtype=torch.float64)[:, None]
+        length = self.shares @ mean_cosines(self.concentrations / scales)
+        weights = torch.softmax(self._near(x), dim=1)
+        return weights @ self.space.features(self.points, slice(1))[0] * length.repeat(2)
+
+    def with_rows(self, points: Tensor, weights: Tensor | None, x: Tensor) -> ConditionalKernels:
+        """Return kernels of the same widths at other rows."""
+        shape = (self.number, self.widths, self.concentrations, self.shares)
+        weights = None if weights is None else weights[:MOST_ROWS]
+        return ConditionalKernels(self.space, points[:MOST_ROWS], weights, x[:MOST_ROWS], *shape)
+
+    def header(self) -> dict[str, Any]:
+        return {"scales": list(KERNEL_SCALES)}
+
+    def tensors(self) -> dict[str, Tensor]:
+        names = ("x", "widths", "concentrations", "shares")
+        found = {name: getattr(self, name) for name in names} | {"points": self.points}
+        return found if self.weights is None else {**found, "weights": self.weights}
+
+    @classmethod
+    def from_header(
+        cls, space: Space, number: Tensor, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        count = len(tensors["points"])
+        shapes = {
+            "points": (count, space.chart_dim), "x": (count, len(number)),
+            "widths": (int(number.max()) + 1,), "concentrations": (len(space.spheres),),
+            "shares": (len(KERNEL_SCALES),),
+        }  # fmt: skip
+        shapes |= {"weights": (count,)} if "weights" in tensors else {}
+        points, x, *others = checked(tensors, shapes, "conditional kernels")
+        if (
+            not 1 <= count <= MOST_ROWS
+            or not all(bool((own > 0).all()) for own in others)
+            or abs(float(others[2].sum()) - 1) > 1e-6
+            or header.get("scales") != list(KERNEL_SCALES)
+        ):
+            raise OrbiflowError("conditional kernels of other shapes or values")
+        return cls(space, points, tensors.get("weights"), x, number, *others[:3])
