@@ -7,19 +7,13 @@ from tinycss2.ast import Node
 # what orbiflow uses
 
 class SelectorError(ValueError): ...
-
-class CompiledSelector:
-    specificity: tuple[int, int, int]
+class CompiledSelector: ...
 
 def compile_selector_list(
     input: str | Iterable[Node], namespaces: Mapping[str | None, str] | None = None
 ) -> list[CompiledSelector]: ...
 
 class Matcher:
-    id_selectors: dict[str, list[Any]]
-    class_selectors: dict[str, list[Any]]
-    lower_local_name_selectors: dict[str, list[Any]]
-    other_selectors: list[Any]
     def add_selector(self, selector: CompiledSelector, payload: Any) -> None: ...
     def match(
         self, element: ElementWrapper
@@ -27,21 +21,9 @@ class Matcher:
 
 class ElementWrapper:
     etree_element: Element
-    parent: Any
-    previous: Any
+    parent: ElementWrapper | None
     local_name: str
     namespace_url: str
-    id: str | None
-    classes: set[str]
-    etree_children: list[Element]
-    def __init__(
-        self,
-        etree_element: Element,
-        parent: Any,
-        index: int,
-        previous: Any,
-        in_html_document: bool,
-        content_language: str | None = None,
-    ) -> None: ...
-    def iter_children(self) -> Iterator[Any]: ...
-    def iter_subtree(self) -> Iterator[Any]: ...
+    @classmethod
+    def from_xml_root(cls, root: Element) -> ElementWrapper: ...
+    def iter_subtree(self) -> Iterator[ElementWrapper]: ...

@@ -63,7 +63,7 @@ BIRD = shapely.union_all([oval(120, 40), oval(20, 80), BAR])
     ],
 )
 def test_drawings(name: str, shape: shapely.Polygon) -> None:
-    assert iou(Target.read(TRIALS / name).outline, shape) > 0.998
+    assert iou(Target.read(TRIALS / name).outline, shape) > 0.997
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_drawings(name: str, shape: shapely.Polygon) -> None:
 def test_pictures(name: str, note: str) -> None:
     """The same L in each."""
     target = Target.read(TRIALS / name)
-    assert iou(target.outline, L) > 0.998
+    assert iou(target.outline, L) > 0.997
     assert note in " ".join(target.notes)
 
 

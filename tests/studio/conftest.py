@@ -27,12 +27,12 @@ def studio_fixture(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running
 @pytest.fixture(scope="module", name="context")
 def context_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
     """What the pages of a module share: files that were fetched."""
-    shared = browser.new_context(
+    own = browser.new_context(
         base_url=studio.address, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
     )
-    shared.set_default_timeout(120_000)
-    yield shared
-    shared.close()
+    own.set_default_timeout(120_000)
+    yield own
+    own.close()
 
 
 @pytest.fixture(name="page")
@@ -56,8 +56,8 @@ def page_fixture(context: Any, studio: RunningStudio) -> Iterator[Any]:
     if not page.is_closed() and page.url.startswith(studio.address):
         page.evaluate("localStorage.clear()")
     context.clear_permissions()
-    for tab in context.pages:
-        tab.close()
+    for own in context.pages:
+        own.close()
     assert wrong == []
 
 

@@ -82,7 +82,6 @@ def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> Non
     other.goto(f"/#/p/{own}")
     other.wait_for_selector(".cards", state="attached")
     small_searches(page, "IH1", "IH4")
-    page.bring_to_front()
     page.goto(f"/#/p/{own}/picture")
     page.get_by_role("button", name="Find tiles").click()
     other.wait_for_selector(CARD)

@@ -130,7 +130,6 @@ def test_two_tabs_paint_on_one_picture(page, drawing, studio: RunningStudio) -> 
     other.wait_for_selector(READ)
     seen = "() => document.querySelector('canvas.reading').toDataURL()"
     before = other.evaluate(seen)
-    page.bring_to_front()  # a tab behind another draws once a second
     page.get_by_role("radio", name="Remove").check()
     page.get_by_role("radio", name="lasso").check()
     stroke(page, "canvas.reading", (0.3, 0.68), (0.6, 0.68), (0.6, 0.97), (0.3, 0.97))
@@ -138,7 +137,6 @@ def test_two_tabs_paint_on_one_picture(page, drawing, studio: RunningStudio) -> 
         lambda: (area := area_of(studio.project(own))) < 0.95 * whole and area  # a leg is gone
     )
     studio.until(lambda: other.wait_for_timeout(50) or other.evaluate(seen) != before)
-    other.bring_to_front()
     other.wait_for_selector(READ)
     other.get_by_role("radio", name="Add").check()
     stroke(other, "canvas.reading", (0.7, 0.3), (0.9, 0.16))

@@ -22,5 +22,6 @@ class FunctionBlock(Node):
 
 class Declaration(Node):
     name: str
+    lower_name: str
     value: list[Node]
     important: bool

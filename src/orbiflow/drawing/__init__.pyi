@@ -15,6 +15,7 @@ from .palettes import DEFAULT_PALETTE as DEFAULT_PALETTE
 from .palettes import PALETTES as PALETTES
 from .palettes import Palette as Palette
 from .palettes import PaletteName as PaletteName
+from .palettes import lightness as lightness
 from .palettes import palette as palette
 from .raster import FINER as FINER
 from .raster import draw_line as draw_line

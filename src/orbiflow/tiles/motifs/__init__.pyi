@@ -1,3 +1,4 @@
+from .artwork import page_picture as page_picture
 from .carried import CarriedPicture as CarriedPicture
 from .carried import Over as Over
 from .carried import carried_places as carried_places
@@ -13,7 +14,6 @@ from .on_figures import TEXELS_PER_PIXEL as TEXELS_PER_PIXEL
 from .on_figures import FigurePictures as FigurePictures
 from .on_figures import figure_paint as figure_paint
 from .on_figures import worn as worn
-from .page_pictures import page_picture as page_picture
 from .raster import MARGIN as MARGIN
 from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid

@@ -6,40 +6,33 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 import shapely
 from numpy.typing import NDArray
 from PIL import Image
-from shapely.errors import GEOSException
-from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, png_bytes
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError
 from orbiflow.settings import as_path
 from orbiflow.tiles import search
-from orbiflow.tiles.geometry import polygons_in, triangle_sides
+from orbiflow.tiles.geometry import triangle_sides
+from orbiflow.tiles.motifs.artwork import TooManyPoints, read_parts, whole_picture
 from orbiflow.tiles.motifs.engraving import engraved, eye
 from orbiflow.tiles.motifs.raster import Grid, Paint, bilinear, inside_ring, region_sides, runs
 from orbiflow.tiles.motifs.settings import MotifSettings
-from orbiflow.tiles.page import INK, Curve, Motif, PathPart, Raster, Style, boundary
+from orbiflow.tiles.page import INK, Motif, PathPart, Raster, Style
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.silhouette import (
     Covered,
     Drawing,
-    DrawnShape,
     Frame,
-    Regions,
-    SubPath,
     Target,
-    TooManyPoints,
-    TooTangled,
     check_file,
     open_image,
-    paints,
     read_head,
 )
 from orbiflow.tiles.tile import EscherTile, TileSource
@@ -217,31 +210,6 @@ LONGEST = 1 / 150
 # the tile and fills it as the drawing did. A machine is to follow a line where a picture has an area
 WIDEST_LINE, WIDEST_FOLLOWED = 1 / 150, 1 / 40
 MOST_CARRIED = 400_000  # greatest number of points that are carried in all
-FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
-
-
-def read_drawing(
-    path: Path, tile: EscherTile, widest: float = WIDEST_LINE
-) -> tuple[Motif, tuple[str, ...]]:
-    """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes.
-
-    Strokes wider than `widest`, in sizes of the silhouette, are carried as areas, unless their
-    vector-effect is non-scaling-stroke.
-    """
-    drawing = Drawing(path)
-    carry = _Carry(path, drawing, tile, widest)
-    regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
-    parts: list[PathPart] = []
-    for shape in drawing.shapes:
-        try:
-            parts += parts_of(shape, regions, carry)
-        except (TooManyPoints, TooTangled, GEOSException) as error:
-            raise InputFileError(
-                f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
-            ) from error
-    if not parts:
-        raise InputFileError(f"{path}: draws nothing that is filled or stroked")
-    return Motif(tuple(parts)), tuple(drawing.left_out())
 
 
 class _Carry:
@@ -273,69 +241,6 @@ class _Carry:
         return self.tile.forward(fine[:-1] if closed else fine)
 
 
-class Carry(Protocol):
-    """A map of a drawing's points.
-
-    - `size`: The size of the whole, in the units of the images.
-    - `scale`: The units of the images in one of the drawing's.
-    - `widest`: The widest stroke that stays a line, in the drawing's units.
-    """
-
-    size: float
-    scale: float
-    widest: float
-
-    def __call__(self, points: Array, *, closed: bool) -> Array:
-        """Return the images (M, 2) of a line's points (N, 2), and of some between them."""
-        ...
-
-
-def parts_of(shape: DrawnShape, regions: Regions, carry: Carry) -> list[PathPart]:
-    """Return what is filled and stroked of a shape, carried.
-
-    Raises `InputFileError` for a shape that reaches too far.
-    """
-    drawing = regions.drawing
-    reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
-    painted = paints(drawing, shape)
-    if painted and not (np.abs(reach) < FARTHEST * carry.size / carry.scale).all():  # NaN, too
-        raise InputFileError(
-            f"{drawing.path}: a path reaches much too far beyond the page; delete or shorten it"
-        )
-    found: list[PathPart] = []
-    for kind, paint in painted.items():
-        width = shape.width * shape.scale
-        line = kind == "stroke" and (width <= carry.widest or shape.keeps_its_width)
-        if line and paint.gradient is None and regions.has_plain_stroke(shape):
-            style, opacity = Style(None, paint.colour, width * carry.scale), paint.opacity
-            lines = regions.lines(shape)
-            curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
-        else:
-            region, (colour, opacity, _), _ = regions.layer(shape, kind, paint)
-            style, curves = Style(colour), _area(region, carry)
-        if curves:
-            found.append(PathPart(tuple(curves), style, opacity))
-    return found
-
-
-def _area(region: BaseGeometry, carry: Carry) -> list[Curve]:
-    curves: list[Curve] = []
-    for polygon in polygons_in(region):
-        rings = [
-            shapely.get_coordinates(ring)[:-1] for ring in (polygon.exterior, *polygon.interiors)
-        ]
-        outer, *holes = (carry(ring, closed=True) for ring in rings)
-        curves += boundary(shapely.Polygon(outer, holes))
-    return curves
-
-
-def _line(carry: Carry, points: Array, path: SubPath) -> Curve:
-    if path.closed and len(points) > 2 and np.allclose(points[0], points[-1]):
-        points = points[:-1]
-    closed = path.closed and len(points) > 2
-    return Curve.polyline(carry(points, closed=closed), closed=closed)
-
-
 class Over(NamedTuple):
     """What lies over the silhouette, a picture or a drawing; and what was decided for the user."""
 
@@ -354,11 +259,35 @@ def read_over(path: str | Path, tile: EscherTile, *, followed: bool = False) -> 
     check_file(path)
     head = read_head(path, 4096).lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith(b"<") or (path.suffix.lower() == ".svg" and b"\0" not in head[:64]):
-        widest = WIDEST_FOLLOWED if followed else WIDEST_LINE
-        drawing, notes = read_drawing(path, tile, widest)
-        return Over(None, drawing, notes)
+        return _read_drawing(path, tile, WIDEST_FOLLOWED if followed else WIDEST_LINE)
     picture = read_picture(path, tile)
     return Over(picture, None, picture.notes)
+
+
+def _read_drawing(path: Path, tile: EscherTile, widest: float) -> Over:
+    """Read an SVG file over a tile: its fills and strokes as curves, or else its page as pixels.
+
+    Strokes wider than `widest`, in sizes of the silhouette, are carried as areas.
+    """
+    drawing = Drawing(path)
+    carry = _Carry(path, drawing, tile, widest)
+    parts, notes = read_parts(drawing, carry), drawing.notes()
+    if parts:
+        return Over(None, Motif(tuple(parts)), tuple(notes))
+    bounds = drawing.box or (0.0, 0.0, 100.0, 100.0)
+    if not drawing.pixels(bounds, (300, 300))[..., 3].any():
+        raise InputFileError(f"{path}: draws nothing that is filled or stroked")
+    if drawing.box is None:
+        raise InputFileError(
+            f"{path}: a drawing of more than fills and strokes needs a page, a viewBox as the "
+            "silhouette has it"
+        )
+    picture = whole_picture(drawing)
+    notes.append(
+        f"carried the drawing as a picture of {picture.width} x {picture.height} pixels: it is more "
+        "than fills and strokes"
+    )
+    return Over(CarriedPicture(picture, tile.covered, tuple(notes)), None, tuple(notes))
 
 
 def require_figures(tile: EscherTile, settings: MotifSettings, pictures: int) -> None:

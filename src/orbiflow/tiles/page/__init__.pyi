@@ -1,6 +1,8 @@
 from .endless import Endless as Endless
 from .endless import polygon_json as polygon_json
 from .endless import tiling_json as tiling_json
+from .fills import TooTangled as TooTangled
+from .fills import fill as fill
 from .flattening import boundary as boundary
 from .flattening import cut_off as cut_off
 from .flattening import expanded as expanded

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array
 from orbiflow.drawing import png_bytes
 from orbiflow.tiles.geometry import orient, polygons_in
+from orbiflow.tiles.page.fills import fill
 from orbiflow.tiles.page.scene import (
     INK,
     Curve,
@@ -26,7 +27,6 @@ from orbiflow.tiles.page.scene import (
     Style,
     Uses,
 )
-from orbiflow.tiles.silhouette import fill
 
 
 def flattened(scene: Scene, tolerance: float, *, cut_pictures: bool = True) -> Scene:

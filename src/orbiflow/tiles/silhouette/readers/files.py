@@ -32,7 +32,7 @@ from orbiflow.tiles.silhouette.readers.reading import (
     unzipped,
 )
 from orbiflow.tiles.silhouette.readers.svg import read_svg
-from orbiflow.tiles.silhouette.readers.svg_drawing import MAX_BYTES
+from orbiflow.tiles.silhouette.readers.svg_documents import MAX_BYTES
 
 _HEAD_BYTES = 65536
 MAX_GAP_SHARE = 0.03  # of the drawing's size: such gaps in an outline are closed

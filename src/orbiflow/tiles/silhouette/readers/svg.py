@@ -1,244 +1,428 @@
-"""SVG drawings: the outline of the largest shape that is seen, in the drawing's own user units."""
+"""SVG drawings: the outline of the largest shape that is seen in a render, in user units."""
 
-# pyright: reportUnknownMemberType=false
-# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import chain
+import math
+from collections.abc import Callable, Collection
+from copy import deepcopy
+from xml.etree.ElementTree import Element
 
 import numpy as np
+import scipy
 import shapely
-from shapely.errors import GEOSException
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Window
+from orbiflow.drawing import level_curves
 from orbiflow.errors import Advice, InputFileError
-from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import (
+    MAX_COORDINATE,
     clean_ring,
-    filled,
     outer_outline,
     outer_ring,
     percent,
-    thinned,
 )
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
-from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
-from orbiflow.tiles.silhouette.readers.svg_overlays import (
-    BLACK,
-    MIN_NOTED_SHARE,
-    PAPER_COLOUR,
-    alike,
-    overlay,
-    solid,
-    without_grid,
+from orbiflow.tiles.silhouette.readers.svg_render import (
+    Drawing,
+    Rgba,
+    only,
+    picture_size,
+    visible,
+    without_colour,
 )
-from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
-from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, PaintedLayer, Regions
 
-# Flattening error, of the size of each shape, and its floor, of the size of the drawing.
-FLATNESS = 1 / 2000
-FLATNESS_FLOOR = 1 / 20_000
-# of the size of the drawing: vertices nearer their chord than this are dropped
-COLLINEAR_TOLERANCE = 1e-6
-WHOLE_SHARE, PAVED_SHARE = (
-    0.999,
-    0.95,
-)  # shares of the page that a background covers: one shape, several
-DISC_AREA_TOLERANCE = 0.01  # of its box: how nearly a disc has the area of one
-MIN_DRAWN_SHARE = 0.25  # of a disc's sides: what is drawn on it
-MIN_BADGE_SHARE = 0.5  # of a disc's width or height: more than an eye or a spot on it has
-MIN_HOLE_SHARE = 0.1  # of what fills the page: what is cut out of it is larger
-MAX_STRIPS = 500  # rectangles that a background is made of, as strips or a chequerboard
+LONG_PIXELS = 1500
+"""The longer side of the picture that is traced."""
+
+TOLERANCE_PIXELS = 0.3
+"""How far the outline is from that of the pixels, whose own opacity is of quarters of them."""
+
+SMALL_PIXELS = 400
+"""The longer side of pictures by which it is found where a drawing is."""
+
+MARGIN = 0.02
+"""Of what is drawn: what is traced lies so far from the edge of its picture."""
+
+BEYOND = (0.5, 10.0)
+"""How many pages beyond the page are looked at, on each side."""
+
+FIRST_REACH = 1000.0
+"""User units from the origin, within which a drawing without a page is sought first."""
+
+PAVED_SHARE = 0.95
+"""Of the page: what a background covers."""
+
+MIN_EDGE_SHARE = 0.5
+"""Of the page's edge: what a background covers."""
+
+EDGE_SHARE = 0.02
+"""Of the page's longer side: a background may end so far from the edge."""
+
+MAX_STRIPS = 60
+"""The most of the lowest shapes that are looked at one by one."""
+
+MIN_VISIBLE = 0.5
+"""Opacity: what is less opaque is not seen."""
+
+MAX_CHANNEL_DISTANCE = 10
+"""Of 255: colours whose channels differ by no more are one."""
+
+MIN_SHOWN_SHARE = 0.5
+"""Of the whole: what is left if shapes in the paper's colour are background, and not the drawing."""
+
+MIN_DENSE_SHARE = 0.25
+"""Of what is all faint: less that is dense is where faint shapes overlap."""
+
+MIN_OVERLAP_SHARE = 0.1
+"""Of a shape in the paper's colour: what lies over others by more is background."""
+
+MAX_CURVE_POINTS = 300_000
+"""The most points of the curves around what is seen."""
+
+MIN_NOTED_SHARE = 0.001
+MIN_HOLE_SHARE = 0.1
+"""Of what fills the page: what is cut out of it is larger."""
+
+DISC_AREA_TOLERANCE = 0.01
+"""Of its box: how nearly a disc has the area of one."""
+
+MIN_BADGE_SHARE = 0.25
+"""Of a disc: what is drawn on it is as wide or as high, and more than an eye or a spot."""
+
+WHITE = np.array([255, 255, 255], dtype=np.uint8)
+_Mask = NDArray[np.bool_]
+_AROUND = np.ones((3, 3), dtype=bool)
+_FILLED = "path,rect,circle,ellipse,polygon,polyline{fill:#000!important;opacity:1!important}"
 
 
 def read_svg(path: Source) -> Reading:
     """Read the outline of the silhouette in an SVG drawing, in user units of the viewBox, with y down.
 
-    What is seen counts: fills, strokes and markers, cut by clips and masks, one painted over the other.
-    What has the background's colour hides what lies below. The largest component is kept and its holes
-    are filled. Where nothing is painted, all paths count as filled.
+    What is seen counts, as resvg renders it: fills, strokes, texts and pictures, cut by clips, masks
+    and the page, one painted over the other. What has the background's colour hides what lies below.
+    The largest component is kept and its holes are filled. Where nothing is painted, all paths count
+    as filled.
+
+    Raises `InputFileError` for a drawing that is damaged, too large, or shows nothing.
     """
-    drawing = Drawing(path)
-    size = _size(drawing)
-    try:
-        seen, notes = _seen(drawing, size)
-    except TooManyPoints as exc:
+    drawing, notes = Drawing(path), list[str]()
+    box = _bounds(drawing)
+    root: Element | None = None
+    if box is None and drawing.window is not None and _share_beyond(drawing, None):
+        page = " ".join(f"{value:g}" for value in drawing.box or ())
         raise InputFileError(
-            f"{path}: the paths come to more than {MAX_POINTS} points; simplify them"
-        ) from exc
-    except TooTangled as exc:
-        raise InputFileError(
-            f"{path}: a path crosses itself too often to be filled or stroked; simplify it"
-        ) from exc
-    except GEOSException as exc:
-        raise InputFileError(
-            f"{path}: the shapes cannot be united ({exc}); unite them in the drawing program"
-        ) from exc
+            f"{path}: nothing lies on the page {page} (the viewBox, or width and height); fit the "
+            "page to the drawing"
+        )
+    if box is None:
+        root, notes = _all_filled(drawing), ["nothing is painted: took the closed paths as filled"]
+        box = _bounds(drawing, root)
+    if box is None:
+        left = "".join(f"; {note}" for note in drawing.notes())
+        raise InputFileError(f"{path}: the drawing has no shape that encloses an area{left}")
+    paper = None
+    if drawing.window is not None and root is None:
+        root, paper, said = _without_background(drawing, drawing.window)
+        notes += said
+        if root is not None:
+            box = _bounds(drawing, root) or box
+    window = _framed(box, drawing.window)
+    size = picture_size(window, LONG_PIXELS)
+    pixels = drawing.pixels(window, size, root)
+
+    def without_paper() -> Rgba:
+        shown = deepcopy(drawing.document)
+        shown.root = shown.root if root is None else root
+        colour = WHITE if paper is None else paper
+        return drawing.pixels(window, size, without_colour(shown, colour, MAX_CHANNEL_DISTANCE))
+
+    values, said = _shares(pixels, paper, without_paper)
+    low, high = np.array(window[:2]), np.array(window[2:])
+    unit = (high - low) / size
+    traced = _traced(values)
+    if traced is None:
+        raise InputFileError(f"{path}: the drawing is too intricate; simplify it")
+    seen = shapely.transform(traced, lambda points: low + points * unit)
     if not seen.area > 0:
         raise InputFileError(f"{path}: the drawing encloses no area that shows at its size")
     shape, kept = outer_outline(seen)
-    outline, cleaned = clean_ring(
-        outer_ring(thinned(shape, COLLINEAR_TOLERANCE * size)[0]), str(path), InputFileError
-    )
+    outline, cleaned = clean_ring(outer_ring(shape), str(path), InputFileError)
+    notes += [*said, *_doubts(drawing, shape, seen, pixels)]
+    if drawing.window is not None and (share := _share_beyond(drawing, root)) > MIN_NOTED_SHARE:
+        notes.append(f"left out what lies beyond the page: {percent(share)} of what is painted")
+    notes += [*drawing.notes(), *kept, *cleaned]
     left, top, right, bottom = drawing.box or (0.0, 0.0, 0.0, 0.0)
-    size = (right - left, bottom - top) if drawing.box else None
-    notes = (*notes, *drawing.left_out(), *kept, *cleaned)
-    return Reading(outline, True, "svg", size, notes, (left, top), seen)
+    page = (right - left, bottom - top) if drawing.box else None
+    return Reading(outline, True, "svg", page, tuple(notes), (left, top), seen)
 
 
-def _size(drawing: Drawing) -> float:
-    """Return the longer side of what paths span on the page."""
-    reach = [path.reach() for shape in drawing.shapes for path in shape.paths]
-    if not reach:
-        return 0.0
-    points = np.concatenate(reach)
-    if drawing.window is not None:
-        points = points.clip(drawing.window[:2], drawing.window[2:])
-    return float(np.ptp(points, axis=0).max())
+def _traced(values: Array) -> BaseGeometry | None:
+    """Return where values (height, width) are above a half, in pixels; (0, 0) spans [0, 1] x [0, 1].
 
-
-def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
-    """Return the region that is seen as shape, and notes of what was decided."""
-
-    least = size * FLATNESS_FLOOR
-
-    def tolerance(reach: Array) -> float:
-        return max(float(np.ptp(reach, axis=0).max()) * FLATNESS, least)
-
-    regions = Regions(drawing, tolerance, MAX_POINTS, drawing.window)
-    layers = [regions.layers(shape) for shape in drawing.shapes]
-    notes: list[str] = []
-    if not any(layers):
-        if regions.beyond > 0:
-            page = " ".join(f"{value:g}" for value in drawing.box or ())
-            raise InputFileError(
-                f"{drawing.path}: nothing lies on the page {page} (the viewBox, or width and "
-                "height); fit the page to the drawing"
-            )
-        fills = [regions.shown(shape, regions.fill(shape)) for shape in drawing.shapes]
-        layers = [[PaintedLayer(region, BLACK)] for region in fills if region.area > 0]
-        notes = ["nothing is painted: took the closed paths as filled"]
-    layers = [own for own in layers if own]
-    paper, grounds = _background(layers, drawing)
-    n = len(grounds)
-    shown = [layer for k, own in enumerate(layers) if k not in grounds for layer in own]
-    if not shown:
-        raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
-    noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
-    notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
-    shown, ruled = without_grid(shown, paper or PAPER_COLOUR)
-    seen, decided = overlay(shown, paper)
-    decided = [*ruled, *decided]
-    colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= MIN_VISIBLE_OPACITY}
-    whole = solid(seen)
-    if whole >= PAVED_SHARE * _page(layers, drawing).area:
-        all_but = "the silhouette is all but the whole page"
-        if len(colours) > 1:
-            notes.append(f"{all_but}; if that is a background, delete it")
-        elif seen.area < (1 - MIN_HOLE_SHARE) * whole:
-            notes.append(Advice(f"{all_but}; if the hole in it is the shape, change {{invert}}"))
-    elif _is_badge(seen, shown):
-        notes.append(
-            "the silhouette is a disc with a drawing on it; if it is a background, delete it"
-        )
-    cut = regions.beyond / (regions.beyond + sum(layer.region.area for layer in shown))
-    if cut > MIN_NOTED_SHARE:
-        notes.append(f"left out what lies beyond the page: {percent(cut)} of what is painted")
-    return seen, notes + decided
-
-
-def _page(layers: list[list[PaintedLayer]], drawing: Drawing) -> shapely.Polygon:
-    """Return the page, or without one the box of what is painted."""
-    every = [layer.region for own in layers for layer in own]
-    xmin, ymin, xmax, ymax = drawing.box or shapely.total_bounds(every)
-    return shapely.box(xmin, ymin, xmax, ymax)
-
-
-def _background(layers: list[list[PaintedLayer]], drawing: Drawing) -> tuple[str | None, set[int]]:
-    """Return the background's colour, if it is painted, and which shapes are no more than it."""
-    if not layers:
-        return drawing.ground, set()
-    first, page = [own[0] for own in layers], _page(layers, drawing)
-    whole = {k for k, layer in enumerate(first) if _covers(layer.region, page)}
-    paving = set(range(_paving(layers, page)))
-    if whole == set(range(len(layers))) and not drawing.others.keys() & {"image", "text"}:
-        return drawing.ground, set()
-    # frames have no colour that others lie on
-    solid = [k for k in sorted(whole) if first[k].region.area >= WHOLE_SHARE * page.area]
-    under = solid[-1:] or sorted(paving, key=lambda k: first[k].region.area)[-1:]
-    return first[under[0]].brush.colour if under else drawing.ground, whole | paving
-
-
-def _covers(region: BaseGeometry, page: shapely.Polygon) -> bool:
-    if region.envelope.intersection(page).area < WHOLE_SHARE * page.area:
-        return False
-    return _without_holes(region).area >= WHOLE_SHARE * region.envelope.area
-
-
-def _paving(layers: list[list[PaintedLayer]], page: shapely.Polygon) -> int:
-    """Return how many of the lowest shapes are rectangles that pave the page for others on them.
-
-    Corners may be rounded. Once the page is paved, what lies beside the rest or reaches from edge to
-    edge still belongs to it.
+    None is of what is too intricate.
     """
-    xmin, ymin, xmax, ymax = page.buffer(-(1 - WHOLE_SHARE) * page.length / 4).bounds
-    ground: BaseGeometry = shapely.Polygon()
-    count, paved = 0, False
-    for own in layers[:MAX_STRIPS]:
-        parts = polygons_in(own[0].region)
-        if any(filled(part).area < PAVED_SHARE * part.envelope.area for part in parts):
+    curves = level_curves(np.pad(values, 1), 0.5)
+    if sum(map(len, curves)) > MAX_CURVE_POINTS:
+        return None
+    rings = [shapely.LinearRing(curve[:, ::-1] - 0.5) for curve in curves if len(curve) > 3]
+    area = shapely.build_area(shapely.GeometryCollection(rings))
+    height, width = values.shape
+    # what fills the edge of the picture ends there, and not in the middle of its pixels
+    simple = shapely.simplify(area, TOLERANCE_PIXELS)
+    return shapely.intersection(simple, shapely.box(0, 0, width, height))
+
+
+def _bounds(drawing: Drawing, root: Element | None = None) -> Window | None:
+    """Return bounds of all that is seen, on the page if there is one; None if nothing is."""
+    if drawing.window is not None:
+        return _seen_in(drawing, drawing.window, root)
+    reach, found = FIRST_REACH, None
+    while found is None or max(np.abs(found)) >= reach * (1 - 2 / SMALL_PIXELS):
+        if reach > MAX_COORDINATE:
+            if found is None:
+                return None
+            raise InputFileError(
+                f"{drawing.path}: a path reaches beyond {MAX_COORDINATE:g} user units; rescale the "
+                "drawing"
+            )
+        found = _seen_in(drawing, (-reach, -reach, reach, reach), root)
+        reach *= 10 if found is not None or reach < 1e6 else 1000
+    for _ in range(20):  # to a drawing that is small beside its distance from the origin
+        before = found
+        found = _seen_in(drawing, before, root) or before
+        if _size_of(found) > _size_of(before) / 2:
             break
-        region = _without_holes(own[0].region)
-        left, low, right, high = region.bounds
-        spans = (left <= xmin and right >= xmax) or (low <= ymin and high >= ymax)
-        beside = region.intersection(ground).area <= MIN_NOTED_SHARE * region.area
-        if paved and not spans and not beside:
-            break
-        ground, count = ground.union(region), count + 1
-        paved = ground.intersection(page).area >= PAVED_SHARE * page.area
-    widest = max(
-        (own[0] for own in layers[:count]), key=lambda layer: layer.region.area, default=None
-    )
-    has_others = widest and _shown_on(widest.brush.colour, chain(*layers[count:]))
-    return count if paved and has_others else 0
+    return found
 
 
-def _shown_on(colour: str, layers: Iterable[PaintedLayer]) -> list[PaintedLayer]:
-    """Return the layers that are no fainter than what is seen, and of another colour."""
-    visible = (layer for layer in layers if layer.brush.opacity >= MIN_VISIBLE_OPACITY)
-    return [layer for layer in visible if not alike(layer.brush.colour, colour)]
+def _size_of(window: Window) -> float:
+    return max(window[2] - window[0], window[3] - window[1])
 
 
-def _is_badge(seen: BaseGeometry, layers: list[PaintedLayer]) -> bool:
-    """Return whether what is seen is a disc in one colour with a drawing of another on it."""
-    whole = outer_outline(seen)[0]
+def _seen_in(drawing: Drawing, window: Window, root: Element | None) -> Window | None:
+    """Return bounds of what is seen in a window, a pixel wider on each side."""
+    size = picture_size(window, SMALL_PIXELS)
+    shown = drawing.pixels(window, size, root)[..., 3] > 0
+    if not shown.any():
+        return None
+    rows, columns = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
+    first = np.array([columns[0] - 1, rows[0] - 1]).clip(0)
+    last = np.array([columns[-1] + 2, rows[-1] + 2]).clip(None, size)
+    low, high = np.array(window[:2]), np.array(window[2:])
+    unit = (high - low) / size
+    left, top = (low + first * unit).tolist()
+    right, bottom = (low + last * unit).tolist()
+    return left, top, right, bottom
+
+
+def _framed(box: Window, page: Window | None) -> Window:
+    """Return a window around a box with a margin, on the page."""
+    margin = MARGIN * _size_of(box)
+    low, high = np.array(box[:2]) - margin, np.array(box[2:]) + margin
+    if page is not None:
+        low, high = np.maximum(low, page[:2]), np.minimum(high, page[2:])
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _all_filled(drawing: Drawing) -> Element:
+    """Return the document with all its shapes filled."""
+    root = deepcopy(drawing.document.root)
+    for item in root.iter():
+        item.attrib.pop("style", None)
+        for key in [key for key in item.attrib if key.startswith(("fill", "stroke", "opacity"))]:
+            del item.attrib[key]
+    sheet = Element("style")
+    sheet.text = _FILLED
+    root.append(sheet)
+    return root
+
+
+def _without_background(
+    drawing: Drawing, page: Window
+) -> tuple[Element | None, NDArray[np.uint8] | None, list[str]]:
+    """Return the document without the lowest shapes that pave the page, their colour, and a note.
+
+    They are as few of the lowest as pave it, and rectangles on these that reach from edge to edge;
+    something of another colour is left on them.
+    """
+    size = picture_size(page, SMALL_PIXELS)
+    document = drawing.document
+    if not _is_paved(drawing.pixels(page, size)):
+        return None, None, []
+
+    def shown(kept: Collection[int]) -> Rgba:
+        return drawing.pixels(page, size, only(document, kept))
+
+    leaves = len(list(document.leaves()))
+    frames = {k for k in range(min(leaves, MAX_STRIPS)) if _is_frame(shown({k}))}
+    others = [k for k in range(leaves) if k not in frames]
+    ground, most = shown(range(0)), 0
+    if _is_paved(shown(others)):
+        least, most = 0, len(others)  # that leave the page bare, and that pave it
+        while most - least > 1:
+            middle = (least + most) // 2
+            is_enough = _is_paved(shown(others[:middle]))
+            least, most = (least, middle) if is_enough else (middle, most)
+        ground = shown(others[:most])
+        while most < min(len(others) - 1, MAX_STRIPS) and _is_strip(shown({others[most]}), ground):
+            most += 1
+    number = most + len(frames)
+    left = shown(others[most:])
+    solid = ground[ground[..., 3] > 127][:, :3]
+    shades, counts = np.unique(solid, axis=0, return_counts=True)
+    paper = shades[counts.argmax()] if len(shades) else WHITE
+    apart = np.abs(left[..., :3].astype(np.int16) - paper).max(axis=-1) > MAX_CHANNEL_DISTANCE
+    if not number or not (apart & (left[..., 3] > 127)).any():
+        return None, None, []
+    noun = "a background" if number == 1 else f"{number} shapes of a background"
+    note = f"left out {noun} that cover{'s' * (number == 1)} the whole drawing"
+    return only(document, others[most:]), paper if len(shades) else None, [note]
+
+
+def _is_frame(pixels: Rgba) -> bool:
+    """Whether what is seen is a line around the page, with nothing in it."""
+    opaque = visible(pixels) >= MIN_VISIBLE
+    return bool(_is_paved(pixels) and opaque.mean() < 1 - PAVED_SHARE / 2)
+
+
+def _is_paved(pixels: Rgba) -> bool:
+    opaque = visible(pixels) >= MIN_VISIBLE
+    height, width = opaque.shape
+    rim = math.ceil(EDGE_SHARE * max(height, width))
+    inner = opaque[rim : height - rim, rim : width - rim]
+    shares = [
+        np.concatenate([part[0], part[-1], part[:, 0], part[:, -1]]).mean()
+        for part in (opaque, inner)
+    ]
+    solid = scipy.ndimage.binary_fill_holes(opaque)
+    return bool(np.mean(solid) >= PAVED_SHARE and max(shares) >= MIN_EDGE_SHARE)
+
+
+def _is_strip(pixels: Rgba, ground: Rgba) -> bool:
+    """Whether rectangles are seen that reach from one edge of the page to the other, or lie beside."""
+    opaque = visible(pixels) >= MIN_VISIBLE
+    labels = scipy.ndimage.label(opaque)[0]
+    boxes = scipy.ndimage.find_objects(labels)
+    if not boxes or sum(opaque[box].size for box in boxes) * PAVED_SHARE > opaque.sum():
+        return False
+    if (opaque & (visible(ground) >= MIN_VISIBLE)).sum() <= MIN_NOTED_SHARE * opaque.sum():
+        return True
+    ends = opaque[[0, -1]].any(axis=1), opaque[:, [0, -1]].any(axis=0)
+    return any(bool(both.all()) for both in ends)
+
+
+def _shares(
+    pixels: Rgba, paper: NDArray[np.uint8] | None, without_paper: Callable[[], Rgba]
+) -> tuple[Array, list[str]]:
+    """Return how much of each pixel is seen as shape on a paper, and notes of what was decided.
+
+    The pixels of the drawing `without_paper`, without what has the paper's colour, show what that
+    hides.
+    """
+    opacity, notes = visible(pixels), list[str]()
+    opaque = opacity >= MIN_VISIBLE
+    shown = opacity > 1 / 32
+    # where faint shapes overlap they are no shape of their own
+    if not opaque.any() or (opacity.max() < 0.9 and opaque.sum() < MIN_DENSE_SHARE * shown.sum()):
+        usual = float(np.median(opacity[opacity > opacity.max() / 2]))
+        return opacity / usual, ["took faint shapes, as there are no others"]
+    few = opacity[::3, ::3]  # of the edges of shapes no two neighbours are among them
+    faint = scipy.ndimage.binary_erosion((few > 1 / 32) & (few < MIN_VISIBLE), _AROUND)
+    if faint.sum() > MIN_NOTED_SHARE * (few >= MIN_VISIBLE).sum():
+        notes.append("left out faint shapes")
+    colour = WHITE if paper is None else paper
+    apart = np.abs(pixels[..., :3].astype(np.int16) - colour).max(axis=-1)
+    pale = opaque & (apart <= MAX_CHANNEL_DISTANCE)
+    ink = opaque & ~pale
+    if not pale.any():
+        return opacity, notes
+    name = "#" + "".join(f"{value:02x}" for value in colour.tolist())
+    dark = visible(without_paper()) >= MIN_VISIBLE
+    labels, count = scipy.ndimage.label(pale)
+    sizes = np.bincount(labels.ravel(), minlength=count + 1)
+    covered = np.bincount(labels[dark], minlength=count + 1) > MIN_OVERLAP_SHARE * sizes
+    covered[0] = True
+    every = ink | ~covered[labels]  # what lies on the bare paper may be the shape itself
+    hidden = 1 - _solid(ink) / _solid(every)
+    if not ink.any() or (paper is None and hidden > MIN_SHOWN_SHARE):
+        notes.append(f"took shapes in {name} too: they are most of the drawing")
+        return opacity * every, notes
+    bitten = 1 - _solid(ink) / max(_solid(dark), 1)
+    if bitten > MIN_NOTED_SHARE:
+        notes.append(
+            f"took shapes in {name} for background, which hide {percent(bitten)} of the others; give "
+            "them another colour if they belong to the shape"
+        )
+    # beside the paper a pixel is shape as much as its colour is the shape's beside it
+    most = scipy.ndimage.maximum_filter(np.where(ink, apart, 0), 3)
+    beside = scipy.ndimage.binary_dilation(pale, _AROUND) & opaque
+    share = np.where(beside, apart / np.maximum(most, 1), 1.0)
+    return np.where(pale, 0.0, opacity * share), notes
+
+
+def _solid(mask: _Mask) -> int:
+    """Return the pixels of the largest component of a mask with its holes filled."""
+    labels = scipy.ndimage.label(scipy.ndimage.binary_fill_holes(mask))[0]
+    return int(np.bincount(np.ravel(labels))[1:].max(initial=0))
+
+
+def _doubts(
+    drawing: Drawing, whole: shapely.Polygon, seen: BaseGeometry, pixels: Rgba
+) -> list[str]:
+    """Return notes on a shape that is all but the page, or a disc."""
+    page = None if drawing.box is None else shapely.box(*drawing.box)
+    shades = pixels[visible(pixels) > 0.9][:, :3] // (2 * MAX_CHANNEL_DISTANCE)
+    has_colours = len(shades) > 0 and bool((np.ptp(shades, axis=0) > 1).any())
+    if page is not None and whole.area >= PAVED_SHARE * page.area:
+        all_but = "the silhouette is all but the whole page"
+        if has_colours:
+            return [f"{all_but}; if that is a background, delete it"]
+        if seen.area < (1 - MIN_HOLE_SHARE) * whole.area:
+            return [Advice(f"{all_but}; if the hole in it is the shape, change {{invert}}")]
+        return []
     gap = DISC_AREA_TOLERANCE * whole.envelope.area
-    if abs(whole.area - np.pi / 4 * whole.envelope.area) > gap:
-        return False
-    disc = max(layers, key=lambda layer: layer.region.area)
-    on_it = [layer.region for layer in _shown_on(disc.brush.colour, layers)]
-    is_round = whole.convex_hull.area - whole.area < gap and disc.region.area > whole.area - gap
-    if not on_it or not is_round:
-        return False
-    shares = _sides(outer_outline(shapely.union_all(on_it))[0]) / _sides(whole)
-    return bool(shares.min() > MIN_DRAWN_SHARE and shares.max() > MIN_BADGE_SHARE)
+    is_disc = abs(whole.area - math.pi / 4 * whole.envelope.area) < gap
+    if (
+        is_disc
+        and has_colours
+        and whole.convex_hull.area - whole.area < gap
+        and _is_drawn_on(pixels)
+    ):
+        return ["the silhouette is a disc with a drawing on it; if it is a background, delete it"]
+    return []
 
 
-def _sides(region: BaseGeometry) -> Array:
-    bounds = np.array(region.bounds)
-    return bounds[2:] - bounds[:2]
+def _is_drawn_on(pixels: Rgba) -> bool:
+    """Whether something of another colour than most is wide and high on what is opaque."""
+    opaque = visible(pixels) > 0.9
+    shades, counts = np.unique(pixels[opaque][:, :3], axis=0, return_counts=True)
+    usual = shades[counts.argmax()].astype(np.int16)
+    other = opaque & (np.abs(pixels[..., :3] - usual).max(axis=-1) > MAX_CHANNEL_DISTANCE)
+    other = scipy.ndimage.binary_opening(other, _AROUND)
+    sides = [np.ptp(np.flatnonzero(other.any(axis=axis))) if other.any() else 0 for axis in (0, 1)]
+    whole = [np.ptp(np.flatnonzero(opaque.any(axis=axis))) for axis in (0, 1)]
+    shares = [float(side) / float(most) for side, most in zip(sides, whole, strict=True)]
+    return min(shares) > MIN_BADGE_SHARE
 
 
-def _without_holes(region: BaseGeometry) -> BaseGeometry:
-    return shapely.union_all([filled(part) for part in polygons_in(region)])
-
-
-def _why_empty(drawing: Drawing) -> str:
-    images, texts = drawing.others.get("image", 0), drawing.others.get("text", 0)
-    if images or texts:
-        parts = [f"{images} embedded image(s)"] * bool(images) + [f"{texts} text(s)"] * bool(texts)
-        advice = "trace the image or give it as PNG" if images else "convert the text to paths"
-        return f"no closed path: it holds only {' and '.join(parts)}; {advice}"
-    left = "".join(f"; {note}" for note in drawing.left_out())
-    return f"no closed path: the drawing has no shape that encloses an area{left}"
+def _share_beyond(drawing: Drawing, root: Element | None) -> float:
+    """Return which share of what is painted lies beyond the page, near it or farther away."""
+    page = drawing.window
+    assert page is not None
+    low, high = np.array(page[:2]), np.array(page[2:])
+    found = 0.0
+    for beyond in BEYOND:
+        sides = beyond * (high - low)
+        (left, top), (right, bottom) = (low - sides).tolist(), (high + sides).tolist()
+        wide = left, top, right, bottom
+        shown = visible(drawing.pixels(wide, picture_size(wide, SMALL_PIXELS), root))
+        rows, columns = (
+            np.abs(np.arange(int(count)) + 0.5 - count / 2) <= count / (2 + 4 * beyond) + 1.5
+            for count in shown.shape
+        )
+        total = float(shown.sum())
+        outside = total - float(shown[rows][:, columns].sum())
+        found = max(found, outside / total if total else 0.0)
+    return found

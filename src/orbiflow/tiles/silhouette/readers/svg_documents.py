@@ -1,0 +1,335 @@
+"""SVG documents made safe to render: bounded, complete in themselves, with their page known."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import contextlib
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator
+from urllib.parse import unquote, unquote_to_bytes
+from xml.etree.ElementTree import Element
+
+import svgelements
+
+from orbiflow.arrays import Window
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.silhouette.readers.image_files import decoded_image
+from orbiflow.tiles.silhouette.readers.reading import FileContent, Source, quoted, read_bytes
+from orbiflow.tiles.silhouette.readers.svg_styles import write_styles
+from orbiflow.tiles.silhouette.readers.svg_xml import HREF, Notes, is_own, parse_xml
+
+MAX_BYTES = 16 * 2**20
+MAX_DRAWN = 10_000  # elements, those drawn again by references counted again
+MAX_STEPS = 1_000_000  # of markers at the points of paths
+MAX_NESTED = 200  # elements in elements, and referred to by these
+MAX_FILTERS = 100  # steps of filters, counted again where they are used
+MAX_CHARACTERS = 20_000  # of texts
+PAGE_TOLERANCE = 1e-9  # of the page: what is seen of the plane is the page if it differs by less
+_PIXELS = {
+    **{"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "in": 96.0, "em": 16.0, "rem": 16.0, "ex": 8.0},
+    **{"cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6},
+}
+_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s?([a-z]*)\s*", re.IGNORECASE)
+_URL = re.compile(r"url\(\s*(?P<quote>[\"']?)(?P<target>[^)]*?)(?P=quote)\s*\)", re.IGNORECASE)
+_IMPORT = re.compile(r"@import\b[^;]*;?", re.IGNORECASE)
+_DATA = re.compile(r"data:image/(png|jpe?g|gif|webp)\s*(;[^,]*)?,", re.IGNORECASE)
+_SIZES = re.compile(r"(?<![\w-])(width|height)\s*:\s*([^;]*)", re.IGNORECASE)
+_HTML = {"foreignObject", "video", "audio", "canvas", "iframe"}
+_ANIMATIONS = {"animate", "animateTransform", "animateMotion", "animateColor", "set", "discard"}
+_DROPPED = {**dict.fromkeys(_HTML, "a piece of HTML"), "script": "", "metadata": ""}
+_EFFECT = "vector-effect"
+# what the library raises for texts that are damaged
+_DAMAGED = (ValueError, TypeError, IndexError, AttributeError, ArithmeticError)
+_POINTS = re.compile(r"[a-df-z]|[-+.\d]\d*", re.IGNORECASE)
+
+
+class Document:
+    """An SVG document that can be rendered without reading or fetching anything else.
+
+    - `root`: Its elements, all of SVG's own; references lead to others of them or hold their data.
+    - `box`: The page (xmin, ymin, xmax, ymax) in user units: the viewBox, or the size; None without.
+    - `pixel`: The size of a pixel of the screen in user units.
+    - `window`: What of the plane is seen, which is wider than the page where its sides' ratio is not
+      that of the size; None without a page.
+
+    Raises `InputFileError` for one that is damaged, too large, or would take too long.
+    """
+
+    def __init__(self, path: Source) -> None:
+        self.path, self.notes, self.left_out = path, Notes(), Counter[str]()
+        self.root = parse_xml(path, read_bytes(path, MAX_BYTES))
+        if self.root.attrib.pop("{}xml-stylesheet", None):
+            self.notes.add("style sheets in other files are not read")
+        write_styles(path, self.root, self.notes)
+        self._make_safe(self.root)
+        self._check_work()
+        self.box, self.window = self._page()
+        if self.root.attrib.pop("transform", None):
+            self.notes.add("the transform of <svg> is left out: put it on a group")
+        if any(
+            _EFFECT in item.get("style", "") or _EFFECT in item.attrib for item in self.root.iter()
+        ):
+            self._thin_strokes(self.root, svgelements.Matrix())
+
+    @property
+    def has_text(self) -> bool:
+        """Whether there is text, which is drawn in fonts."""
+        return any(item.tag == "text" for item in self.root.iter())
+
+    def said(self) -> list[str]:
+        """Return notes of what was met and is not drawn."""
+        left = [f"{count} {name}{'s' * (count > 1)}" for name, count in self.left_out.items()]
+        return [f"left out {' and '.join(left)} of the drawing"] * bool(left) + self.notes.counted()
+
+    def leaves(self) -> Iterator[tuple[Element, Element]]:
+        """Yield each element that draws by itself, with its parent, from bottom to top."""
+        stack = [(self.root, iter(self.root))]
+        while stack:
+            parent, children = stack[-1]
+            child = next(children, None)
+            if child is None:
+                stack.pop()
+            elif child.tag in ("svg", "g", "a", "switch"):
+                stack.append((child, iter(child)))
+            elif child.tag in DRAWN:
+                yield child, parent
+
+    def _make_safe(self, element: Element) -> None:
+        for child in list(element):
+            name = _DROPPED.get(child.tag)
+            if child.tag in _ANIMATIONS:
+                self.notes.add("read as it stands, without its animations")
+            elif name is None and is_own(child):
+                self._make_safe(child)
+                continue
+            elif name and child.get("requiredExtensions") is None:
+                self.left_out["piece of HTML"] += 1
+            element.remove(child)
+        if element.tag == "style":
+            text = "".join(element.itertext())
+            if _IMPORT.search(text):
+                self.notes.add("style sheets in other files are not read")
+            element.text = self._within(_IMPORT.sub("", text))
+        self._make_attributes_safe(element)
+
+    def _make_attributes_safe(self, element: Element) -> None:
+        link = element.attrib.pop(HREF, None)
+        link = element.attrib.pop("href", link)
+        for key in [key for key in element.attrib if key[:1] == "{" and not key.endswith("}space")]:
+            del element.attrib[key]
+        for key, text in element.items():
+            if "url" in text.lower():
+                element.set(key, self._within(text))
+        if "pathLength" in element.attrib:
+            self._scale_dashes(element)
+        if link is not None and element.tag != "a":
+            link = link.strip()
+            if link.startswith("#") or (
+                element.tag in ("image", "feImage") and self._is_data(link)
+            ):
+                element.set("href", link)
+            elif element.tag in ("image", "feImage"):
+                self.left_out["image in another file"] += not link.lower().startswith("data:")
+                self.left_out["image of another kind"] += link.lower().startswith("data:")
+                self.left_out = +self.left_out
+            elif link:
+                self.notes.add(
+                    f"<{element.tag}> refers to {quoted(link)}, which is outside the file"
+                )
+
+    def _within(self, text: str) -> str:
+        """Return a text of style whose references to other files lead nowhere."""
+
+        def safe(found: re.Match[str]) -> str:
+            if found["target"].strip().startswith("#"):
+                return found[0]
+            self.notes.add(f"{quoted(found['target'])} is outside the file, and is not read")
+            return "none"
+
+        return _URL.sub(safe, text)
+
+    def _is_data(self, link: str) -> bool:
+        """Return whether a link holds the data of a picture within bounds."""
+        found = _DATA.match(link)
+        if found is None:
+            return False
+        try:
+            text = link[found.end() :]
+            encoded = "base64" in (found[2] or "").lower()
+            data = base64.b64decode(text) if encoded else unquote_to_bytes(text)
+            decoded_image(FileContent(data, f"{self.path}: a picture in it"))
+        except (binascii.Error, ValueError):
+            return False
+        return True
+
+    def _scale_dashes(self, element: Element) -> None:
+        """Write the dashes of a shape of a declared length in user units, as renderers read them."""
+        declared = _number(element.attrib.pop("pathLength"))
+        style = properties(element)
+        dashes = style.get("stroke-dasharray", element.get("stroke-dasharray", "none"))
+        if declared <= 0 or dashes == "none":
+            return
+        length = 2 * math.pi * _number(element.get("r", "0"))
+        if element.tag == "path":
+            length = 0.0  # of a path that is damaged
+            with contextlib.suppress(*_DAMAGED):
+                length = svgelements.Path(element.get("d", "")).length(error=1e-5)
+        offset = style.get("stroke-dashoffset", element.get("stroke-dashoffset", "0"))
+        for key, text in {"stroke-dasharray": dashes, "stroke-dashoffset": offset}.items():
+            numbers = [_number(word) * length / declared for word in text.replace(",", " ").split()]
+            style[key] = " ".join(f"{number:.9g}" for number in numbers)
+        element.set("style", text_of(style))
+
+    def _check_work(self) -> None:
+        """Refuse a drawing whose references multiply its elements, or lead in a circle."""
+        by_id: dict[str, Element] = {}
+        for item in self.root.iter():
+            by_id.setdefault(item.get("id", ""), item)
+        by_id.pop("", None)
+        known: dict[Element, tuple[int, int]] = {}
+        self._work(self.root, by_id, known, set())
+        elements, filters = known[self.root]
+        if elements > MAX_DRAWN:
+            raise InputFileError(
+                f"{self.path}: draws more than {MAX_DRAWN} elements; keep only the silhouette"
+            )
+        characters = sum(len("".join(item.itertext())) for item in self.root.iter("text"))
+        if filters > MAX_FILTERS or characters > MAX_CHARACTERS:
+            raise InputFileError(
+                f"{self.path}: has too many filters or too much text; draw the silhouette alone"
+            )
+
+    def _work(
+        self,
+        element: Element,
+        by_id: dict[str, Element],
+        known: dict[Element, tuple[int, int]],
+        above: set[Element],
+    ) -> tuple[int, int]:
+        """Return how many elements and steps of filters are drawn for one."""
+        if element in known:
+            return known[element]
+        if element.tag in ("linearGradient", "radialGradient"):  # which draw nothing themselves
+            return 1, 0
+        if element in above or len(above) > MAX_NESTED:
+            how = "refer to each other in a circle" if element in above else "nest too deeply"
+            raise InputFileError(f"{self.path}: <{element.tag}> elements {how}")
+        above.add(element)
+        elements, filters = 1, int(element.tag.startswith("fe"))
+        for child in element:
+            more = self._work(child, by_id, known, above)
+            if child.tag not in DEFINED:
+                elements, filters = elements + more[0], filters + more[1]
+        for name, times in self._references(element):
+            target = by_id.get(name, by_id.get(unquote(name)))
+            if target is None:
+                self.notes.add(f"<{element.tag}> refers to '#{name[:40]}', which is not there")
+            else:
+                more = self._work(target, by_id, known, above)
+                elements, filters = elements + times * more[0], filters + times * more[1]
+        above.discard(element)
+        known[element] = min(elements, 10**12), min(filters, 10**12)
+        return known[element]
+
+    def _references(self, element: Element) -> Iterator[tuple[str, int]]:
+        """Yield the names to which an element refers, and how often each is drawn for it."""
+        if (link := element.get("href", "")).startswith("#") and element.tag != "a":
+            yield link[1:], 1
+        for key, text in element.items():
+            for found in _URL.finditer(text) if "url" in text.lower() else ():
+                is_marker = "marker" in key or (key == "style" and "marker" in text)
+                points = element.get("d", element.get("points", ""))
+                yield found["target"].strip()[1:], 1 + is_marker * len(_POINTS.findall(points))
+
+    def _page(self) -> tuple[Window | None, Window | None]:
+        """Return the page in user units, and the part of the plane that shows."""
+        inline = dict(_SIZES.findall(self.root.get("style", "")))
+        width, height = (
+            self._pixels(key, inline.get(key, self.root.get(key))) for key in ("width", "height")
+        )
+        text, self.pixel = self.root.get("viewBox"), 1.0
+        if text is None:
+            page = None if not (width and height) else (0.0, 0.0, width, height)
+            return page, page
+        try:
+            x, y, wide, high = map(float, text.replace(",", " ").split())
+        except ValueError:
+            x, y, wide, high = (math.nan,) * 4
+        if not (math.isfinite(x + y + wide + high) and wide > 0 and high > 0):
+            raise InputFileError(
+                f"{self.path}: <svg>: viewBox {quoted(text)} should be four numbers, such as "
+                "'0 0 100 100', the last two above 0"
+            )
+        page = x, y, x + wide, y + high
+        self.pixel = max(
+            side / (pixels or side) for side, pixels in ((wide, width), (high, height))
+        )
+        aspect = self.root.get("preserveAspectRatio", "xMidYMid").split()
+        if not (width and height) or "none" in aspect:
+            return page, page
+        scale = (max if "slice" in aspect else min)(width / wide, height / high)
+        sides = width / scale, height / scale
+        align = aspect[0] if aspect else "xMidYMid"
+        shares = [
+            next((share for word, share in _ALIGN.items() if f"{axis}{word}" in align), 0.5)
+            for axis in "xY"
+        ]
+        left, top = x + shares[0] * (wide - sides[0]), y + shares[1] * (high - sides[1])
+        window = left, top, left + sides[0], top + sides[1]
+        gap = max(abs(one - other) for one, other in zip(page, window, strict=True))
+        return page, page if gap <= PAGE_TOLERANCE * max(wide, high) else window
+
+    def _thin_strokes(self, element: Element, matrix: svgelements.Matrix) -> None:
+        """Give strokes that are as wide in any transform the width that renderers then make so."""
+        if text := element.get("transform"):
+            with contextlib.suppress(*_DAMAGED):
+                matrix = svgelements.Matrix(text) * matrix
+        style = properties(element)
+        if style.get(_EFFECT, element.get(_EFFECT)) == "non-scaling-stroke":
+            scale = math.sqrt(abs(matrix.a * matrix.d - matrix.b * matrix.c)) / self.pixel
+            width = _number(style.get("stroke-width", element.get("stroke-width", "1")))
+            style["stroke-width"] = f"{width / (scale or 1.0):.9g}"
+            element.set("style", text_of(style))
+        for child in element:
+            self._thin_strokes(child, matrix)
+
+    def _pixels(self, key: str, text: str | None) -> float | None:
+        """Return a length of the root in pixels; None for none, a share or `auto`."""
+        text = (text or "").strip()
+        if not text or text.endswith("%") or text == "auto":
+            return None
+        found = _LENGTH.fullmatch(text)
+        if found is None or found[2].lower() not in _PIXELS:
+            raise InputFileError(f"{self.path}: <svg>: {key} {quoted(text)} is not a length")
+        value = float(found[1]) * _PIXELS[found[2].lower()]
+        return value if 0 < value < math.inf else None
+
+
+def properties(element: Element) -> dict[str, str]:
+    """Return the properties in the attribute `style`, as `write_styles` has written it."""
+    parts = element.get("style", "").split(";")
+    return dict(part.strip().split(":", 1) for part in parts if ":" in part)
+
+
+def text_of(style: dict[str, str]) -> str:
+    """Return properties as the attribute `style` holds them."""
+    return ";".join(f"{key}:{text}" for key, text in style.items())
+
+
+def _number(text: str) -> float:
+    """Return the number that a text begins with; 0 without one."""
+    found = _LENGTH.match(text)
+    return float(found[1]) if found else 0.0
+
+
+_ALIGN = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
+DRAWN = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "use", "image", "text"}
+"""Elements that draw by themselves."""
+DEFINED = {"defs", "symbol", "clipPath", "mask", "marker", "pattern", "filter"} | {
+    "linearGradient",
+    "radialGradient",
+}
+"""Elements that are drawn only where something refers to them."""
