@@ -19,6 +19,7 @@ class PathSegment:
 
 class Move(PathSegment): ...
 class Close(PathSegment): ...
+class Line(PathSegment): ...
 
 class QuadraticBezier(PathSegment):
     control: Point
@@ -26,6 +27,7 @@ class QuadraticBezier(PathSegment):
 class CubicBezier(PathSegment):
     control1: Point
     control2: Point
+    def npoint(self, positions: Any) -> Any: ...
 
 class Arc(PathSegment):
     center: Point
@@ -53,7 +55,13 @@ class Matrix:
     def __init__(self, text: str = "") -> None: ...
     def __mul__(self, other: Matrix) -> Matrix: ...
 
-class SVG:
+class Use:
+    values: dict[str, str] | None
+
+class Group:
+    values: dict[str, str] | None
+
+class SVG(Group):
     @staticmethod
     def parse(source: Any, reify: bool = True, ppi: float = 96.0, color: str = "black") -> SVG: ...
     def elements(self) -> Iterator[object]: ...
