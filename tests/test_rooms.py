@@ -21,7 +21,15 @@ TILES += [
 TILES += ["run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
-    *("data_space", "estimator", "conditional_estimator", "comparing", "regions"),
+    *(
+        "data_space",
+        "random_state",
+        "given_covariates",
+        "estimator",
+        "conditional_estimator",
+        "comparing",
+        "regions",
+    ),
     *("weighed_rows", "uniformity", "summaries", "orientations", "tables", "pictures"),
     *("run_folder", "operations"),
 ]

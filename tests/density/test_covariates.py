@@ -177,8 +177,12 @@ def test_densities_take_a_context_as_features_or_by_name(fit: ConditionalEstimat
 def test_a_fast_fit_says_what_it_left_out() -> None:
     rng = np.random.default_rng(1)
     x = rng.uniform(-1, 1, 200)
-    fit = ConditionalEstimator(unit="radians", effort="fast")
-    fit.fit(rng.vonmises(2 * x, 8.0)[:, None], {"x": x})
+    fit = DensityEstimator(unit="radians", effort="fast")
+    angles = rng.vonmises(2 * x, 8.0)[:, None]
+    fit.fit(angles, given={"x": x})
+    assert fit.score(angles, given={"x": x}) > fit.score(angles) + 0.5
+    assert fit.sample(3, 0, given={"x": 0.5}).shape == (3, 1)
+    assert fit.at(x=0.5).mean()[0] == pytest.approx(1, abs=0.2)
     report = fit.conditional_report_
     assert {part.kind for part in report.parts} == {"all", "kernels", "regression"}
     assert report.untried == ("network", "joint")

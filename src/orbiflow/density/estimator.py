@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import inspect
-import numbers
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import torch
@@ -22,6 +21,7 @@ from orbiflow.density.data import (
     asked_roles,
     choose,
     frame_of,
+    is_declared,
     rows_of,
     runs_of_draws,
 )
@@ -37,8 +37,8 @@ from orbiflow.density.fitting import (
     refuse_flow_settings,
     weighed,
 )
+from orbiflow.density.given_covariates import GivenCovariates
 from orbiflow.density.inference import (
-    FittedFigures,
     at_observed,
     axes_named,
     chart_of_rows,
@@ -50,34 +50,16 @@ from orbiflow.density.inference import (
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
+from orbiflow.density.random_state import RandomState, seed_of
 from orbiflow.density.spaces import DataColumns, Space, check_measure
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.settings import as_choice, as_instance, as_whole, check_names, fields_of, refusal
-
-RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
-"""As scikit-learn has it, and NumPy's newer generators."""
-
-
-def seed_of(random_state: RandomState) -> int:
-    """A seed; None and generators give another one at every call."""
-    if random_state is None:
-        return int(np.random.randint(2**31))  # noqa: NPY002  scikit-learn's convention
-    if isinstance(random_state, np.random.RandomState):
-        return int(random_state.randint(2**31))
-    if isinstance(random_state, np.random.Generator):
-        return int(random_state.integers(2**31))
-    if not isinstance(random_state, bool) and isinstance(random_state, numbers.Integral):
-        return int(random_state) % 2**63
-    wanted = "None, an integer, or a NumPy RandomState or Generator"
-    raise refusal("random_state", wanted, random_state)
 
 
 def _refuse_targets(y: object) -> None:
     """Refuse what is not used: a density has no targets."""
     if y is not None:
-        raise refusal(
-            "y", "None", y, "weights are given as sample_weight, covariates to another class"
-        )
+        raise refusal("y", "None", y, "weights are given as sample_weight, covariates as given")
 
 
 def _signature() -> inspect.Signature:
@@ -91,7 +73,7 @@ def _signature() -> inspect.Signature:
     )
 
 
-class DensityEstimator(FittedFigures):
+class DensityEstimator(GivenCovariates):
     """Exact, normalised density of angles, directions, axes or Klein-bottle coordinates.
 
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
@@ -155,6 +137,7 @@ class DensityEstimator(FittedFigures):
         y: object = None,
         sample_weight: ArrayLike | None = None,
         *,
+        given: Any = None,
         groups: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> Self:
@@ -168,6 +151,11 @@ class DensityEstimator(FittedFigures):
         Args:
             sample_weight: of the rows (N,), at least 0: how much each counts in everything that is
                 fitted and judged. Only ratios count, equal ones are none.
+            given: what is known of each row, on which the density may depend: columns of the frame X
+                with their roles, {"hour": "cycle:24", "site": "word"}, or columns of their own: a data
+                frame, a mapping {"name": values}, or an array (N, c), whose columns are called x1, x2
+                and so on. Text is words; numbers have the role of their name, others are asked for in
+                data frames, and real in arrays.
             groups: a label (N,) a row: rows of one are held out together where parts are chosen, for
                 densities of new groups (proteins, stations, fires). Default: none, of draws in chains
                 the tenths of each chain, because neighbouring draws are alike.
@@ -175,22 +163,30 @@ class DensityEstimator(FittedFigures):
         Raises:
             UndeclaredError: for columns of a frame of which nothing says what they are; `proposal` is
                 what may be declared.
-            OrbiflowError: for data that are not of the space or contradict what is declared; too few
+            OrbiflowError: for data that are not of the space or contradict what is declared; covariates
+                that lack values or have one alone, and fewer than 30 rows of them; too few
                 points, weights that are none, a setting out of range, or one that has no meaning on a
                 torus of so many angles.
         """
         _refuse_targets(y)
-        _, sample_weight, groups = alongside(X=X, sample_weight=sample_weight, groups=groups)
-        rows = self.read_rows(X)
+        if given is None:
+            _, sample_weight, groups = alongside(X=X, sample_weight=sample_weight, groups=groups)
+            rows = self.read_rows(X)
+            sample_weight, groups = rows.beside(sample_weight, groups)
+            if groups is None and not self.settings().flow_alone:
+                groups = runs_of_draws(X)
+            self._fit(rows, sample_weight, groups, progress)
+            return self
+        beside = {} if is_declared(given) else {"given": given}
+        _, sample_weight, groups, *aligned = alongside(
+            X=X, sample_weight=sample_weight, groups=groups, **beside
+        )
+        rows, cells, covariates = self._read_given(X, aligned[0] if aligned else given)
         sample_weight, groups = rows.beside(sample_weight, groups)
-        if groups is None and not self.settings().flow_alone:
-            groups = runs_of_draws(X)
-        self._fit(rows, sample_weight, groups, progress)
+        pooled = self._fit(rows, sample_weight, groups, progress)
+        how: dict[str, Any] = {"weights": sample_weight, "groups": groups, "progress": progress}
+        self._fit_given(pooled, self._chart(rows.values), cells, covariates, **how)
         return self
-
-    def clone(self) -> Self:
-        """An estimator of the same parameters that is not fitted."""
-        return type(self)(**self.get_params())
 
     def read_rows(self, X: Any, others: Sequence[str] = (), apart: Sequence[str] = ()) -> TableRows:
         """The rows that `fit` reads; sets their space.
@@ -295,6 +291,10 @@ class DensityEstimator(FittedFigures):
         kept, axes = chosen_columns(self.space_, left, len(names))
         return self._of(conditional(density, known, axes), [names[k] for k in kept])
 
+    def at(self, given: Mapping[str, Any] | None = None, /, **values: Any) -> DensityEstimator:
+        """The density where covariates have some values: `at(temperature=295, residue="GLY")`."""
+        return self._of(self._density_at({**(given or {}), **values}), self._column_names())
+
     @classmethod
     def fitted(
         cls,
@@ -318,8 +318,10 @@ class DensityEstimator(FittedFigures):
         made.n_features_in_ = len(density.space.columns)
         return made
 
-    def score_samples(self, X: ArrayLike, *, measure: str = "natural") -> Array:
+    def score_samples(self, X: ArrayLike, *, given: Any = None, measure: str = "natural") -> Array:
         """Log densities (N,) in nats at data (N, k), with respect to `measure` (see `MEASURES`).
+
+        Where covariates are `given`, as to `fit`, each where its own are; without, of all rows.
 
         Of rows that lack angles (NaN), with `missing="marginalise"`, of the angles that they have. The
         columns of a data frame are found by the names that `fit` has seen. Data that are likelier in
@@ -330,8 +332,14 @@ class DensityEstimator(FittedFigures):
                 codes for missing values.
         """
         check_measure(measure, self._fitted().space)
-        points = self._chart(self._checked(X))
-        return at_observed(self.density_, points, measure=measure).numpy()
+        if given is None:
+            points = self._chart(self._checked(X))
+            return at_observed(self.density_, points, measure=measure).numpy()
+        if is_declared(given):
+            given = X
+        else:
+            _, given = alongside(X=X, given=given)
+        return self._log_prob_given(self.points_of(X), given, measure).numpy()
 
     def points_of(self, X: ArrayLike) -> torch.Tensor:
         """Points (N, d) of the chart at data (N, k), which are read as `score_samples` reads them."""
@@ -346,23 +354,33 @@ class DensityEstimator(FittedFigures):
         return log_density_gradient(self._fitted(), self._checked(X))[1]
 
     def score(
-        self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None
+        self,
+        X: ArrayLike,
+        y: object = None,
+        sample_weight: ArrayLike | None = None,
+        *,
+        given: Any = None,
     ) -> float:
         """Mean log density of data (N, k), weighted, in natural measure; there is no `y` but None."""
         _refuse_targets(y)
-        _, sample_weight = alongside(X=X, sample_weight=sample_weight)
-        points = self._chart(self._checked(X))
-        scores = at_observed(self.density_, points, measure="natural")
+        beside = {} if given is None or is_declared(given) else {"given": given}
+        _, sample_weight, *aligned = alongside(X=X, sample_weight=sample_weight, **beside)
+        given = aligned[0] if aligned else given
+        scores = torch.as_tensor(DensityEstimator.score_samples(self, X, given=given))
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
 
-    def sample(self, n_samples: int = 1, random_state: RandomState = None) -> Any:
+    def sample(
+        self, n_samples: int = 1, random_state: RandomState = None, *, given: Any = None
+    ) -> Any:
         """New data (n_samples, k) in the space's own units: an array, or what `set_output` asked for.
 
         Args:
             random_state: as scikit-learn has it. None: other points at every call, from NumPy's
                 global state, which `np.random.seed` sets. An integer: always the same points. A
                 NumPy `RandomState` or `Generator`: the next ones from it.
+            given: the covariates: one value for each name, or as many rows as samples, of which each
+                has one. A single value among columns is that of all rows.
 
         Raises:
             OrbiflowError: before `fit`, for fewer than one sample, or another random state.
@@ -370,7 +388,11 @@ class DensityEstimator(FittedFigures):
         density = self._fitted()
         count = as_whole(n_samples, "n_samples", 1)
         generator = torch.Generator().manual_seed(seed_of(random_state))
-        rows = self.space_.from_chart(density.sample((count,), generator))
+        if given is None:
+            points = density.sample((count,), generator)
+        else:
+            points = self._samples_given(count, given, generator)
+        rows = self.space_.from_chart(points)
         return frame_of(rows, self._column_names(), getattr(self, "output_", "default"))
 
     def set_output(self, *, transform: str | None = None) -> Self:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import cross_validation_folds
-from orbiflow.density.conditional_estimator import columns_given
 from orbiflow.density.data import asked_roles, is_declared
-
-if TYPE_CHECKING:
-    from orbiflow.density.estimator import DensityEstimator
+from orbiflow.density.estimator import DensityEstimator
+from orbiflow.density.given_covariates import columns_given
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +70,8 @@ def cross_validate(
     declared = is_declared(given)
     cells = {} if declared or given is None else columns_given(given)
     names = [str(name) for name in asked_roles(given)] if declared else list(cells)
-    read = estimator.clone().read_rows(rows, others=names if declared else (), apart=names)
+    first = DensityEstimator(**estimator.get_params())
+    read = first.read_rows(rows, others=names if declared else (), apart=names)
     weights, labels = read.beside(sample_weight, groups)
     read = replace(
         read,
@@ -84,10 +83,8 @@ def cross_validate(
     scores = np.full(len(fold), np.nan)
     for number in range(folds):
         seen, unseen = read.only(fold != number), read.only(fold == number)
-        own: Any = estimator.clone()
-        if given is None:
-            scores[fold == number] = own.fit(seen).score_samples(unseen.values)
-        else:
-            own.fit(seen, given if declared else seen.given)
-            scores[fold == number] = own.score_samples(unseen.values, unseen.given)
+        own = DensityEstimator(**estimator.get_params())
+        own.fit(seen, given=given if declared or given is None else seen.given)
+        known = None if given is None else unseen.given
+        scores[fold == number] = own.score_samples(unseen.values, given=known)
     return CrossValidatedRows(scores, fold, read.weights)

@@ -149,7 +149,6 @@ def fit_rows(
     given: Mapping[str, Role] | None = None,
 ) -> DensityEstimator:
     """Fit a density to the rows of a table; where columns are `given`, also by what they are."""
-    from orbiflow.density.conditional_estimator import ConditionalEstimator
     from orbiflow.density.estimator import DensityEstimator
 
     own: dict[str, Any] = {
@@ -161,9 +160,7 @@ def fit_rows(
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # notes say the same
-        if given is None:
-            return DensityEstimator(**own).fit(rows, progress=progress)
-        return ConditionalEstimator(**own).fit(rows, given, progress=progress)
+        return DensityEstimator(**own).fit(rows, given=given, progress=progress)
 
 
 def _check(where: SpaceSettings, settings: DensitySettings, reading: RowSettings) -> None:
