@@ -366,7 +366,11 @@ class DensityEstimator(GivenCovariates):
         beside = {} if given is None or is_declared(given) else {"given": given}
         _, sample_weight, *aligned = alongside(X=X, sample_weight=sample_weight, **beside)
         given = aligned[0] if aligned else given
-        scores = torch.as_tensor(DensityEstimator.score_samples(self, X, given=given))
+        if given is None:  # not by `score_samples`: warnings name the caller's line
+            points = self._chart(self._checked(X))
+            scores = at_observed(self._fitted(), points, measure="natural")
+        else:
+            scores = torch.as_tensor(DensityEstimator.score_samples(self, X, given=given))
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
 

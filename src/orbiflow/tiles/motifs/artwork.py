@@ -7,6 +7,7 @@ import math
 from itertools import pairwise
 from typing import Literal, Protocol
 from xml.etree.ElementTree import tostring
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import shapely
@@ -45,6 +46,7 @@ ARC_PIECE = math.tau / 16
 _CURRENT = "#010203"
 """What stands for `currentColor` where no colour is set: that of what shows on what lies below."""
 
+_PEN = ("stroke-linecap", "stroke-linejoin", "stroke-miterlimit")
 _CAPS: dict[str, Literal["round", "square"]] = {"round": "round", "square": "square"}
 _JOINS: dict[str, Literal["round", "bevel"]] = {"round": "round", "bevel": "bevel"}
 _DAMAGED = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
@@ -90,7 +92,7 @@ class _Painted:
 
     def __init__(self, colour: svgelements.Color, width: float, lines: list[_Line]) -> None:
         self.colour, self.opacity = colour.hexrgb, float(colour.opacity)
-        self.width, self.lines = width, lines
+        self.width, self.lines, self.pen = width, lines, ""
         self.region: BaseGeometry = shapely.Polygon()
 
 
@@ -182,6 +184,8 @@ def _paints(shape: svgelements.Shape, lines: list[_Line], carry: Carry) -> list[
     width = float(shape.stroke_width or 0.0)
     if shape.stroke is not None and shape.stroke.value is not None and width > 0:
         pen = _Painted(shape.stroke, width, [line for line in lines if len(line.points) > 1])
+        shown = ((key, values[key]) for key in _PEN if isinstance(values.get(key), str))
+        pen.pen = "".join(f" {key}={quoteattr(value)}" for key, value in shown)
         keeps_width = values.get("vector-effect") == "non-scaling-stroke"
         if width > carry.widest and pen.lines and not keeps_width:
             cap, join = values.get("stroke-linecap", ""), values.get("stroke-linejoin", "")
@@ -290,7 +294,7 @@ def _svg(painted: _Painted) -> str:
     ]
     if painted.lines:
         style = f'fill="none" stroke="{painted.colour}" stroke-width="{painted.width:.9g}"'
-        style += f' stroke-opacity="{painted.opacity:g}"'
+        style += f' stroke-opacity="{painted.opacity:g}"{painted.pen}'
         rings = [shapely.get_coordinates(line.string()) for line in painted.lines]
     texts = ("M" + " ".join(f"{x:.9g},{y:.9g}" for x, y in ring.tolist()) for ring in rings)
     return f'<path d="{"".join(texts)}" {style}/>'
