@@ -119,7 +119,7 @@ export class Pulling {
     this.on.released(this.puller.parameters(), this.puller.insides());
   }
 
-  /** Let the outline go after the pointer, frame by frame. */
+  /** Let the outline follow the pointer. */
   #follow() {
     this.stage.before = () => {
       if (!this.hand || !this.aim) {
@@ -162,7 +162,7 @@ export class Pulling {
     const to = this.puller.z.slice();
     const began = performance.now();
     this.stage.before = (now) => {
-      if (this.hand) return;
+      if (this.hand || !this.puller) return;
       const share = calm ? 1 : Math.min(1, Math.max(0, (now - began) / 220));
       const eased = 1 - (1 - share) ** 3;
       this.puller.z.forEach((_, k) => {
