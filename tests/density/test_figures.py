@@ -76,12 +76,12 @@ def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> N
 
 def test_a_real_column_has_quantiles_and_a_mean() -> None:
     rng = np.random.default_rng(1)
-    data = rng.normal(5, 2, (2000, 1))
+    data = rng.normal(5, 2, (600, 1))
     fit = DensityEstimator(columns={0: "linear"}, components="kernels,mixture").fit(data)
     assert fit.mean()[0] == pytest.approx(data.mean(), abs=0.1)
     wanted = np.quantile(data, [0.05, 0.5, 0.95])
     assert fit.quantile([0.05, 0.5, 0.95]) == pytest.approx(wanted, abs=0.3)
-    assert fit.entropy().value == pytest.approx(stats.norm(5, 2).entropy(), abs=0.06)
+    assert fit.entropy().value == pytest.approx(stats.norm(5, 2).entropy(), abs=0.08)
     other = DensityEstimator(columns={0: "linear"}, components="mixture").fit(data + 1.0)
     assert fit.kl_divergence(other).value == pytest.approx(1 / 8, abs=0.04)
 

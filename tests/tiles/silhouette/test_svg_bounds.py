@@ -11,7 +11,7 @@ from PIL import Image
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import Reading, read_outline
 from orbiflow.tiles.silhouette import FileContent
-from orbiflow.tiles.silhouette.readers import svg_process
+from orbiflow.tiles.silhouette.readers import svg, svg_process
 from refusals import refused
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
@@ -26,6 +26,12 @@ ILLUSTRATOR = """<?xml version="1.0" encoding="utf-8"?>
 <svg xmlns="&ns_svg;" xmlns:i="&ns_ai;" viewBox="0 0 100 100"><switch>
 <foreignObject requiredExtensions="&ns_ai;" width="1" height="1"><i:pgfRef/></foreignObject>
 <g i:extraneous="self"><path style="&st0;" d="M10 10h50v50h-50z"/></g></switch></svg>"""
+
+
+@pytest.fixture(autouse=True)
+def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(svg, "LONG_PIXELS", 500)
+    monkeypatch.setattr(svg, "SMALL_PIXELS", 200)
 
 
 def read(text: str) -> Reading:
