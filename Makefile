@@ -108,5 +108,5 @@ $(VENV)/.installed-dev: pyproject.toml constraints.txt
 
 $(VENV)/.installed-docs: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) -e '.[docs]'
+	$(PIP) -e '.[all,docs]'
 	touch $@ $(VENV)/.installed
