@@ -48,7 +48,8 @@ def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
     if over.picture is not None:
         if settings.purpose == "plotter":
             raise OrbiflowError(
-                "a pen draws lines, and the picture is made of pixels; give a drawing in SVG"
+                "a pen draws lines, and the picture is made of pixels; give an SVG drawing of fills "
+                "and strokes alone"
             )
         density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
         rasters = (carried_raster(over.picture, given, density * place.scale),)

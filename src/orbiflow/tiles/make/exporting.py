@@ -157,7 +157,7 @@ def laid_out(
     if any(over.picture for over in overs) and settings.file_format in LINES_ALONE:
         raise OrbiflowError(
             f"{next(filter(None, pictures))}: DXF and JSON hold lines, and the picture is made of "
-            "pixels; choose SVG or PDF, or draw it as SVG"
+            "pixels; choose SVG or PDF, or give an SVG drawing of fills and strokes alone"
         )
     placed = layout(given, settings)
     offset = [note for _, note in placed.pieces] if settings.cut == "pieces" else []

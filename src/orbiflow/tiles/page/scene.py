@@ -309,7 +309,7 @@ class Scene:
             elif isinstance(item, Raster):
                 raise OrbiflowError(
                     "DXF and JSON hold lines, and the picture is made of pixels; choose SVG or PDF, "
-                    "or give a drawing in SVG as the picture"
+                    "or give an SVG drawing of fills and strokes alone as the picture"
                 )
 
 
