@@ -136,9 +136,9 @@ def test_nothing_but_the_drawing_is_opened(
 def test_what_the_renderer_cannot_stand_ends_in_an_error(
     text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(svg_process, "MAX_WAIT", 2.0)
     monkeypatch.setattr(svg, "LONG_PIXELS", 1500)
-    with refused("drawing.svg", kind=InputFileError):
+    with monkeypatch.context() as hasty, refused("drawing.svg", kind=InputFileError):
+        hasty.setattr(svg_process, "MAX_WAIT", 2.0)
         body(text)
     assert shapely.Polygon(body(SQUARE).outline).area == pytest.approx(2500, rel=5e-3)
 
