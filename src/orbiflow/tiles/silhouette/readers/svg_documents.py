@@ -32,6 +32,7 @@ _PIXELS = {
     **{"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "in": 96.0, "em": 16.0, "rem": 16.0, "ex": 8.0},
     **{"cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6},
 }
+_RARE = {"q", "rem"}  # units that the renderer does not know
 _LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s?([a-z]*)\s*", re.IGNORECASE)
 _URL = re.compile(r"url\(\s*(?P<quote>[\"']?)(?P<target>[^)]*?)(?P=quote)\s*\)", re.IGNORECASE)
 _IMPORT = re.compile(r"@import\b[^;]*;?", re.IGNORECASE)
@@ -123,6 +124,10 @@ class Document:
         for key, text in element.items():
             if "url" in text.lower():
                 element.set(key, self._within(text))
+            elif (
+                key in LENGTHS and (found := _LENGTH.fullmatch(text)) and found[2].lower() in _RARE
+            ):
+                element.set(key, f"{float(found[1]) * _PIXELS[found[2].lower()]:.9g}")
         if "pathLength" in element.attrib:
             self._scale_dashes(element)
         if link is not None and element.tag != "a":
@@ -326,6 +331,9 @@ def _number(text: str) -> float:
 
 
 _ALIGN = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
+LENGTHS = {"x", "y", "cx", "cy", "r", "rx", "ry", "width", "height", "stroke-width"}
+"""Attributes that are lengths."""
+
 DRAWN = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "use", "image", "text"}
 """Elements that draw by themselves."""
 DEFINED = {"defs", "symbol", "clipPath", "mask", "marker", "pattern", "filter"} | {
