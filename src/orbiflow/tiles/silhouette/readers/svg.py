@@ -24,6 +24,7 @@ from orbiflow.tiles.silhouette.outlines import (
     percent,
 )
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
+from orbiflow.tiles.silhouette.readers.svg_documents import leaves
 from orbiflow.tiles.silhouette.readers.svg_render import (
     Drawing,
     Rgba,
@@ -133,8 +134,7 @@ def read_svg(path: Source) -> Reading:
     pixels = drawing.pixels(window, size, root)
 
     def without_paper() -> Rgba:
-        shown = deepcopy(drawing.document)
-        shown.root = shown.root if root is None else root
+        shown = drawing.document.root if root is None else root
         colour = WHITE if paper is None else paper
         return drawing.pixels(window, size, without_colour(shown, colour, MAX_CHANNEL_DISTANCE))
 
@@ -248,16 +248,16 @@ def _without_background(
     something of another colour is left on them.
     """
     size = picture_size(page, SMALL_PIXELS)
-    document = drawing.document
+    whole = drawing.document.root
     if not _is_paved(drawing.pixels(page, size)):
         return None, None, []
 
     def shown(kept: Collection[int]) -> Rgba:
-        return drawing.pixels(page, size, only(document, kept))
+        return drawing.pixels(page, size, only(whole, kept))
 
-    leaves = len(list(document.leaves()))
-    frames = {k for k in range(min(leaves, MAX_STRIPS)) if _is_frame(shown({k}))}
-    others = [k for k in range(leaves) if k not in frames]
+    count = len(list(leaves(whole)))
+    frames = {k for k in range(min(count, MAX_STRIPS)) if _is_frame(shown({k}))}
+    others = [k for k in range(count) if k not in frames]
     ground, most = shown(range(0)), 0
     if _is_paved(shown(others)):
         least, most = 0, len(others)  # that leave the page bare, and that pave it
@@ -278,7 +278,7 @@ def _without_background(
         return None, None, []
     noun = "a background" if number == 1 else f"{number} shapes of a background"
     note = f"left out {noun} that cover{'s' * (number == 1)} the whole drawing"
-    return only(document, others[most:]), paper if len(shades) else None, [note]
+    return only(whole, others[most:]), paper if len(shades) else None, [note]
 
 
 def _is_frame(pixels: Rgba) -> bool:

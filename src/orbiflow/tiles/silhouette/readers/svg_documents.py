@@ -23,7 +23,6 @@ from orbiflow.tiles.silhouette.readers.svg_xml import HREF, Notes, is_own, parse
 
 MAX_BYTES = 16 * 2**20
 MAX_DRAWN = 10_000  # elements, those drawn again by references counted again
-MAX_STEPS = 1_000_000  # of markers at the points of paths
 MAX_NESTED = 200  # elements in elements, and referred to by these
 MAX_FILTERS = 100  # steps of filters, counted again where they are used
 MAX_CHARACTERS = 20_000  # of texts
@@ -84,19 +83,6 @@ class Document:
         """Return notes of what was met and is not drawn."""
         left = [f"{count} {name}{'s' * (count > 1)}" for name, count in self.left_out.items()]
         return [f"left out {' and '.join(left)} of the drawing"] * bool(left) + self.notes.counted()
-
-    def leaves(self) -> Iterator[tuple[Element, Element]]:
-        """Yield each element that draws by itself, with its parent, from bottom to top."""
-        stack = [(self.root, iter(self.root))]
-        while stack:
-            parent, children = stack[-1]
-            child = next(children, None)
-            if child is None:
-                stack.pop()
-            elif child.tag in ("svg", "g", "a", "switch"):
-                stack.append((child, iter(child)))
-            elif child.tag in DRAWN:
-                yield child, parent
 
     def _make_safe(self, element: Element) -> None:
         for child in list(element):
@@ -311,6 +297,20 @@ class Document:
             raise InputFileError(f"{self.path}: <svg>: {key} {quoted(text)} is not a length")
         value = float(found[1]) * _PIXELS[found[2].lower()]
         return value if 0 < value < math.inf else None
+
+
+def leaves(root: Element) -> Iterator[tuple[Element, Element]]:
+    """Yield each element that draws by itself, with its parent, from bottom to top."""
+    stack = [(root, iter(root))]
+    while stack:
+        parent, children = stack[-1]
+        child = next(children, None)
+        if child is None:
+            stack.pop()
+        elif child.tag in ("svg", "g", "a", "switch"):
+            stack.append((child, iter(child)))
+        elif child.tag in DRAWN:
+            yield child, parent
 
 
 def properties(element: Element) -> dict[str, str]:

@@ -20,7 +20,7 @@ from tinycss2.color3 import parse_color
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source
-from orbiflow.tiles.silhouette.readers.svg_documents import Document, properties, text_of
+from orbiflow.tiles.silhouette.readers.svg_documents import Document, leaves, properties, text_of
 from orbiflow.tiles.silhouette.readers.svg_process import Renderer, RendererFailed
 from orbiflow.tiles.silhouette.readers.svg_xml import SVG
 
@@ -79,11 +79,8 @@ class Drawing:
         shown.attrib.update(xmlns=SVG, width=str(size[0]), height=str(size[1]))
         shown.set("viewBox", f"{xmin!r} {ymin!r} {xmax - xmin!r} {ymax - ymin!r}")
         shown.set("preserveAspectRatio", "none")
-        return self._rendered(tostring(shown, encoding="unicode"))
-
-    def _rendered(self, text: str) -> Rgba:
         fonts = _fonts(STAND_IN) if self.document.has_text else {"skip_system_fonts": True}
-        return self._drawn(text, fonts)
+        return self._drawn(tostring(shown, encoding="unicode"), fonts)
 
     def _drawn(self, text: str, fonts: dict[str, Any]) -> Rgba:
         try:
@@ -131,21 +128,21 @@ def visible(pixels: Rgba) -> Array:
     return pixels[..., 3] / 255.0
 
 
-def only(document: Document, kept: Collection[int]) -> Element:
+def only(root: Element, kept: Collection[int]) -> Element:
     """Return a document's elements with those alone, of what draws by itself, that have these numbers.
 
     They are counted from 0, from the lowest.
     """
-    other = deepcopy(document)
-    for number, (leaf, parent) in enumerate(list(other.leaves())):
+    root = deepcopy(root)
+    for number, (leaf, parent) in enumerate(list(leaves(root))):
         if number not in kept:
             parent.remove(leaf)
-    return other.root
+    return root
 
 
-def without_colour(document: Document, colour: NDArray[np.uint8], distance: int) -> Element:
+def without_colour(root: Element, colour: NDArray[np.uint8], distance: int) -> Element:
     """Return a document's elements without what is painted in a colour, or in one so near."""
-    root = deepcopy(document.root)
+    root = deepcopy(root)
     for item in root.iter():
         style = properties(item)
         for key in ("fill", "stroke"):
@@ -166,8 +163,5 @@ def _fonts(serif: str) -> dict[str, Any]:
 
 def _families(item: Element) -> list[str]:
     """Return the fonts that an element asks for."""
-    found = [item.get("font-family", "")]
-    text = item.get("style", "") + (item.text or "" if item.tag == "style" else "")
-    found += [part.partition(":")[2] for part in text.replace("}", ";").split(";")
-              if part.rpartition("{")[2].strip().lower().startswith("font-family")]  # fmt: skip
-    return found
+    style = properties(item)
+    return [item.get("font-family", ""), style.get("font-family", "")]
