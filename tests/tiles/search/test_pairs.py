@@ -124,7 +124,7 @@ def test_forces_are_those_of_the_energies_of_both(seed: int) -> None:
     way = complex_points(rng.normal(size=(len(body), 1, 2)))
 
     def energy(z: Complex) -> float:
-        own = zip(body.parts, body.places, strict=True)
+        own = zip(body.figures, body.places, strict=True)
         return sum(
             float(part.energy(z[at])[0]) + part.stiffness.pose * _pose(part, z[at])
             for part, at in own

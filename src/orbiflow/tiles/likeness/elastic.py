@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -60,17 +61,28 @@ class ElasticBody(ABC):
     """What springs can pull: N points, of which the first n are an outline, and a quadratic energy.
 
     Subclasses have the points at rest (N,), the number `size` n, the stiffness matrix (N, N), and the
-    forces of shapes.
+    forces of shapes. The first `outer` points, n at least, lie on outlines of its figures.
     """
 
     rest: Complex
     size: int
+    outer: int
 
     def __init__(self) -> None:
         self._solvers: dict[float, Array] = {}
 
     def __len__(self) -> int:
         return len(self.rest)
+
+    @property
+    @abstractmethod
+    def figures(self) -> tuple[Elastic, ...]:
+        """The figures of which it consists: itself, or several that share a part of their outlines."""
+
+    @property
+    @abstractmethod
+    def places(self) -> tuple[Integers, ...]:
+        """Which of its points each figure's points (N_k,) are."""
 
     @cached_property
     @abstractmethod
@@ -95,10 +107,33 @@ class ElasticBody(ABC):
             z = _times(solve, right)
         return z
 
+    @property
+    def ring_places(self) -> list[Integers]:
+        """Which of its points the outlines (n_k,) of all figures are."""
+        owners = zip(self.figures, self.places, strict=True)
+        return [places[: figure.size] for figure, places in owners]
+
+    def rings(self, z: Complex) -> list[Complex]:
+        """Return the outlines (n_k, ...) of all figures in shapes (N, ...)."""
+        return [z[places] for places in self.ring_places]
+
+    def on_outlines(self, rings: Iterable[Complex]) -> Complex:
+        """Return the points (m,) that lie on outlines, from the outlines (n_k,) of all figures."""
+        points = np.empty(self.outer, dtype=complex)
+        for ring, places in zip(rings, self.ring_places, strict=True):
+            points[places] = ring
+        return points
+
     @cached_property
     def condensed(self) -> Condensed:
         """The body with its inner points eliminated, so that only the outline is free."""
-        n = self.size
+        return self._condensed(self.size)
+
+    def condensed_to(self, n: int) -> Condensed:
+        """Return the body with all but its first n points eliminated."""
+        return self.condensed if n == self.size else self._condensed(n)
+
+    def _condensed(self, n: int) -> Condensed:
         inner = self.matrix[n:, n:]
         if not len(inner):
             none = np.zeros((0, n))
@@ -137,7 +172,7 @@ class Elastic(ElasticBody):
         super().__init__()
         self.mesh = mesh or triangulate(ring)
         self.stiffness = stiffness or Stiffness()
-        self.size = len(ring)
+        self.size = self.outer = len(ring)
         self.rest = complex_points(self.mesh.points)
         pairs = self._pairs(stiff)
         self._i, self._j = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
@@ -157,6 +192,14 @@ class Elastic(ElasticBody):
         self._own = np.asarray(self._sums.sum(axis=1)).ravel()
         self._own_conjugate = np.conj(self._own)
         self._solvers = {}
+
+    @property
+    def figures(self) -> tuple[Elastic, ...]:
+        return (self,)
+
+    @property
+    def places(self) -> tuple[Integers, ...]:
+        return (np.arange(len(self)),)
 
     @cached_property
     def measures(self) -> Measures:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import CertificationError
@@ -31,7 +30,9 @@ from orbiflow.tiles.search.carving import BehindError, Carved, Race, carved
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
     Orientation,
+    costs_of,
     drawn_to_tiles,
+    following,
     held_on_tiles,
     shifted,
 )
@@ -47,7 +48,6 @@ TWIN_DISTANCE = 2e-4  # mean squared distance of two bent outlines below which t
 FIRST_ROUNDS = 6  # steps of the minimisation for all that are held
 FOLLOWING_STRENGTH = 60.0  # strength of the springs by which a finer body follows a coarser one
 RELAXED_STRENGTH = 1500.0  # strength of the springs that keep a relaxed outline near its tile
-FOLLOW_ROUNDS = 3  # the number of times that the inside follows a carved outline
 # The most tiles of a class that cross themselves and are carved apart; twice as many if all do
 MAX_REPAIRED = 1
 MAX_MARK_BEHIND = 0.25  # below the best mark of tiles that are not carved yet: what is carved, too
@@ -234,12 +234,12 @@ def _best_coarse(
     outline = body.rest[: body.size]
     placements = best_placements(kind, outline, settings.placements)
     z, space = drawn_to_tiles(body, kind, placements)
-    rough, _ = _costs(body, z)
-    chosen = np.argsort(rough, kind="stable")[: settings.held]
+    rough, _ = costs_of(body, z)
+    chosen = np.argsort(rough[0], kind="stable")[: settings.held]
     picked = placements._replace(turns=space.turns).take(chosen)
     tiles = held_on_tiles(body, TileSpace(kind, picked), z[:, chosen], FIRST_ROUNDS)
-    costs, simple = _costs(body, tiles.points)
-    order = np.lexsort((costs, ~simple))
+    costs, simple = costs_of(body, tiles.points)
+    order = np.lexsort((costs[0], ~simple))
     fresh = _unlike_outlines(tiles.points[: body.size].T, order.tolist(), settings.starts)
     return tiles.placements.take(fresh), tiles.points[:, fresh]
 
@@ -279,22 +279,20 @@ def _detailed(lot: _Lot, kind: IsohedralClass, settings: LikenessSearch) -> Bent
 def _carved(kind: IsohedralClass, bent: Bent, min_neck: float, race: Race) -> Bent:
     """Carve a tile, with room between its parts if it needs that; return it as it is if no better."""
     body, space = bent.orientation.fine, TileSpace(kind, bent.placement)
-    own = bent.placement._replace(turns=space.turns)
-    found = [bent]
+    placement = bent.placement._replace(turns=space.turns)
+    uncarved = Carved(bent.ring, np.arange(body.size), bent.corners, bent.linear, bent.offset)
+    tried = [bent]
     for room in (0.0,) * (bent.factor > 0) + (max(MIN_CARVED_GAP, 1.2 * min_neck),):
-        try:
-            own_race = None if room else race  # what lacks room costs more
-            tile = carved(body, space, bent.ring, bent.corners, room=room, race=own_race)
+        try:  # what lacks room costs more, and is in no race
+            (tile,) = carved(body, space, [uncarved], room=room, race=None if room else race)
         except BehindError:
             break
-        points = bent.points[:, None]
-        for _ in range(FOLLOW_ROUNDS):
-            points = body.condensed.whole(tile.outline[:, None], body.forces(points))
-        better = _bent(bent.orientation, body, tile, points, own, min_neck)
-        found += [] if better is None else [better]
+        points = following(body, tile.outline, bent.points)[:, None]
+        better = _bent(bent.orientation, body, tile, points, placement, min_neck)
+        tried += [] if better is None else [better]
         if better is not None and better.factor == 1:
             break
-    return max(found, key=lambda own: own.score)
+    return max(tried, key=lambda tile: tile.score)
 
 
 def _bent(
@@ -325,16 +323,6 @@ def _bent(
         kept_of(body.measures, outline[:, 0], 0.0),
         neck_factor(neck_up_to(polygon, min_neck), min_neck) if simple else 0.0,
     )
-
-
-def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
-    """Return costs (C,) of shapes, and which of them do not cross themselves."""
-    rings = plane_points(z[: body.size].T)
-    area = signed_area(rings)
-    simple = np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > 0.1)
-    return body.energy(z) / np.maximum(area, 0.1) + body.stiffness.pose * body.displacement(
-        z
-    ), simple
 
 
 def _unlike_outlines(outlines: Complex, order: Iterable[int], count: int) -> Integers:

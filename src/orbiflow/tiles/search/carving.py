@@ -1,4 +1,4 @@
-"""Carving: the outline of a bent tile moves to the highest mark among the tiles of its placement.
+"""Carving: the outlines of bent tiles move to the highest mark among the tiles of their placement.
 
 Bending spreads what must change over the whole outline, as its energy is quadratic. Eyes would rather
 have a few places changed and the rest exact: that is what the mark says (`likeness.faithful`). So the
@@ -12,13 +12,16 @@ Edges of a tile that fit each other have equal numbers of vertices. Bent, one ve
 silhouette, so both edges would have to show equal lengths of it. Carved, the silhouette's points slide
 along the tile's outline instead, by a spline: first along a smooth curve through its vertices, so that
 the mark has a gradient everywhere, and then they stay where they are, on its sides.
+
+Where several figures share a tile, the points of the paths between them are free as well, and a soft
+minimum of all marks climbs, since the mark of the better figure helps nobody.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,12 +29,14 @@ import scipy.linalg
 import scipy.optimize
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.tiles.likeness import Elastic, Gaps, mark_gradient
+from orbiflow.tiles.likeness import Elastic, ElasticBody, Gaps, mark_gradient
 from orbiflow.tiles.search.tile_space import TileSpace
 
 SLIDING_STEPS, LAST_STEPS = 60, 20  # the largest numbers of steps while points slide, and after it
 STEPS_APART = 20  # of these, those after which it is looked anew where gaps are missing
 RACE_STEPS, MAX_BEHIND = 20, 0.05  # steps of carving, and marks behind another, after which it ends
+SOFTNESS = 0.4  # marks by which one figure may be better before the others alone count
+NO_MARK = 20.0  # of a figure that may have any shape: above all marks, so that it never counts
 WRINKLE_COST = 0.12  # in marks a radian by which the tile turns elsewhere than the silhouette
 GAP_COST = 1.0  # in marks for each point that has no gap at all
 UNEVEN_COST = 0.1  # in marks for a mean square of 1 of how much nearer points lie than vertices
@@ -42,11 +47,11 @@ CORNER_REACH = 3  # how many points to either side of a tile's corner move so th
 
 
 class Carved(NamedTuple):
-    """A carved tile."""
+    """A figure's outline in a tile, which is the tile's own if there is one figure."""
 
     ring: Complex  # (n,) its vertices
     places: Array  # (n,) where the silhouette's points lie on it, in vertices from the first
-    corners: Integers  # (K,) the points of the silhouette that lie at its corners
+    corners: Integers  # (K,) the points of the silhouette that lie at its corners, if any are to
     linear: Array  # with `offset`: the map from the group's own frame
     offset: Array
 
@@ -86,55 +91,31 @@ class Race:
 
 
 def carved(
-    body: Elastic,
+    body: ElasticBody,
     space: TileSpace,
-    ring: Complex,
-    corners: Integers,
+    figures: Sequence[Carved],
     *,
     room: float = 0.0,
     race: Race | None = None,
-) -> Carved:
-    """Return the tile of the highest mark near a tile (n,) of the space's only placement.
+    most_steps: tuple[int, int] = (SLIDING_STEPS, LAST_STEPS),
+    shapeless: Collection[int] = (),
+) -> list[Carved]:
+    """Return the tile of the highest mark near a tile of the space's only placement, as its figures.
 
-    It may cross itself. With `room`, in square roots of the area, parts of the outline move apart until
-    there is so much between them. `corners` are the vertices at the tile's corners. Raises
-    `BehindError` if it falls behind in a race.
+    It may cross itself. With `room`, in square roots of the area, parts of outlines move apart until
+    there is so much between them. `most_steps` are those while points slide, and after it. The figures
+    that are `shapeless` may have any shape. Raises `BehindError` if it falls behind in a race.
     """
-    basis, root = _basis(body, space)
-    spline = spline_basis(body, ring)
-    count, own = basis.shape[1], np.arange(body.size)
-    whole = np.stack([basis.real, basis.imag], axis=1).reshape(-1, count)  # x and y of each vertex
-    across = np.ascontiguousarray(whole.T)
+    hill = _Hill(body, space, [figure.ring for figure in figures], shapeless)
 
-    def lost(parameters: Array, fixed: Array | None, gaps: Gaps | None) -> tuple[float, Array]:
-        ring = (whole @ parameters[:count]).view(complex)
-        slide = spline @ parameters[count:]
-        places = own + slide if fixed is None else fixed
-        laid = Laid.smoothly(places) if fixed is None else Laid.straight(places)
-        mark, rise = mark_gradient(body.measures, laid.points(ring))
-        wrinkles, bumpy, shifted = body.measures.wrinkles(ring, places)
-        cost, down = WRINKLE_COST * wrinkles - mark, WRINKLE_COST * bumpy - laid.gradient(rise)
-        if gaps is not None:
-            missing, apart = gaps.missing(ring)
-            cost, down = cost + GAP_COST * missing, down + GAP_COST * apart
-        steep = across @ down.view(float)
-        if fixed is not None:
-            return cost, np.append(steep, np.zeros(SLIDES))
-        uneven = np.roll(slide, -1) - slide
-        cost += UNEVEN_COST * float((uneven**2).mean())
-        sliding = WRINKLE_COST * shifted - laid.slide_gradient(ring, rise)
-        sliding += UNEVEN_COST * 2 / body.size * (np.roll(uneven, 1) - uneven)
-        return cost, np.concatenate([steep, spline.T @ sliding])
-
-    def climbed(start: Array, fixed: Array | None = None) -> Array:
-        steps = SLIDING_STEPS if fixed is None else LAST_STEPS
-        rounds = steps // STEPS_APART if room else 1
+    def climbed(start: Array, fixed: list[Array] | None = None) -> Array:
+        steps = most_steps[0] if fixed is None else most_steps[1]
+        rounds = max(1, steps // STEPS_APART) if room else 1
         for _ in range(rounds):
-            gaps = Gaps((whole @ start[:count]).view(complex), room) if room else None
             start = scipy.optimize.minimize(
-                lost,
+                hill.lost,
                 start,
-                (fixed, gaps),
+                (fixed, hill.gaps(start, room) if room else []),
                 jac=True,
                 method="L-BFGS-B",
                 callback=race.watch() if race and fixed is None else None,
@@ -142,20 +123,119 @@ def carved(
             ).x
         return start
 
-    start = scipy.linalg.lstsq(whole, ring.view(float), lapack_driver="gelsy")[0]
-    best = climbed(np.append(start, np.zeros(SLIDES)))
-    places, points = cornered(own + calmed(spline @ best[count:]), corners)
-    best = climbed(best, places)[:count]
-    parameters = scipy.linalg.solve_triangular(root, best, lower=True, trans="T")
-    return Carved(basis @ best, places, points, *space.group(0, parameters))
+    best = climbed(hill.start(figures))
+    slides = map(calmed, hill.slides(best))
+    laid = [
+        cornered(numbers + slide, figure.corners)
+        for numbers, slide, figure in zip(hill.numbers, slides, figures, strict=True)
+    ]
+    best = climbed(best, [places for places, _ in laid])
+    vertices, group = hill.tile(best)
+    rings = (vertices[places] for places in hill.places)
+    return [Carved(ring, *own, *group) for ring, own in zip(rings, laid, strict=True)]
 
 
-def _basis(body: Elastic, space: TileSpace) -> tuple[Complex, Array]:
-    """Return the tiles (n, d) of unit stiffness, and the factor (d, d) that makes them from others."""
-    real, imaginary = space.matrices(0)
-    columns = real + 1j * imaginary
-    root = scipy.linalg.cholesky(_stiffness(body, columns, 1e-6), lower=True)
-    return scipy.linalg.solve_triangular(root, columns.T, lower=True).T, root
+class _Hill:
+    """What figures lose, by parameters: of their vertices, then of how the points of each slide."""
+
+    def __init__(
+        self,
+        body: ElasticBody,
+        space: TileSpace,
+        rings: Sequence[Complex],
+        shapeless: Collection[int],
+    ) -> None:
+        self.body, self.space, self.shapeless = body, space, shapeless
+        self.measures = [figure.measures for figure in body.figures]
+        self.places = body.ring_places
+        self.numbers = [np.arange(len(places)) for places in self.places]
+        self.splines = list(map(spline_basis, body.figures, rings))
+        real, imaginary = space.matrices(0)
+        self.tile_count = real.shape[1]
+        within = body.outer - body.size
+        # the tiles, then x and y of each point within the paths that figures share
+        columns = np.zeros((body.outer, self.tile_count + 2 * within), dtype=complex)
+        columns[: body.size, : self.tile_count] = real + 1j * imaginary
+        columns[body.size :, self.tile_count :] = np.kron(np.eye(within), [1, 1j])
+        matrix = body.condensed_to(body.outer).outline
+        self.root = scipy.linalg.cholesky(_stiffness(matrix, columns, 1e-6), lower=True)
+        basis = scipy.linalg.solve_triangular(self.root, columns.T, lower=True).T
+        self.count = basis.shape[1]
+        # x and y of each vertex
+        self.basis = np.stack([basis.real, basis.imag], axis=1).reshape(-1, self.count)
+        self.across = np.ascontiguousarray(self.basis.T)
+
+    def start(self, figures: Sequence[Carved]) -> Array:
+        """Return the parameters of figures."""
+        vertices = self.body.on_outlines(figure.ring for figure in figures)
+        first = scipy.linalg.lstsq(self.basis, vertices.view(float), lapack_driver="gelsy")[0]
+        slides = [
+            np.linalg.lstsq(spline, figure.places - numbers, rcond=None)[0]
+            for spline, figure, numbers in zip(self.splines, figures, self.numbers, strict=True)
+        ]
+        return np.concatenate([first, *slides])
+
+    def tile(self, parameters: Array) -> tuple[Complex, tuple[Array, Array]]:
+        """Return the vertices (m,), and the map from the group's own frame."""
+        first = parameters[: self.count]
+        own = scipy.linalg.solve_triangular(self.root, first, lower=True, trans="T")
+        return self._vertices(parameters), self.space.group(0, own[: self.tile_count])
+
+    def _vertices(self, parameters: Array) -> Complex:
+        return (self.basis @ parameters[: self.count]).view(complex)
+
+    def slides(self, parameters: Array) -> list[Array]:
+        """Return by how many vertices the points (n_k,) of each figure slide."""
+        amounts = parameters[self.count :].reshape(-1, SLIDES)
+        return [spline @ amount for spline, amount in zip(self.splines, amounts, strict=True)]
+
+    def gaps(self, parameters: Array, room: float) -> list[tuple[Integers, Gaps]]:
+        """Return where room is missing: within each figure, and around several."""
+        z = self._vertices(parameters)
+        rings = self.places if len(self.places) == 1 else [*self.places, np.arange(self.body.size)]
+        return [(ring, Gaps(z[ring], room)) for ring in rings]
+
+    def lost(
+        self, parameters: Array, fixed: list[Array] | None, gaps: list[tuple[Integers, Gaps]]
+    ) -> tuple[float, Array]:
+        """Return what is lost, and its gradient; points slide unless their places are fixed."""
+        z, share = self._vertices(parameters), 1 / len(self.places)
+        slides = self.slides(parameters) if fixed is None else []
+        places = fixed or [n + slide for n, slide in zip(self.numbers, slides, strict=True)]
+        marks, rises, laid = list[float](), list[Complex](), list[Laid]()
+        for k, (measures, at) in enumerate(zip(self.measures, self.places, strict=True)):
+            laid.append((Laid.smoothly if fixed is None else Laid.straight)(places[k]))
+            mark, rise = mark_gradient(measures, laid[k].points(z[at]))
+            marks.append(NO_MARK if k in self.shapeless else mark)
+            rises.append(0 * rise if k in self.shapeless else rise)
+        least, weights = _soft_minimum(np.array(marks))
+        cost, uneven_cost = -least, 0.0
+        down, sliding = np.zeros(len(z), dtype=complex), list[Array]()
+        for k, (measures, at) in enumerate(zip(self.measures, self.places, strict=True)):
+            ring, rise = z[at], weights[k] * rises[k]
+            wrinkles, bumpy, shifted = measures.wrinkles(ring, places[k])
+            cost += share * WRINKLE_COST * wrinkles
+            down[at] += share * WRINKLE_COST * bumpy - laid[k].gradient(rise)
+            if fixed is None:
+                uneven = np.roll(slides[k], -1) - slides[k]
+                uneven_cost += share * UNEVEN_COST * float((uneven**2).mean())
+                slope = share * WRINKLE_COST * shifted - laid[k].slide_gradient(ring, rise)
+                slope += share * UNEVEN_COST * 2 / len(at) * (np.roll(uneven, 1) - uneven)
+                sliding.append(self.splines[k].T @ slope)
+        for at, gap in gaps:
+            missing, apart = gap.missing(z[at])
+            cost, down[at] = cost + GAP_COST * missing, down[at] + GAP_COST * apart
+        steep = self.across @ down.view(float)
+        ends = sliding or [np.zeros(SLIDES) for _ in self.places]
+        return cost + uneven_cost, np.concatenate([steep, *ends])
+
+
+def _soft_minimum(marks: Array) -> tuple[float, Array]:
+    """Return about the least of marks (F,), and its gradient (F,)."""
+    least = float(marks.min())
+    weights = np.exp((least - marks) / SOFTNESS)
+    total = float(weights.sum())
+    return least - SOFTNESS * math.log(total / len(marks)), weights / total
 
 
 def spline_basis(body: Elastic, ring: Complex) -> Array:
@@ -165,13 +245,12 @@ def spline_basis(body: Elastic, ring: Complex) -> Array:
     far = abs((at + SLIDES / 2) % SLIDES - SLIDES / 2)
     spline = np.where(far < 1, 2 / 3 - far**2 + far**3 / 2, np.maximum(2 - far, 0) ** 3 / 6)
     moved = spline * ((np.roll(ring, -1) - np.roll(ring, 1)) / 2)[:, None]
-    root = scipy.linalg.cholesky(_stiffness(body, moved, 1e-3), lower=True)
+    root = scipy.linalg.cholesky(_stiffness(body.condensed.outline, moved, 1e-3), lower=True)
     return SLIDE_UNIT * scipy.linalg.solve_triangular(root, spline.T, lower=True).T
 
 
-def _stiffness(body: Elastic, columns: Complex, least: float) -> Array:
-    """Return the stiffness (d, d) of an outline that moves along columns (n, d)."""
-    matrix = body.condensed.outline
+def _stiffness(matrix: Array, columns: Complex, least: float) -> Array:
+    """Return the stiffness (d, d) of outlines with a matrix (n, n) that move along columns (n, d)."""
     real, imaginary = columns.real, columns.imag
     stiff = real.T @ (matrix @ real) + imaginary.T @ (matrix @ imaginary)
     stiff[np.diag_indices_from(stiff)] += least * np.trace(stiff) / len(stiff)
@@ -228,6 +307,8 @@ def calmed(slide: Array) -> Array:
 
 def cornered(places: Array, corners: Integers) -> tuple[Array, Integers]:
     """Return places (n,) of which some are moved to the corners, and which points (K,) these are."""
+    if not len(corners):
+        return places, corners
     n = len(places)
     first = corners - corners[0]
     away = (places - corners[0] - first[:, None] % n + n / 2) % n - n / 2

@@ -36,6 +36,8 @@ from orbiflow.tiles.tilings import IsohedralClass
 SPRING_STRENGTHS = tuple(np.geomspace(1.2, 3000.0, 3))  # strengths of the springs, stage by stage
 ROUNDS = 3  # steps of choosing rotations and solving in each stage
 NEIGHBOUR_ROUNDS = 2  # the same of each neighbour
+FOLLOW_ROUNDS = 3  # the number of times that the inside follows a carved outline
+LEAST_AREA = 0.1  # the area of a figure of area about 1 below which nothing is left of it
 
 
 class BentTiles(NamedTuple):
@@ -61,9 +63,22 @@ def drawn_to_tiles(
     for strength in strengths:
         space.turn(space.best_turns(z[: body.size].T))
         for _ in range(rounds):
-            tiles = space.nearest(z[: body.size].T)
-            z = body.pulled(z, space.in_order(tiles.vertices).T, strength, 1)
+            z = body.pulled(z, nearest_tiles(space, z), strength, 1)
     return z, space
+
+
+def nearest_tiles(space: TileSpace, z: Complex) -> Complex:
+    """Return the nearest tiles (n, C) to the outlines of shapes (N, C), point by point."""
+    return space.in_order(space.nearest(z[: space.size].T).vertices).T
+
+
+def sprung(body: ElasticBody, space: TileSpace, z: Complex, rounds: int) -> Complex:
+    """Return shapes (N, C) that strong springs pull to tiles, whose glide axes turn to suit them."""
+    if space.glides:
+        space.turn(space.best_turns(z[: body.size].T))
+    for _ in range(rounds):
+        z = body.pulled(z, nearest_tiles(space, z), COMPARISON_STRENGTH, 1)
+    return z
 
 
 def held_on_tiles(body: ElasticBody, space: TileSpace, z: Complex, rounds: int) -> BentTiles:
@@ -85,6 +100,32 @@ def held_on_tiles(body: ElasticBody, space: TileSpace, z: Complex, rounds: int) 
         np.array([offset for _, offset in groups]).reshape(-1, 2),
         space.placements._replace(turns=space.turns),
     )
+
+
+def following(body: ElasticBody, outline: Complex, points: Complex) -> Complex:
+    """Return a shape (N,) near `points` (N,) whose first points are an outline (m,)."""
+    condensed, z = body.condensed_to(len(outline)), points[:, None]
+    for _ in range(FOLLOW_ROUNDS):
+        z = condensed.whole(outline[:, None], body.forces(z))
+    return z[:, 0]
+
+
+def costs_of(body: ElasticBody, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
+    """Return what bending all figures costs (F, C) in shapes (N, C), and which shapes are sound.
+
+    Sound ones do not cross themselves, nor do figures overlap.
+    """
+    costs, sound = np.empty((len(body.figures), z.shape[1])), np.ones(z.shape[1], dtype=bool)
+    for k, (figure, places) in enumerate(zip(body.figures, body.places, strict=True)):
+        shapes = z[places]
+        rings = plane_points(shapes[: figure.size].T)
+        area = signed_area(rings)
+        sound &= np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > LEAST_AREA)
+        costs[k] = figure.energy(shapes) / np.maximum(area, LEAST_AREA)
+        costs[k] += figure.stiffness.pose * figure.displacement(shapes)
+    if len(costs) > 1:
+        sound &= np.asarray(shapely.is_valid(shapely.polygons(plane_points(z[: body.size].T))))
+    return costs, sound
 
 
 class _Reduced:
@@ -224,17 +265,10 @@ def shifted(
 
 def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex) -> Drawn:
     space, n = TileSpace(kind, placements), body.size
-    if space.glides:
-        space.turn(space.best_turns(points[:n].T))
-
-    def tiles() -> Complex:
-        return space.in_order(space.nearest(points[:n].T).vertices).T
-
-    for _ in range(NEIGHBOUR_ROUNDS):
-        points = body.pulled(points, tiles(), COMPARISON_STRENGTH, 1)
+    points = sprung(body, space, points, NEIGHBOUR_ROUNDS)
     rings = plane_points(points[:n].T)
-    apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
-    area = np.maximum(signed_area(rings), 0.1)
+    apart = (abs(points[:n] - nearest_tiles(space, points)) ** 2).mean(axis=0)
+    area = np.maximum(signed_area(rings), LEAST_AREA)
     costs = (body.lenient_energy(points) + COMPARISON_STRENGTH * apart) / area
     costs += body.stiffness.pose * body.displacement(points)
     costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSING_COST

@@ -25,8 +25,11 @@ from orbiflow.tiles.search.co_deformation import (
     COMPARISON_STRENGTH,
     CROSSING_COST,
     MAX_COST_RATIO,
+    costs_of,
     drawn_to_tiles,
     held_on_tiles,
+    nearest_tiles,
+    sprung,
 )
 from orbiflow.tiles.search.gluing import Placement
 from orbiflow.tiles.search.pair_body import Glue, PairBody
@@ -141,7 +144,7 @@ class BentPair:
 
     @cached_property
     def _costs(self) -> tuple[Array, bool]:
-        costs, sound = self.body.costs(self.points[:, None])
+        costs, sound = costs_of(self.body, self.points[:, None])
         return costs[:, 0], bool(sound[0])
 
     @property
@@ -161,7 +164,7 @@ class BentPair:
         ring = self.points[:n]
         steps = abs(np.roll(ring, -1) - ring)
         # which figure each step is of; those of the first one come first
-        first = np.arange(n) < self.body.parts[0].size - self.glue.length
+        first = np.arange(n) < self.body.figures[0].size - self.glue.length
         lengths = own.lengths[0]
         corners = np.cumsum(lengths) - lengths + own.starts[0]
 
@@ -185,7 +188,7 @@ class BentPair:
         return min(self.marks) - CROSSING_MARKS * (not self.sound)
 
     @property
-    def outlines(self) -> tuple[Complex, Complex]:
+    def outlines(self) -> list[Complex]:
         """Where the points (n_k,) of both figures' outlines are."""
         return self.body.rings(self.points)
 
@@ -194,7 +197,7 @@ class BentPair:
         """The marks that people would give to both figures."""
         one, two = (
             kept_of(part.measures, ring, 0.0).mark
-            for part, ring in zip(self.body.parts, self.outlines, strict=True)
+            for part, ring in zip(self.body.figures, self.outlines, strict=True)
         )
         return one, one if self.figures.background else two
 
@@ -232,7 +235,7 @@ def bent(figures: Figures, placements: Sequence[Placement], count: int) -> list[
     for (glue, kind), found in groups.items():
         own, body = _as_placements(found), glued_body(figures, 0, glue)
         z, space = drawn_to_tiles(body, kind, own)
-        costs, _ = body.costs(z)
+        costs, _ = costs_of(body, z)
         own = own._replace(turns=space.turns)
         rough += [
             (cost, BentPair(figures, 0, glue, kind, own.take(np.array([k])), z[:, k]))
@@ -256,13 +259,13 @@ def finer(pair: BentPair, level: int, *, rounds: int = HELD_ROUNDS) -> BentPair:
     shapes = (pair.points[places] for places in pair.body.places)
     one, two = (
         followed(old, part, z[:, None], _turned(part, old, z))
-        for part, old, z in zip(body.parts, pair.body.parts, shapes, strict=True)
+        for part, old, z in zip(body.figures, pair.body.figures, shapes, strict=True)
     )
     own = own._replace(lengths=own.lengths * multiple, starts=own.starts * multiple)
     space = TileSpace(pair.kind, own)
-    z = _sprung(body, space, body.joined((one, two)), 2)
+    z = sprung(body, space, body.joined((one, two)), 2)
     if not rounds:
-        z[: body.size] = _tiles(body, space, z)
+        z[: body.size] = nearest_tiles(space, z)
     own = own._replace(turns=space.turns)
     found = BentPair(pair.figures, level, glue, pair.kind, own, z[:, 0])
     return held(found, rounds) if rounds else found
@@ -272,20 +275,6 @@ def _turned(body: Elastic, old: Elastic, z: Complex) -> Complex:
     """Return a body (N, 1) in the pose of a coarser one's shape (N,)."""
     turn = np.exp(1j * np.angle(best_similarity(old.rest, z)))
     return (body.rest * turn + z[: old.size].mean())[:, None]
-
-
-def _tiles(body: PairBody, space: TileSpace, z: Complex) -> Complex:
-    """Return the nearest tiles (n, C), point by point."""
-    return space.in_order(space.nearest(z[: body.size].T).vertices).T
-
-
-def _sprung(body: PairBody, space: TileSpace, z: Complex, rounds: int) -> Complex:
-    """Return shapes (N, C) that strong springs pull to tiles, whose glide axes turn to suit them."""
-    if space.glides:
-        space.turn(space.best_turns(z[: body.size].T))
-    for _ in range(rounds):
-        z = body.pulled(z, _tiles(body, space, z), COMPARISON_STRENGTH, 1)
-    return z
 
 
 # How the ends of the path move along the first outline, along the second, and how much longer it is
@@ -324,9 +313,9 @@ class _Sprung:
         cls, body: PairBody, kind: IsohedralClass, placements: Placements, z: Complex
     ) -> _Sprung:
         space = TileSpace(kind, placements)
-        z = _sprung(body, space, z, SPRUNG_ROUNDS)
-        costs, sound = body.costs(z)
-        away = (abs(z[: body.size] - _tiles(body, space, z)) ** 2).mean(axis=0)
+        z = sprung(body, space, z, SPRUNG_ROUNDS)
+        costs, sound = costs_of(body, z)
+        away = (abs(z[: body.size] - nearest_tiles(space, z)) ** 2).mean(axis=0)
         whole = together(costs) + COMPARISON_STRENGTH * away + CROSSING_COST * ~sound
         return cls(body, placements._replace(turns=space.turns), z, whole)
 
@@ -340,7 +329,7 @@ class _Sprung:
 
 def moved(pair: BentPair, step: int = 1, *, most: int = 6, tried: int = 12) -> BentPair:
     """Move corners and the path's ends by so many points until no neighbour costs less."""
-    parts = pair.body.parts
+    parts = pair.body.figures
     here = _Sprung.of(pair.body, pair.kind, pair.placement, pair.points[:, None])
     for _ in range(most):
         options: list[tuple[float, Glue, Placements, Complex]] = []

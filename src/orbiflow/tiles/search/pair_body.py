@@ -6,14 +6,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import shapely
-from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.tiles.geometry import plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, ElasticBody
-
-LEAST_AREA = 0.1  # the area of a figure of area about 1 below which nothing is left of it
 
 
 class Glue(NamedTuple):
@@ -48,11 +43,12 @@ class PairBody(ElasticBody):
     def __init__(self, parts: tuple[Elastic, Elastic], glue: Glue) -> None:
         super().__init__()
         one, two = parts
-        self.parts, self.glue = parts, glue
+        self.glue, self._figures = glue, parts
         first, second, length = glue
         free = one.size - length  # the steps of the first figure that are not on the path
         self.size = free + two.size - length
-        within, count = np.arange(1, length), self.size + length - 1
+        self.outer = count = self.size + length - 1
+        within = np.arange(1, length)
         own, other = np.empty(len(one), dtype=np.int64), np.empty(len(two), dtype=np.int64)
         own[(first + length + np.arange(free)) % one.size] = np.arange(free)
         rest = np.arange(two.size - length)
@@ -63,7 +59,7 @@ class PairBody(ElasticBody):
         other[(second + length - within) % two.size] = on_path
         own[one.size :] = count + np.arange(len(one) - one.size)
         other[two.size :] = count + len(one) - one.size + np.arange(len(two) - two.size)
-        self.places: tuple[Integers, Integers] = (own, other)  # of each figure's points (N_k,)
+        self._places: tuple[Integers, Integers] = (own, other)
         self._count = count + len(one) - one.size + len(two) - two.size
         paths = self.path(one.rest, two.rest)
         turn = np.vdot(np.diff(paths[1]), np.diff(paths[0]))
@@ -71,15 +67,18 @@ class PairBody(ElasticBody):
         self.rest = self.joined((one.rest[:, None], moved[:, None]))[:, 0]
 
     @property
-    def outer(self) -> int:
-        """The number of points on the outline and on the path: all but those inside of the figures."""
-        return self.size + self.glue.length - 1
+    def figures(self) -> tuple[Elastic, Elastic]:
+        return self._figures
+
+    @property
+    def places(self) -> tuple[Integers, Integers]:
+        return self._places
 
     def path(self, one: Complex, two: Complex) -> tuple[Complex, Complex]:
         """Return the path's points (length + 1,) as each figure's own points have them."""
         first, second, length = self.glue
         along = np.arange(length + 1)
-        sizes = [part.size for part in self.parts]
+        sizes = [part.size for part in self.figures]
         return one[(first + along) % sizes[0]], two[(second + length - along) % sizes[1]]
 
     def joined(self, shapes: tuple[Complex, Complex]) -> Complex:
@@ -91,36 +90,15 @@ class PairBody(ElasticBody):
             count[places] += 1
         return np.divide(total, count, dtype=np.complex128)
 
-    def rings(self, z: Complex) -> tuple[Complex, Complex]:
-        """Return both figures' outlines (n_k, ...) in shapes (N, ...)."""
-        one, two = (z[own[: part.size]] for own, part in zip(self.places, self.parts, strict=True))
-        return one, two
-
     def forces(self, z: Complex) -> Complex:
         found = np.zeros_like(z, dtype=complex)
-        for places, part in zip(self.places, self.parts, strict=True):
+        for places, part in zip(self.places, self.figures, strict=True):
             found[places] += part.forces(z[places])
         return found
 
     @cached_property
     def matrix(self) -> Array:
         found = np.zeros((len(self), len(self)))
-        for places, part in zip(self.places, self.parts, strict=True):
+        for places, part in zip(self.places, self.figures, strict=True):
             found[np.ix_(places, places)] += part.matrix
         return found
-
-    def costs(self, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
-        """Return costs (2, C) of both figures in shapes (N, C), and which shapes are sound.
-
-        Sound ones do not cross themselves, nor do the figures overlap.
-        """
-        costs, sound = np.empty((2, z.shape[1])), np.ones(z.shape[1], dtype=bool)
-        for k, (places, part) in enumerate(zip(self.places, self.parts, strict=True)):
-            own = z[places]
-            rings = plane_points(own[: part.size].T)
-            area = signed_area(rings)
-            sound &= np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > LEAST_AREA)
-            costs[k] = part.energy(own) / np.maximum(area, LEAST_AREA)
-            costs[k] += part.stiffness.pose * part.displacement(own)
-        both = shapely.polygons(plane_points(z[: self.size].T))
-        return costs, sound & np.asarray(shapely.is_valid(both))

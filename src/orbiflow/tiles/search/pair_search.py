@@ -219,7 +219,7 @@ def search_pair(
 
 def _whole(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
     """Return pairs of which no figure crosses itself, though they may overlap each other's copies."""
-    rings = [[plane_points(ring) for ring in (*p.body.rings(p.points), *p.laid)] for p in pairs]
+    rings = [[plane_points(ring) for ring in (*p.body.rings(p.points), *p.outlines)] for p in pairs]
     kept = (bool(np.all(shapely.is_valid(list(map(shapely.Polygon, own))))) for own in rings)
     return [pair for pair, is_kept in zip(pairs, kept, strict=True) if is_kept]
 

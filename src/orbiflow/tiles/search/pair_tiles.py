@@ -11,9 +11,9 @@ import numpy as np
 from orbiflow.arrays import Integers
 from orbiflow.tiles.geometry import Place, plane_points, reverse
 from orbiflow.tiles.likeness import Elastic, Overlap, Stiffness, kept_of
-from orbiflow.tiles.search.bending import FOLLOW_ROUNDS, Bent, PlacedBent, placed_best
+from orbiflow.tiles.search.bending import Bent, PlacedBent, placed_best
 from orbiflow.tiles.search.carving import Laid, cornered
-from orbiflow.tiles.search.co_deformation import Orientation
+from orbiflow.tiles.search.co_deformation import Orientation, following
 from orbiflow.tiles.search.finished_tiles import measured_tile, with_bent
 from orbiflow.tiles.search.pair_carving import CarvedPair
 from orbiflow.tiles.silhouette import Samples, Target
@@ -85,7 +85,7 @@ def _place(placed: PlacedBent, pair: CarvedPair, k: int) -> Place:
 def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
     """Return a figure of a pair as a bent silhouette that is a tile, over its silhouette."""
     mirrored, scale = bool(k) and pair.figures.mirrored, pair.figures.sizes[k]
-    part, places = pair.body.parts[k], pair.body.places[k]
+    part, places = pair.body.figures[k], pair.body.places[k]
     normal = np.asarray(target.normal)
     ring = part.mesh.points[: part.size] / scale
     body = Elastic(ring, Stiffness())
@@ -96,20 +96,17 @@ def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
         lambda _level, _stiffness: body,
         plain=True,
     )
-    along, corners = cornered(np.arange(part.size) + pair.slides[k], _corners(pair, k))
+    along, corners = cornered(pair.tiles[k].places, _corners(pair, k))
     vertices = pair.points[places] / scale
     outline = Laid.straight(along).points(vertices[: part.size])
-    points = vertices[:, None]
-    for _ in range(FOLLOW_ROUNDS):
-        points = body.condensed.whole(outline[:, None], body.forces(points))
     bent = Bent(
         side,
         body,
         vertices[: part.size],
-        points[:, 0],
+        following(body, outline, vertices),
         corners,
-        pair.linear / scale,
-        pair.offset / scale,
+        pair.tiles[k].linear / scale,
+        pair.tiles[k].offset / scale,
         pair.placement,
         kept_of(body.measures, outline, 0.0),
         pair.factor,
@@ -119,7 +116,7 @@ def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
 
 def _corners(pair: CarvedPair, k: int) -> Integers:
     """Return which vertices of a figure are corners of the union or ends of the path."""
-    ring = pair.body.places[k][: pair.body.parts[k].size]
+    ring = pair.body.places[k][: pair.body.figures[k].size]
     lengths, start = pair.placement.lengths[0], pair.placement.starts[0]
     corners = (np.cumsum(lengths) - lengths + start) % pair.body.size
     glue, size = pair.glue, len(ring)
