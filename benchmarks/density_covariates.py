@@ -3,7 +3,7 @@
     python benchmarks/density_covariates.py [--sets wind,chi,...] [--device cuda]    (pip install zuko)
 
 Mean log density of test rows where the covariates are known, in nats (per radian^d), and seconds of a
-fit: of `ConditionalEstimator`, without its covariates, of the linear-circular regression of Fisher and
+fit: of `DensityEstimator`, without its covariates, of the linear-circular regression of Fisher and
 Lee (Regression models for an angular response, 1992), and of zuko's NCSF with the covariates as its
 context. The regression is von Mises about m + 2 atan(b.x) with a concentration exp(c + g.x), by maximum
 likelihood, for each angle by itself. Of simulated rows the truth is known.
@@ -27,7 +27,7 @@ from density_data import Data, dequantised, residues, rna, rna_structures, sidec
 from rivals import trained
 from scipy import optimize, special, stats
 
-from orbiflow.density import ConditionalEstimator
+from orbiflow.density import DensityEstimator
 
 UNSEEN = 5_000
 """The most rows of a test."""
@@ -226,12 +226,12 @@ def compare(names: list[str], device: str) -> None:
         group = None if rows.group is None else rows.group[train]
         roles = {name: f"cycle:{period:g}" for name, period in rows.periods.items()}
         begin = time.perf_counter()
-        fit = ConditionalEstimator(unit="radians", columns=roles)
-        fit.fit(rows.angles[train], some, groups=group)
+        fit = DensityEstimator(unit="radians", columns=roles)
+        fit.fit(rows.angles[train], given=some, groups=group)
         times = [time.perf_counter() - begin]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of covariates far beyond the rows of the fit
-            ours, without = fit.score(rows.angles[test], new), fit.score(rows.angles[test])
+            ours, without = fit.score(rows.angles[test], given=new), fit.score(rows.angles[test])
         x = fit.conditional_density_.covariates.features(rows.known).numpy()
         begin = time.perf_counter()
         angles = rows.angles[train], rows.angles[test]
@@ -246,7 +246,8 @@ def compare(names: list[str], device: str) -> None:
         first = f"{name:10} {len(train):6} {rows.angles.shape[1]} {ours:8.4f} {times[0]:7.1f}"
         second = f"{without:7.4f} | {linear:10.4f} {times[1]:7.1f} | {theirs:6.3f} {times[2]:7.1f}"
         print(f"{first} {second} | {truth}", flush=True)
-        for words in fit.conditional_report_.words():
+        assert fit.report_.given is not None
+        for words in fit.report_.given.lines(()):
             print(f"    {words}", flush=True)
 
 

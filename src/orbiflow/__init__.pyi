@@ -1,6 +1,7 @@
 __version__: str
 __all__: list[str]
 
+from .density.angle_regressor import AngleRegressor as AngleRegressor
 from .density.comparing.data_sets import compare_samples as compare_samples
 from .density.comparing.named import named_tests as named_tests
 from .density.comparing.paired import compare_models as compare_models
@@ -9,8 +10,6 @@ from .density.comparing.resampling import cross_validation_folds as cross_valida
 from .density.comparing.settings import ComparisonSettings as ComparisonSettings
 from .density.comparing.settings import DataComparisonSettings as DataComparisonSettings
 from .density.comparing.settings import NamedTestSettings as NamedTestSettings
-from .density.conditional_estimator import AngleRegressor as AngleRegressor
-from .density.conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .density.cross_validation.estimators import cross_validate as cross_validate
 from .density.estimator import DensityEstimator as DensityEstimator
 from .density.inference.partial import conditional as conditional

@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from orbiflow.density import (
-    CONDITIONAL,
     MODEL,
     REPORT,
-    ConditionalEstimator,
     DensityEstimator,
     FitReport,
     density_to_bytes,
-    read_conditional,
     read_density,
     written_files,
 )
@@ -81,7 +78,7 @@ def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
     """Return what was saved in a folder or file.
 
     - a folder of `orbiflow density fit`, or its density.safetensors: the fitted `DensityEstimator`,
-      with `report_` and `feature_names_in_`, or the `ConditionalEstimator` of a fit with `--given`;
+      with `report_` and `feature_names_in_`;
     - a folder of `orbiflow escherize`, or its result.json: a `LoadedRun`, whose tiles are certified
       anew;
     - the folder of one of its tiles, such as `out/turtle/IH4`: the `EscherTile`;
@@ -153,12 +150,7 @@ def _save_estimator(estimator: DensityEstimator, path: Path) -> Path:
         raise OrbiflowError("the estimator was not fitted, so there is nothing to save: call fit")
     columns = [str(name) for name in getattr(estimator, "feature_names_in_", ())]
     content = density_to_bytes(estimator.density_, columns=columns)
-    given = getattr(estimator, "conditional_density_", None)
     if path.suffix == ".safetensors":
-        if given is not None:
-            raise OrbiflowError(
-                "a density where covariates are known is saved in a folder: leave out .safetensors"
-            )
         return write_atomic(path, content)
     space, report = estimator.space_, getattr(estimator, "report_", None)
     document: dict[str, Any] = {
@@ -168,14 +160,10 @@ def _save_estimator(estimator: DensityEstimator, path: Path) -> Path:
     }
     if report is not None:
         document["settings"] = {name: getattr(estimator, name) for name in _SETTINGS}
-    if given is not None:
-        document["given"] = {"covariates": given.covariates.to_json()}
     folder = ResultFolder(path, written_files)
     with folder.replaced() as staged:
         write_atomic(staged / MODEL, content)
         write_json(staged / REPORT, document)
-        if given is not None:
-            write_atomic(staged / CONDITIONAL, density_to_bytes(given, columns=columns))
     return folder.path
 
 
@@ -192,13 +180,7 @@ def _estimator(path: Path) -> DensityEstimator:
             settings = {name: given[name] for name in _SETTINGS if name in given}
         if unit := density.space.settings().get("unit"):
             settings["unit"] = unit
-        given = file.with_name(CONDITIONAL)
-        if file.name != MODEL or not given.is_file():
-            return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)
-        found = ConditionalEstimator.fitted(density, report, extra.get("columns"), **settings)
-        assert isinstance(found, ConditionalEstimator)
-        found.conditional_density_ = read_conditional(given)[0]
-        return found
+        return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)
     except (KeyError, TypeError, ValueError) as error:
         raise InputFileError(f"{beside}: not the report of a density: {error}") from error
 

@@ -39,10 +39,10 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_report_says_what_is_gained(model: Path) -> None:
-    said = json.loads((model / "fit" / "report.json").read_text())["given"]
+    said = json.loads((model / "fit" / "report.json").read_text())["report"]["given"]
     assert said["gain"] > 4 * said["error"]
-    assert set(said["words"]["residue"]) == set(MEANS)
-    assert [one["name"] for one in said["covariates"]] == ["residue", "warm", "hour"]
+    assert {entry["word"] for entry in said["words"]["residue"]} == set(MEANS)
+    assert said["declaration"] == "residue=word,warm=linear,hour=cycle:24"
 
 
 def test_rows_are_scored_where_all_is_known(model: Path, orbiflow, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What columns of files are taken for is what `ConditionalEstimator` takes them for, and as refused."""
+"""What columns of files are taken for is what `DensityEstimator` takes them for, and as refused."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbiflow.density import ConditionalEstimator
+from orbiflow.density import DensityEstimator
 
 pandas = pytest.importorskip("pandas")
 RNG = np.random.default_rng(0)
@@ -47,11 +47,11 @@ def test_files_and_frames_are_read_alike(fit: Any) -> None:
     pytest.importorskip("pyarrow")
     given = "hour,elevation=linear,level=word"
     said = fit(TABLE, "--columns", "phi", "--given", given, ending="parquet")
-    estimator = ConditionalEstimator(columns="phi", unit="degrees", components="mixture")
+    estimator = DensityEstimator(columns="phi", unit="degrees", components="mixture")
     model = estimator.fit(TABLE, given=given)
     known = model.conditional_density_.covariates.columns
-    for one, own in zip(said["given"]["covariates"], known, strict=True):
-        assert (one["name"], one["period"], one["words"]) == (own.name, own.period, [*own.words])
+    declaration = said["report"]["given"]["declaration"]
+    assert declaration == model.conditional_density_.covariates.declaration
     assert [own.kind for own in known] == ["cycle:24", "linear", "3 words"]
 
 

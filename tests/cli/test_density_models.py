@@ -108,7 +108,7 @@ def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, or
 def test_where_a_table_goes_is_looked_at_first(
     command: str, out: str, about: str, folder: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("orbiflow.density.operations.saved.model_at", None)
+    monkeypatch.setattr("orbiflow.density.operations.saved.SavedDensity", None)
     monkeypatch.setattr("orbiflow.density.tables.rows.read_rows", None)
     options = {
         "score": (folder / "torus.csv", "-m", folder / "torus"),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from cli.conftest import Outcome, call_main
-from orbiflow.density import ConditionalEstimator, DensityEstimator
+from orbiflow.density import DensityEstimator
 from orbiflow.density.inference import shortest_intervals
 from orbiflow.density.models import AdaptiveKernels, Density, Mixture, UniformDensity
 from orbiflow.density.spaces import Space, Torus
@@ -139,16 +139,16 @@ def test_samples_may_have_a_row_of_covariates_each() -> None:
     rng = np.random.default_rng(0)
     lengths, words = rng.uniform(0, 2, 120), rng.choice(["a", "b"], 120)
     angles = rng.vonmises(lengths + 2 * (words == "b"), 60.0)[:, None]
-    fitted = ConditionalEstimator(unit="radians", components="kernels")
-    fitted.fit(angles, {"length": lengths, "word": words})
+    fitted = DensityEstimator(unit="radians", components="kernels")
+    fitted.fit(angles, given={"length": lengths, "word": words})
     wanted = np.repeat([0.2, 1.0, 1.8], 40)
     given = {"length": wanted, "word": "b"}
-    apart = np.angle(np.exp(1j * (fitted.sample(120, given, 0)[:, 0] - wanted - 2)))
+    apart = np.angle(np.exp(1j * (fitted.sample(120, 0, given=given)[:, 0] - wanted - 2)))
     assert np.abs(np.median(apart.reshape(3, 40), axis=1)).max() < 0.25
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame({"word": "b", "length": wanted})
-    assert np.array_equal(fitted.sample(120, frame, 0), fitted.sample(120, given, 0))
-    assert fitted.sample(4, frame[:1], 0).shape == (4, 1)
+    assert np.array_equal(fitted.sample(120, 0, given=frame), fitted.sample(120, 0, given=given))
+    assert fitted.sample(4, 0, given=frame[:1]).shape == (4, 1)
     for count in (1, 119):
         with refused("120"):
-            fitted.sample(count, given, 0)
+            fitted.sample(count, 0, given=given)

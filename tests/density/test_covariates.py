@@ -18,26 +18,23 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from orbiflow.density import (
-    AngleRegressor,
-    ConditionalEstimator,
-    DensityEstimator,
-    UniformDensity,
-    make_space,
-)
+from orbiflow.density import AngleRegressor, DensityEstimator, UniformDensity, make_space
 from orbiflow.density.cross_validation import cross_validate
 from orbiflow.density.data import given_roles
+from orbiflow.density.fitting import GivenReport
 from orbiflow.density.models import (
     AdaptiveKernels,
     CircularRegression,
     ConditionalDensity,
     ConditionalKernels,
     JointDensity,
+    KernelShape,
+    KnownRows,
     NeuralMixture,
     Unconditional,
     density_to_bytes,
     joint_torus,
-    read_conditional,
+    read_density,
 )
 from orbiflow.density.spaces import Covariates, ProductSpace, Torus
 from orbiflow.errors import DataWarning, InputFileError
@@ -63,9 +60,15 @@ def drawn(count: int, seed: int = 0) -> tuple[Any, dict[str, Any], Any]:
 
 
 @pytest.fixture(scope="module")
-def fit() -> ConditionalEstimator:
+def fit() -> DensityEstimator:
     angles, cells, _ = drawn(500)
-    return ConditionalEstimator(**QUICK, columns={"hour": "cycle:24"}).fit(angles, cells)
+    return DensityEstimator(**QUICK, columns={"hour": "cycle:24"}).fit(angles, given=cells)
+
+
+def report_of(fit: DensityEstimator) -> GivenReport:
+    """How it was chosen."""
+    assert fit.report_.given is not None
+    return fit.report_.given
 
 
 def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
@@ -85,9 +88,8 @@ def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
     wide = torch.tensor(rng.uniform(0.05, 3, len(covariates.columns)))
     width = len(space.spheres)
     kappa = torch.tensor(rng.uniform(0.5, 30, width))
-    kernels = ConditionalKernels(
-        space, points, None, x, covariates.number, wide, kappa, torch.tensor(rng.dirichlet([1] * 3))
-    )
+    shape = KernelShape(wide, kappa, torch.tensor(rng.dirichlet([1] * 3)))
+    kernels = ConditionalKernels(space, KnownRows(points, None, x, covariates.number), shape)
     hidden, out = 8, 3 * (space.features(points).shape[-1] + width + 1)
     shapes = [
         (x.shape[1], hidden),
@@ -147,26 +149,26 @@ def test_rows_on_a_sphere_and_beside_a_number_have_densities_too(beside: bool) -
     assert torch.allclose(density.at(x[0]).log_prob(points), logs, atol=1e-6)
 
 
-def test_truth_is_found_with_numbers_cycles_and_words_together(fit: ConditionalEstimator) -> None:
+def test_truth_is_found_with_numbers_cycles_and_words_together(fit: DensityEstimator) -> None:
     angles, cells, truth = drawn(1500, seed=1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)
-        regret = float((truth - fit.score_samples(angles, cells)).mean())
+        regret = float((truth - fit.score_samples(angles, given=cells)).mean())
     assert 0 < regret < 0.2
     assert fit.score(angles) < truth.mean() - 0.8  # without covariates
-    report = fit.conditional_report_
+    report = report_of(fit)
     assert report.gain > 5 * report.error > 0
     shares = {one.kind: one.share for one in report.parts}
     assert sum(shares.values()) == pytest.approx(1)
     assert shares["all"] < 0.1
 
 
-def test_densities_take_a_context_as_features_or_by_name(fit: ConditionalEstimator) -> None:
+def test_densities_take_a_context_as_features_or_by_name(fit: DensityEstimator) -> None:
     angles, cells, _ = drawn(20, seed=2)
     density, points = fit.conditional_density_, fit.points_of(angles)
     x = density.covariates.features(cells)
     logs = density.log_prob(points, cells, measure="natural")
-    assert np.allclose(logs.numpy(), fit.score_samples(angles, cells))
+    assert np.allclose(logs.numpy(), fit.score_samples(angles, given=cells))
     assert torch.equal(
         density.log_prob(points, x[0]), density.log_prob(points, x[:1].expand(20, -1))
     )
@@ -183,11 +185,11 @@ def test_a_fast_fit_says_what_it_left_out() -> None:
     assert fit.score(angles, given={"x": x}) > fit.score(angles) + 0.5
     assert fit.sample(3, 0, given={"x": 0.5}).shape == (3, 1)
     assert fit.at(x=0.5).mean()[0] == pytest.approx(1, abs=0.2)
-    report = fit.conditional_report_
+    report = report_of(fit)
     assert {part.kind for part in report.parts} == {"all", "kernels", "regression"}
     assert report.untried == ("network", "joint")
     assert set(fit.report_.weights or {}) <= {"kernels", "uniform"}
-    assert any("effort fast" in text for text in report.words())
+    assert any("effort fast" in str(text) for text in fit.report_.words())
     assert any("flow, chains, network" in text for text in fit.report_.notes)
     with refused("effort", "components"):
         DensityEstimator(components="flow", effort="fast").fit(rng.vonmises(0, 1, (40, 1)))
@@ -198,7 +200,7 @@ def test_an_estimator_is_cross_validated(declared: bool) -> None:
     rng = np.random.default_rng(3)
     x = rng.uniform(-1, 1, 120)
     angles = rng.vonmises(2 * x, 8.0)
-    estimator = ConditionalEstimator(unit="radians", components="kernels", effort="fast")
+    estimator = DensityEstimator(unit="radians", components="kernels", effort="fast")
     label = np.arange(120) // 2
     if declared:
         frame = pd.DataFrame({"dir": angles, "x": x, "site": label})
@@ -213,13 +215,13 @@ def test_an_estimator_is_cross_validated(declared: bool) -> None:
     assert found.mean > plain.mean + 0.3
 
 
-def test_samples_are_of_the_density_at_the_covariates(fit: ConditionalEstimator) -> None:
+def test_samples_are_of_the_density_at_the_covariates(fit: DensityEstimator) -> None:
     known = {"temperature": 0.5, "hour": 6.0, "residue": "PRO"}
-    samples = fit.sample(4000, known, random_state=0)
+    samples = fit.sample(4000, 0, given=known)
     at = fit.at(known)
     assert stats.kstest(at.cdf(samples), "uniform").pvalue > 1e-3
     assert at.mean()[0] == pytest.approx(2 + 0.8 * np.tanh(0.5) + 0.6, abs=0.25)
-    whole = fit.score_samples(samples[:5], {name: [v] * 5 for name, v in known.items()})
+    whole = fit.score_samples(samples[:5], given={name: [v] * 5 for name, v in known.items()})
     assert np.allclose(at.score_samples(samples[:5]), whole, atol=1e-6)
 
 
@@ -227,19 +229,17 @@ def test_a_useless_covariate_leaves_the_density_of_all_rows() -> None:
     rng = np.random.default_rng(0)
     angles, new = rng.vonmises(0, 2, (300, 1)), rng.vonmises(0, 2, (500, 1))
     how = {**QUICK, "components": "mixture"}
-    fit = ConditionalEstimator(**how).fit(angles, {"noise": rng.normal(size=300)})
-    assert [(one.kind, one.share) for one in fit.conditional_report_.parts if one.share] == [
-        ("all", 1.0)
-    ]
+    fit = DensityEstimator(**how).fit(angles, given={"noise": rng.normal(size=300)})
+    assert [(one.kind, one.share) for one in report_of(fit).parts if one.share] == [("all", 1.0)]
     assert np.allclose(
-        fit.score_samples(new, {"noise": rng.normal(size=500)}), fit.score_samples(new)
+        fit.score_samples(new, given={"noise": rng.normal(size=500)}), fit.score_samples(new)
     )
 
 
 def test_intervals_hold_the_shares_that_they_say() -> None:
     rng = np.random.default_rng(4)
     x, new = rng.uniform(-1, 1, 400), rng.uniform(-0.9, 0.9, 2000)
-    fit = ConditionalEstimator(**QUICK).fit(rng.vonmises(2 * x, 8.0)[:, None], {"x": x})
+    fit = DensityEstimator(**QUICK).fit(rng.vonmises(2 * x, 8.0)[:, None], given={"x": x})
     angles = rng.vonmises(2 * new, 8.0)
     grid = np.linspace(-0.9, 0.9, 31)
     trend = fit.trend_along("x", grid, levels=(0.5, 0.9))
@@ -249,24 +249,28 @@ def test_intervals_hold_the_shares_that_they_say() -> None:
         assert ((low < angles) & (angles < high)).mean() == pytest.approx(mass, abs=0.05)
 
 
-def test_a_file_makes_the_same_density_again(fit: ConditionalEstimator, tmp_path: Path) -> None:
+def test_a_file_makes_the_same_density_again(fit: DensityEstimator, tmp_path: Path) -> None:
     for number, density in enumerate((
         fit.conditional_density_, random_density(5, make_space("torus", axes=1), 1)
     )):  # fmt: skip
         path = tmp_path / f"{number}.safetensors"
-        path.write_bytes(density_to_bytes(density, columns=["phi"]))
-        again, extra = read_conditional(path)
+        whole = UniformDensity(density.space)
+        whole.given = density
+        path.write_bytes(density_to_bytes(whole, columns=["phi"]))
+        saved, extra = read_density(path)
         assert extra == {"columns": ["phi"]}
+        again = saved.given
+        assert again is not None
         points = density.space.midpoints(50)
         x = torch.randn(50, density.covariates.width, dtype=torch.float64).clamp(-1, 1)
         assert torch.equal(again.log_prob(points, x), density.log_prob(points, x))
         data = path.read_bytes()
         path.write_bytes(data[:-9] + bytes([data[-9] ^ 1]) + data[-8:])
         with pytest.raises(InputFileError):
-            read_conditional(path)
+            read_density(path)
 
 
-def test_what_is_given_must_be_known(fit: ConditionalEstimator) -> None:
+def test_what_is_given_must_be_known(fit: DensityEstimator) -> None:
     angles, cells, _ = drawn(40)
     lacking = {**cells, "temperature": np.append(cells["temperature"][:-1], np.nan)}
     other = {**cells, "residue": np.array(["TRP"] * 40)}
@@ -278,15 +282,15 @@ def test_what_is_given_must_be_known(fit: ConditionalEstimator) -> None:
     ]
     for given_cells, message in wrong:
         with refused(*message.split()):
-            fit.score_samples(angles, given_cells)
+            fit.score_samples(angles, given=given_cells)
     with refused("speed"):
         fit.at(speed=3)
     with refused("hour", "residue"):
         fit.at(temperature=3)
     with refused("value", "x"):
-        ConditionalEstimator(**QUICK).fit(angles, {"x": np.ones(40)})
+        DensityEstimator(**QUICK).fit(angles, given={"x": np.ones(40)})
     with refused("rows", "30", "20"):
-        ConditionalEstimator(**QUICK).fit(angles[:20], {"x": np.arange(20.0)})
+        DensityEstimator(**QUICK).fit(angles[:20], given={"x": np.arange(20.0)})
     with warned("temperature", "1000", kind=DataWarning):
         fit.at(temperature=1000, hour=3, residue="GLY")
 
@@ -297,7 +301,7 @@ def test_weights_and_groups_count() -> None:
     angles = np.where(np.arange(240) % 2, rng.vonmises(2 * x, 9.0), rng.vonmises(3, 9.0, 240))
     weights = np.where(np.arange(240) % 2, 1.0, 1e-3)
     how = {"sample_weight": weights, "groups": np.arange(240) // 4}
-    fit = ConditionalEstimator(**QUICK).fit(angles[:, None], {"x": x}, **how)
+    fit = DensityEstimator(**QUICK).fit(angles[:, None], given={"x": x}, **how)
     assert fit.at(x=0.5).mean()[0] == pytest.approx(1.0, abs=0.25)
 
 
@@ -322,24 +326,29 @@ def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     length = rng.uniform(0, 2, 80)
     angles = rng.vonmises(length, 8.0)[:, None]
-    fit = ConditionalEstimator(unit="radians", components="mixture").fit(angles, {"length": length})
+    fit = DensityEstimator(unit="radians", components="mixture").fit(
+        angles, given={"length": length}
+    )
     folder = save(fit, tmp_path / "fit")
     again = load(folder)
-    assert isinstance(again, ConditionalEstimator)
+    assert isinstance(again, DensityEstimator)
     known = {"length": length[:9]}
     np.testing.assert_allclose(
-        again.score_samples(angles[:9], known), fit.score_samples(angles[:9], known)
+        again.score_samples(angles[:9], given=known), fit.score_samples(angles[:9], given=known)
     )
     assert save(again, folder) == folder
     plain = DensityEstimator("torus", unit="radians", components="mixture").fit(angles)
-    assert type(load(save(plain, folder))) is DensityEstimator
-    with refused("saved", "folder"):
-        save(fit, tmp_path / "fit.safetensors")
+    again = load(save(plain, folder))
+    assert isinstance(again, DensityEstimator)
+    assert again.density_.given is None
+    one_file = load(save(fit, tmp_path / "fit.safetensors"))
+    assert isinstance(one_file, DensityEstimator)
+    assert one_file.density_.given is not None
 
 
 def test_rows_that_lack_angles_are_refused_before_the_fit() -> None:
     angles = np.full((40, 2), np.nan)
-    fit = ConditionalEstimator(unit="radians", missing="marginalise")
+    fit = DensityEstimator(unit="radians", missing="marginalise")
     with refused("marginalise", "densities"):
-        fit.fit(angles, {"length": np.arange(40.0)})
+        fit.fit(angles, given={"length": np.arange(40.0)})
     assert not hasattr(fit, "density_")

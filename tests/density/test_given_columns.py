@@ -8,7 +8,6 @@ import pytest
 
 from orbiflow.density import (
     AngleRegressor,
-    ConditionalEstimator,
     DensityEstimator,
     Role,
     UndeclaredError,
@@ -41,8 +40,8 @@ CATEGORIES: dict[str, Any] = {
 }
 
 
-def fit(given: Any, **settings: Any) -> ConditionalEstimator:
-    return ConditionalEstimator(**KIND, **settings).fit(ANGLES, given)
+def fit(given: Any, **settings: Any) -> DensityEstimator:
+    return DensityEstimator(**KIND, **settings).fit(ANGLES, given=given)
 
 
 def kinds(given: Any, **settings: Any) -> list[str]:
@@ -50,7 +49,7 @@ def kinds(given: Any, **settings: Any) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            ConditionalEstimator(**KIND, **settings).fit(ANGLES, given, np.zeros(ROWS))
+            DensityEstimator(**KIND, **settings).fit(ANGLES, None, np.zeros(ROWS), given=given)
         except OrbiflowError as error:
             if "weights are 0" not in str(error):
                 raise
@@ -58,15 +57,15 @@ def kinds(given: Any, **settings: Any) -> list[str]:
 
 
 @pytest.fixture(scope="module", name="by_word")
-def by_word_fixture() -> ConditionalEstimator:
+def by_word_fixture() -> DensityEstimator:
     return fit({"level": WORDS})
 
 
 @pytest.mark.parametrize("kind", CATEGORIES)
-def test_categories_are_words(kind: str, by_word: ConditionalEstimator) -> None:
+def test_categories_are_words(kind: str, by_word: DensityEstimator) -> None:
     given = {"level": CATEGORIES[kind]}
-    right = by_word.score_samples(ANGLES, {"level": WORDS})
-    assert np.array_equal(by_word.score_samples(ANGLES, given), right)
+    right = by_word.score_samples(ANGLES, given={"level": WORDS})
+    assert np.array_equal(by_word.score_samples(ANGLES, given=given), right)
     with refused("level", "7"):
         by_word.at(level=7)
 
@@ -79,7 +78,7 @@ def test_fits_to_categories_know_no_others() -> None:
     for table in tables:
         model = fit(table)
         with refused("level", "7"):
-            model.score_samples(ANGLES[:1], {"level": [7]})
+            model.score_samples(ANGLES[:1], given={"level": [7]})
     gap = pandas.Categorical([None, *LEVELS[1:]])
     with refused("1", "level"):
         fit({"level": gap})
@@ -132,7 +131,7 @@ def test_both_ends_of_a_day_are_one() -> None:
     model = fit({"hour": HOURS})
     same = fit({"hour": HOURS}, columns={"hour": "cycle:24"})
     plain = fit({"hour": HOURS}, columns={"hour": "linear"})
-    scores = [own.score_samples(ANGLES, {"hour": HOURS}) for own in (model, same, plain)]
+    scores = [own.score_samples(ANGLES, given={"hour": HOURS}) for own in (model, same, plain)]
     assert np.array_equal(scores[0], scores[1])
     assert model.at(hour=0).score(ANGLES) == pytest.approx(model.at(hour=24).score(ANGLES))
     assert [own.period for own in plain.conditional_density_.covariates.columns] == [None]
@@ -220,7 +219,6 @@ def test_arguments_are_used_or_refused() -> None:
     "call",
     [
         DensityEstimator,
-        ConditionalEstimator,
         AngleRegressor,
         lambda **wrong: DensityEstimator().set_params(**wrong),
         lambda **wrong: make_space("torus", **wrong),
@@ -250,24 +248,24 @@ def test_words_that_do_not_recur_are_refused() -> None:
 
 def test_columns_of_the_frame_are_given() -> None:
     table = pandas.DataFrame({"phi": ANGLES[:, 0], "hour": HOURS, "site": WORDS, "level": LEVELS})
-    model = ConditionalEstimator(columns="phi=angle:degrees", components="mixture")
-    model.fit(table, {"hour": "cycle:24", "level": "word"})
-    apart = ConditionalEstimator(**KIND, columns={"level": "word"})
-    apart.fit(ANGLES, table[["hour", "level"]])
-    right = apart.score_samples(ANGLES, table[["hour", "level"]])
+    model = DensityEstimator(columns="phi=angle:degrees", components="mixture")
+    model.fit(table, given={"hour": "cycle:24", "level": "word"})
+    apart = DensityEstimator(**KIND, columns={"level": "word"})
+    apart.fit(ANGLES, given=table[["hour", "level"]])
+    right = apart.score_samples(ANGLES, given=table[["hour", "level"]])
     for given in (table, table[["hour", "level"]], ["hour", "level"]):
-        assert np.array_equal(model.score_samples(table, given), right)
+        assert np.array_equal(model.score_samples(table, given=given), right)
     with refused("site", "cycle:24"):
-        model.fit(table, {"site": "cycle:24"})
+        model.fit(table, given={"site": "cycle:24"})
     with refused("level", kind=UndeclaredError) as caught:
-        model.fit(table, ["hour", "level"])
-    model.fit(table, caught.value.proposal)
+        model.fit(table, given=["hour", "level"])
+    model.fit(table, given=caught.value.proposal)
     assert model.conditional_density_.covariates.names == ["hour", "level"]
 
 
 def test_a_whole_number_is_the_same_word_as_a_float() -> None:
-    model = ConditionalEstimator(**KIND).fit(
-        ANGLES, {"site": pandas.Series(pandas.Categorical(LEVELS))}
+    model = DensityEstimator(**KIND).fit(
+        ANGLES, given={"site": pandas.Series(pandas.Categorical(LEVELS))}
     )
     assert model.at(site=2.0).mean() == pytest.approx(model.at(site="2").mean())
     with refused("site", 5):

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from density.blends import random_kernels
 from orbiflow.arrays import Array
 from orbiflow.density import (
-    ConditionalEstimator,
     DensityEstimator,
     DensitySettings,
     Torus,
@@ -183,8 +182,8 @@ def read(column: np.ndarray, role: str) -> None:
     roles = {"phi": "angle:degrees", "x": "linear"}
     if role == "covariate":
         columns = {"phi": "angle:degrees"}
-        estimator = ConditionalEstimator(columns=columns, components="mixture")
-        estimator.fit(table, {"x": "linear"}, none)
+        estimator = DensityEstimator(columns=columns, components="mixture")
+        estimator.fit(table, None, none, given={"x": "linear"})
     else:
         DensityEstimator(columns=roles, components="mixture").fit(table, sample_weight=none)
 
@@ -266,8 +265,8 @@ def test_columns_beside_a_sphere() -> None:
 
 def test_codes_are_refused_where_covariates_are_given() -> None:
     columns = {"p": "linear", "tide": "cycle:12.4"}
-    model = ConditionalEstimator(unit="degrees", components="mixture", columns=columns).fit(
-        ANGLES[:120, None], {"p": PRESSURE, "tide": RNG.uniform(0, 12.4, 120)}
+    model = DensityEstimator(unit="degrees", components="mixture", columns=columns).fit(
+        ANGLES[:120, None], given={"p": PRESSURE, "tide": RNG.uniform(0, 12.4, 120)}
     )
     model.at(p=999.9, tide=3.0)
     for values in ({"p": -9999, "tide": 3.0}, {"p": 1000, "tide": 99}):

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from density.blends import flow_of
 from orbiflow.density import (
     AngleRegressor,
-    ConditionalEstimator,
     DataComparisonSettings,
     DensityEstimator,
     NamedTestSettings,
@@ -343,18 +342,20 @@ def test_covariates_have_labels() -> None:
     y = pandas.DataFrame({"phi": np.degrees(RNG.vonmises(np.radians(x["warm"]), 9))}, NAMES)
     mixed = x.iloc[SHUFFLED]
     real: Any = {**KIND, "columns": {"warm": "linear"}}
-    model = ConditionalEstimator(**real).fit(y, x)
-    right = model.score_samples(y, x)
+    model = DensityEstimator(**real).fit(y, given=x)
+    right = model.score_samples(y, given=x)
     columns = {"warm": mixed["warm"], "side": x["side"]}
     for covariates in (mixed, columns):
-        assert np.array_equal(model.score_samples(y, covariates), right)
-        assert model.score(y, covariates) == pytest.approx(right.mean())
-    assert np.array_equal(ConditionalEstimator(**real).fit(y, columns).score_samples(y, x), right)
-    weighed = model.score(y, mixed, WEIGHTS.iloc[SHUFFLED])
+        assert np.array_equal(model.score_samples(y, given=covariates), right)
+        assert model.score(y, given=covariates) == pytest.approx(right.mean())
+    assert np.array_equal(
+        DensityEstimator(**real).fit(y, given=columns).score_samples(y, given=x), right
+    )
+    weighed = model.score(y, None, WEIGHTS.iloc[SHUFFLED], given=mixed)
     assert weighed == pytest.approx(np.average(right, weights=WEIGHTS))
     for call in (model.fit, model.score, model.score_samples):
         with refused("given", "2"):
-            call(y, x.set_axis([*NAMES[1:], "new"]))
+            call(y, given=x.set_axis([*NAMES[1:], "new"]))
 
 
 def test_targets_of_regressions_have_labels() -> None:

@@ -1,3 +1,4 @@
+from .angle_regressor import AngleRegressor as AngleRegressor
 from .comparing.data_sets import DataComparison as DataComparison
 from .comparing.data_sets import Divergence as Divergence
 from .comparing.data_sets import compare_samples as compare_samples
@@ -13,8 +14,6 @@ from .comparing.resampling import cross_validation_folds as cross_validation_fol
 from .comparing.settings import ComparisonSettings as ComparisonSettings
 from .comparing.settings import DataComparisonSettings as DataComparisonSettings
 from .comparing.settings import NamedTestSettings as NamedTestSettings
-from .conditional_estimator import AngleRegressor as AngleRegressor
-from .conditional_estimator import ConditionalEstimator as ConditionalEstimator
 from .data.roles import Role as Role
 from .data.table import TableError as TableError
 from .data.table import UndeclaredError as UndeclaredError
@@ -38,7 +37,6 @@ from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
 from .models.evaluation import log_density_gradient as log_density_gradient
 from .models.files import density_to_bytes as density_to_bytes
-from .models.files import read_conditional as read_conditional
 from .models.files import read_density as read_density
 from .models.fisher_bingham import AngularCentralGaussian as AngularCentralGaussian
 from .models.fisher_bingham import FisherBingham as FisherBingham
@@ -48,7 +46,7 @@ from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
 from .models.network import VonMisesNetwork as VonMisesNetwork
 from .models.sine import VonMisesSine as VonMisesSine
-from .operations.saved import rows_of_model as rows_of_model
+from .operations.saved import SavedDensity as SavedDensity
 from .orientations import OrientationSummary as OrientationSummary
 from .orientations import summarize_orientations as summarize_orientations
 from .pictures.coastlines import read_coastlines as read_coastlines
@@ -76,7 +74,6 @@ from .regions.levels import DensityRegion as DensityRegion
 from .regions.levels import highest_density_region as highest_density_region
 from .regions.settings import RegionSettings as RegionSettings
 from .regions.settings import resolvable_masses as resolvable_masses
-from .run_folder import CONDITIONAL as CONDITIONAL
 from .run_folder import written_files as written_files
 from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus

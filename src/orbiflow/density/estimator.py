@@ -33,6 +33,7 @@ from orbiflow.density.fitting import (
     Progress,
     check_missing,
     fit_chosen,
+    fit_conditional,
     mean_of,
     refuse_flow_settings,
     weighed,
@@ -95,7 +96,8 @@ class DensityEstimator(GivenCovariates):
     On tori of four or more angles and on spaces of unit vectors there is no flow, and its settings
     must be left at their defaults.
 
-    After `fit`: `space_`, `density_` (a `Density`), `report_` (a `FitReport`),
+    After `fit`: `space_`, `density_` (a `Density`), `report_` (a `FitReport`), of covariates what is
+    `given` in both,
     `n_features_in_`, and `feature_names_in_` where the data, a data frame, name their columns.
 
     >>> rng = np.random.default_rng(0)
@@ -169,23 +171,20 @@ class DensityEstimator(GivenCovariates):
                 torus of so many angles.
         """
         _refuse_targets(y)
-        if given is None:
-            _, sample_weight, groups = alongside(X=X, sample_weight=sample_weight, groups=groups)
-            rows = self.read_rows(X)
-            sample_weight, groups = rows.beside(sample_weight, groups)
-            if groups is None and not self.settings().flow_alone:
-                groups = runs_of_draws(X)
-            self._fit(rows, sample_weight, groups, progress)
-            return self
-        beside = {} if is_declared(given) else {"given": given}
+        beside = {} if given is None or is_declared(given) else {"given": given}
         _, sample_weight, groups, *aligned = alongside(
             X=X, sample_weight=sample_weight, groups=groups, **beside
         )
-        rows, cells, covariates = self._read_given(X, aligned[0] if aligned else given)
+        known = None if given is None else self._read_given(X, aligned[0] if aligned else given)
+        rows = self.read_rows(X) if known is None else known[0]
         sample_weight, groups = rows.beside(sample_weight, groups)
-        pooled = self._fit(rows, sample_weight, groups, progress)
+        if groups is None and known is None and not self.settings().flow_alone:
+            groups = runs_of_draws(X)
         how: dict[str, Any] = {"weights": sample_weight, "groups": groups, "progress": progress}
-        self._fit_given(pooled, self._chart(rows.values), cells, covariates, **how)
+        pooled = self._fit(rows, **how)
+        if known is not None:
+            points = self._chart(rows.values)
+            self.report_ = fit_conditional(pooled, points, *known[1:], self.settings(), **how)
         return self
 
     def read_rows(self, X: Any, others: Sequence[str] = (), apart: Sequence[str] = ()) -> TableRows:
@@ -198,21 +197,14 @@ class DensityEstimator(GivenCovariates):
         self.space_ = known.of(rows)
         return rows
 
-    def _fit(
-        self,
-        read: TableRows,
-        sample_weight: ArrayLike | None,
-        groups: ArrayLike | None,
-        progress: Progress | None,
-    ) -> ChosenFit:
-        """Fit to data that were read."""
+    def _fit(self, read: TableRows, groups: ArrayLike | None, **how: Any) -> ChosenFit:
+        """Fit to data that were read; `how` are weights and progress."""
         settings, points = self.settings(), self._chart(read.values)
         if flow_obstacle(self.space_):
             refuse_flow_settings(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
-        how: dict[str, Any] = {"weights": sample_weight, "groups": groups, "progress": progress}
         names = read.columns if read.source.is_named else None
-        how |= {"missing": self.missing, "columns": names}
+        how |= {"groups": groups, "missing": self.missing, "columns": names}
         found = fit_chosen(self.space_, points, settings, **how)
         self._keep(found, read)
         return found

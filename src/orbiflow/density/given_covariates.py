@@ -20,13 +20,7 @@ from orbiflow.density.data import (
     given_roles,
     is_declared,
 )
-from orbiflow.density.fitting import (
-    ChosenFit,
-    ConditionalReport,
-    DensitySettings,
-    check_complete,
-    fit_conditional,
-)
+from orbiflow.density.fitting import DensitySettings, FitReport, check_complete
 from orbiflow.density.inference import FittedFigures, Trend, axes_named, trend_of
 from orbiflow.density.models import ConditionalDensity, Density
 from orbiflow.density.spaces import Covariates, Values
@@ -37,15 +31,14 @@ from orbiflow.settings import described, is_a
 class GivenCovariates(FittedFigures):
     """What an estimator tells where covariates are known.
 
-    After a fit with `given`: `conditional_density_`, and `conditional_report_`, which says what the
-    covariates gain and what is chosen.
+    After a fit with `given`: `conditional_density_`, the density where covariates are known, and
+    `report_.given`, which says what the covariates gain and what is chosen.
     """
 
     columns: Any
     unit: str | None
     missing: str
-    conditional_density_: ConditionalDensity
-    conditional_report_: ConditionalReport
+    report_: FitReport
     settings: Callable[[], DensitySettings]
     read_rows: Callable[..., TableRows]
 
@@ -63,28 +56,14 @@ class GivenCovariates(FittedFigures):
         are_asked = declared is not None or is_frame(given)
         return read, cells, self._covariates(cells, declared or {}, are_asked)
 
-    def _fit_given(
-        self,
-        pooled: ChosenFit,
-        points: torch.Tensor,
-        cells: Mapping[str, Values],
-        covariates: Covariates,
-        **beside: Any,
-    ) -> None:
-        """Fit where covariates are known; `beside` are weights, groups and progress."""
-        self.conditional_density_, self.conditional_report_ = fit_conditional(
-            pooled, points, _features(covariates, cells, len(points)), covariates, self.settings(),
-            **beside,
-        )  # fmt: skip
-
     def _log_prob_given(self, points: torch.Tensor, given: Any, measure: str) -> torch.Tensor:
         """Return log densities (N,) at points where covariates are as given."""
-        density = self._conditional()
+        density = self.conditional_density_
         return density.log_prob(points, self._x(given, len(points)), measure=measure)
 
     def _samples_given(self, count: int, given: Any, generator: torch.Generator) -> torch.Tensor:
         """Return samples (n, d) where covariates are as one row or as many say."""
-        own = self._conditional()
+        own = self.conditional_density_
         cells = _rows_given(given, own.covariates.names, count)
         x = self._x(cells, len(next(iter(cells.values()))))
         points = torch.empty((count, own.space.chart_dim), dtype=torch.float64)
@@ -97,7 +76,7 @@ class GivenCovariates(FittedFigures):
 
     def _density_at(self, given: Mapping[str, Any]) -> Density:
         """Return the density where covariates have the values that are given by their names."""
-        own = self._conditional()
+        own = self.conditional_density_
         if unknown := [name for name in given if name not in own.covariates.names]:
             known = ", ".join(own.covariates.names)
             raise OrbiflowError(f"no covariate {unknown[0]!r}; there are {known}")
@@ -136,17 +115,20 @@ class GivenCovariates(FittedFigures):
         return found
 
     def _x(self, given: Any, rows: int) -> torch.Tensor:
-        covariates = self._conditional().covariates
+        covariates = self.conditional_density_.covariates
         cells = columns_given(given, covariates.names)
-        x = _features(covariates, cells, rows)
+        x = covariates.features(cells, rows)
         for doubt in covariates.doubts(cells):
             warnings.warn(doubt, DataWarning, stacklevel=3)
         return x
 
-    def _conditional(self) -> ConditionalDensity:
-        if not hasattr(self, "conditional_density_"):
+    @property
+    def conditional_density_(self) -> ConditionalDensity:
+        """The density where covariates are known, of a fit with `given`."""
+        density = self._fitted().given
+        if density is None:
             raise OrbiflowError("no covariates are known to this estimator: call fit with given")
-        return self.conditional_density_
+        return density
 
 
 def is_frame(given: Any) -> bool:
@@ -204,10 +186,3 @@ def _rows_given(given: Any, names: Sequence[str], count: int) -> dict[str, Value
             f"given has {found} rows, and n_samples is {count}: give one row, or one for each sample"
         )
     return cells
-
-
-def _features(covariates: Covariates, cells: Mapping[str, Values], rows: int) -> torch.Tensor:
-    x = covariates.features(cells)
-    if len(x) != rows:
-        raise OrbiflowError(f"given: expected {rows} rows, as the data have, got {len(x)}")
-    return x

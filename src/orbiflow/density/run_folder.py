@@ -12,9 +12,6 @@ from orbiflow.runtime import Note, ResultFolder, Sink, Written, write_atomic
 SAMPLES = "samples.csv"
 """Samples beside the density that they are of."""
 
-CONDITIONAL = "conditional.safetensors"
-"""The density where covariates are known, beside that of all rows."""
-
 
 def written_files(folder: Path) -> set[str]:
     """Return the names of the files that a fit wrote into a folder, and of pictures of its model."""
@@ -30,8 +27,8 @@ def written_files(folder: Path) -> set[str]:
     from orbiflow.density.pictures import MODEL, PICTURES, REPORT, TABLE, THUMBNAIL
 
     samples = {SAMPLES} if "samples" in document else set[str]()
-    given = {CONDITIONAL} if "covariates" in (document.get("given") or ()) else set[str]()
-    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES, *samples, *given}
+    before = {"conditional.safetensors"} if "given" in document else set[str]()
+    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES, *samples, *before}
 
 
 def write_files(folder: ResultFolder, files: Mapping[str, str | bytes], tell: Sink) -> None:

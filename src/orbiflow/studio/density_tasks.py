@@ -102,19 +102,19 @@ def _view(folder: Path, data: Path, on_event: Sink) -> dict[str, Any]:
     """Return what a page shows of a fit, and write the files of its surface and its map."""
     from orbiflow.density import (
         PlotSettings,
+        SavedDensity,
         TableSettings,
         flat_data,
         flat_frame,
-        read_density,
-        rows_of_model,
         surface_data,
     )
 
-    fitted, saved = read_density(folder / FIT / "density.safetensors")
-    space, names = fitted.space, tuple(saved["columns"])
+    saved = SavedDensity.read(folder / FIT)
+    fitted, names = saved.density, saved.columns
+    space = fitted.space
     on_event(Progress(0.0, "drawing"))
     asked = TableSettings(drop_missing=True)
-    rows = rows_of_model(data, asked, fitted, saved, ignore).values
+    rows = saved.rows(data, asked, ignore).values
     points = space.to_chart(rows)
     if space.is_planar:
         surface = surface_data(

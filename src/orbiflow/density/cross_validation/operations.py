@@ -88,7 +88,7 @@ def fold(
     out_of_fit = _held(data, next(iter(read.given.values())), fold, held)
     fitted, unseen = read.only(~out_of_fit), read.only(out_of_fit)
     folder = runtime.ResultFolder(out, written_files)
-    estimator = operations.fit_rows(fitted, density, density, rows, on_event, cancel)
+    estimator = operations.fit_rows(fitted, density, rows, on_event, cancel)
     scores = estimator.score_samples(unseen.values)
     if not np.isfinite(scores).all():
         raise SettingError(

@@ -2,8 +2,6 @@ from .automatic import ChosenFit as ChosenFit
 from .automatic import fit_automatic as fit_automatic
 from .automatic import fit_chosen as fit_chosen
 from .automatic import fit_in_folds as fit_in_folds
-from .covariates import ConditionalReport as ConditionalReport
-from .covariates import PartEvidence as PartEvidence
 from .covariates import check_complete as check_complete
 from .covariates import fit_conditional as fit_conditional
 from .evidence import Evidence as Evidence
@@ -26,6 +24,8 @@ from .repeats import places as places
 from .repeats import repeats_of as repeats_of
 from .repeats import spread_evenly as spread_evenly
 from .report import FitReport as FitReport
+from .report import GivenReport as GivenReport
+from .report import PartEvidence as PartEvidence
 from .report import Progress as Progress
 from .report import silent as silent
 from .rows import Rows as Rows

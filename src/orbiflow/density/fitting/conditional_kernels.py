@@ -16,6 +16,8 @@ from orbiflow.density.models import (
     LEAST_LOG_KAPPA,
     MOST_LOG_KAPPA,
     ConditionalKernels,
+    KernelShape,
+    KnownRows,
 )
 from orbiflow.density.spaces import Space
 
@@ -41,18 +43,12 @@ def fit_kernels(space: Space, rows: Rows, x: Tensor, number: Tensor) -> Conditio
     count, width = int(number.max()) + 1, len(space.spheres)
     weights = None if some.weights is None else some.weights[asked]
 
+    known = KnownRows(some.points, some.weights, near, number)
+
     def made(values: Tensor) -> ConditionalKernels:
         widths, kappa, shares = torch.split(values, [count, width, len(KERNEL_SCALES)])
-        return ConditionalKernels(
-            space,
-            some.points,
-            some.weights,
-            near,
-            number,
-            widths.exp(),
-            kappa.exp(),
-            torch.softmax(shares, 0),
-        )
+        shape = KernelShape(widths.exp(), kappa.exp(), torch.softmax(shares, 0))
+        return ConditionalKernels(space, known, shape)
 
     def loss(values: Array) -> tuple[float, Array]:
         own = torch.tensor(values, requires_grad=True)

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import torch
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from orbiflow.density.data import alongside, group_numbers
+from orbiflow.arrays import Array
+from orbiflow.density.data import alongside, group_numbers, words_of_cells
 from orbiflow.density.fitting.automatic import ChosenFit, fit_chosen, fit_in_folds
 from orbiflow.density.fitting.circular_regression import fit_regression
 from orbiflow.density.fitting.conditional_kernels import fit_kernels
 from orbiflow.density.fitting.held_out import Folds, folds_of, sparse_weights, stacked
 from orbiflow.density.fitting.joint import for_conditionals
 from orbiflow.density.fitting.neural_mixture import fit_networks
-from orbiflow.density.fitting.report import Progress, silent
+from orbiflow.density.fitting.report import (
+    FitReport,
+    GivenReport,
+    PartEvidence,
+    Progress,
+    WordEvidence,
+    silent,
+)
 from orbiflow.density.fitting.rows import Rows, gain_of, weighed
 from orbiflow.density.fitting.settings import DensitySettings
 from orbiflow.density.models import (
@@ -34,7 +43,7 @@ from orbiflow.density.models import (
     is_joint_possible,
     joint_torus,
 )
-from orbiflow.density.spaces import Covariates, Space, Torus
+from orbiflow.density.spaces import Covariates, Space, Torus, Values
 from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed
@@ -50,70 +59,6 @@ MOST_CHAINED = 3
 
 MOST_JOINT_ROWS = 10_000
 """The most rows that a joint density is fitted to."""
-
-
-@dataclass(frozen=True)
-class PartEvidence:
-    """What a part of a conditional density is worth at rows held out.
-
-    - `kind`: "all" (the density of all rows), "kernels", "network", "regression" or "joint".
-    - `share`: Its weight in the density.
-    - `gain`, `error`: Mean nats by which it alone is better than the density of all rows, with the
-      standard error.
-    """
-
-    kind: str
-    share: float
-    gain: float
-    error: float
-
-
-@dataclass(frozen=True)
-class ConditionalReport:
-    """How a conditional density was chosen.
-
-    - `rows`: Rows that were held out.
-    - `gain`, `error`: Mean nats by which they are likelier where the covariates are known than by the
-      density of all rows, with the standard error.
-    - `parts`: What it is made of, and what was tried.
-    - `held`: The number of each row held out (n,) and its own gain (n,), for gains of some of them.
-    - `untried`: The kinds of parts that were left out to save time.
-    """
-
-    rows: int
-    gain: float
-    error: float
-    parts: tuple[PartEvidence, ...]
-    held: tuple[Tensor, Tensor]
-    untried: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the report without its rows, ready for JSON."""
-        return {
-            "rows": self.rows,
-            "gain": self.gain,
-            "error": self.error,
-            "parts": [asdict(one) for one in self.parts],
-            "untried": list(self.untried),
-        }
-
-    def words(self) -> list[str]:
-        """Return what a user should know."""
-        found = [
-            f"{self.rows} rows held out are {self.gain:.4f} ± {self.error:.4f} nats likelier where the "
-            "covariates are known"
-        ]
-        for one in self.parts:
-            alone = f"alone {one.gain:+.4f} ± {one.error:.4f} nats"
-            share = f"{one.kind}: {one.share:.1%}"
-            found.append(share if one.kind == Unconditional.kind else f"{share}, {alone}")
-        if not self.gain:
-            found.append(
-                "the covariates say nothing about the data that is no accident of few rows"
-            )
-        if self.untried:
-            found.append(f"effort fast: {' and '.join(self.untried)} not tried")
-        return found
 
 
 @dataclass(frozen=True)
@@ -172,15 +117,15 @@ def check_complete(missing: str) -> None:
 def fit_conditional(
     pooled: ChosenFit,
     points: Tensor,
-    x: Tensor,
+    cells: Mapping[str, Values],
     covariates: Covariates,
     settings: DensitySettings,
     *,
     weights: Any = None,
     groups: ArrayLike | None = None,
     progress: Progress | None = None,
-) -> tuple[ConditionalDensity, ConditionalReport]:
-    """Fit a density of points where the features of covariates are known.
+) -> FitReport:
+    """Fit the density of points where covariates are known, as what is `given` of that of all rows.
 
     Conditional kernels, a neural mixture, the density of all rows and, on tori, a linear-circular
     regression and, beside numbers, a joint density are fitted without a tenth of the rows, for the
@@ -191,17 +136,21 @@ def fit_conditional(
     Args:
         pooled: The fit of the density of all rows.
         points: Points (N, d) of its space's chart.
-        x: Features (N, m) of the covariates.
+        cells: The cells (N,) of each covariate.
         covariates: What these are.
         settings: Those of the densities that are fitted without tenths; flows are left out.
         weights: How much each row counts (N,).
         groups: A label (N,) a row: rows of one are held out together.
         progress: Hears the share of the work done.
 
+    Returns:
+        The fit's report, with that of what is given.
+
     Raises:
-        OrbiflowError: For fewer than `LEAST_ROWS` rows.
+        OrbiflowError: For fewer than `LEAST_ROWS` rows, and cells of another number of rows.
     """
     say = progress or silent
+    x = covariates.features(cells, len(points))
     task, without = _task(pooled, points, x, covariates.number, settings, weights, groups)
     say(0.0, "conditional kernels")
     kernels = fit_kernels(task.space, task.rows, task.x, task.number)
@@ -220,11 +169,24 @@ def fit_conditional(
     some = [(kind, w) for kind, w in zip(fits, listed(shares), strict=True) if w > 0]
     parts = [fits[kind](every, None) for kind, _ in some]
     density = ConditionalDensity(covariates, parts, [w for _, w in some])
-    report = _report(list(fits), logs, shares, task.numbers[held], counts)
-    untried = [NeuralMixture.kind] + [JointDensity.kind] * is_joint_possible(
-        task.space, task.number
+    pooled.density.given = density
+    both = stacked(logs, shares)
+    untried: list[str] = []
+    if settings.is_fast:
+        joint = is_joint_possible(task.space, task.number)
+        untried = [NeuralMixture.kind, *[JointDensity.kind] * joint]
+    report = GivenReport(
+        covariates.declaration,
+        len(held),
+        *gain_of(both, logs[0], counts),
+        tuple(
+            PartEvidence(kind, share, *gain_of(own, logs[0], counts))
+            for kind, share, own in zip(fits, listed(shares), logs, strict=True)
+        ),
+        _by_word(density, cells, task.numbers[held].numpy(), (both - logs[0]).numpy()),
+        tuple(untried),
     )
-    return density, replace(report, untried=tuple(untried)) if settings.is_fast else report
+    return replace(pooled.report, given=report)
 
 
 def _fits(
@@ -363,14 +325,25 @@ def _joint(task: _Task) -> ChosenFit:
     return replace(found, density=evidence.assembled(), evidence=evidence)
 
 
-def _report(
-    kinds: list[str], logs: Tensor, shares: Tensor, held: Tensor, counts: Tensor | None
-) -> ConditionalReport:
-    """Return what parts of these shares are worth, by logs (P, n) at rows held out."""
-    parts = [
-        PartEvidence(kind, share, *gain_of(own, logs[0], counts))
-        for kind, share, own in zip(kinds, listed(shares), logs, strict=True)
-    ]
-    both = stacked(logs, shares)
-    gain = gain_of(both, logs[0], counts)
-    return ConditionalReport(len(held), *gain, tuple(parts), (held, both - logs[0]))
+def _by_word(
+    density: ConditionalDensity, cells: Mapping[str, Values], held: NDArray[Any], gains: Array
+) -> dict[str, tuple[WordEvidence, ...]]:
+    """Return what each word is worth, by gains (n,) of rows held out; `held` are their places."""
+    found: dict[str, tuple[WordEvidence, ...]] = {}
+    for column in density.covariates.columns:
+        if not column.words:
+            continue
+        texts = words_of_cells(cells[column.name])
+        means = np.zeros((len(column.words), 0))
+        if len(cells) == 1 and density.space.is_of_angles:
+            turns = density.mean_directions({column.name: np.array(column.words)})
+            means = density.space.from_chart(turns)
+        entries: list[WordEvidence] = []
+        for word, mean in zip(column.words, means.tolist(), strict=True):
+            some = gains[texts[held] == word]
+            gain = float(some.mean()) if len(some) else None
+            error = float(some.std(ddof=1) / np.sqrt(len(some))) if len(some) > 1 else None
+            count = int((texts == word).sum())
+            entries.append(WordEvidence(word, count, gain, error, tuple(mean)))
+        found[column.name] = tuple(entries)
+    return found

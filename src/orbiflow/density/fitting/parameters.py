@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from orbiflow.runtime import p_in_words
+from orbiflow.runtime import Event, Table, p_in_words
 
 
 @dataclass(frozen=True)
@@ -70,20 +71,34 @@ class ParametricFit:
         names = ", ".join(parameter.name for parameter in self.parameters)
         raise KeyError(f"{name}; there are {names}")
 
-    def words(self) -> list[str]:
-        """Return what is not in the table of parameters, in lines of text."""
-        lines = [
+    def table(self) -> Table:
+        """Return the estimates, a line for each."""
+
+        def shown(value: float | None) -> str:
+            return "-" if value is None else f"{value:.5g}"
+
+        heads = ("parameter", "estimate", "error", f"{100 * self.level:g} % from", "to", "unit")
+        rows = [
+            (one.name, *map(shown, (one.value, one.error, one.low, one.high)), one.unit)
+            for one in self.parameters
+        ]
+        return Table(f"Parameters of the {self.family} density", heads, tuple(rows))
+
+    def words(self) -> Iterator[str | Event]:
+        """Yield the estimates as a table, and the rest in lines of text."""
+        yield self.table()
+        yield (
             f"log-likelihood {self.log_likelihood:.4f} nats with {self.free} free parameters, AIC "
             f"{self.aic:.4f}, BIC {self.bic:.4f}"
-        ]
+        )
         for name, angle in self.cones.items():
             size = "the rows cannot tell it" if angle is None else f"half angle {angle:.4g} degrees"
-            lines.append(f"cone of {100 * self.level:g} % about {name}: {size}")
+            yield f"cone of {100 * self.level:g} % about {name}: {size}"
         if self.goodness is not None:
             test = self.goodness
             verdict = "the rows suit it" if test.p > 0.05 else "the rows do not suit it"
-            lines.append(
+            yield (
                 f"smooth test of the family: {test.statistic:.4g} with {test.degrees} degrees of "
                 f"freedom, p {p_in_words(test.p)} by {test.by}: {verdict}"
             )
-        return [*lines, *self.notes]
+        yield from self.notes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +18,7 @@ from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Event, Table
 from orbiflow.settings import as_instance, as_points
 
 MASS_TOLERANCE = 1e-3
@@ -66,6 +67,103 @@ class ComponentEvidence:
 
 
 @dataclass(frozen=True)
+class PartEvidence:
+    """What a part of a density where covariates are known is worth at rows held out.
+
+    - `kind`: "all" (the density of all rows), "kernels", "network", "regression" or "joint".
+    - `share`: Its weight in the density.
+    - `gain`, `error`: Mean nats by which it alone is better than the density of all rows, with the
+      standard error.
+    """
+
+    kind: str
+    share: float
+    gain: float
+    error: float
+
+    def __str__(self) -> str:
+        alone = "" if self.kind == "all" else f", alone {self.gain:+.4f} ± {self.error:.4f} nats"
+        return f"{self.kind}: {self.share:.1%}{alone}"
+
+
+@dataclass(frozen=True)
+class WordEvidence:
+    """What covariates are worth where a column says one word.
+
+    - `rows`: All rows of the word.
+    - `gain`, `error`: As of `GivenReport`, at those held out; None where there are none, or only one.
+    - `mean`: The mean of each column of the data there, of angles that know of nothing else.
+    """
+
+    word: str
+    rows: int
+    gain: float | None
+    error: float | None
+    mean: tuple[float, ...] = ()
+
+
+MOST_WORDS_SHOWN = 60
+"""The most words in a table."""
+
+
+@dataclass(frozen=True)
+class GivenReport:
+    """How the density where covariates are known was chosen.
+
+    - `declaration`: What the covariates are, in the words of the command line.
+    - `rows`: Rows that were held out.
+    - `gain`, `error`: Mean nats by which they are likelier where the covariates are known than by the
+      density of all rows, with the standard error.
+    - `parts`: What it is made of, and what was tried.
+    - `words`: What each word is worth, by the name of its column.
+    - `untried`: The kinds of parts that were left out to save time.
+    """
+
+    declaration: str
+    rows: int
+    gain: float
+    error: float
+    parts: tuple[PartEvidence, ...]
+    words: dict[str, tuple[WordEvidence, ...]]
+    untried: tuple[str, ...] = ()
+
+    def lines(self, columns: Sequence[str]) -> Iterator[str | Event]:
+        """Yield tables of words and lines of text; `columns` are the names of the data's."""
+        for name, entries in self.words.items():
+            yield _word_table(name, columns, entries)
+        yield (
+            f"{self.rows} rows held out are {self.gain:.4f} ± {self.error:.4f} nats likelier where the "
+            "covariates are known"
+        )
+        yield from map(str, self.parts)
+        if not self.gain:
+            yield "the covariates say nothing about the data that is no accident of few rows"
+        if self.untried:
+            yield f"effort fast: {' and '.join(self.untried)} not tried"
+
+
+def _word_table(name: str, columns: Sequence[str], entries: Sequence[WordEvidence]) -> Table:
+    """Return what came of each word, a line for each."""
+
+    def shown(value: float | None) -> str:
+        return "-" if value is None else f"{value:.3f}"
+
+    rows = [
+        (
+            entry.word,
+            str(entry.rows),
+            shown(entry.gain),
+            shown(entry.error),
+            *(f"{value:.3g}" for value in entry.mean),
+        )
+        for entry in entries[:MOST_WORDS_SHOWN]
+    ]
+    means = [f"mean {column}" for column in columns] if entries[0].mean else []
+    heads = (name, "rows", "nats", "error", *means)
+    return Table(f"Rows held out where {name} is known", heads, tuple(rows))
+
+
+@dataclass(frozen=True)
 class FitReport:
     """What a fit did; log-likelihoods in nats with respect to the square.
 
@@ -86,6 +184,7 @@ class FitReport:
     - `effective`: rows of equal weight that say as much (Kish); None where all weigh the same.
     - `parametric`: of a parametric family alone, its parameters. No rows are held out then:
       `validation` is 0, and `validation_nll` is Akaike's estimate for new rows.
+    - `given`: of a fit with covariates, how the density where they are known was chosen.
     - `notes`: what the user should know, in words.
     """
 
@@ -105,7 +204,16 @@ class FitReport:
     repeats: Repeats | None = None
     effective: float | None = None
     parametric: ParametricFit | None = None
+    given: GivenReport | None = None
     notes: tuple[str, ...] = field(default=())
+
+    def words(self, columns: Sequence[str] = ()) -> Iterator[str | Event]:
+        """Yield what the user is told: tables, and lines of text; `columns` are the data's names."""
+        if self.given is not None:
+            yield from self.given.lines(columns)
+        if self.parametric is not None:
+            yield from self.parametric.words()
+        yield from self.notes
 
 
 def own_points(space: Space, points: Any) -> Tensor:

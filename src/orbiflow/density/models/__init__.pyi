@@ -14,6 +14,8 @@ from .conditional import Context as Context
 from .conditional import Unconditional as Unconditional
 from .conditional_kernels import KERNEL_SCALES as KERNEL_SCALES
 from .conditional_kernels import ConditionalKernels as ConditionalKernels
+from .conditional_kernels import KernelShape as KernelShape
+from .conditional_kernels import KnownRows as KnownRows
 from .conditional_parts import LEAST_LOG_KAPPA as LEAST_LOG_KAPPA
 from .conditional_parts import MOST_LOG_KAPPA as MOST_LOG_KAPPA
 from .conditional_parts import ConditionalPart as ConditionalPart
@@ -29,7 +31,6 @@ from .evaluation import log_density_gradient as log_density_gradient
 from .evaluation import midpoints as midpoints
 from .figures import Estimate as Estimate
 from .files import density_to_bytes as density_to_bytes
-from .files import read_conditional as read_conditional
 from .files import read_density as read_density
 from .fisher_bingham import AngularCentralGaussian as AngularCentralGaussian
 from .fisher_bingham import FisherBingham as FisherBingham

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import torch
 from torch import Tensor
@@ -34,6 +34,31 @@ APART_LOG = -1e4
 """What a row has of kernels that are left out."""
 
 
+class KnownRows(NamedTuple):
+    """Rows that have kernels.
+
+    - `points`: Their points (N, d). `weights`: Their weights (N,), None where all weigh the same.
+    - `x`: Their features (N, m). `number`: The number (m,) of the covariate of each feature.
+    """
+
+    points: Tensor
+    weights: Tensor | None
+    x: Tensor
+    number: Tensor
+
+
+class KernelShape(NamedTuple):
+    """How wide kernels are.
+
+    - `widths`: Of covariates (c,). `concentrations`: Of the space's kernels (w,).
+    - `shares`: Those of the scales (L,), of sum 1.
+    """
+
+    widths: Tensor
+    concentrations: Tensor
+    shares: Tensor
+
+
 class ConditionalKernels(ConditionalPart):
     """Sum of K(x, x_i) k(y, y_i) over sum of K(x, x_i), over rows i (Hall, Racine and Li, 2004).
 
@@ -43,31 +68,16 @@ class ConditionalKernels(ConditionalPart):
 
     Args:
         space: Any space.
-        points: The rows' points (N, d).
-        weights: Their weights (N,); None where all weigh the same.
-        x: Their features (N, m).
-        number: The number (m,) of the covariate of each feature.
-        widths: The widths (c,) of covariates.
-        concentrations: Of the kernels (w,).
-        shares: Those of the scales (L,), of sum 1.
+        rows: The rows with kernels.
+        shape: How wide these are.
     """
 
     kind = "kernels"
 
-    def __init__(
-        self,
-        space: Space,
-        points: Tensor,
-        weights: Tensor | None,
-        x: Tensor,
-        number: Tensor,
-        widths: Tensor,
-        concentrations: Tensor,
-        shares: Tensor,
-    ) -> None:
-        self.space, self.points, self.weights, self.x = space, points, weights, x
-        self.number, self.widths = number, widths
-        self.concentrations, self.shares = concentrations, shares
+    def __init__(self, space: Space, rows: KnownRows, shape: KernelShape) -> None:
+        self.space, self.rows, self.shape = space, rows, shape
+        self.points, self.weights, self.x, self.number = rows
+        self.widths, self.concentrations, self.shares = shape
 
     def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
         size = max(1, BLOCK_ENTRIES // len(self.points))
@@ -124,9 +134,9 @@ class ConditionalKernels(ConditionalPart):
 
     def with_rows(self, points: Tensor, weights: Tensor | None, x: Tensor) -> ConditionalKernels:
         """Return kernels of the same widths at other rows."""
-        shape = (self.number, self.widths, self.concentrations, self.shares)
         weights = None if weights is None else weights[:MOST_ROWS]
-        return ConditionalKernels(self.space, points[:MOST_ROWS], weights, x[:MOST_ROWS], *shape)
+        rows = KnownRows(points[:MOST_ROWS], weights, x[:MOST_ROWS], self.number)
+        return ConditionalKernels(self.space, rows, self.shape)
 
     def header(self) -> dict[str, Any]:
         return {"scales": list(KERNEL_SCALES)}
@@ -155,4 +165,5 @@ class ConditionalKernels(ConditionalPart):
             or header.get("scales") != list(KERNEL_SCALES)
         ):
             raise OrbiflowError("conditional kernels of other shapes or values")
-        return cls(space, points, tensors.get("weights"), x, number, *others[:3])
+        rows = KnownRows(points, tensors.get("weights"), x, number)
+        return cls(space, rows, KernelShape(*others[:3]))

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import torch
 from torch import Tensor
@@ -19,6 +19,9 @@ from orbiflow.density.spaces import CHART, Space, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import SideBySide, Tell, one_thread
 from orbiflow.settings import as_instance, as_points
+
+if TYPE_CHECKING:
+    from orbiflow.density.models.conditional import ConditionalDensity
 
 LEVELS = 4
 """Levels of accuracy of kernels that stand for a density; each has a quarter of the error or less."""
@@ -75,6 +78,8 @@ class Density(WithFigures):
 
     largest_error: float = 0.0
     """The largest difference, in nats, that was found anywhere, also where hardly any mass is."""
+    given: ConditionalDensity | None = None
+    """Where covariates are known, the density of the same data there; see `DensityEstimator.fit`."""
 
     _dtype: torch.dtype = torch.float64
 

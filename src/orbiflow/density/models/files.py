@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import torch
-from torch import Tensor
 
 from orbiflow.density.models.conditional import ConditionalDensity
 from orbiflow.density.models.density import Density
@@ -17,34 +15,31 @@ from orbiflow.density.models.headers import (
     known_kinds,
     space_from,
     space_header,
+    within,
 )
-from orbiflow.density.spaces import Space
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import read_tensors, tensor_bytes
 from orbiflow.settings import as_instance
 
-FORMAT, CONDITIONAL_FORMAT = "orbiflow-density/6", "orbiflow-conditional/1"
-A_DENSITY, A_CONDITIONAL = "a density", "a density where covariates are known"
+FORMAT, A_DENSITY = "orbiflow-density/6", "a density"
 
-Made = TypeVar("Made")
+GIVEN = "given."
+"""What the names of tensors begin with that are of the density where covariates are known."""
 
 
-def density_to_bytes(density: Density | ConditionalDensity, **extra: Any) -> bytes:
-    """Return a density as bytes that `read_density` or `read_conditional` makes the same again.
+def density_to_bytes(density: Density, **extra: Any) -> bytes:
+    """Return a density as bytes that `read_density` makes the same again, with what is `given`.
 
     Saved are densities whose class has a `kind`, on spaces that `make_space` makes again, and flows of
     fields that orbiflow has; anything else is refused by the name of the part. `extra` are further
     values for the reader, for JSON.
     """
-    if isinstance(density, ConditionalDensity):
-        name, what, parts = CONDITIONAL_FORMAT, A_CONDITIONAL, (density.header(), density.tensors())
-    else:
-        name, what = FORMAT, A_DENSITY
-        parts = density_parts(as_instance(density, Density, "density"), "density")
-    space = space_header(density.space)
-    return tensor_bytes(
-        {"format": name, **space, "density": parts[0], "extra": extra}, parts[1], what
-    )
+    header, tensors = density_parts(as_instance(density, Density, "density"), "density")
+    document = {"format": FORMAT, **space_header(density.space), "density": header, "extra": extra}
+    if density.given is not None:
+        document["given"] = density.given.header()
+        tensors |= {GIVEN + name: tensor for name, tensor in density.given.tensors().items()}
+    return tensor_bytes(document, tensors, A_DENSITY)
 
 
 def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
@@ -52,32 +47,22 @@ def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
 
     Raises `InputFileError` for a file that is missing, no density, or damaged: no bit may have changed.
     """
-    return _read(path, FORMAT, A_DENSITY, density_from)
-
-
-def read_conditional(path: str | Path) -> tuple[ConditionalDensity, dict[str, Any]]:
-    """Return a saved density where covariates are known; otherwise as `read_density`."""
-    return _read(path, CONDITIONAL_FORMAT, A_CONDITIONAL, ConditionalDensity.from_header)
-
-
-def _read(
-    path: str | Path,
-    name: str,
-    what: str,
-    make: Callable[[Space, Mapping[str, Any], Mapping[str, Tensor]], Made],
-) -> tuple[Made, dict[str, Any]]:
-    """Return what a file of a format holds, and what was saved with it."""
-    header, tensors = read_tensors(path, what)
+    header, tensors = read_tensors(path, A_DENSITY)
     try:
-        if header["format"] != name:
+        if header["format"] != FORMAT:
             raise ValueError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # what is made in it could never be differentiated
             known_kinds()
-            return make(space_from(header), header["density"], tensors), dict(header["extra"])
+            space = space_from(header)
+            density = density_from(space, header["density"], tensors)
+            if "given" in header:
+                parts = within(tensors, GIVEN)
+                density.given = ConditionalDensity.from_header(space, header["given"], parts)
+            return density, dict(header["extra"])
     except (
         OrbiflowError, ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError,
         RuntimeError,
     ) as error:  # fmt: skip
         raise InputFileError(
-            f"{path}: not {what} saved by orbiflow, or damaged ({error})"
+            f"{path}: not {A_DENSITY} saved by orbiflow, or damaged ({error})"
         ) from error

@@ -19,7 +19,7 @@ from orbiflow.settings import DefaultText, Ending, Option, Repeated
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
     from orbiflow.density.data import TableRows
-    from orbiflow.density.models import Density
+    from orbiflow.density.operations.saved import SavedDensity
 
 DataSets = Annotated[tuple[Path, ...], Option("-d"), Repeated()]
 Out = Annotated[
@@ -58,30 +58,30 @@ def compare(
     if out is not None:
         runtime.check_output_file(out, *models, data)
 
-    from orbiflow.density.operations.saved import model_at, rows_of_model
+    from orbiflow.density.operations.saved import SavedDensity
 
     with runtime.one_thread():
         progress = runtime.progress_events(on_event, cancel)
-        saved = dict(zip(_names(models), map(model_at, models), strict=True))
-        comparing.require_one_space({name: density.space for name, (density, _) in saved.items()})
-        columns = _columns_of_models({name: extra for name, (_, extra) in saved.items()}, table)
+        saved = dict(zip(_names(models), map(SavedDensity.read, models), strict=True))
+        comparing.require_one_space({name: model.density.space for name, model in saved.items()})
+        columns = _columns_of_models(saved, table)
         scores: dict[str, Array] = {}
         notes: list[str] = []
         rows: TableRows | None = None
-        for k, (name, (density, extra)) in enumerate(saved.items()):
+        for k, (name, model) in enumerate(saved.items()):
             tell = runtime.ignore if rows is not None else on_event
-            rows = rows_of_model(data, table.replace(columns=columns[name]), density, extra, tell)
+            rows = model.rows(data, table.replace(columns=columns[name]), tell)
             if not rows.source.is_named and len(set(columns.values())) > 1:
                 raise OrbiflowError(
                     f"{data} does not name its columns, and the models have them in other orders: "
                     "give it a header"
                 )
             scores[name] = comparing.scores_of(
-                density,
+                model.density,
                 rows.values,
                 lambda share, k=k: progress((k + share) / len(saved), "scoring"),
             )
-            notes += _notes_on_known_rows(name, density, extra, rows.values)
+            notes += _notes_on_known_rows(name, model, rows.values)
         assert rows is not None
         found = comparing.compare_scores(scores, settings, groups=rows.labels, weights=rows.weights)
     return _shown(replace(found, notes=(*notes, *found.notes)), out, on_event, cancel)
@@ -186,10 +186,10 @@ def _samples(
 
 
 def _columns_of_models(
-    extras: Mapping[str, Mapping[str, Any]], table: TableSettings
+    models: Mapping[str, SavedDensity], table: TableSettings
 ) -> dict[str, tuple[str, ...] | None]:
     """Return what is declared of the table's columns, in the order in which each model has them."""
-    fitted = {name: tuple(extra.get("columns") or ()) for name, extra in extras.items()}
+    fitted = {name: tuple(model.extra.get("columns") or ()) for name, model in models.items()}
     (first, wanted), *others = fitted.items()
     roles = asked_roles(table.columns)
     sides = [f"{name}={role}" for name, role in roles.items() if role and role.is_side]
@@ -212,17 +212,15 @@ def _columns_of_models(
     return declared
 
 
-def _notes_on_known_rows(
-    name: str, density: Density, extra: Mapping[str, Any], values: Array
-) -> list[str]:
+def _notes_on_known_rows(name: str, model: SavedDensity, values: Array) -> list[str]:
     """Return a note if a model was, or may have been, fitted to the rows."""
-    if not extra.get("fitted_rows"):
+    if not model.extra.get("fitted_rows"):
         return [
             f"{name} has no record of the rows that it was fitted to: make sure that none of these "
             "is one"
         ]
-    sketch = runtime.from_json(comparing.RowSketch, extra["fitted_rows"], "fitted_rows")
-    known, looked_up = sketch.known(density.space, values)
+    sketch = runtime.from_json(comparing.RowSketch, model.extra["fitted_rows"], "fitted_rows")
+    known, looked_up = sketch.known(model.density.space, values)
     note = (
         f"{known} of {looked_up} rows that were looked up equal one that {name} was fitted to: "
         "repeated values, or the same rows"

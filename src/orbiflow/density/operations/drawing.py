@@ -51,7 +51,7 @@ def plot(
         name = min(table.fields_given)
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
-    from orbiflow.density.operations.saved import density_given, names_of, rows_of_model
+    from orbiflow.density.operations.saved import SavedDensity
 
     single = pictures.is_one_file(out)
     if single and settings.format not in (None, "pdf"):
@@ -59,16 +59,16 @@ def plot(
     # pictures may stand beside their model
     check = runtime.check_output_file if single else runtime.check_outside_runs
     check(out, model, data, settings.coastlines)
-    density, extra = density_given(model, at, on_event)
-    space = density.space
+    saved = SavedDensity.read_at(model, at, on_event)
+    space = saved.density.space
     if settings.names is None:
-        settings = settings.replace(names=tuple(names_of(density, extra)))
+        settings = settings.replace(names=tuple(saved.columns))
     points = None
     if data is not None:
-        points = rows_of_model(data, table, density, extra, on_event).values
+        points = saved.rows(data, table, on_event).values
 
     told = runtime.progress_events(on_event, cancel)
-    plotted = pictures.plot_density(density, out, settings, data=points, told=told)
+    plotted = pictures.plot_density(saved.density, out, settings, data=points, told=told)
     captions = plotted.captions if single or settings.sheet.printed else ()
     for path in plotted.files:
         on_event(runtime.Written(path))
@@ -116,10 +116,10 @@ def region(
         model: Folder that `fit` wrote.
         out: File for the regions: .geojson (of directions and axes), .json or .csv.
     """
-    from orbiflow.density.operations.saved import model_at
+    from orbiflow.density.operations.saved import SavedDensity
 
     runtime.check_output_file(out, model)
-    density, _ = model_at(model)
+    density = SavedDensity.read(model).density
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
     if settings.min_mass is not None and not space.is_surface:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from orbiflow import runtime
 from orbiflow.batch import BatchKind, Column, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
-from orbiflow.density.data import asked_roles
-from orbiflow.density.fitting import ComponentSettings, DensitySettings
-from orbiflow.density.operations import covariates
+from orbiflow.density.data import asked_roles, given_roles, in_file
+from orbiflow.density.fitting import DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning, SettingError
@@ -22,9 +21,8 @@ from orbiflow.settings import DefaultText, Hidden, Option, fields_of
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
-    from orbiflow.density.data import Role, TableRows
+    from orbiflow.density.data import Asked, Role, TableRows
     from orbiflow.density.estimator import DensityEstimator
-    from orbiflow.density.fitting import ParametricFit
     from orbiflow.density.spaces import Space
 
 MOST_SCORED = 20_000
@@ -37,11 +35,19 @@ REPORTED = (
 """Settings that the report repeats."""
 
 
+class FitSettings(DensitySettings, SpaceSettings, group="Density"):
+    """Where the data live, and how a density is fitted."""
+
+    def check(self) -> None:
+        """Check that there is such a space, and that what is set is of what is fitted."""
+        SpaceSettings.check(self)
+        DensitySettings.check(self)
+
+
 @runtime.operation("density fit")
 def fit(
     data: Path,
-    where: SpaceSettings,
-    settings: DensitySettings = DensitySettings(),
+    density: FitSettings,
     reading: RowSettings = RowSettings(),
     *,
     given: Annotated[tuple[str, ...], DefaultText("none")] = (),
@@ -62,25 +68,21 @@ def fit(
         picture: Also draw a small picture, thumbnail.png.
     """
     begin = time.perf_counter()
-    _check(where, settings, reading)
+    _check(density, reading)
     with runtime.one_thread():
-        asked = covariates.asked_columns(given, reading)
+        asked = _asked_columns(given, reading)
         rows = tables.read_rows(
-            data, reading, on_event, where=where, given=[str(name) for name in asked]
+            data, reading, on_event, where=density, given=[str(name) for name in asked]
         )
         values = rows.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
         on_event(runtime.Note(f"columns: {rows.declaration}"))
-        roles = covariates.known_in(rows, asked, where.unit, on_event) if given else None
-        estimator = fit_rows(rows, where, settings, reading, on_event, cancel, roles)
+        roles = _given_roles(rows, asked, density.unit, on_event) if given else None
+        estimator = fit_rows(rows, density, reading, on_event, cancel, roles)
         document = _document(
-            estimator, rows, {**settings.values(), **reading.values()}, settings.seed
+            estimator, rows, {**density.values(), **reading.values()}, density.seed
         )
-        others: dict[str, bytes] = {}
-        if roles is not None:
-            others, said = covariates.told(estimator, rows, on_event)
-            document |= said
         document["seconds"] = time.perf_counter() - begin
         sketch = comparing.RowSketch.of(estimator.space_, values[rows.whole])
         model = models.density_to_bytes(
@@ -90,37 +92,47 @@ def fit(
             fitted_rows=runtime.to_json(sketch),
         )
         report = json.dumps(document, allow_nan=False, indent=1)
-        files = {pictures.MODEL: model, pictures.REPORT: report, **others}
+        files = {pictures.MODEL: model, pictures.REPORT: report}
         if picture:
             files[pictures.THUMBNAIL] = pictures.density_thumbnail(estimator.density_, values)
     write_files(folder, files, on_event)
-    parametric = estimator.report_.parametric
-    if parametric is not None:
-        on_event(parameter_table(parametric))
-        for line in parametric.words():
-            on_event(runtime.Note(line))
-    for note in (*estimator.report_.notes, *_words(document, len(values), out)):
-        on_event(runtime.Note(note))
+    for line in (*estimator.report_.words(rows.columns), *_words(document, len(values), out)):
+        on_event(runtime.Note(line) if isinstance(line, str) else line)
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
     summary |= {"folder": str(out), "rows": len(values)}
     return runtime.Outcome({**summary, "picture": pictures.THUMBNAIL if picture else None})
 
 
-def parameter_table(found: ParametricFit) -> runtime.Table:
-    """Return the estimates of a parametric family, a line for each."""
+def _asked_columns(given: Sequence[str], reading: RowSettings) -> Asked:
+    """Return the columns of a table that are given to a fit, which must be one of whole rows."""
+    if not given:
+        return {}
+    fitting.check_complete(reading.kept_missing)
+    try:
+        return asked_roles(given)
+    except SettingError as error:
+        raise SettingError(error.template.replace("{columns}", "{given}")) from error
 
-    def shown(value: float | None) -> str:
-        return "-" if value is None else f"{value:.5g}"
 
-    sure = f"{100 * found.level:g} %"
-    return runtime.Table(
-        f"Parameters of the {found.family} density",
-        ("parameter", "estimate", "error", f"{sure} from", "to", "unit"),
-        tuple(
-            (one.name, *map(shown, (one.value, one.error, one.low, one.high)), one.unit)
-            for one in found.parameters
-        ),
-    )
+def _given_roles(
+    rows: TableRows, asked: Asked, unit: str | None, tell: runtime.Sink
+) -> dict[str, Role]:
+    """Return what is known of rows, by its name, before anything is fitted.
+
+    `unit` is that of angles that name none.
+    """
+    roles = given_roles(list(rows.given), rows.given, asked, unit, where=rows.source.where)
+    try:
+        covariates = spaces.Covariates.of(rows.given, roles)
+        doubts = covariates.fit_doubts(rows.given)
+    except SettingError as error:
+        refusal = in_file(error, rows.source.where)
+        refusal.template = refusal.template.replace("{columns}", "{given}")
+        raise refusal from error
+    tell(runtime.Note(f"given: {covariates.declaration}"))
+    for doubt in doubts:
+        tell(runtime.Note(f"WARNING: {doubt}"))
+    return roles
 
 
 def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> str | Space:
@@ -141,34 +153,36 @@ def columns_of(where: SpaceSettings, rows: TableRows, seed: int = 0) -> spaces.D
 
 def fit_rows(
     rows: TableRows,
-    where: SpaceSettings,
-    settings: ComponentSettings,
+    density: SpaceSettings,
     reading: RowSettings,
     tell: runtime.Sink,
     cancel: runtime.Cancel,
     given: Mapping[str, Role] | None = None,
 ) -> DensityEstimator:
-    """Fit a density to the rows of a table; where columns are `given`, also by what they are."""
+    """Fit a density to the rows of a table; where columns are `given`, also by what they are.
+
+    Beside the space, `density` has settings of the fit, which are taken where they were set.
+    """
     from orbiflow.density.estimator import DensityEstimator
 
     own: dict[str, Any] = {
-        name: getattr(settings, name)
+        name: getattr(density, name)
         for name in (entry.name for entry in fields_of(DensitySettings))
-        if name in settings.fields_given
+        if name in density.fields_given
     }
-    own |= {"space": columns_of(where, rows).space, "missing": reading.kept_missing}
+    own |= {"space": columns_of(density, rows).space, "missing": reading.kept_missing}
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # notes say the same
         return DensityEstimator(**own).fit(rows, given=given, progress=progress)
 
 
-def _check(where: SpaceSettings, settings: DensitySettings, reading: RowSettings) -> None:
+def _check(density: FitSettings, reading: RowSettings) -> None:
     """Refuse rows that such a density cannot be fitted to, before they are read."""
     kinds = {role.kind for role in asked_roles(reading.columns).values() if role is not None}
-    settings.check_rows("refuse", "group" if "group" in kinds else None)
+    density.check_rows("refuse", "group" if "group" in kinds else None)
     if reading.missing == "marginalise":
-        check_marginalised(where, settings)
+        check_marginalised(density, density)
 
 
 def check_marginalised(where: SpaceSettings, settings: DensitySettings) -> None:
@@ -241,8 +255,7 @@ def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]
 @runtime.operation("density batch", keeps_partial=True, starts_processes=True)
 def batch(
     folder: Path,
-    where: SpaceSettings,
-    settings: DensitySettings = DensitySettings(),
+    density: FitSettings,
     reading: RowSettings = RowSettings(),
     out: Annotated[Path, Option("-o")] = Path("batch"),
     work: WorkSettings = WorkSettings(),
@@ -262,8 +275,8 @@ def batch(
         out: Folder for the results; an earlier batch there is resumed.
         match: Only files whose names fit a pattern, such as "*.csv".
     """
-    _check(where, settings, reading)
-    given = {**where.to_json(), **settings.to_json(), **reading.to_json(), "picture": True}
+    _check(density, reading)
+    given = {**density.to_json(), **reading.to_json(), "picture": True}
 
     def call_of(name: str, _results: str) -> runtime.Call:
         return runtime.find("density fit").call({**given, "data": name, "out": "out"})

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from orbiflow import runtime
 from orbiflow.density import comparing, fitting, models, regions, spaces, tables
-from orbiflow.density.operations import covariates
-from orbiflow.density.run_folder import write_file, written_files
+from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import RowSettings, check_table_name
-from orbiflow.errors import Advice, SettingError, literal
+from orbiflow.errors import Advice, InputFileError, OrbiflowError, SettingError
 from orbiflow.settings import DefaultText, Needs, Option, Range, Settings
 
 if TYPE_CHECKING:
@@ -79,29 +78,23 @@ def score(
                 f"{{{name}}} requires complete rows; leave it out, or {{missing}} marginalise"
             )
 
-    from orbiflow.density.operations.saved import axes_of, model_at, rows_of_model
+    from orbiflow.density.operations.saved import SavedDensity
 
     runtime.check_output_file(out, data, model)
     with runtime.one_thread():
-        density, extra = model_at(model)
-        spaces.check_measure(settings.measure, density.space)
-        where_known = covariates.conditional_in(model) if settings.given else None
-        asked = covariates.columns_asked(where_known[0], settings.given) if where_known else []
-        rows = rows_of_model(data, reading, density, extra, on_event, asked)
+        saved = SavedDensity.read(model)
+        spaces.check_measure(settings.measure, saved.density.space)
+        covariates = saved.covariates_named(settings.given)
+        rows = saved.rows(data, reading, on_event, covariates)
         progress = runtime.progress_events(on_event, cancel)
-        names = [*rows.columns]
-        if where_known and asked:
-            logs = covariates.score_given(
-                where_known[0], rows, settings.measure, on_event, progress
-            )
-            columns, over, notes = {"log_prob_given": logs}, f"{rows.whole.sum()} rows", []
-            mean = mean_of_whole(logs, rows.weights, rows.whole)
+        if covariates:
+            found = score_given(saved.density, rows, settings, progress, on_event)
         else:
-            known = axes_of(settings.given, names, on_event) if settings.given else ()
-            if len(known) == len(names):
+            known = saved.axes(settings.given, on_event) if settings.given else ()
+            if len(known) == len(saved.columns):
                 raise SettingError("{given} names all columns: nothing is left to have a density")
-            found = score_rows(density, rows, settings, progress, may_lack, known)
-            columns, mean, over, notes = found
+            found = score_rows(saved.density, rows, settings, progress, may_lack, known)
+        columns, mean, over, notes = found
     weighted = "" if rows.weights is None else ", weighted"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
     table = tables.append_columns(rows, columns)
@@ -113,7 +106,10 @@ def score(
     return runtime.Outcome({"file": str(out), "rows": len(rows.values), "mean": mean})
 
 
-BLOCK, BLOCK_GRADIENT = 2**18, 2**16
+Scores: TypeAlias = "tuple[dict[str, Array], float, str, list[str]]"
+"""Columns to add, a mean log density, the rows that it is over in words, and notes."""
+
+BLOCK, BLOCK_GIVEN, BLOCK_GRADIENT = 2**18, 2**12, 2**16
 """Rows at a time: many cost less each, few leave room and tell how far it is."""
 
 SCORED_SHARE = 0.3
@@ -127,7 +123,7 @@ def score_rows(
     progress: fitting.Progress,
     may_lack: bool,
     given: Sequence[int] = (),
-) -> tuple[dict[str, Array], float, str, list[str]]:
+) -> Scores:
     """Return columns (N,) to add to the table, log densities first, and what is known of them.
 
     Where columns are `given`, by their numbers from 0, they are log densities of the others.
@@ -163,6 +159,52 @@ def score_rows(
     return columns, mean_of_whole(columns[name], rows.weights, whole), over, notes
 
 
+def score_given(
+    density: models.Density,
+    rows: TableRows,
+    settings: ScoreSettings,
+    progress: fitting.Progress,
+    tell: runtime.Sink,
+) -> Scores:
+    """Return log densities (N,) of rows, each where its covariates are, as `score_rows`."""
+    from orbiflow.density import inference
+
+    known = density.given
+    assert known is not None
+    cells = dict(zip(known.covariates.names, rows.given.values(), strict=True))
+    try:
+        x = known.covariates.features(cells)
+        doubts = known.covariates.doubts(cells)
+    except OrbiflowError as error:
+        text = f"{rows.source.where}{error}; leave such rows out, or score without what is given"
+        raise InputFileError(text) from error
+    for doubt in doubts:
+        tell(runtime.Note(f"WARNING: {doubt}"))
+    points = inference.chart_of_rows(density.space, rows.values, may_lack=False)
+
+    def score_block(some: slice) -> Tensor:
+        return known.log_prob(points[some], x[some], measure=settings.measure)
+
+    logs = _in_blocks(score_block, len(points), BLOCK_GIVEN, progress)
+    mean = mean_of_whole(logs, rows.weights, rows.whole)
+    return {"log_prob_given": logs}, mean, f"{rows.whole.sum()} rows", []
+
+
+def _in_blocks(
+    score: Callable[[slice], Tensor], count: int, size: int, progress: fitting.Progress
+) -> Array:
+    """Return scores (N,) of rows, so many at a time."""
+    import numpy as np
+    import torch
+
+    found: list[Array] = []
+    for start in range(0, count, size):
+        with torch.no_grad():
+            found.append(score(slice(start, start + size)).double().numpy())
+        progress(min(1.0, (start + size) / count), "scoring")
+    return np.concatenate(found)
+
+
 def _only(points: Tensor, given: Sequence[int]) -> Tensor:
     """Return points (N, d) that lack all but some columns."""
     some = points.new_full(points.shape, math.nan)
@@ -173,20 +215,13 @@ def _only(points: Tensor, given: Sequence[int]) -> Tensor:
 def _log_densities(
     density: models.Density, points: Tensor, settings: ScoreSettings, progress: fitting.Progress
 ) -> Array:
-    import numpy as np
-    import torch
-
     from orbiflow.density import inference
 
-    found: list[Array] = []
     end = SCORED_SHARE if settings.gradient else 1.0
-    for start in range(0, len(points), BLOCK):
-        with torch.no_grad():
-            block = points[start : start + BLOCK]
-            scores = inference.at_observed(density, block, measure=settings.measure)
-        found.append(scores.double().numpy())
-        progress(end * min(1.0, (start + BLOCK) / len(points)), "scoring")
-    return np.concatenate(found)
+    return _in_blocks(
+        lambda some: inference.at_observed(density, points[some], measure=settings.measure),
+        len(points), BLOCK, lambda share, what: progress(end * share, what),
+    )  # fmt: skip
 
 
 def _gradients(
@@ -269,17 +304,16 @@ def sample(
 
     import torch
 
-    from orbiflow.density.operations.saved import density_given, names_of
+    from orbiflow.density.operations.saved import SavedDensity
 
     runtime.check_output_file(out, model)
     with runtime.one_thread():
-        density, extra = density_given(model, settings.at, on_event)
+        saved = SavedDensity.read_at(model, settings.at, on_event)
         generator = torch.Generator().manual_seed(settings.seed)
-        data = density.space.from_chart(density.sample((settings.count,), generator))
-    names = names_of(density, extra)
+        data = saved.density.space.from_chart(saved.density.sample((settings.count,), generator))
     cancel.check()
     words = f"{settings.count} samples written to {out}"
-    write_file(out, tables.to_csv(names, data), on_event, words)
+    write_file(out, tables.to_csv(saved.columns, data), on_event, words)
     return runtime.Outcome({"file": str(out), "rows": settings.count})
 
 
@@ -320,30 +354,13 @@ def marginal(
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
-    from orbiflow.density import inference
-    from orbiflow.density.operations.saved import (
-        axes_of,
-        in_first_part,
-        model_at,
-        names_of,
-        write_derived,
-    )
+    from orbiflow.density.operations.derived import Partial
+    from orbiflow.density.operations.saved import SavedDensity
 
     runtime.check_output_folder(out, model, what="model")
     with runtime.one_thread():
-        density, extra = model_at(model)
-        names = names_of(density, extra)
-        asked = axes_of(columns, names, on_event)
-        numbers, axes = inference.chosen_columns(density.space, asked, len(names))
-        folder = runtime.ResultFolder(out, written_files)
-        progress = runtime.progress_events(on_event, cancel)
-        progress(0.0, "integrating")
-        found = inference.marginal(
-            density, axes, accuracy=settings.accuracy, progress=in_first_part(progress)
-        )
-        kept = [names[number] for number in numbers]
-        origin = {"marginal": kept, "model": str(model)}
-        return write_derived(found, kept, origin, folder, settings, progress, on_event)
+        saved = SavedDensity.read(model)
+        return Partial(saved, out, settings, on_event, cancel).marginal(columns)
 
 
 @runtime.operation("density conditional")
@@ -371,55 +388,11 @@ def conditional(
     """
     if not at:
         raise SettingError("{at} says nothing; give what is known, as in psi=-45")
-    for text in at:
-        covariates.pair_of(text)
 
-    from orbiflow.density import inference
-    from orbiflow.density.operations import saved
+    from orbiflow.density.operations.derived import Partial
+    from orbiflow.density.operations.saved import SavedDensity
 
     runtime.check_output_folder(out, model, what="model")
     with runtime.one_thread():
-        density, extra, left, x = saved.split_given(model, at, on_event)
-        pairs = [_angle(text) for text in left]
-        names = saved.names_of(density, extra)
-        if not pairs:
-            folder = runtime.ResultFolder(out, written_files)
-            progress = runtime.progress_events(on_event, cancel)
-            kept = saved.axes_of(columns, names, on_event) if columns is not None else None
-            found = saved.some_columns(density, kept, len(names))
-            kept_names = [names[k] for k in kept or range(len(names))]
-            origin = {"given": x, "model": str(model)}
-            return saved.write_derived(
-                found, kept_names, origin, folder, settings, progress, on_event
-            )
-        known, given_at, others = saved.condition_of(density.space, names, pairs, columns, on_event)
-        kept, axes = inference.chosen_columns(density.space, others, len(names))
-        folder = runtime.ResultFolder(out, written_files)
-        progress = runtime.progress_events(on_event, cancel)
-        progress(0.0, "integrating")
-        found = inference.conditional(
-            density, given_at, axes,
-            accuracy=settings.accuracy, progress=saved.in_first_part(progress),
-        )  # fmt: skip
-        evidence = saved.evidence_of(density, given_at)
-        rare = "; few data lie there, or none" if evidence < -3 else ""
-        words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
-        ratio = f"{math.exp(evidence):.3g} times that of the uniform density{rare}"
-        on_event(runtime.Note(f"the density at {words} is {ratio}"))
-        over_uniform = {"log_density_of_given_over_uniform": evidence}
-        origin = {"given": {**x, **known}, **over_uniform, "model": str(model)}
-        kept_names = [names[k] for k in kept]
-        return saved.write_derived(found, kept_names, origin, folder, settings, progress, on_event)
-
-
-def _angle(text: str) -> tuple[str, float]:
-    """Return the name and the value of an angle that is known."""
-    name, sign, value = text.rpartition("=")
-    try:
-        if not sign or not name.strip():
-            raise ValueError
-        return name.strip(), float(tables.with_minus(value.strip()))
-    except ValueError:
-        raise SettingError(
-            f"{{at}} must be angles such as psi=-45, got {literal(repr(text))}"
-        ) from None
+        saved, others = SavedDensity.read(model).split(at, on_event)
+        return Partial(saved, out, settings, on_event, cancel).conditional(others, columns)

@@ -1,284 +1,188 @@
-"""Saved densities, the tables that fit them, and the marginal and conditional ones made of them.
-
-Their folder holds a model that other commands read, and of one or two angles a table and a picture.
-"""
+"""Saved densities as commands ask them: their columns, the tables that suit them, what is known."""
 
 from __future__ import annotations
 
-import json
-import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
-from orbiflow.arrays import Array
-from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import Declaration, TableRows, check_form, in_file
-from orbiflow.density.fitting import Progress as InProgress
-from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
-from orbiflow.density.operations import covariates
-from orbiflow.density.regions import size_unit
-from orbiflow.density.run_folder import SAMPLES, write_files
-from orbiflow.density.spaces import RotationSpace, Space, Torus
-from orbiflow.density.tables import TableSettings, to_csv
+from orbiflow.density import data, inference, pictures, tables
+from orbiflow.density.models import ConditionalDensity, Density, read_density
 from orbiflow.errors import InputFileError, SettingError, literal
-from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
+from orbiflow.runtime import Note, Sink, ignore
 
 if TYPE_CHECKING:
-    from orbiflow.density.operations.queries import PartialSettings
+    from orbiflow.density.spaces import Covariate, Values
 
 
-def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
-    """Return the density in a file or in the folder of a fit, and what was saved with it."""
-    file = path / pictures.MODEL if path.is_dir() else path
-    if not file.exists():
-        what = f"{pictures.MODEL} in it" if path.is_dir() else "such folder"
-        raise InputFileError(
-            f"cannot read {path}: there is no {what}; give the folder that `orbiflow density fit` wrote"
-        )
-    return read_density(file)
+@dataclass(frozen=True)
+class SavedDensity:
+    """A density that was read, what its columns are called, and what else was saved with it.
 
-
-def split_given(
-    path: Path, given: Sequence[str], tell: Sink
-) -> tuple[Density, dict[str, Any], list[str], dict[str, Any]]:
-    """Return a model where covariates are known, what was saved, what else is given, and covariates.
-
-    `given` are texts such as temperature=295: those of covariates choose the density, all others are
-    left.
+    - `at`: The covariates, by name, at which it is the density.
     """
-    found = covariates.conditional_in(path)
-    own = {} if found is None else {one.casefold(): one for one in found[0].covariates.names}
-    pairs = [(text.rpartition("=")[0].strip().casefold(), text) for text in given]
-    left = [text for name, text in pairs if name not in own]
-    known = [covariates.pair_of(text) for name, text in pairs if name in own]
-    if found is None or not known:
-        return *model_at(path), left, {}
-    density = covariates.density_at(found[0], known, tell)
-    values = covariates.values_of(found[0], known)
-    return density, found[1], left, {name: cell[0].item() for name, cell in values.items()}
 
+    path: Path
+    density: Density
+    columns: tuple[str, ...]
+    extra: Mapping[str, Any]
+    at: Mapping[str, Any]
 
-def density_given(path: Path, given: Sequence[str], tell: Sink) -> tuple[Density, dict[str, Any]]:
-    """Return a model where covariates are as texts such as temperature=295 say, and what was saved."""
-    density, extra, left, _ = split_given(path, given, tell)
-    if left:
-        raise SettingError(
-            "{at}: "
-            + literal(f"{path} has no covariate {left[0].rpartition('=')[0]!r}")
-            + "; `density conditional` fixes columns of the data"
-        )
-    return density, extra
+    @classmethod
+    def read(cls, path: Path) -> SavedDensity:
+        """Read the density in a file or in the folder of a fit."""
+        file = path / pictures.MODEL if path.is_dir() else path
+        if not file.exists():
+            what = f"{pictures.MODEL} in it" if path.is_dir() else "such folder"
+            raise InputFileError(
+                f"cannot read {path}: there is no {what}; give the folder that `orbiflow density fit` "
+                "wrote"
+            )
+        density, extra = read_density(file)
+        names = tuple(str(name) for name in extra.get("columns") or ())
+        there = density.space.columns
+        return cls(path, density, names if len(names) == len(there) else there, extra, {})
 
-
-def some_columns(density: Density, kept: Sequence[int] | None, count: int) -> Mixture:
-    """Return a density of all its `count` columns, or of some of them, as a mixture."""
-    if kept is not None:
-        axes = inference.chosen_columns(density.space, kept, count).axes
-        return inference.marginal(density, axes)
-    return density if isinstance(density, Mixture) else Mixture([density], [1.0])
-
-
-def names_of(density: Density, extra: dict[str, Any]) -> list[str]:
-    """Return what the columns of a density's data are called."""
-    names = [str(name) for name in extra.get("columns") or ()]
-    return names if len(names) == len(density.space.columns) else list(density.space.columns)
-
-
-def rows_of_model(
-    data: Path,
-    settings: TableSettings,
-    density: Density,
-    extra: dict[str, Any],
-    tell: Sink,
-    given: Sequence[str] = (),
-) -> TableRows:
-    """Return the rows of a table that can be of a model, and warn of what is doubtful.
-
-    The columns are those of the fit, where none were chosen.
-    """
-    space = density.space
-    names = tuple(extra.get("columns") or space.columns)
-    if len(names) not in space.widths:
-        names = space.columns
-    said = Declaration(space.data_name, widths=space.widths, roles=space.roles, names=tuple(names))
-    rows = tables.read_rows(data, settings, tell, fitted=said, given=given)
-    own = [k for k, role in enumerate(space.roles(len(rows.columns))) if role is None]
-    try:
-        base = getattr(space, "base", space)
-        if isinstance(base, RotationSpace) and rows.source.is_named:
-            names = [rows.columns[k] for k in own]
-            check_form(space.data_name, names, base.form_of(len(names)))
-        doubts = inference.data_doubts(density, rows.values, rows.columns, rows.place)
-    except SettingError as error:
-        raise in_file(error, f"{data}: ") from error
-    for doubt in doubts:
-        tell(Note(f"WARNING: {data}: {doubt}"))
-    return rows
-
-
-PICTURE = "density.png"
-
-TABLE_ROWS = {1: 720, 2: 120}
-"""Rows of the table along an angle, by the number of angles."""
-
-SHARE_BEFORE_FILES = 0.7
-"""Share of the work that is done when a density is found, and its files are to be made."""
-
-HISTOGRAM_SAMPLES = 20_000
-"""Samples in the picture of one angle."""
-
-
-def axes_of(wanted: Sequence[str], names: Sequence[str], tell: Sink = ignore) -> list[int]:
-    """Return the numbers, from 0, of angles given by name, or else by number from 1.
-
-    Columns without a name have the numbers of their table, of which the model may have some alone. Of
-    those with names, the user is told which one a number means.
-
-    >>> axes_of(["psi", "1"], ["phi", "psi"]), axes_of(["3"], ["column2", "column3"])
-    ([1, 0], [1])
-    """
-    lower = {name.casefold() for name in names}
-    numbers = {str(number): number - 1 for number in range(1, len(names) + 1)}
-    unnamed = [re.fullmatch(r"column(\d+)", name) for name in names]
-    if all(unnamed):
-        numbers = {found[1]: axis for axis, found in enumerate(unnamed) if found}
-    asked = [one if one.casefold() in lower else numbers.get(one, one) for one in wanted]
-    found = inference.axes_named(asked, names)
-    for one, axis in zip(wanted, found, strict=True):
-        if one.isdigit() and not all(unnamed):
-            place = f"number {one} among the model's columns ({', '.join(names)})"
-            tell(Note(f"took {one} for {names[axis]}, {place}"))
-    return found
-
-
-def condition_of(
-    space: Space,
-    names: list[str],
-    pairs: Sequence[tuple[str, float]],
-    columns: Sequence[str] | None,
-    tell: Sink,
-) -> tuple[dict[str, float], dict[int, float], list[int]]:
-    """Return what is known by name in the data's unit and by chart coordinate, and columns to keep.
-
-    All others are kept, or those of `columns`. The user is warned of angles that seem to be in another
-    unit.
-    """
-    axes = axes_of([name for name, _ in pairs], names, tell)
-    values = list(zip(axes, (value for _, value in pairs), strict=True))
-    given = inference.given_named(space, values, names)
-    known = {names[axis]: value for axis, value in values}
-    kept = [axis for axis in range(len(names)) if axis not in axes]
-    if columns is not None:
-        kept = axes_of(columns, names, tell)
-        both = [names[axis] for axis in kept if axis in axes]
-        if both:
+    @classmethod
+    def read_at(cls, path: Path, texts: Sequence[str], tell: Sink) -> SavedDensity:
+        """Read the density where all covariates are as texts such as temperature=295 say."""
+        saved, others = cls.read(path).split(texts, tell)
+        if others:
+            name = pair_of(others[0])[0]
             raise SettingError(
-                literal(repr(both[0])) + " is both among {columns} and {at}; name it in one of them"
+                "{at}: "
+                + literal(f"{path} has no covariate {name!r}")
+                + "; `density conditional` fixes columns of the data"
             )
-    for doubt in inference.given_doubts(space, known, names):
-        tell(Note(f"WARNING: {doubt}"))
-    return known, given, kept
+        return saved
 
+    def split(self, texts: Sequence[str], tell: Sink) -> tuple[SavedDensity, list[str]]:
+        """Return the density where covariates are as texts say, and the texts of other columns."""
+        given = self.density.given
+        names = [] if given is None else [name.casefold() for name in given.covariates.names]
+        known = [pair for text in texts if (pair := pair_of(text))[0].casefold() in names]
+        others = [text for text in texts if pair_of(text)[0].casefold() not in names]
+        if given is None or not known:
+            return self, others
+        cells = values_of(given, known)
+        for doubt in given.covariates.doubts(cells):
+            tell(Note(f"WARNING: {doubt}"))
+        at = {name: cell[0].item() for name, cell in cells.items()}
+        return replace(self, density=given.at(cells), at=at), others
 
-def evidence_of(density: Density, given: dict[int, float]) -> float:
-    """Return the log density of known chart coordinates relative to the uniform one."""
-    at = [[given.get(axis, math.nan) for axis in range(density.space.chart_dim)]]
-    points = torch.tensor(at, dtype=torch.float64)
-    return float(inference.log_prob_observed(density, points, measure="uniform"))
+    def rows(
+        self, path: Path, reading: tables.TableSettings, tell: Sink, given: Sequence[str] = ()
+    ) -> data.TableRows:
+        """Return the rows of a table that can be of the density, and warn of what is doubtful.
 
-
-def in_first_part(progress: InProgress) -> InProgress:
-    """Return a function that tells the same progress, as that of the work before files are made."""
-    return lambda share, what: progress(SHARE_BEFORE_FILES * share, what)
-
-
-def write_derived(
-    density: Mixture,
-    names: list[str],
-    origin: dict[str, Any],
-    folder: ResultFolder,
-    settings: PartialSettings,
-    progress: InProgress,
-    tell: Sink,
-) -> Outcome:
-    """Write the folder of a density of fewer angles; `origin` says in the report where it is from."""
-    space = density.space
-    named = {"space": {"name": space.name, **space.settings()}, "columns": names}
-    errors = {"error": density.error, "largest_error": density.largest_error}
-    document = {**named, "report": errors, **origin}
-    if settings.sample is not None:
-        document["samples"] = settings.sample
-    files: dict[str, str | bytes] = {
-        pictures.MODEL: density_to_bytes(density, columns=names),
-        pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),
-    }
-    if settings.sample is not None:
-        progress(SHARE_BEFORE_FILES, "drawing samples")
-        drawn = density.sample((settings.sample,), torch.Generator().manual_seed(settings.seed))
-        files[SAMPLES] = to_csv(names, space.from_chart(drawn))
-        for text in _sample_notes(density):
-            tell(Note(text))
-    progress(0.8, "drawing")
-    if space.dim in TABLE_ROWS and isinstance(space, Torus):
-        files[pictures.TABLE] = to_csv((*names, "density"), _table(density, space))
-    if space.has_square and space.dim in TABLE_ROWS:
-        progress(0.9, "drawing")
-        files[PICTURE] = _picture(density, names)
-    progress(1.0, "writing")
-    write_files(folder, files, tell)
-    if density.error > settings.accuracy:
-        tell(
-            Note(
-                f"WARNING: the density cannot be approximated to within {settings.accuracy:g} nats"
-            )
+        The columns are those of the fit, where none were chosen; `given` are others to read.
+        """
+        space = self.density.space
+        names = tuple(self.extra.get("columns") or space.columns)
+        names = names if len(names) in space.widths else space.columns
+        said = data.Declaration(
+            space.data_name, widths=space.widths, roles=space.roles, names=tuple(names)
         )
-    tell(Note(_words(density, names, folder.path)))
-    summary = {"folder": str(folder.path), "files": list(files), "columns": names}
-    return Outcome({**summary, **errors})
+        rows = tables.read_rows(path, reading, tell, fitted=said, given=given)
+        try:
+            if rows.source.is_named:
+                space.form_in(rows.own_names)
+            doubts = inference.data_doubts(self.density, rows.values, rows.columns, rows.place)
+        except SettingError as error:
+            raise data.in_file(error, f"{path}: ") from error
+        for doubt in doubts:
+            tell(Note(f"WARNING: {path}: {doubt}"))
+        return rows
 
+    def axes(self, wanted: Sequence[str], tell: Sink = ignore) -> list[int]:
+        """Return the numbers, from 0, of columns given by name, or else by number from 1.
 
-def _sample_notes(density: Mixture) -> list[str]:
-    """Return of what is drawn with weights how many draws count, in words."""
-    found: list[str] = []
-    for own, weight in zip(density.components, density.weights.tolist(), strict=True):
-        share = own.effective_share()
-        if share < 1:
-            found.append(
-                f"{100 * weight:.1f}% of the samples are chosen among weighed draws, of which "
-                f"{100 * share:.2g}% count (effective sample size)"
+        A column without a name is called column and its number: its number means it, and no other.
+        """
+        names = self.columns
+        lower = {name.casefold() for name in names}
+        numbers = {str(number): number - 1 for number in range(1, len(names) + 1)}
+        unnamed = [re.fullmatch(r"column(\d+)", name) for name in names]
+        if all(unnamed):
+            numbers = {match[1]: axis for axis, match in enumerate(unnamed) if match}
+        asked = [name if name.casefold() in lower else numbers.get(name, name) for name in wanted]
+        axes = inference.axes_named(asked, names)
+        for name, axis in zip(wanted, axes, strict=True):
+            if name.isdigit() and not all(unnamed):
+                place = f"number {name} among the model's columns ({', '.join(names)})"
+                tell(Note(f"took {name} for {names[axis]}, {place}"))
+        return axes
+
+    def covariates_named(self, asked: Sequence[str]) -> list[str]:
+        """Return the covariates of the fit, if these are what is asked for; none if none of them is.
+
+        Raises `SettingError` if some of them are, and others are not, and for other roles than the
+        fit's.
+        """
+        given = self.density.given
+        fitted: dict[str, Covariate] = {}
+        if given is not None:
+            fitted = {column.name.casefold(): column for column in given.covariates.columns}
+        roles = {str(name).casefold(): role for name, role in data.asked_roles(asked).items()}
+        if given is None or not roles.keys() & fitted.keys():
+            return []
+        names = given.covariates.names
+        if roles.keys() != fitted.keys():
+            raise SettingError(
+                "{given} must name all covariates of the fit, " + literal(", ".join(names))
             )
-    return found
+        for name, role in roles.items():
+            before = fitted[name].role
+            same_turn = role is not None and role.turn is not None and role.turn == before.turn
+            if role is not None and role != before and not same_turn:
+                raise SettingError(
+                    f"{{given}}: {literal(fitted[name].name)} is declared as {role}, and in the fit it "
+                    f"is {before}: convert it, or leave the role out"
+                )
+        return names
 
 
-def _words(density: Density, names: list[str], out: Path) -> str:
-    exact = "in closed form"
-    if density.error:
-        exact = (
-            f"its logarithm right within {density.error:.1e} nats (root mean square) where it is "
-            f"dense, and {density.largest_error:.1e} anywhere"
+def values_of(
+    density: ConditionalDensity, pairs: Sequence[tuple[str, str]], apart: Sequence[str] = ()
+) -> dict[str, Values]:
+    """Return the value (1,) of each covariate but those `apart`, by its name.
+
+    Raises `SettingError` for a covariate without a value, one that there is not, and no number.
+    """
+    texts = {name.casefold(): text for name, text in pairs}
+    names = density.covariates.names
+    if unknown := sorted(set(texts) - {name.casefold() for name in names}):
+        raise SettingError(
+            "{at}: " + literal(f"no covariate {unknown[0]!r}; there are {', '.join(names)}")
         )
-    per = re.sub(r"\b(degree|turn|radian|steradian|unit)s\b", r"\1", size_unit(density.space))
-    return f"the density of {', '.join(names)}, per {per}, {exact}; written to {out}"
+    cells: dict[str, Values] = {}
+    for column in density.covariates.columns:
+        text = texts.get(column.name.casefold())
+        if column.name in apart:
+            continue
+        if text is None:
+            raise SettingError(
+                "{at} must say all that is known: " + literal(f"{column.name} is missing")
+            )
+        cells[column.name] = np.array([text if column.words else number_of(column.name, text)])
+    return cells
 
 
-def _table(density: Density, space: Torus) -> Array:
-    """Return angles from minus half a turn on, and the density in their unit: (N, d + 1)."""
-    count = TABLE_ROWS[space.dim]
-    lines = [axis.even(count) for axis in space.axes]
-    data = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, space.dim)
-    with torch.no_grad():
-        logs = density.log_prob(space.to_chart(data), measure="natural")
-    return np.column_stack([data, logs.exp().numpy()])
+def number_of(name: str, text: str) -> float:
+    """Return the number that a text is."""
+    try:
+        return float(tables.with_minus(text.strip()))
+    except ValueError:
+        raise SettingError("{at}: " + literal(f"{name} must be a number, got {text!r}")) from None
 
 
-def _picture(density: Density, names: list[str]) -> bytes:
-    settings = pictures.PlotSettings(names=tuple(names))
-    if density.space.dim == 2:
-        return pictures.density_picture(density, settings=settings).file()
-    drawn = density.sample((HISTOGRAM_SAMPLES,), torch.Generator().manual_seed(0))
-    return pictures.corner_picture(density, None, drawn, settings).file()
+def pair_of(text: str) -> tuple[str, str]:
+    """Return the name and the value of a text such as temperature=295."""
+    name, sign, value = text.rpartition("=")
+    if not sign or not name.strip() or not value.strip():
+        raise SettingError(f"{{at}} must be values such as psi=-45, got {literal(repr(text))}")
+    return name.strip(), value.strip()

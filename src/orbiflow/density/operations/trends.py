@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
-from orbiflow.density import models
-from orbiflow.density.operations import covariates
+from orbiflow.density import inference, pictures
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import check_table_name
 from orbiflow.errors import SettingError, literal
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from orbiflow.arrays import Array
     from orbiflow.density.fitting import Progress
     from orbiflow.density.inference import Trend
-    from orbiflow.density.models import ConditionalDensity
-    from orbiflow.density.spaces import Covariate, Torus
-    from orbiflow.drawing import Picture
+    from orbiflow.density.models import ConditionalDensity, Density
+    from orbiflow.density.operations.saved import SavedDensity
+    from orbiflow.density.spaces import Torus
 
 MOST_PANELS = 24
 """The most words of which each has a panel."""
@@ -73,124 +73,111 @@ def trend(
     """
     check_table_name(out)
 
-    from orbiflow.density.operations.saved import model_at
+    from orbiflow.density.operations.saved import SavedDensity
 
     runtime.check_output_file(out, model)
     with runtime.one_thread():
         progress = runtime.progress_events(on_event, cancel)
-        found = covariates.conditional_in(model)
-        names = [] if found is None else found[0].covariates.names
-        name = next((one for one in names if one.casefold() == along.casefold()), None)
-        if found is not None and name is not None:
-            density, extra = found
-            drawn = _along_covariate(density, extra, of, name, settings, progress, on_event)
+        saved = SavedDensity.read(model)
+        given = saved.density.given
+        names = [] if given is None else given.covariates.names
+        name = next((name for name in names if name.casefold() == along.casefold()), None)
+        if given is not None and name is not None:
+            drawn = _along_covariate(given, saved, of, name, settings, progress, on_event)
         elif settings.at:
             raise SettingError("{at} is for trends along a covariate of the fit; leave it out")
         else:
-            drawn = _along_column(*model_at(model), of, along, settings, progress, on_event)
-        picture = drawn.picture()
-    image = out.with_suffix(".png")
-    write_file(out, drawn.table(), on_event)
+            drawn = _along_column(saved, of, along, settings, progress, on_event)
+        image = out.with_suffix(".png")
+        contents = {out: drawn.content(".csv"), image: drawn.picture("png")}
+    for path, content in contents.items():
+        write_file(path, content, on_event)
     words = f"the mean of {drawn.names[0]} along {drawn.names[1]}; written to {out}"
-    write_file(image, picture.file(), on_event, words)
-    return runtime.Outcome({"file": str(out), "picture": str(image), "rows": drawn.rows})
+    on_event(runtime.Note(words))
+    rows = sum(len(part.at) for part in drawn.trends.values())
+    return runtime.Outcome({"file": str(out), "picture": str(image), "rows": rows})
 
 
-class _Drawn(NamedTuple):
+@dataclass(frozen=True)
+class TrendAnswer(runtime.Answer):
     """Trends by the word that is known beside, "" if there is none.
 
     - `names`: The column whose mean it is, and what it is along.
     - `space`: The torus of both.
-    - `words`: What the values are numbers of, if they are words.
+    - `labels`: What the values are numbers of, if they are words.
+    - `beside`: The covariate of the words by which trends are known.
     """
 
     trends: Mapping[str, Trend]
     names: tuple[str, str]
     space: Torus
-    words: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
     beside: str = ""
 
-    @property
-    def rows(self) -> int:
-        """Rows of the table."""
-        return sum(len(found.at) for found in self.trends.values())
+    def table(self) -> Iterator[dict[str, Any]]:
+        """Yield a row for each value, with the word beside it if there are such."""
+        name, along = self.names
+        for word, part in self.trends.items():
+            for k, value in enumerate(part.at.tolist()):
+                row: dict[str, Any] = {self.beside: word} if self.beside else {}
+                row |= {along: self.labels[k] if self.labels else value, name: float(part.mean[k])}
+                for level, low, high in zip(part.levels, part.low[k], part.high[k], strict=True):
+                    row |= {f"{name}_low_{100 * level:g}": float(low)}
+                    row |= {f"{name}_high_{100 * level:g}": float(high)}
+                if part.log_density is not None:
+                    row["log_density"] = float(part.log_density[k])
+                yield {key: f"{v:.10g}" if is_a(v, float) else v for key, v in row.items()}
 
-    def table(self) -> bytes:
-        """Return a row for each value, with the word beside it if there are such."""
-        first = next(iter(self.trends.values()))
-        heads = [*([self.beside] if self.beside else []), self.names[1], self.names[0]]
-        for level in first.levels:
-            heads += [f"{self.names[0]}_{end}_{100 * level:g}" for end in ("low", "high")]
-        if first.log_density is not None:
-            heads.append("log_density")
-        lines: list[list[Any]] = []
-        for word, found in self.trends.items():
-            for k, value in enumerate(found.at.tolist()):
-                cells: list[Any] = [word] if self.beside else []
-                cells += [self.words[k] if self.words else value, float(found.mean[k])]
-                for low, high in zip(found.low[k], found.high[k], strict=True):
-                    cells += [float(low), float(high)]
-                if found.log_density is not None:
-                    cells.append(float(found.log_density[k]))
-                lines.append([f"{own:.10g}" if is_a(own, float) else own for own in cells])
-        return runtime.csv_bytes(heads, lines)
-
-    def picture(self) -> Picture:
+    def picture(self, form: str) -> bytes:
         """Return the picture of all of them."""
-        from orbiflow.density import pictures
-
-        return pictures.trend_picture(self.trends, self.space, self.names, words=self.words)
+        del form  # always pixels
+        picture = pictures.trend_picture(self.trends, self.space, self.names, words=self.labels)
+        return picture.file()
 
 
 def _along_column(
-    density: models.Density,
-    extra: dict[str, Any],
+    saved: SavedDensity,
     of: str,
     along: str,
     settings: TrendSettings,
     progress: Progress,
     tell: runtime.Sink,
-) -> _Drawn:
-    from orbiflow.density import inference
-    from orbiflow.density.operations.saved import axes_of, names_of
-
-    names = names_of(density, extra)
-    first, second = axes_of([of, along], names, tell)
+) -> TrendAnswer:
+    names = saved.columns
+    first, second = saved.axes([of, along], tell)
     called = names[first], names[second]
-    density, first, second = inference.pair_alone(density, first, second, len(names))
+    density, first, second = inference.pair_alone(saved.density, first, second, len(names))
     at = _values(density, second, settings)
     found = inference.trend(
         density, first, second, at, levels=settings.levels,
         tick=lambda share: progress(0.9 * share, "finding conditional densities"),
     )  # fmt: skip
     space = inference.check_torus(density.space, "trends").of_axes([first, second])
-    return _Drawn({"": found}, called, space)
+    return TrendAnswer({"": found}, called, space)
 
 
 def _along_covariate(
     density: ConditionalDensity,
-    extra: dict[str, Any],
+    saved: SavedDensity,
     of: str,
     along: str,
     settings: TrendSettings,
     progress: Progress,
     tell: runtime.Sink,
-) -> _Drawn:
+) -> TrendAnswer:
     import numpy as np
 
-    from orbiflow.density import inference
-    from orbiflow.density.operations.saved import axes_of
     from orbiflow.density.spaces import Torus
 
     torus = inference.check_torus(density.space, "trends")
-    names = [str(name) for name in extra.get("columns") or torus.columns]
-    (axis,) = axes_of([of], names, tell)
+    (axis,) = saved.axes([of], tell)
     column = density.covariates.column(along)
     known, beside, panels = _others(density, along, settings.at, tell)
+    low, high = (0.0, column.period) if column.period is not None else column.range
     values = (
         np.array(column.words)
         if column.words
-        else np.linspace(*_ends(column, settings), settings.count)
+        else np.linspace(*_in_order(low, high, settings), settings.count)
     )
     count, done = len(values) * len(panels), 0
     trends: dict[str, Trend] = {}
@@ -199,7 +186,7 @@ def _along_covariate(
         cells = {name: np.full(len(values), cell) for name, cell in fixed.items()}
         x = density.covariates.features({**cells, along: values})
 
-        def densities(x: Tensor = x) -> Iterator[models.Density]:
+        def densities(x: Tensor = x) -> Iterator[Density]:
             nonlocal done
             for row in x:
                 progress(0.9 * done / count, "finding densities")
@@ -209,14 +196,16 @@ def _along_covariate(
         at = np.arange(float(len(values))) if column.words else values
         trends[word] = inference.trend_of(densities(), axis, at, levels=settings.levels)
     space = Torus([torus.axes[axis], (0.0, 1.0)], unit=str(torus.unit))
-    return _Drawn(trends, (names[axis], along), space, column.words, beside)
+    return TrendAnswer(trends, (saved.columns[axis], along), space, column.words, beside)
 
 
 def _others(
     density: ConditionalDensity, along: str, given: Sequence[str], tell: runtime.Sink
 ) -> tuple[dict[str, Any], str, tuple[str, ...]]:
     """Return the values of other covariates, one that has a panel for each word, and these words."""
-    pairs = [covariates.pair_of(text) for text in given]
+    from orbiflow.density.operations.saved import pair_of, values_of
+
+    pairs = [pair_of(text) for text in given]
     said = {name.casefold() for name, _ in pairs}
     if along.casefold() in said:
         raise SettingError("{at} and {along} " + literal(f"both name {along!r}"))
@@ -230,14 +219,8 @@ def _others(
         elif own.words and not beside and len(own.words) <= MOST_PANELS:
             beside, panels = own.name, own.words
             apart.append(own.name)
-    cells = covariates.values_of(density, pairs, apart)
+    cells = values_of(density, pairs, apart)
     return {name: cell[0] for name, cell in cells.items()}, beside, panels
-
-
-def _ends(column: Covariate, settings: TrendSettings) -> tuple[float, float]:
-    """Return the first and the last value of a covariate of numbers."""
-    low, high = (0.0, column.period) if column.period is not None else column.range
-    return _in_order(low, high, settings)
 
 
 def _in_order(low: float, high: float, settings: TrendSettings) -> tuple[float, float]:
@@ -249,12 +232,10 @@ def _in_order(low: float, high: float, settings: TrendSettings) -> tuple[float, 
     return low, high
 
 
-def _values(density: models.Density, axis: int, settings: TrendSettings) -> Array:
+def _values(density: Density, axis: int, settings: TrendSettings) -> Array:
     """Return the values (n,) of a column at which a trend is found."""
     import numpy as np
     import torch
-
-    from orbiflow.density import inference
 
     space = inference.check_torus(density.space, "trends")
     period = space.axes[axis].period

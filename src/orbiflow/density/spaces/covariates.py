@@ -181,9 +181,17 @@ class Covariates:
         widths = torch.tensor([own.width for own in self.columns])
         return torch.arange(len(widths)).repeat_interleave(widths)
 
-    def features(self, cells: Mapping[str, Values]) -> Tensor:
-        """Return what models see of cells, in float64: (N, width)."""
-        return torch.cat([own.features(cells[own.name]) for own in self.columns], dim=1)
+    @property
+    def declaration(self) -> str:
+        """What they are, in the words of the command line."""
+        return ",".join(f"{column.name}={column.role}" for column in self.columns)
+
+    def features(self, cells: Mapping[str, Values], rows: int | None = None) -> Tensor:
+        """Return what models see of cells, in float64: (N, width); check the number of `rows`."""
+        x = torch.cat([own.features(cells[own.name]) for own in self.columns], dim=1)
+        if rows is not None and len(x) != rows:
+            raise OrbiflowError(f"given: expected {rows} rows, as the data have, got {len(x)}")
+        return x
 
     def fit_doubts(self, cells: Mapping[str, Values]) -> list[str]:
         """Return what makes one doubt the cells of a fit."""

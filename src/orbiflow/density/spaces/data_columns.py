@@ -15,7 +15,6 @@ from orbiflow.density.data import (
     Role,
     TableRows,
     asked_roles,
-    check_form,
     check_unit,
     checked_rows,
     found_column,
@@ -25,7 +24,6 @@ from orbiflow.density.data import (
 from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.product import ProductSpace
 from orbiflow.density.spaces.quotient import QuotientSpace
-from orbiflow.density.spaces.rotations import RotationSpace
 from orbiflow.density.spaces.space import Space, space_for
 from orbiflow.errors import DataWarning, SettingError, literal
 from orbiflow.symmetry import group_by_name, is_group_name
@@ -107,12 +105,8 @@ class DataColumns:
 
     def _form(self, names: Sequence[str]) -> str | None:
         """Return how rotations are written in columns of these names, or numbers."""
-        space = self.space
-        base = space.base if isinstance(space, ProductSpace) else space
-        if isinstance(base, RotationSpace):
-            form = base.form_of(len(names))
-            check_form(self.name, names, form)
-            return form
+        if isinstance(self.space, Space):
+            return self.space.form_in(names)
         return rotation_form(self.name, names, len(names)) if self.name in ROTATIONS else None
 
     def of(self, rows: TableRows) -> Space:

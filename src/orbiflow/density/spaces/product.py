@@ -102,6 +102,9 @@ class ProductSpace(Space):
     def data_unit(self, width: int) -> str | None:
         return self.base.data_unit(width - self.beside.dim)
 
+    def form_in(self, names: Sequence[str]) -> str | None:
+        return self.base.form_in(names)
+
     @property
     def volume(self) -> float:
         return self.base.volume * self.beside.volume

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import is_angular
+from orbiflow.density.data import check_form, is_angular
 from orbiflow.density.spaces.axes import whole_turn
 from orbiflow.density.spaces.checked import checked_table
 from orbiflow.density.spaces.point_groups import rotation_group_name, rotations_of
@@ -126,6 +127,11 @@ class RotationSpace(UnitVectorSpace):
         three = self.form if self.form in (*EULER, "rodrigues") else "vector"
         four = "scalar-first" if self.form == "scalar-first" else "quaternion"
         return {3: three, 9: "matrix"}.get(width, four)
+
+    def form_in(self, names: Sequence[str]) -> str | None:
+        form = self.form_of(len(names))
+        check_form(self.data_name, names, form)
+        return form
 
     @property
     def widths(self) -> tuple[int, ...]:

@@ -296,6 +296,11 @@ class Space(ABC):
         del width
         return None
 
+    def form_in(self, names: Sequence[str]) -> str | None:
+        """Return how rotations are written in columns of these names; refuse another form's names."""
+        del names
+        return None
+
     def distance(self, start: Tensor, end: Tensor) -> Tensor:
         """Return the geodesic distance (...,) in the flat metric of the chart, over group images."""
         return linalg.vector_norm(self.displacement(start, end), dim=-1)

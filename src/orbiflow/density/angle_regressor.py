@@ -1,4 +1,4 @@
-"""The density estimator by other orders of arguments: `fit(X, given)`, and `fit(X, y)` of angles."""
+"""The density estimator of angles where covariates are known, as a regression: `fit(X, y)`."""
 
 from __future__ import annotations
 
@@ -8,66 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
-from orbiflow.density.data import TableRows, alongside, as_data, as_numbers
-from orbiflow.density.estimator import DensityEstimator, RandomState
+from orbiflow.density.data import alongside, as_data, as_numbers
+from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.fitting import Progress
 from orbiflow.density.given_covariates import columns_given
 from orbiflow.density.spaces import Torus
 from orbiflow.errors import OrbiflowError
 
 
-class ConditionalEstimator(DensityEstimator):
-    """Exact, normalised density p(X | given), by the order of arguments: `fit(X, given)`.
-
-    It is a `DensityEstimator`, whose `fit`, `score_samples`, `score` and `sample` take `given` by name.
-    Covariates are real numbers, cyclic ones such as hours of the day, and words, alone and together.
-    Held-out rows choose among conditional kernels, a neural mixture, the conditional of a joint density
-    and the density of all rows, which is what is left where covariates say nothing. That density is
-    there as well: what is asked without `given` is asked of it.
-
-    >>> rng = np.random.default_rng(0)
-    >>> length = rng.uniform(0, 2, 200)
-    >>> angles = rng.vonmises(length, 8.0)[:, None]
-    >>> fit = ConditionalEstimator(unit="radians", components="kernels").fit(angles, {"length": length})
-    >>> bool(abs(fit.at(length=1.5).mean()[0] - 1.5) < 0.2)
-    True
-    """
-
-    def fit(  # pyright: ignore[reportIncompatibleMethodOverride]
-        self,
-        X: ArrayLike | TableRows,
-        given: Any,
-        sample_weight: ArrayLike | None = None,
-        *,
-        groups: ArrayLike | None = None,
-        progress: Progress | None = None,
-    ) -> Self:
-        """Fit to data (N, k) and what is known of each row, as `DensityEstimator.fit`."""
-        return super().fit(X, None, sample_weight, given=given, groups=groups, progress=progress)
-
-    def score_samples(  # pyright: ignore[reportIncompatibleMethodOverride]
-        self, X: ArrayLike, given: Any = None, *, measure: str = "natural"
-    ) -> Array:
-        """Log densities (N,) in nats at data (N, k), as `DensityEstimator.score_samples`."""
-        return super().score_samples(X, given=given, measure=measure)
-
-    def score(  # pyright: ignore[reportIncompatibleMethodOverride]
-        self, X: ArrayLike, given: Any = None, sample_weight: ArrayLike | None = None
-    ) -> float:
-        """Mean log density of data (N, k), weighted, in natural measure; as `score_samples`."""
-        return super().score(X, None, sample_weight, given=given)
-
-    def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
-        self, n_samples: int = 1, given: Any = None, random_state: RandomState = None
-    ) -> Any:
-        """New data (n_samples, k), as `DensityEstimator.sample`."""
-        return super().sample(n_samples, random_state, given=given)
-
-
-class AngleRegressor(ConditionalEstimator):
+class AngleRegressor(DensityEstimator):
     """Regression of angles on covariates, in scikit-learn's order: `fit(X, y)`, `predict(X)`.
 
-    A `ConditionalEstimator` whose `X` are covariates and whose `y` are angles; `at`, `sample` and
+    A `DensityEstimator` whose `X` are covariates and whose `y` are angles; `at`, `sample` and
     `trend_along` are those of the density. Parameters are the same.
 
     >>> rng = np.random.default_rng(0)
@@ -93,14 +45,15 @@ class AngleRegressor(ConditionalEstimator):
         )
         angles = as_data(y, "y")
         self.is_flat_ = np.ndim(y) == 1
-        super().fit(_table(angles.values), X, sample_weight, groups=groups, progress=progress)
+        how: dict[str, Any] = {"given": X, "groups": groups, "progress": progress}
+        super().fit(_table(angles.values), None, sample_weight, **how)
         self._period()
         self.n_features_in_ = len(self.conditional_density_.covariates.columns)
         return self
 
     def predict(self, X: Any) -> Array:
         """The mean directions (N,) or (N, d) where the covariates are X (N, c), within half a turn."""
-        own = self._conditional()
+        own = self.conditional_density_
         rows = len(next(iter(columns_given(X, own.covariates.names).values())))
         turns = own.mean_directions(self._x(X, rows)).numpy()
         angles = turns * self._period()
