@@ -169,17 +169,6 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow, fitted) -> None:
         names(outcome.err, *about.split())
 
 
-def test_a_fit_that_the_limit_ended_says_so(tmp_path: Path, orbiflow) -> None:
-    data, model = table(tmp_path), tmp_path / "model"
-    fit = ("density", "fit", data, "--space", "torus", *ANGLES, "--out", model)
-    fitted = orbiflow(*fit, *FIT, "--seconds", 0)
-    said = "stopped by the limit of 0 s: another run may differ"
-    assert said in fitted.out
-    report = json.loads((model / "report.json").read_text())["report"]
-    assert said in report["notes"]
-    assert report["mass"] == pytest.approx(1.0, abs=1e-3)
-
-
 def test_nothing_of_an_earlier_model_stays(tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
     fit = ("density", "fit", data, "--space", "torus", *ANGLES, "--out", model)

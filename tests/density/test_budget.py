@@ -45,29 +45,6 @@ from refusals import refused
 SMALL: dict[str, Any] = {"max_frequency": 2, "segments": 2, "roughness": (1e-3,)}
 
 
-class Clock:
-    """Stands still for so many looks, then leaps ahead."""
-
-    def __init__(self, looks: float) -> None:
-        self.looks, self.asked = looks, 0
-
-    def __call__(self) -> float:
-        self.asked += 1
-        return 0.0 if self.asked <= self.looks else 1e9
-
-
-@pytest.fixture(name="striking_after")
-def striking_after_fixture(monkeypatch):
-    """A clock in place of the real one."""
-
-    def put(looks: float) -> Clock:
-        clock = Clock(looks)
-        monkeypatch.setattr("orbiflow.density.fitting.likelihood.clock", clock)
-        return clock
-
-    return put
-
-
 def cluster(name: str, count: int = 200) -> torch.Tensor:
     """Chart points about (20, 60) degrees."""
     rng = np.random.default_rng(0)
@@ -84,39 +61,16 @@ def test_a_budget_counts(limit: int, wanted: int) -> None:
     assert budget.used == min(limit, wanted)
     assert budget.notes() == []
     if wanted > limit:
-        with refused("evaluations", kind=Spent):
+        with pytest.raises(Spent):
             budget.spend()
         assert budget.used == limit
         assert budget.notes() == [f"stopped by the budget of {limit} evaluations"]
 
 
-def test_without_a_limit_no_clock_is_asked(striking_after) -> None:
-    clock = striking_after(math.inf)
-    fit_density(make_space("torus"), cluster("torus"), FlowSettings(**SMALL, iterations=3))
-    assert clock.asked <= 5  # when budgets begin
-
-
-@pytest.mark.parametrize(
-    ("name", "looks"), [("torus", 1), ("klein-bottle", 60), ("projective-plane", 20)]
-)
-def test_the_integral_does_not_depend_on_the_clock(name: str, looks: int, striking_after) -> None:
-    clock = striking_after(looks)
-    settings = FlowSettings(**SMALL, seconds=1.0)
-    density, report = fit_density(make_space(name), cluster(name), settings)
-    assert report.mass == pytest.approx(1.0, abs=5e-4)
-    assert density.mass(32) == pytest.approx(1.0, abs=1e-3)
-    assert report.integration_error < 5e-4
-    struck = clock.asked > looks
-    assert report.notes == ("stopped by the limit of 1 s: another run may differ",) * struck
-
-
-def test_the_same_evaluations_give_the_same_density(striking_after) -> None:
+def test_the_same_evaluations_give_the_same_density() -> None:
     space, points, values = make_space("sphere"), cluster("sphere"), []
     for _ in range(2):
-        clock = striking_after(10**6)  # never, however many looks
-        settings = FlowSettings(**SMALL, evaluations=12, seconds=1e6)
-        density, report = fit_density(space, points, settings)
-        assert clock.asked > 10
+        density, report = fit_density(space, points, FlowSettings(**SMALL, evaluations=12))
         assert report.notes == ("stopped by the budget of 12 evaluations",)
         with torch.no_grad():
             values.append(density.log_prob(points))
@@ -171,7 +125,7 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
     with one_core():
         course = Course(lambda *_: None, 1.0)
         candidates = candidates_of(
-            SPACE, [KernelFamily(SPACE)], folds, course, Budget(), SideBySide(), Rivals().meet
+            SPACE, [KernelFamily(SPACE)], folds, course, SideBySide(), Rivals().meet
         )
     return (
         folds,
@@ -185,10 +139,7 @@ def tried(
 ) -> TriedFlow:
     settings = FlowSettings(**QUICK)
     return try_flow(
-        folds,
-        candidates,
-        weights,
-        lambda k: flow_beside(SPACE, folds, k, settings, Budget(), None, told),
+        folds, candidates, weights, lambda k: flow_beside(SPACE, folds, k, settings, None, told)
     )
 
 
@@ -216,14 +167,6 @@ def test_no_step_of_a_fit_is_half_of_it(parts: tuple[Component, ...]) -> None:
     assert shares == sorted(shares)
     assert shares[-1] == BEFORE_END
     assert max(np.diff(shares)) < 0.35
-
-
-def test_a_flow_that_has_no_time_is_none() -> None:
-    folds, candidates, weights = evidence()
-    spent = Budget(seconds=0)
-    none = flow_beside(SPACE, folds, 0, FlowSettings(**QUICK), spent, None, lambda *_: None)
-    assert none is None
-    assert try_flow(folds, candidates, weights, lambda _: none) == TriedFlow()
 
 
 @pytest.mark.parametrize(("tenths", "weighted"), [(1, False), (2, True)])

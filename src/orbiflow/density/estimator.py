@@ -91,7 +91,7 @@ class DensityEstimator(GivenCovariates):
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
         settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
-            `seconds`, `seed` and others. They are checked by `fit`.
+            `effort`, `seed` and others. They are checked by `fit`.
 
     On tori of four or more angles and on spaces of unit vectors there is no flow, and its settings
     must be left at their defaults.

@@ -48,7 +48,7 @@ from orbiflow.density.fitting.held_out import (
     supported_weights,
 )
 from orbiflow.density.fitting.kernels import limit_notes, narrowest_for
-from orbiflow.density.fitting.likelihood import Budget, training
+from orbiflow.density.fitting.likelihood import training
 from orbiflow.density.fitting.parametric import fit_parametric, require_family
 from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
 from orbiflow.density.fitting.report import (
@@ -194,7 +194,6 @@ def fit_in_folds(
     With `folds` the points are of their rows, in their order, and are weighed and held out alike.
     """
     say = progress or silent
-    budget = Budget(seconds=settings.seconds)
     rows, settings, notes = _rows(space, points, weights, groups, settings, check_missing(missing))
     if folds is not None:
         rows = replace(folds.rows, points=rows.points)
@@ -226,10 +225,8 @@ def fit_in_folds(
     total = work_of(len(families), folds.used) + FLOW_WORK * flows
     course = Course(lambda done, what: say(BEFORE_END * done, what), total)
     with SideBySide(waiting=1) as beside, Rivals() as rivals:
-        fitted = (
-            _flow_fits(space, folds, settings, budget, rivals, course, beside) if flows else None
-        )
-        candidates = candidates_of(space, families, folds, course, budget, beside, rivals.meet)
+        fitted = _flow_fits(space, folds, settings, rivals, course, beside) if flows else None
+        candidates = candidates_of(space, families, folds, course, beside, rivals.meet)
         weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
         weights = without_idle(candidates, weights)  # each part costs time at every query
         others = judged(candidates, weights)  # while the flow is fitted
@@ -252,23 +249,20 @@ def fit_in_folds(
         *settings.left_out,
         *found.notes(taken_for),
         *limited,
-        *budget.notes(),
         *steps_note(report.steps, report.integration_error),
     )
     report = replace(report, notes=(*notes, *after))
-    done = min((len(own) for own in candidates.fitted.values()), default=0)
-    return ChosenFit(density, report, replace(folds, used=done), evidence)
+    return ChosenFit(density, report, folds, evidence)
 
 
 def _flow_fits(
     space: Space,
     folds: Folds,
     settings: DensitySettings,
-    budget: Budget,
     rivals: Rivals,
     course: Course,
     beside: SideBySide,
-) -> Callable[[int], FittedFlow | None]:
+) -> Callable[[int], FittedFlow]:
     """Begin to fit a flow without the first tenth; return the fits without the first and the second.
 
     The first is given up where the `rivals` outdo it.
@@ -276,11 +270,9 @@ def _flow_fits(
     chosen = flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow)
     tell = course.part(FLOW_WORK)
 
-    def begun(number: int) -> Callable[[], FittedFlow | None]:
+    def begun(number: int) -> Callable[[], FittedFlow]:
         outdone = None if number else rivals.outdo
-        return beside.begin(
-            partial(flow_beside, space, folds, number, chosen, budget, outdone), tell
-        )
+        return beside.begin(partial(flow_beside, space, folds, number, chosen, outdone), tell)
 
     first = begun(0)
     return lambda number: begun(number)() if number else first()

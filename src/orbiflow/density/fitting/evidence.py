@@ -13,7 +13,6 @@ from torch import Tensor
 
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.held_out import Folds, sparse_weights, stacked, stacking_weights
-from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, Progress
 from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
 from orbiflow.density.inference import at_observed
@@ -111,7 +110,6 @@ def candidates_of(
     families: list[Family],
     folds: Folds,
     course: Course,
-    budget: Budget,
     beside: SideBySide,
     meet: Callable[[Tensor, Tensor, Rows], None],
 ) -> Candidates:
@@ -121,10 +119,10 @@ def candidates_of(
     densities (N,) of all candidates together and the uniform one, at the first rows held out.
     """
 
-    def begun(number: int) -> list[Callable[[], Fitted | None]]:
+    def begun(number: int) -> list[Callable[[], Fitted]]:
         return [
             beside.begin(
-                partial(_fitted, family, folds, number, budget),
+                partial(_fitted, family, folds, number),
                 course.part(1.0 if number else FIRST_FOLD_WORK),
             )
             for family in reversed(families)  # the longest first
@@ -135,10 +133,7 @@ def candidates_of(
     fitted: dict[str, list[dict[str, Density]]] = {family.name: [] for family in families}
     weights: list[Tensor | None] = []
     for number in range(folds.used):
-        found = [result() for result in waiting[number]]
-        whole = [one for one in found if one is not None]
-        if len(whole) < len(families):
-            break
+        whole = [result() for result in waiting[number]]
         held = folds.held(number)
         block: dict[tuple[str, str], Tensor] = {}
         for family, (parts, logs) in zip(families, whole, strict=True):
@@ -157,10 +152,8 @@ def candidates_of(
     return Candidates(keys, table, fitted, sizes, torch.cat(known) if known else None)
 
 
-def _fitted(family: Family, folds: Folds, number: int, budget: Budget, say: Tell) -> Fitted | None:
-    """Fit a family to a fold; None if the time is over before one after the first begins."""
-    if number and budget.is_spent:
-        return None
+def _fitted(family: Family, folds: Folds, number: int, say: Tell) -> Fitted:
+    """Fit a family to a fold."""
     tried = count()
 
     def tell(what: str, share: float | None = None) -> None:

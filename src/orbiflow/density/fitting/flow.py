@@ -198,7 +198,7 @@ def fit_density(
     say(0.0, "matching")
     density = _start(space, train, settings, generator)
     start_nll = mean_nll(density, validation.points.to(DTYPE), validation.weights)
-    budget = Budget(settings.evaluations, settings.seconds)
+    budget = Budget(settings.evaluations)
     stages = refine_in_stages(density, train, validation, settings, say, budget, outdone)
     density.flow.double()
     error, mass = settle(density, validation.points[:MOST_HELD], MOST_STEPS)

@@ -13,7 +13,6 @@ from torch import Tensor
 from orbiflow.density.fitting.evidence import Candidates
 from orbiflow.density.fitting.flow import Outdone, fit_density
 from orbiflow.density.fitting.held_out import Folds, stacked, stacking_weights
-from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, FitReport
 from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
@@ -51,19 +50,16 @@ def flow_beside(
     folds: Folds,
     number: int,
     chosen: FlowSettings,
-    budget: Budget,
     outdone: Outdone | None,
     say: Tell,
-) -> FittedFlow | None:
-    """Fit a flow without a tenth; None if the time is over before it begins."""
-    if budget.is_spent:
-        return None
+) -> FittedFlow:
+    """Fit a flow without a tenth."""
     train = folds.train(number)
     begin, end = ((0.0, FIRST_TENTH_SHARE), (FIRST_TENTH_SHARE, 1.0))[number]
     return fit_density(
         space,
         train.points,
-        chosen.replace(seconds=budget.seconds_left),
+        chosen,
         weights=train.weights,
         progress=lambda done, what: say(begin + (end - begin) * done, f"flow: {what}"),
         outdone=outdone,
@@ -97,10 +93,7 @@ class Rivals:
 
 
 def try_flow(
-    folds: Folds,
-    candidates: Candidates,
-    weights: Tensor,
-    fitted: Callable[[int], FittedFlow | None],
+    folds: Folds, candidates: Candidates, weights: Tensor, fitted: Callable[[int], FittedFlow]
 ) -> TriedFlow:
     """A flow fitted without the first tenth, and the share that this tenth gives it.
 
@@ -120,14 +113,12 @@ def try_flow(
         held.append(rows)
         return _worth(tables, held)
 
-    if (first := fitted(0)) is None:
-        return TriedFlow()
-    density, report = first
+    density, report = fitted(0)
     worth = worth_of(density, 0)
     kept = _is_worth_it(worth)
     sure = Gain(worth.gain, worth.error).is_sure
-    if kept and not sure and folds.used > 1 and (second := fitted(1)) is not None:
-        worth = worth_of(second[0], 1)
+    if kept and not sure and folds.used > 1:
+        worth = worth_of(fitted(1)[0], 1)
         kept = _is_worth_it(worth) and worth.gain >= LIKELY_ERRORS * worth.error
     if not kept:
         worth = replace(worth, share=0.0, gain=0.0, error=0.0)

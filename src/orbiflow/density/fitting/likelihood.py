@@ -53,8 +53,8 @@ class Refinement:
     - `train`, `validation`: Mean negative log densities with respect to the square, at the start, every
       `ITERATIONS_PER_SCORE` iterations and at the end.
     - `best`: The entry whose parameters were kept.
-    - `stopped`: What ended it: "iterations", "validation", "converged", "outdone", "evaluations" or
-      "time".
+    - `stopped`: What ended it: "iterations", "validation", "converged", "outdone" or
+      "evaluations".
     - `seconds`: The time that it took.
     """
 
@@ -285,19 +285,12 @@ def merged(rows: Rows, cells: int, crowd: int) -> Rows:
     return Rows(sums / total[:, None], (total / total.sum()).to(points))
 
 
-clock = time.monotonic
-"""Seconds since some moment; tests put another in its place."""
-
-
 class Spent(Stop):
-    """Raised where the next evaluation would begin; `reason` is "evaluations" or "time"."""
+    """Raised where the next evaluation would begin, and none is left."""
 
 
 class Budget:
-    """Counts evaluations of an objective, and looks at the clock between them.
-
-    A fit that ends by its evaluations is the same on a busy machine; one that ends by time is not, so
-    its report says it: `notes`.
+    """Counts evaluations of an objective, so that a fit ends alike on a busy machine.
 
     >>> budget = Budget(evaluations=1)
     >>> budget.spend()
@@ -305,44 +298,28 @@ class Budget:
     True
     """
 
-    def __init__(self, evaluations: float = math.inf, seconds: float | None = None) -> None:
+    def __init__(self, evaluations: float = math.inf) -> None:
         self.evaluations = evaluations
-        self.seconds = math.inf if seconds is None else seconds
         self.used = 0
-        self._began = clock()
-        self._reason: str | None = None
+        self._was_asked = False
 
     @property
     def is_spent(self) -> bool:
-        """Whether the next evaluation may not begin: ask only before one. Once so, always so."""
-        if self._reason is None:
-            if self.used >= self.evaluations:
-                self._reason = "evaluations"
-            # no limit needs no clock
-            elif self.seconds < math.inf and clock() - self._began >= self.seconds:
-                self._reason = "time"
-        return self._reason is not None
-
-    @property
-    def seconds_left(self) -> float | None:
-        """What is left of the limit on time, at least 0; None if there is no limit."""
-        if self.seconds == math.inf:
-            return None
-        return max(0.0, self.seconds - (clock() - self._began))
+        """Whether the next evaluation may not begin: ask only before one."""
+        if self.used < self.evaluations:
+            return False
+        self._was_asked = True
+        return True
 
     def spend(self) -> None:
         """Count an evaluation that is about to begin."""
         if self.is_spent:
-            raise Spent(str(self._reason))
+            raise Spent("evaluations")
         self.used += 1
 
     def notes(self) -> list[str]:
         """What the user should know, in words."""
-        if self._reason == "time":
-            return [f"stopped by the limit of {self.seconds:g} s: another run may differ"]
-        if self._reason == "evaluations":
-            return [f"stopped by the budget of {self.evaluations:g} evaluations"]
-        return []
+        return [f"stopped by the budget of {self.evaluations:g} evaluations"] * self._was_asked
 
 
 @contextlib.contextmanager

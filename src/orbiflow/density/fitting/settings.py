@@ -5,16 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, get_args
 
 from orbiflow.errors import SettingError
-from orbiflow.settings import (
-    DefaultText,
-    HelpHeading,
-    Hidden,
-    Parsed,
-    Range,
-    Settings,
-    Unit,
-    fields_of,
-)
+from orbiflow.settings import DefaultText, HelpHeading, Hidden, Parsed, Range, Settings, fields_of
 
 Component = Literal[
     "flow", "kernels", "mixture", "chains", "network", "von-mises", "von-mises-sine",
@@ -118,10 +109,6 @@ class FlowOptions(Settings, group="Flow"):
     validation: Annotated[float, Range(above=0, below=1), Hidden()] = 0.1
     """Share of the points held out for early stopping."""
 
-    seconds: Annotated[float | None, Range(0), Unit("s"), DefaultText("no limit")] = None
-    """Maximum training time. A fit that it ends depends on the machine's speed, and its report says so;
-    `evaluations` end alike everywhere."""
-
 
 class FlowSettings(FlowOptions, group="Flow"):
     """How a flow is trained; the defaults are measured on the benchmarks."""
@@ -187,11 +174,11 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
     @property
     def flow(self) -> FlowSettings:
         """Settings of a flow that is fitted alone."""
-        return FlowSettings(seconds=self.seconds, seed=self.seed, **self.of_flow)
+        return FlowSettings(seed=self.seed, **self.of_flow)
 
     @property
     def of_flow(self) -> dict[str, Any]:
-        """What was given of a flow, the time apart, by name."""
-        names = [entry.name for entry in fields_of(FlowOptions) if entry.name != "seconds"]
+        """What was given of a flow, by name."""
+        names = [entry.name for entry in fields_of(FlowOptions)]
         given = {name: getattr(self, name) for name in names if name in self.fields_given}
         return {name: value for name, value in given.items() if value is not None}

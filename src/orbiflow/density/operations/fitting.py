@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from orbiflow import runtime
 from orbiflow.batch import BatchKind, Column, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
-from orbiflow.density.data import asked_roles, given_roles, in_file
+from orbiflow.density.data import asked_roles
 from orbiflow.density.fitting import DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import RowSettings, SpaceSettings
@@ -121,6 +121,8 @@ def _given_roles(
 
     `unit` is that of angles that name none.
     """
+    from orbiflow.density.data import given_roles, in_file
+
     roles = given_roles(list(rows.given), rows.given, asked, unit, where=rows.source.where)
     try:
         covariates = spaces.Covariates.of(rows.given, roles)
