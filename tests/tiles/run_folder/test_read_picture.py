@@ -88,7 +88,7 @@ def test_a_failed_search_leaves_the_earlier_run(picture: Path, tmp_path, monkeyp
         assert (out / "read-next.png").is_file()  # before the search
         raise RuntimeError
 
-    monkeypatch.setattr("orbiflow.tiles.search.escherizing._search_by_levels", fail)
+    monkeypatch.setattr("orbiflow.tiles.search.class_search.ClassSearch.search", fail)
     with pytest.raises(RuntimeError):
         finding.escherize(picture, out, on_event=told.append)
     note = f"read-next.png, and in {out / 'read.png'} once this run replaces the earlier one"

@@ -124,7 +124,7 @@ def test_tiles_that_cross_themselves_are_carved_apart(monkeypatch: pytest.Monkey
     assert found() == ([], crossed)
     assert tiles[0].score > 0.4
     for bent in tiles:
-        assert shapely.Polygon(plane_points(bent.ring)).is_valid
+        assert shapely.Polygon(plane_points(bent.tile.ring)).is_valid
 
 
 def test_a_search_that_carves_has_better_tiles() -> None:

@@ -127,7 +127,7 @@ def test_finalists_are_the_best_of_all_bodies_and_no_twins() -> None:
     own = squirrel_orientations()[:1], CLASSES["IH4"]
     found, _ = bent_tiles(*own, several)
     assert len(found) > 1
-    pairs = combinations([bent.ring for bent in found], 2)
+    pairs = combinations([bent.tile.ring for bent in found], 2)
     assert all(apart(one, other) > TWIN_DISTANCE for one, other in pairs)
     alone = [bent_tiles(*own, replace(several, bodies=(body,)))[0] for body in several.bodies]
     best = [max((bent.fidelity.mark for bent in tiles), default=-np.inf) for tiles in alone]

@@ -62,11 +62,8 @@ class Bent(NamedTuple):
 
     orientation: Orientation  # what was bent
     body: Elastic  # as which body
-    ring: Complex  # (n,) the vertices of the tile, up to a similarity
+    tile: Carved  # the tile, up to a similarity
     points: Complex  # (N,) of the fine body; its outline lies on the tile
-    corners: Integers  # (K,) which of these lie at the tile's corners
-    linear: Array  # with `offset`: the map from the group's own frame, of `ring`
-    offset: Array
     placement: Placements  # one, of the fine outline
     fidelity: Fidelity  # what is left of the outline; without the cost
     factor: float  # of its score: 1, less where a neck is too thin, 0 if it crosses itself
@@ -135,7 +132,7 @@ def _best_first(found: list[Bent]) -> list[Bent]:
 
 
 def _twins(a: Bent, b: Bent) -> bool:
-    return a.orientation is b.orientation and apart(a.ring, b.ring) <= TWIN_DISTANCE
+    return a.orientation is b.orientation and apart(a.tile.ring, b.tile.ring) <= TWIN_DISTANCE
 
 
 class _Lot(NamedTuple):
@@ -280,11 +277,10 @@ def _carved(kind: IsohedralClass, bent: Bent, min_neck: float, race: Race) -> Be
     """Carve a tile, with room between its parts if it needs that; return it as it is if no better."""
     body, space = bent.orientation.fine, TileSpace(kind, bent.placement)
     placement = bent.placement._replace(turns=space.turns)
-    uncarved = Carved(bent.ring, np.arange(body.size), bent.corners, bent.linear, bent.offset)
     tried = [bent]
     for room in (0.0,) * (bent.factor > 0) + (max(MIN_CARVED_GAP, 1.2 * min_neck),):
         try:  # what lacks room costs more, and is in no race
-            (tile,) = carved(body, space, [uncarved], room=room, race=None if room else race)
+            (tile,) = carved(body, space, [bent.tile], room=room, race=None if room else race)
         except BehindError:
             break
         points = following(body, tile.outline, bent.points)[:, None]
@@ -314,11 +310,8 @@ def _bent(
     return Bent(
         side,
         body,
-        tile.ring,
+        tile,
         points[:, 0],
-        tile.corners,
-        tile.linear,
-        tile.offset,
         placement,
         kept_of(body.measures, outline[:, 0], 0.0),
         neck_factor(neck_up_to(polygon, min_neck), min_neck) if simple else 0.0,
@@ -441,7 +434,7 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
     """Lay a bent tile over its silhouette by the similarity of largest IoU, found by L-BFGS."""
     rest, points = bent.orientation.fine.rest, bent.points
     center = points.mean()
-    ring = bent.ring - center
+    ring = bent.tile.ring - center
     factor, middle, _ = best_overlay(
         ring, overlap, complex(best_similarity(points, rest)), rest.mean()
     )
@@ -455,9 +448,9 @@ def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:
     order = (np.arange(n) + bent.placement.starts[0]) % n
     turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
     tiles = NearestTiles(
-        (factor * bent.ring + shift)[order][None],
-        (turn @ bent.linear)[None],
-        (turn @ bent.offset + [shift.real, shift.imag])[None],
+        (factor * bent.tile.ring + shift)[order][None],
+        (turn @ bent.tile.linear)[None],
+        (turn @ bent.tile.offset + [shift.real, shift.imag])[None],
         np.cumsum(bent.placement.lengths, axis=1) - bent.placement.lengths,
         np.zeros(1),
     )

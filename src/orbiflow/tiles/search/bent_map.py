@@ -53,7 +53,7 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     own = np.interp(passed, places, np.arange(n + 1))
     mesh, images = divided(side.fine.mesh, _unknown(side.fine.mesh, own), plane_points(z))
     mesh, images = onto_polygon(
-        mesh, images, tile.polygon * flip, bent.corners, np.array(tile.corners)
+        mesh, images, tile.polygon * flip, bent.tile.corners, np.array(tile.corners)
     )
     outline = points_along(
         side.outline, along[0] + np.interp(shares(mesh), np.arange(n + 1), places)

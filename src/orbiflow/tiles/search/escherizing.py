@@ -16,7 +16,7 @@ import scipy
 import shapely
 
 from orbiflow import __version__
-from orbiflow.errors import CertificationError, OrbiflowError, SettingError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     NEVER,
     Cancel,
@@ -26,21 +26,20 @@ from orbiflow.runtime import (
     ignore,
     one_blas_thread,
     one_thread,
-    process_context,
-    work,
 )
-from orbiflow.settings import as_instance, described, is_a
+from orbiflow.settings import as_instance
 from orbiflow.tiles.likeness import NearSymmetry, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.candidates import ClassFinalists, OnProgress, silent
+from orbiflow.tiles.search.class_search import ClassSearch, ClassTask
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
-from orbiflow.tiles.search.finished_tiles import ClassFailure, best_tiles, rated
+from orbiflow.tiles.search.finished_tiles import ClassFailure, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.pair_record import PairRecord
 from orbiflow.tiles.search.pair_search import PairSearch
-from orbiflow.tiles.search.search_method import SYMMETRIC_CLASSES, Goal, SearchMethod, Sketches
-from orbiflow.tiles.search.search_record import OnTile, Outcome, Record, without_twins
-from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Emphasis, Pins, Target
+from orbiflow.tiles.search.search_method import SYMMETRIC_CLASSES, Goal, SearchMethod
+from orbiflow.tiles.search.search_record import OnTile, Outcome, Record
+from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
 
@@ -133,44 +132,46 @@ def escherize(
         settings.check_single()
     goal = settings.goal(target)
     goal = replace(goal, emphasis=emphasis or goal.emphasis, pins=pins or goal.pins)
-    if second is not None or settings.background:
+    other, near = settings.second_goal(second) if second else None, None
+    if settings.background:
+        if second is not None:
+            raise SettingError("{background} takes the place of a second silhouette; leave one out")
+        other = Goal.background()
+    if other is not None:
         if method is not None:
             raise OrbiflowError(
                 "a method of one's own searches for one silhouette; leave out second"
             )
-        if second is not None and settings.background:
-            raise SettingError("{background} takes the place of a second silhouette; leave one out")
-        other = Goal.background() if second is None else settings.second_goal(second)
-        search = settings.pair_search
-        record = PairRecord((goal, other), search, on_tile, on_event)
-        found = record.search(on_checked, cancel)
-        seconds, known = time.perf_counter() - begin, (search, goal.emphasis, goal.pins)
-        workers, left = search.workers, found.interrupted
-        return SearchResult(
-            target, found.tiles, found.failures, *known, seconds, workers, left, second=other
-        )
-    emphasis, pins = goal.emphasis, goal.pins
-    method = method or settings.search_method
-    task = _task(goal, method, settings.per_class, settings.force)
-    near = _near_symmetry(target) if method.takes_symmetric else None
-    names = _class_names(settings.classes, near)
-    notes = list(goal.notes)
-    if near is not None and near.stabiliser in SYMMETRIC_CLASSES:
-        notes.append(_symmetry_note(near, names))
-    workers = min(settings.workers or 1, len(names))
-    shown = None if on_tile is None else _rating(on_tile, target)
-    record = Record(names, on_event, shown, most=settings.per_class)
+        search = PairRecord((goal, other), settings.pair_search, on_tile, on_event)
+    else:
+        method = method or settings.search_method
+        task = ClassTask(goal, method, settings.per_class, settings.force)
+        near = _near_symmetry(target) if method.takes_symmetric else None
+        names = _class_names(settings.classes, near)
+        shown = None if on_tile is None else _rating(on_tile, target)
+        record = Record(names, on_event, shown, most=settings.per_class)
+        notes = goal.notes + _symmetry_notes(near, names)
+        search = ClassSearch(task, settings.workers or 1, notes, record)
     with contextlib.suppress(Cancelled):
-        _look_first(task, names, record, cancel)
+        search.look_first(cancel)
         if on_checked is not None:
             on_checked()
-        for note in notes:
+        for note in search.notes:
             on_event(Note(note))
-        _search_by_levels(task, names, workers, record, cancel)
-    tiles, failures, left = record.finish()
-    seconds = time.perf_counter() - begin
+        search.search(cancel)
+    tiles, failures, left = search.finish()
     return SearchResult(
-        target, tiles, failures, method, emphasis, pins, seconds, workers, left, near
+        target,
+        tiles,
+        failures,
+        search.method,
+        goal.emphasis,
+        goal.pins,
+        time.perf_counter() - begin,
+        search.workers,
+        left,
+        near,
+        other,
     )
 
 
@@ -200,15 +201,26 @@ def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> li
     return list(dict.fromkeys(found))
 
 
-def _symmetry_note(near: NearSymmetry, names: Sequence[str]) -> str:
+def _symmetry_notes(near: NearSymmetry | None, names: Sequence[str]) -> list[str]:
     """Return a note on a silhouette near to symmetric, and which of its classes are searched."""
+    if near is None or near.stabiliser not in SYMMETRIC_CLASSES:
+        return []
     what = "its mirror image" if near.stabiliser == "D1" else "itself turned by 180 degrees"
-    own = [name for name in SYMMETRIC_CLASSES[near.stabiliser] if name in names]
-    searched = f"{', '.join(own)} with exactly symmetric tiles" if own else "no class of such tiles"
-    return (
-        f"the silhouette is much like {what} (likeness {max(near):.2f}): {searched} "
-        f"{'are' if len(own) > 1 else 'is'} searched"
+    classes = [name for name in SYMMETRIC_CLASSES[near.stabiliser] if name in names]
+    searched = (
+        f"{', '.join(classes)} with exactly symmetric tiles"
+        if classes
+        else "no class of such tiles"
     )
+    return [
+        f"the silhouette is much like {what} (likeness {max(near):.2f}): {searched} "
+        f"{'are' if len(classes) > 1 else 'is'} searched"
+    ]
+
+
+def _rating(on_tile: OnTile, target: Target) -> OnTile:
+    """Return a function that gives a tile its stars before it is shown."""
+    return lambda tile, stage: on_tile(rated([tile], target)[0], stage)
 
 
 def escherize_class(
@@ -228,8 +240,8 @@ def escherize_class(
     Raises:
         Cancelled: If the token was cancelled.
     """
-    task = _task(Goal(target), method, per_class, force)
-    return _outcome(task, isohedral_class(kind), progress, cancel)
+    task = ClassTask(Goal(target), method, per_class, force)
+    return task.outcome(isohedral_class(kind), progress, cancel)
 
 
 def fit_tile(
@@ -261,154 +273,9 @@ def fit_tile(
     >>> best.name, best.certificate.valid
     ('IH4', True)
     """
-    task = _task(Goal(target, emphasis, pins), method or LikenessSearch.for_effort("normal"))
+    task = ClassTask(Goal(target, emphasis, pins), method or LikenessSearch.for_effort("normal"))
     with one_thread(), one_blas_thread():
         return task.method.fit(task.goal, isohedral_class(kind), per_class, progress, cancel)
-
-
-@dataclass(frozen=True, eq=False)
-class _Task:
-    """What is to be done for each class."""
-
-    goal: Goal
-    method: SearchMethod
-    per_class: int
-    force: bool
-
-
-def _task(goal: Goal, method: SearchMethod, per_class: int = 1, force: bool = False) -> _Task:
-    """Return the task, checked, with what its method needs imported."""
-    as_instance(goal.target, Target, "the target", HOW_TO_GET_A_TARGET)
-    if not is_a(method, SearchMethod):
-        raise OrbiflowError(
-            f"the method must be a search such as LikenessSearch(), got {described(method)}; for a "
-            'level of effort: LikenessSearch.for_effort("fast")'
-        )
-    if goal.pins is not None:
-        as_instance(goal.pins, Pins, "pins", "Pins.read and Pins.at make one")
-        if not method.takes_pins:
-            raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
-    return _Task(goal, method, per_class, force)
-
-
-def _rating(on_tile: OnTile, target: Target) -> OnTile:
-    """Return a function that gives a tile its stars before it is shown."""
-    return lambda tile, stage: on_tile(rated([tile], target)[0], stage)
-
-
-SKETCHING = 0.1  # the share of the work that first looks are, if somebody watches
-
-
-def _look_first(task: _Task, names: Sequence[str], record: Record, cancel: Cancel) -> None:
-    """Show a certified tile of one of the classes in a moment, if the method can."""
-    record.next_level("sketch", SKETCHING * (record.on_tile is not None))
-    with one_thread(), one_blas_thread():
-        first = task.method.preview(task.goal, names, cancel)
-    if first is not None:
-        record.first_look(first)
-
-
-def _search_by_levels(
-    task: _Task, names: Sequence[str], workers: int, record: Record, cancel: Cancel
-) -> None:
-    """Do the task for each class, one level of effort after another, each for the promising ones."""
-    # asked before torch is limited here: a limit makes no fork safe
-    preload = ("orbiflow.tiles.search.escherizing", type(task.method).__module__)
-    context = process_context(preload) if workers > 1 else None
-
-    def search(names: Sequence[str], method: SearchMethod, per_class: int) -> None:
-        own = replace(task, method=method, per_class=per_class)
-        if context is not None and len(names) > 1:
-            _search_in_processes(own, names, workers, context, record, cancel)
-            return
-        for name in names:
-            cancel.check()
-            progress = functools.partial(record.progress, name)
-            record.level_outcome(_outcome(own, isohedral_class(name), progress, cancel))
-
-    method, rest = task.method, 1.0
-    if record.on_tile is not None:
-        rest -= SKETCHING
-        search([name for name in names if name not in record.looks], Sketches(method), 1)
-    levels = method.levels()
-    for share, own in levels:
-        is_last = own is levels[-1][1]
-        record.next_level("final" if is_last else "better", share * rest)
-        search(names, own, task.per_class)
-        if not is_last:
-            names = record.settled(names, method.is_promising)
-
-
-def _search_in_processes(
-    task: _Task, names: Sequence[str], workers: int, context: Any, record: Record, cancel: Cancel
-) -> None:
-    cancel.check()
-    if context.get_start_method() == "fork":
-        with one_thread(), one_blas_thread():
-            task.method.prepare(task.goal)  # once, for all workers
-    order = task.method.in_order(names)
-    function = functools.partial(_work_on, task)
-    with contextlib.closing(work(function, order, workers, context=context, cancel=cancel)) as news:
-        for one in news:
-            if one.done:
-                record.level_outcome(one.value)
-            else:
-                record.progress(order[one.index], *one.value)
-
-
-def _work_on(
-    task: _Task, name: str, tell: Callable[[tuple[float, float]], None], cancel: Cancel
-) -> Outcome:
-    """Do the task for a class in a worker process."""
-    return _outcome(task, isohedral_class(name), lambda share, loss: tell((share, loss)), cancel)
-
-
-def _outcome(task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Cancel) -> Outcome:
-    """Return the best certified tile of a class, which holds the others, or why there is none."""
-    begin = time.perf_counter()
-    try:
-        chosen = _chosen_tiles(task, kind, progress, cancel)
-    except CertificationError as error:
-        return ClassFailure(kind.name, str(error))
-    seconds = time.perf_counter() - begin
-    best, *others = (tile.changed(search=replace(tile.search, seconds=seconds)) for tile in chosen)
-    return best.changed(others=tuple(others))
-
-
-def _chosen_tiles(
-    task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Cancel
-) -> list[EscherTile]:
-    """Return the tiles of a class that are shown, best first, no two of them alike.
-
-    They are those of the first goal that has some.
-
-    Raises:
-        CertificationError: If none has, with the first one's reason.
-    """
-    method, count = task.method, task.per_class
-
-    def found(goal: Goal, share: float) -> list[EscherTile]:
-        fit = method.fit(goal, kind, count, progress, cancel)
-        tiles = best_tiles(
-            goal.target,
-            fit,
-            force=task.force,
-            min_neck=method.least_neck(goal),
-            original=task.goal.target,
-            smoothed=share,
-        )
-        cancel.check()
-        return [tiles[k] for k in without_twins(tiles, count)]
-
-    # many small systems: several threads would wait for each other, ten times as long as they work
-    with one_thread(), one_blas_thread():
-        reasons: list[CertificationError] = []
-        for share, own in method.goals(task.goal):
-            try:
-                return found(own, share)
-            except CertificationError as error:
-                reasons.append(error)
-        raise reasons[0]
 
 
 def _second_report(goal: Goal) -> dict[str, Any] | None:

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Complex, Integers
 from orbiflow.tiles.geometry import plane_points
 from orbiflow.tiles.search.bending import unlike
-from orbiflow.tiles.search.pair_body import Glue
+from orbiflow.tiles.search.glued_body import Glue
 from orbiflow.tiles.search.tile_orbits import relations_of
-from orbiflow.tiles.search.tile_space import edge_lengths
+from orbiflow.tiles.search.tile_space import Placements, edge_lengths
 from orbiflow.tiles.tilings import IsohedralClass
 
 # What a pair of steps is taken to lose on the rest of the outline, in mean squared steps: longer paths
@@ -53,9 +53,7 @@ class Placement(NamedTuple):
     residual: float  # in mean squared steps
     glue: Glue
     kind: IsohedralClass
-    lengths: Integers  # (K,) as of `Placements`, with the next two
-    start: int
-    turn: float
+    corners: Placements  # one
 
 
 def _steps(outline: Complex) -> Complex:
@@ -261,9 +259,7 @@ def placements(
             row, start = divmod(at, len(steps))
             turn = 0.0 if glides is None else float(np.angle(glides[row, start]) / 2)
             residual = float(glued.missed + (whole - 2 * float(flat[at])) / unit)
-            found.append(
-                Placement(
-                    residual, glued.glue, kind, _complete(kind, tables, row, start), start, turn
-                )
-            )
+            lengths = _complete(kind, tables, row, start)[None]
+            known = (np.array([number]) for number in (start, turn, -residual))
+            found.append(Placement(residual, glued.glue, kind, Placements(lengths, *known)))
     return sorted(found, key=lambda own: own.residual)[:count]

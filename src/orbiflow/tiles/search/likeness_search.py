@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
@@ -52,6 +52,17 @@ def rounded_off(target: Target, share: float) -> Target:
         return target.smoothed(share)
     except OrbiflowError:  # nothing would be left
         return target
+
+
+def rounded_goals(goals: Sequence[Goal]) -> Iterator[tuple[float, list[Goal]]]:
+    """Yield silhouettes and, without emphasis and pins, them with ever more rounded off.
+
+    Each comes after the share of their lengths below which parts are rounded off.
+    """
+    yield 0.0, list(goals)
+    if all(goal.emphasis is None and goal.pins is None for goal in goals):
+        for share in ROUNDED_SHARES:
+            yield share, [replace(goal, target=rounded_off(goal.target, share)) for goal in goals]
 
 
 class LikenessSearch(Settings, SearchMethod):
@@ -120,10 +131,7 @@ class LikenessSearch(Settings, SearchMethod):
 
     def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
         """Return the silhouette and, without emphasis and pins, it with thin parts rounded off."""
-        if goal.emphasis is not None or goal.pins is not None:
-            return [(0.0, goal)]
-        rounded = [(share, Goal(rounded_off(goal.target, share))) for share in ROUNDED_SHARES]
-        return [(0.0, goal), *rounded]
+        return [(share, rounded) for share, (rounded,) in rounded_goals([goal])]
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image, as the first phase has them."""

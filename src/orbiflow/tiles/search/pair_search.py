@@ -9,28 +9,17 @@ from itertools import product
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-import shapely
 
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import NEVER, Cancel, Sink, Team, ignore
 from orbiflow.settings import Count, Range, Seed, Settings, as_choice
-from orbiflow.tiles.geometry import plane_points
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.bending import unlike
+from orbiflow.tiles.search.glued_body import MULTIPLES, Couple, Stiff, glued_body
 from orbiflow.tiles.search.gluing import Placement, glues, placements
-from orbiflow.tiles.search.pair_bending import (
-    MULTIPLES,
-    BentPair,
-    Figures,
-    Stiff,
-    bent,
-    finer,
-    glued_body,
-    moved,
-)
-from orbiflow.tiles.search.pair_carving import CarvedPair, carved_pair, finer_slides
+from orbiflow.tiles.search.pairs import BentPair, bent, carved_pair, finer, moved
 from orbiflow.tiles.search.search_method import Goal
-from orbiflow.tiles.tilings import CLASSES, IsohedralClass, certify, isohedral_class
+from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
 
 FIRST_STEPS, LAST_STEPS = 25, 60  # of carving, with half of the points and with all
 PINNED_STIFFNESS = 30.0  # how much stiffer than the rest are parts that a user pins
@@ -46,7 +35,7 @@ LOOK: dict[str, Any] = {
     "starts": 12,
     "carved": 6,
 }
-PairSink = Callable[[str, list[CarvedPair]], object]
+PairSink = Callable[[str, list[BentPair]], object]
 """Is called with each stage's name and its certified pairs, best first."""
 
 
@@ -122,7 +111,7 @@ class PairSearch(Settings):
             )
         return kinds
 
-    def figures(self, goals: Sequence[Goal]) -> list[Figures]:
+    def couples(self, goals: Sequence[Goal]) -> list[Couple]:
         """Return both silhouettes at all sizes, the second one as it is and mirrored."""
         one, two = (np.asarray(goal.target.normal) for goal in goals)
         first = float(np.random.default_rng(self.seed).random()) if self.seed else 0.0
@@ -138,12 +127,12 @@ class PairSearch(Settings):
         for more in MORE_POINTS:
             count = round(more * self.points)
             found = [
-                Figures.of(one, two, ratio=float(ratio), mirrored=hand, count=count, **known)
+                Couple.of(one, two, ratio=float(ratio), mirrored=hand, count=count, **known)
                 for ratio, hand in product(ratios, hands)
             ]
             with contextlib.suppress(OrbiflowError):
                 for own, level in product(found, (0, 1, 2)):
-                    own.parts(level)
+                    own.bodies(level)
                 return found
         raise SettingError(
             "parts of a silhouette are too thin to be followed: draw them thicker, or round them off "
@@ -173,11 +162,11 @@ def _stiff_where_pinned(goal: Goal, points: np.ndarray) -> np.ndarray:
 
 def first_pair(
     goals: Sequence[Goal], settings: PairSearch, cancel: Cancel = NEVER
-) -> list[CarvedPair]:
+) -> list[BentPair]:
     """Return certified pairs of two silhouettes in some seconds, best first, if there are any."""
     few = settings.replace(**LOOK)
     return _certified(
-        _rough(few, few.figures(goals), Team(__name__, few.workers, ignore, cancel))[1]
+        _rough(few, few.couples(goals), Team(__name__, few.workers, ignore, cancel))[1]
     )
 
 
@@ -188,7 +177,7 @@ def search_pair(
     on_pairs: PairSink = lambda _stage, _pairs: None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
-) -> list[CarvedPair]:
+) -> list[BentPair]:
     """Search for tilings of two silhouettes, of which the second may be mirrored.
 
     What is returned is certified, and comes by the score of the worse figure, best first. The figures
@@ -207,35 +196,28 @@ def search_pair(
     """
     own = settings or PairSearch()
     team = Team(__name__, own.workers, on_event, cancel)
-    starts, carved = _rough(own, own.figures(goals), team)
+    starts, carved = _rough(own, own.couples(goals), team)
     on_pairs("better", _certified(_ranked(carved)[: own.finalists]))
     before = dict(zip(map(id, carved), starts, strict=True))
-    ranked = unlike(_ranked(carved), own.ranked, CarvedPair.is_twin)
+    ranked = unlike(_ranked(carved), own.ranked, BentPair.is_twin)
     nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "moving corners", 0.9)
-    last = unlike(_ranked([*ranked, *nearby]), own.finalists, CarvedPair.is_twin)
+    last = unlike(_ranked([*ranked, *nearby]), own.finalists, BentPair.is_twin)
     done = team.each(_detailed, last, "carving with all detail", 1.0)
-    return _whole(_ranked(done)) if own.force else _certified(done)
+    return [pair for pair in _ranked(done) if (own.force and pair.is_whole) or pair.certified]
 
 
-def _whole(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
-    """Return pairs of which no figure crosses itself, though they may overlap each other's copies."""
-    rings = [[plane_points(ring) for ring in (*p.body.rings(p.points), *p.outlines)] for p in pairs]
-    kept = (bool(np.all(shapely.is_valid(list(map(shapely.Polygon, own))))) for own in rings)
-    return [pair for pair, is_kept in zip(pairs, kept, strict=True) if is_kept]
-
-
-def _certified(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
-    return [pair for pair in _ranked(pairs) if pair.sound and certify(pair.tiling).valid]
+def _certified(pairs: Sequence[BentPair]) -> list[BentPair]:
+    return [pair for pair in _ranked(pairs) if pair.certified]
 
 
 def _rough(
-    settings: PairSearch, figures: Sequence[Figures], team: Team
-) -> tuple[list[BentPair], list[CarvedPair]]:
+    settings: PairSearch, couples: Sequence[Couple], team: Team
+) -> tuple[list[BentPair], list[BentPair]]:
     """Return pairs with half of the points, before they are carved and after it."""
-    found = team.each(partial(_placed, settings), figures, "gluing", 0.3)
+    found = team.each(partial(_placed, settings), couples, "gluing", 0.3)
     kept = sorted(placement.residual for placed in found for placement in placed)[: settings.placed]
     best = [[p for p in placed if p.residual <= kept[-1]] for placed in found]
-    jobs = list(zip(figures, best, strict=True))
+    jobs = list(zip(couples, best, strict=True))
     bending = team.each(partial(_bent, settings), jobs, "bending", 0.5)
     pairs = [pair for some in bending for pair in some]
     pairs.sort(key=lambda pair: pair.cost)
@@ -247,30 +229,30 @@ def _rough(
     return starts, team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
 
 
-def _placed(settings: PairSearch, figures: Figures) -> list[Placement]:
+def _placed(settings: PairSearch, couple: Couple) -> list[Placement]:
     """Return placements of the best glues."""
-    one, two = (part.rest[: part.size] for part in figures.parts(0))
+    one, two = (part.rest[: part.size] for part in couple.bodies(0))
     steps = np.concatenate([np.roll(own, -1) - own for own in (one, two)])
     unit = float((abs(steps) ** 2).mean())
     found: list[Placement] = []
     for own in glues(one, two, settings.glues):
-        body = glued_body(figures, 0, own.glue)
+        body = glued_body(couple, 0, own.glue)
         found += placements(body.rest[: body.size], own, settings.kinds, unit, settings.per_glue)
     return found
 
 
-def _bent(settings: PairSearch, job: tuple[Figures, list[Placement]]) -> list[BentPair]:
+def _bent(settings: PairSearch, job: tuple[Couple, list[Placement]]) -> list[BentPair]:
     return bent(*job, settings.held)
 
 
-def _moved(pair: BentPair) -> CarvedPair:
+def _moved(pair: BentPair) -> BentPair:
     return carved_pair(moved(pair), FIRST_STEPS)
 
 
-def _detailed(pair: CarvedPair) -> CarvedPair:
-    return carved_pair(finer_slides(pair, finer(pair, 2, rounds=0)), LAST_STEPS)
+def _detailed(pair: BentPair) -> BentPair:
+    return carved_pair(finer(pair, 2, rounds=0), LAST_STEPS)
 
 
-def _ranked(pairs: Sequence[CarvedPair]) -> list[CarvedPair]:
+def _ranked(pairs: Sequence[BentPair]) -> list[BentPair]:
     """Return pairs by the worse of their scores, then by the better."""
     return sorted(pairs, key=lambda own: own.scores, reverse=True)

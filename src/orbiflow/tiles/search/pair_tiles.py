@@ -12,10 +12,10 @@ from orbiflow.arrays import Integers
 from orbiflow.tiles.geometry import Place, plane_points, reverse
 from orbiflow.tiles.likeness import Elastic, Overlap, Stiffness, kept_of
 from orbiflow.tiles.search.bending import Bent, PlacedBent, placed_best
-from orbiflow.tiles.search.carving import Laid, cornered
+from orbiflow.tiles.search.carving import Carved, cornered
 from orbiflow.tiles.search.co_deformation import Orientation, following
 from orbiflow.tiles.search.finished_tiles import measured_tile, with_bent
-from orbiflow.tiles.search.pair_carving import CarvedPair
+from orbiflow.tiles.search.pairs import BentPair
 from orbiflow.tiles.silhouette import Samples, Target
 from orbiflow.tiles.tile import NO_MAP, EscherTile, Part
 from orbiflow.tiles.tile_map import TileMap
@@ -26,7 +26,7 @@ FLIP = np.array([1.0, -1.0])
 
 def finished_pair(
     targets: Sequence[Target],
-    pair: CarvedPair,
+    pair: BentPair,
     originals: Sequence[Target] | None = None,
     smoothed: float = 0.0,
 ) -> EscherTile:
@@ -43,14 +43,14 @@ def finished_pair(
     whole = frames[0].after(ways[0])
     parts: list[Part] = []
     for k, (target, own, original) in enumerate(zip(targets, placed, originals, strict=True)):
-        polygon = plane_points(pair.body.rings(pair.points)[k])
-        if k == 1 and pair.figures.background:
+        polygon = pair.polygons[k]
+        if k == 1 and pair.couple.background:
             left = Tile(whole(polygon), parts[0].figure.tile.group)
             parts.append(Part.background(left, y_down=targets[0].y_down))
             break
         tile = Tile(polygon, pair.tiling.group, corners=tuple(_corners(pair, k).tolist()))
         figure = measured_tile(target, tile.transformed(*ways[k]), TileMap(), original)
-        known = replace(figure.likeness, smoothed=smoothed, min_neck=pair.figures.min_neck)
+        known = replace(figure.likeness, smoothed=smoothed, min_neck=pair.couple.min_neck)
         figure = with_bent(target, figure.changed(likeness=known), own, original)
         figure = figure.changed(name=PurePath(original.source).stem)
         parts.append(Part(figure, whole.after(frames[k].after(ways[k]).inverse)))
@@ -65,7 +65,7 @@ def finished_pair(
     )
 
 
-def _union(pair: CarvedPair) -> Tile:
+def _union(pair: BentPair) -> Tile:
     """Return both figures together as a tile of the pair's class, in the pair's own coordinates."""
     lengths, start = pair.placement.lengths[0], int(pair.placement.starts[0])
     ring = np.roll(plane_points(pair.points[: pair.body.size]), -start, axis=0)
@@ -73,18 +73,18 @@ def _union(pair: CarvedPair) -> Tile:
     return Tile(ring, pair.tiling.group, pair.kind.name, tuple(corners.tolist()))
 
 
-def _place(placed: PlacedBent, pair: CarvedPair, k: int) -> Place:
+def _place(placed: PlacedBent, pair: BentPair, k: int) -> Place:
     """Return the map from the pair's coordinates to the normal form of a silhouette."""
-    a, b = placed.factor / pair.figures.sizes[k], placed.shift
+    a, b = placed.factor / pair.couple.sizes[k], placed.shift
     place = Place(np.array([[a.real, -a.imag], [a.imag, a.real]]), np.array([b.real, b.imag]))
     if placed.bent.orientation.mirrored:
         place = Place(np.diag(FLIP), np.zeros(2)).after(place)
     return place
 
 
-def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
+def _placed(target: Target, pair: BentPair, k: int) -> PlacedBent:
     """Return a figure of a pair as a bent silhouette that is a tile, over its silhouette."""
-    mirrored, scale = bool(k) and pair.figures.mirrored, pair.figures.sizes[k]
+    mirrored, scale = bool(k) and pair.couple.mirrored, pair.couple.sizes[k]
     part, places = pair.body.figures[k], pair.body.places[k]
     normal = np.asarray(target.normal)
     ring = part.mesh.points[: part.size] / scale
@@ -96,25 +96,19 @@ def _placed(target: Target, pair: CarvedPair, k: int) -> PlacedBent:
         lambda _level, _stiffness: body,
         plain=True,
     )
-    along, corners = cornered(pair.tiles[k].places, _corners(pair, k))
-    vertices = pair.points[places] / scale
-    outline = Laid.straight(along).points(vertices[: part.size])
-    bent = Bent(
-        side,
-        body,
-        vertices[: part.size],
-        following(body, outline, vertices),
-        corners,
-        pair.tiles[k].linear / scale,
-        pair.tiles[k].offset / scale,
-        pair.placement,
-        kept_of(body.measures, outline, 0.0),
-        pair.factor,
+    carved = pair.tiles[k]
+    along, corners = cornered(carved.places, _corners(pair, k))
+    vertices, group = pair.points[places] / scale, (carved.linear / scale, carved.offset / scale)
+    tile = Carved(vertices[: part.size], along, corners, *group)
+    points, kept = (
+        following(body, tile.outline, vertices),
+        kept_of(body.measures, tile.outline, 0.0),
     )
+    bent = Bent(side, body, tile, points, pair.placement, kept, pair.factor)
     return placed_best(bent, Overlap(normal * FLIP if mirrored else normal))
 
 
-def _corners(pair: CarvedPair, k: int) -> Integers:
+def _corners(pair: BentPair, k: int) -> Integers:
     """Return which vertices of a figure are corners of the union or ends of the path."""
     ring = pair.body.places[k][: pair.body.figures[k].size]
     lengths, start = pair.placement.lengths[0], pair.placement.starts[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,28 @@ STAGE_WORDS = {
     "final": "finishing the tiles",
 }
 """What is being done in each stage, for who watches."""
+
+
+class Found(NamedTuple):
+    """What a search has found."""
+
+    tiles: Sequence[EscherTile]  # best first
+    failures: Sequence[ClassFailure]
+    interrupted: frozenset[str]  # the classes that were not finished
+
+
+def outcome_event(found: Outcome) -> TileFound | ClassFailed:
+    """Return the event that tells of an outcome."""
+    if isinstance(found, ClassFailure):
+        return ClassFailed(found.name, found.reason)
+    iou, certified = found.worst.likeness.metrics.iou, found.certificate.valid
+    return TileFound(found.isohedral_class, iou, found.score, certified)
+
+
+def preview_event(tile: EscherTile, begin: float) -> Preview:
+    """Return the event that tells of a first look, in a search that began at a time."""
+    iou = tile.worst.likeness.metrics.iou
+    return Preview(tile.isohedral_class, iou, time.perf_counter() - begin)
 
 
 class Record:
@@ -57,8 +80,7 @@ class Record:
     def first_look(self, tile: EscherTile) -> None:
         """Keep a tile that the search is going to improve on."""
         self.looks[tile.name] = tile
-        seconds = time.perf_counter() - self.begin
-        self.on_event(Preview(tile.name, tile.likeness.metrics.iou, seconds))
+        self.on_event(preview_event(tile, self.begin))
         if self.on_tile is not None:
             self.level_outcome(tile)
 
@@ -114,17 +136,10 @@ class Record:
         """Keep what a class gave, and report it."""
         self.outcomes[found.name] = found
         self.progress(found.name, share)
-        if isinstance(found, ClassFailure):
-            self.on_event(ClassFailed(found.name, found.reason))
-        else:
-            iou, certified = found.likeness.metrics.iou, found.certificate.valid
-            self.on_event(TileFound(found.name, iou, found.score, certified))
+        self.on_event(outcome_event(found))
 
-    def finish(self) -> tuple[list[EscherTile], list[ClassFailure], frozenset[str]]:
-        """Return tiles, best first; failures; who is left.
-
-        Of a class that is left, a first look is its tile.
-        """
+    def finish(self) -> Found:
+        """Return what was found: of a class that was not finished, a first look is its tile."""
         names = list(self.shares)
         left = [name for name in names if name not in self.outcomes]
         for name in left:
@@ -136,7 +151,7 @@ class Record:
         tiles = [tile for first in best for tile in first.family()]
         tiles.sort(key=lambda tile: (-tile.score, names.index(tile.name)))
         failures = [found for found in outcomes if isinstance(found, ClassFailure)]
-        return tiles, failures, frozenset(left)
+        return Found(tiles, failures, frozenset(left))
 
 
 def best_of(earlier: Outcome | None, later: Outcome, count: int) -> Outcome:

@@ -44,6 +44,11 @@ class Placements(NamedTuple):
         """Return those at `index`."""
         return self._make(part[index] for part in self)
 
+    @classmethod
+    def joined(cls, several: Sequence[Placements]) -> Placements:
+        """Return all of them in one."""
+        return cls(*map(np.concatenate, zip(*several, strict=True)))
+
 
 def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placements:
     """Return the `keep` placements of largest gain; of those that differ by a relabelling, one.

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
@@ -213,6 +214,9 @@ class IsohedralClass:
 
     name: str
     row: TypeRow
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
+        return isohedral_class, (self.name,)  # there is one of each in a process
 
     @property
     def group_name(self) -> str:
