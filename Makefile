@@ -6,14 +6,18 @@ export DENO_DIR := $(VENV)/deno
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .PHONY: demo test test-tiles test-density test-solids test-studio test-core explore other-processor \
-	lint lint-scripts bench docs gallery paper wheel clean
+	pytest lint style types lint-scripts bench docs gallery paper wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/orbiflow escherize examples/silhouettes/turtle.png --out out/demo
 
-# On two cores: pages and processes wait for each other, so three workers are faster than two. More
-# threads of linear algebra would only be in their way.
-test: lint
+# What takes seconds comes first. On two cores, pages and processes wait for each other, so that three
+# workers are faster than two, and the types are checked in what they leave. More threads of linear
+# algebra would only be in their way.
+test: style
+	$(MAKE) --no-print-directory --jobs types pytest
+
+pytest: $(VENV)/.installed-dev
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal -q
 
 # What a change in one part needs: its tests and examples, with the lint of its part. The core is all
@@ -53,10 +57,15 @@ other-processor: $(VENV)/.installed-dev
 		tests/symmetry tests/fields tests/flows tests/tiles/tilings tests/tiles/geometry \
 		tests/studio/test_shapes.py
 
-lint: $(VENV)/.installed-dev lint-scripts
+lint: style types
+
+style: $(VENV)/.installed-dev lint-scripts
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright --pythonpath $(BIN)/python --threads 2
+
+# One thread: two take more processor time together, which the tests beside them need.
+types: $(VENV)/.installed-dev
+	$(BIN)/pyright --pythonpath $(BIN)/python
 
 lint-scripts: $(VENV)/.installed-dev
 	$(BIN)/deno fmt --check --quiet
