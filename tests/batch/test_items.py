@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.batch import Entry
@@ -83,6 +83,7 @@ entries = st.lists(
 )
 
 
+@settings(max_examples=4)
 @given(entries, st.data())
 def test_a_journal_that_was_cut_short_loses_its_last_entry_at_most(
     tmp_path_factory: pytest.TempPathFactory, added: list[Entry], data: st.DataObject

@@ -36,7 +36,7 @@ def small_fills() -> Iterator[None]:
         patch.setitem(search.EFFORTS, "fast", few)
         patch.setattr(search, "ball_of_cells", _few_cells)
         patch.setattr(run_folder, "SHEET_WIDTH", 480)
-        patch.setattr(run_folder, "FRAMES", 3)
+        patch.setattr(run_folder, "FRAMES", 2)
         yield
 
 

@@ -199,6 +199,6 @@ def test_a_page_has_no_barriers(page: Any) -> None:
 
 
 def test_pages_are_small(tmp_path: Path) -> None:
-    page = stack_page(with_a_ball(bumpy_cell(steps=40)))
+    page = stack_page(with_a_ball(bumpy_cell(steps=20)))
     (tmp_path / "page.html").write_text(page)
-    assert (tmp_path / "page.html").stat().st_size < 2_500_000
+    assert (tmp_path / "page.html").stat().st_size < 700_000

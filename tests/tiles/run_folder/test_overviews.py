@@ -94,8 +94,10 @@ def flowed_fixture(target: Target) -> EscherTile:
 
 
 def test_a_page_names_everything_and_refers_to_what_is_there(
-    target: Target, bent: EscherTile, flowed: EscherTile, tmp_path: Path
+    target: Target, bent: EscherTile, flowed: EscherTile, tmp_path: Path, monkeypatch
 ) -> None:
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
+    monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 4)
     failed = [ClassFailure("IH21", "it <crosses> itself")]
     write_gallery(SearchResult(target, [bent, flowed, bent], failed), tmp_path, figures=True)
     (tmp_path / "result.json").write_text("{}")
