@@ -39,6 +39,8 @@ SETTLED = """() => document.getAnimations().forEach((own) => {
     if (own instanceof CSSTransition) own.finish();
 })"""
 
+VIOLATIONS = """async () => (await axe.run({ resultTypes: ["violations"] })).violations"""
+
 
 def untidy_parts(page: Any, *widths: int) -> list[str]:
     """Return what is beyond the window, cut off, or over another control.
@@ -56,10 +58,12 @@ def untidy_parts(page: Any, *widths: int) -> list[str]:
 
 def serious_issues(page: Any) -> list[str]:
     """Return what axe finds on a page that keeps people out, with the elements."""
-    from axe_playwright_python.sync_playwright import Axe
+    from axe_playwright_python.base import AXE_SCRIPT
 
     page.evaluate(SETTLED)  # a colour on its way to another one has a contrast of its own
-    found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
+    if not page.evaluate("'axe' in window"):
+        page.evaluate(AXE_SCRIPT)
+    found = page.evaluate(VIOLATIONS)
     return [
         f"{issue['id']}: {node['target']} {node['failureSummary']}"
         for issue in found

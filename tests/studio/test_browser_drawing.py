@@ -152,7 +152,7 @@ def test_shape_is_chosen_and_opened(page: Any, studio: RunningStudio) -> None:
     page.get_by_role("button", name="A shape that fits").click()
     page.wait_for_selector(".shapes a")
     assert page.locator(".shapes a").count() == len(CLASSES)
-    serious_issues(page)
+    assert serious_issues(page) == []
     page.get_by_text("All other types").click()
     page.wait_for_selector("[data-shape=IH93]")
     assert page.locator(".shapes a").count() == len(ISOHEDRAL_TYPES)

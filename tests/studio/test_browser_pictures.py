@@ -94,6 +94,7 @@ def test_it_is_there_by_default_and_no_seam_shows(browser, studio, coloured, til
             base_url=studio.address,
             viewport={"width": 900, "height": 800},
             device_scale_factor=ratio,
+            reduced_motion="reduce",
         )
         own = context.new_page()
         close_up(own, coloured, tile, tint=0)

@@ -145,7 +145,7 @@ def test_page_is_moved_far_coloured_anew_and_turned(alone: Any, tmp_path: Path) 
     assert "#ff0000" in drawing(alone)[1]
     alone.click("#again")
     assert drawing(alone)[1] == before[1]
-    serious_issues(alone)
+    assert serious_issues(alone) == []
 
 
 def test_picture_and_eyes_are_in_the_file_and_can_be_hidden(alone: Any, tmp_path: Path) -> None:
