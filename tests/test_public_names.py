@@ -2,8 +2,6 @@
 
 import re
 import runpy
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -48,11 +46,3 @@ def test_pages_import_what_is_public() -> None:
 def test_an_unknown_name_is_refused() -> None:
     with refused("orbiflow", "tessellate", kind=AttributeError):
         _ = orbiflow.tessellate  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def test_importing_loads_no_numerical_library() -> None:
-    script = "import sys, orbiflow; print(sorted({'torch', 'numpy', 'scipy'} & set(sys.modules)))"
-    shown = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert shown.stdout.strip() == "[]"

@@ -12,7 +12,6 @@ from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from refusals import refused
 from strategies import (
     SMALL_SPACE_GROUPS,
-    central_difference,
     groups,
     largest,
     random_field,
@@ -91,27 +90,6 @@ def test_a_batch_has_one_lipschitz_bound_a_field():
         with torch.no_grad():
             single.parameters_.copy_(batch.parameters_[s])
         assert float(single.lipschitz_bound()) == pytest.approx(float(bounds[s]), rel=1e-14)
-
-
-def curl_and_stretch(p):
-    x, y = p[..., 0], p[..., 1]
-    return torch.stack([x.sin() * y, (x * y).cos() + x], dim=-1)
-
-
-@given(seeds)
-def test_the_jacobian_agrees_with_finite_differences(seed):
-    points = random_tensor(seed, 2, 3, 2)
-    slopes = central_difference(curl_and_stretch, points)
-    torch.testing.assert_close(jacobian(curl_and_stretch, points), slopes, rtol=0, atol=1e-9)
-
-
-@given(seeds)
-def test_the_divergence_is_the_trace(seed):
-    points = random_tensor(seed, 5, 2)
-    x, y = points.unbind(-1)
-    torch.testing.assert_close(
-        divergence(curl_and_stretch, points), x.cos() * y - x * (x * y).sin(), rtol=0, atol=1e-12
-    )
 
 
 def test_a_closed_form_is_used_where_there_is_one():

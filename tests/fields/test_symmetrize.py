@@ -62,13 +62,6 @@ def test_the_value_and_slope_do_not_jump_at_the_edge_of_the_cell(order):
     assert float(jump) < 2 * float(within) + 1e-8
 
 
-@pytest.mark.parametrize("shape", [(2,), (0, 2), (3, 4, 2)])
-@pytest.mark.parametrize("periodic", [True, False])
-def test_shapes_of_points_are_kept(shape, periodic):
-    field = symmetrize(torch.sin, wallpaper_group("p3"), periodic=periodic)
-    assert field(torch.zeros(shape, dtype=torch.float64)).shape == shape
-
-
 @settings(max_examples=10)
 @given(groups, seeds, st.booleans())
 def test_the_divergence_is_the_trace_of_the_jacobian(group, seed, closed):

@@ -312,11 +312,3 @@ def test_another_mesh_begins_anew(client: Client) -> None:
     kept = {path.name for path in home(client, own).iterdir()}
     assert kept == {"mesh.obj", "mesh.json", "figure.json", "backdrop.png"}
     assert client.get(f"{own}/mesh").json()["mesh"]["triangles"] == 12
-
-
-def test_a_solid_is_removed(client: Client, search: Search) -> None:
-    own, _ = uploaded(client, obj(BUMPY), "thing.obj")
-    search(own, [solid_of(0.5)])
-    (card,) = client.get(own).json()["tiles"]
-    assert client.delete(f"{own}/tiles/{card['id']}").status_code == 200
-    assert client.get(own).json()["tiles"] == []

@@ -54,14 +54,6 @@ def test_torch_and_numpy_agree(g, seed, kind):
     np.testing.assert_allclose(pushed.numpy(), g.push(p), atol=tolerance)
 
 
-def test_gradients_pass_through_the_action():
-    g = Isometry(np.array([[0.0, -1.0], [1.0, 0.0]]), np.ones(2))
-    p = torch.zeros(2, dtype=torch.float64, requires_grad=True)
-    g(p)[0].backward()
-    assert p.grad is not None
-    assert p.grad.tolist() == [0.0, -1.0]
-
-
 def test_parts_cannot_be_changed_from_outside():
     linear = np.eye(2)
     g = Isometry(linear, np.zeros(2))

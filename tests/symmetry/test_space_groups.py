@@ -29,7 +29,6 @@ from orbiflow.symmetry import (
     translation,
 )
 from orbiflow.symmetry.group import generated
-from orbiflow.symmetry.space_groups import element_counts
 from refusals import refused, warned
 
 SETTINGS = {row.xhm(): row for row in gemmi.spacegroup_table()}
@@ -315,15 +314,6 @@ def test_types_whose_elements_are_alike_are_told_apart(tmp_path, number, other, 
     path.write_text(f"{text}_space_group_IT_number {other}\n")
     with refused("group.cif", other, kind=InputFileError):
         group_from_cif(path)
-
-
-@pytest.mark.parametrize(("number", "other"), ENANTIOMORPHS)
-def test_enantiomorphs_differ_along_any_axes(number, other):
-    own, its = (element_counts(space_group(n)) for n in (number, other))
-    assert own != its
-    for row in SETTINGS.values():
-        if row.number == number:
-            assert element_counts(space_group(f"Hall: {row.hall}")) == own
 
 
 def test_rhombohedral_axes_and_unknown_names_are_named_after_what_was_read(tmp_path):

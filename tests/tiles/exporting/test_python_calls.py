@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from artworks import art_settings, squirrel, write_run
-from orbiflow.errors import CertificationError, InputFileError, OutputError
+from orbiflow.errors import CertificationError, InputFileError
 from orbiflow.tiles import (
     ArtSettings,
     ClassFailure,
@@ -58,16 +58,6 @@ def drawing(tile: Any, out: Path, settings: ArtSettings, **options: Any) -> Path
 
 def sources(folder: Path, found: EscherTile) -> list[Any]:
     return [folder, str(folder), folder / "result.json", read_result(folder), found]
-
-
-def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(tmp_path, found) -> None:
-    target, out = animal("squirrel.dat"), tmp_path / "out"
-    for figures in (True, False):
-        write_folder(SearchResult(target, [found]), out, figures=figures)
-        assert (out / "IH4" / "overlay.pdf").is_file() == figures
-    (out / "notes.txt").write_text("mine")
-    with refused("notes.txt", kind=OutputError):
-        write_folder(SearchResult(target, [found]), out)
 
 
 def test_a_run_without_a_tile_says_why_and_replaces_none(tmp_path: Path, found: EscherTile) -> None:

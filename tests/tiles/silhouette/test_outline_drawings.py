@@ -1,6 +1,5 @@
 """Drawings of an outline are read on the middle of their line; lines around a shape are doubted."""
 
-import io
 from typing import Any
 
 import numpy as np
@@ -162,20 +161,4 @@ def test_a_shape_in_a_round_frame_is_doubted(inside: bool) -> None:
     eye = '<circle cx="40" cy="50" r="4"/>'
     found = doubts(drawing(ring, FILL if inside else eye))
     assert [text for text in found if "inside the hole" in text] == found
-    assert len(found) == inside
-
-
-@pytest.mark.parametrize("inside", [True, False])
-def test_a_shape_in_a_round_frame_of_a_picture_is_doubted(inside: bool) -> None:
-    image = Image.new("L", (300, 300), 255)
-    draw = ImageDraw.Draw(image)
-    draw.ellipse((10, 10, 289, 289), outline=0, width=3)
-    points = [(3 * x, 3 * y) for x, y in SHAPE]
-    if inside:
-        draw.polygon(points, fill=0)
-    else:
-        draw.ellipse((100, 120, 120, 140), fill=0)
-    stream = io.BytesIO()
-    image.save(stream, "PNG")
-    found = doubts(Target.from_bytes(stream.getvalue(), "a.png"))
     assert len(found) == inside

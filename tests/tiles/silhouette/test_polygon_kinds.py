@@ -78,12 +78,6 @@ def test_a_promise_that_is_not_kept_is_refused(n: int, more: int) -> None:
             read(text)
 
 
-def test_a_closed_ring_may_repeat_its_first_vertex() -> None:
-    reading = read("4\n" + points([*SHAPE, SHAPE[0]]))
-    assert reading.outline.tolist() == SHAPE
-    assert reading.notes == ()
-
-
 FOUR = [
     *("x,y", "X;Y", "x\ty", "x y", '"x","y"', "x (mm),y (mm)", "x_coord,y_coord", "lon,lat"),
     *("longitude,latitude", "decimalLongitude,decimalLatitude", "Easting;Northing", "lng,lat"),
@@ -103,12 +97,6 @@ def test_headers_say_which_column_is_which(header: str, is_turned: bool, is_clos
     assert reading.outline.tolist() == SHAPE
     assert not reading.y_down
     assert reading.notes[0].startswith("took ")
-
-
-def test_columns_are_found_among_others() -> None:
-    rows = [[i, y, f"p{i}", x] for i, (x, y) in enumerate(SHAPE)]
-    reading = read("id,lat,name,lon\n" + points(rows, ","), "a.csv")
-    assert reading.outline.tolist() == SHAPE
 
 
 @pytest.mark.parametrize("separator", [";", "\t", " ", "; "])

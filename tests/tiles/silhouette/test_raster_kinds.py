@@ -217,13 +217,6 @@ def test_a_frame_around_a_shape_is_the_shape_and_doubted(tones: tuple[int, int])
     assert "frame" in doubt
 
 
-def test_a_frame_around_nothing_is_the_shape() -> None:
-    pixels = np.full((100, 100), 255, np.uint8)
-    pixels[10:90, 10:90], pixels[12:88, 12:88] = 0, 255
-    reading = read(saved(Image.fromarray(pixels)))
-    assert any("middle of its line" in note for note in reading.notes)
-
-
 @pytest.mark.parametrize("corner", [0, 12])
 def test_a_card_with_a_drawing_on_it_is_the_shape_and_doubted(corner: int) -> None:
     where = Image.new("L", (110, 110))

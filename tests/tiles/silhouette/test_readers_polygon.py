@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
-from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 from orbiflow.errors import InputFileError, OrbiflowError
@@ -62,9 +60,6 @@ def test_json(tmp_path: Path, content: object, y_down: bool, notes: tuple[str, .
         ("[[0, 0], [1, 0], [NaN, 1]]", "vertex 2 .* finite"),
         ("[[0, 0], [1e999, 0], [0, 1]]", "vertex 1 .* finite"),
         ("[[0, 0], [1, 0]]", "at least 3 distinct vertices"),
-        ("[[0, 0], [0, 0], [1, 0], [0, 0]]", "at least 3 distinct vertices"),
-        ("[[0, 0], [1, 1], [2, 2]]", "all lie on one line"),
-        ("[[0, 0], [4, 4], [4, 0], [0, 4]]", r"near \(2, 2\)"),
         ("[[0, 0], [1, 0], [0, 1, 2]]", r"vertex 2 .*\[0, 1, 2\]"),
         ('[[0, 0], [1, 0], ["x", 1]]', "vertex 2"),
         ("[[0, 0], [1, 0], [true, 1]]", "vertex 2"),
@@ -77,9 +72,6 @@ def test_json(tmp_path: Path, content: object, y_down: bool, notes: tuple[str, .
         ("{}", "it has nothing"),
         ('{"polygon": 3}', "must be a list"),
         ('{"polygon": [[0, 0], [1, 0], [0, 1]], "y_down": "yes"}', '"y_down" must be true or'),
-        ('{"type": "MultiPolygon", "coordinates": []}', "GeoJSON of type 'MultiPolygon'"),
-        ('{"type": "Feature", "geometry": null}', "GeoJSON of type 'Feature'"),
-        ('{"type": "Polygon", "coordinates": []}', "no ring"),
         ("[" + "[0,0]," * 100_001 + "[0,1]]", "100002 vertices, at most 100000"),
         (b"[[0, 0], [1, 0], \xff]", "not valid JSON"),
     ],
@@ -133,12 +125,10 @@ def test_bad_dat(tmp_path: Path, content: str | bytes, message: str) -> None:
 @pytest.mark.parametrize(
     ("content", "name", "message"),
     [
-        ("hello there", "a.png", r"is no PNG image, or a damaged one"),
         (b"\x00\x01\x02\x03" * 9, "a.bin", r"holds data of an unknown kind although .* \.bin"),
         ("hello", "noname", "holds text of an unknown kind; give a PNG"),
         (b"", "a.png", "the file is empty"),
         (b"\x1f\x8b\x08\x00rest", "a.svgz", "gzip-compressed"),
-        (b"%PDF-1.7 ...", "a.svg", "a PDF or Illustrator file; .* save it as SVG"),
         ("<html><body/></html>", "a.html", "holds text of an unknown kind"),
     ],
 )
@@ -157,14 +147,6 @@ def test_no_file_to_read(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.png")
     with refused("pipe.png", kind=InputFileError):
         read_outline(tmp_path / "pipe.png")
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
-def test_unreadable_file(tmp_path: Path) -> None:
-    path = write(tmp_path, "[]", "a.json")
-    path.chmod(0)
-    with refused("permissions", kind=InputFileError):
-        read_outline(path)
 
 
 def test_an_unreadable_file_by_its_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,12 +224,6 @@ def test_bytes_and_streams_are_read_as_files_are(name: str) -> None:
     assert others[3].source == str(path)
 
 
-def test_drawings_in_memory() -> None:
-    svg = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0 L9 0 L9 9 L0 9 Z"/></svg>'
-    assert Target.from_bytes(svg).area == pytest.approx(81, rel=5e-3)
-    assert Target.from_bytes(b"4\n0 0\n2 0\n2 2\n0 2\n").kind == "dat"
-
-
 def test_a_mask_is_read_as_its_picture_is() -> None:
     image = drawn()
     levels = np.asarray(image)
@@ -288,19 +264,6 @@ def test_the_settings_are_those_of_images() -> None:
         Target.from_mask(frame, threshold=0.5)
     with refused("threshold", 2):
         Target.from_mask(ramp, threshold=2)
-
-
-@given(st.integers(3, 60), st.integers(3, 60), st.integers(0, 3), st.integers(0, 3))
-def test_the_area_is_that_of_the_marked_pixels(width, height, left, top) -> None:
-    mask = np.zeros((height + top + 4, width + left + 4), bool)
-    mask[top + 2 : top + 2 + height, left + 2 : left + 2 + width] = True
-    if width * height < 40:
-        return
-    target = Target.from_mask(mask)
-    assert target.area == pytest.approx(width * height, rel=0.08)
-    low, high = target.outline.min(axis=0), target.outline.max(axis=0)
-    assert np.allclose(low, [left + 2, top + 2], atol=0.6)
-    assert np.allclose(high, [left + 2 + width, top + 2 + height], atol=0.6)
 
 
 @pytest.mark.parametrize(

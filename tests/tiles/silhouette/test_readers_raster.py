@@ -66,14 +66,6 @@ def test_every_mode_of_png(tmp_path: Path, mode: str) -> None:
     assert reading.outline.max(axis=0) == pytest.approx([80, 90], abs=0.05)
 
 
-def test_palette_with_transparent_colour(tmp_path: Path) -> None:
-    image = draw("P", 1, 0)
-    image.putpalette([255, 255, 255, 255, 255, 255])
-    reading = read_outline(save(tmp_path, image, transparency=0))
-    assert reading.notes[0] == "the shape is what is not transparent (edge at 0.50)"
-    assert iou(reading.outline, SHAPE) > 0.995
-
-
 def test_rounded_corners_cut_nothing_out(tmp_path: Path) -> None:
     """A screenshot's transparent corners once made a rectangle of whatever it showed."""
     image = draw("RGBA", (0, 0, 0, 255), (255, 255, 255, 255))
@@ -95,12 +87,6 @@ def test_other_formats(tmp_path: Path, name: str, mode: str) -> None:
     inks = {"CMYK": ((0, 0, 0, 255), (0, 0, 0, 0)), "RGBA": ((0, 0, 0, 255), (0, 0, 0, 0))}
     image = draw(mode, *inks[mode]) if mode in inks else draw("L").convert(mode)
     assert iou(read_outline(save(tmp_path, image, name)).outline, SHAPE) > 0.97
-
-
-def test_content_decides_not_the_name(tmp_path: Path) -> None:
-    path = tmp_path / "shape.svg"
-    path.write_bytes(save(tmp_path, draw()).read_bytes())
-    assert read_outline(path).kind == "image"
 
 
 def test_anti_aliased_edges_are_found_between_pixels(tmp_path: Path) -> None:
@@ -194,24 +180,6 @@ def test_shape_on_the_border_is_closed_along_it(tmp_path: Path) -> None:
     assert "touches the image's border" in reading.notes[-1]
     assert reading.outline.min() >= 0
     assert reading.outline.max() <= 100
-
-
-def test_large_images_are_averaged_down_in_original_pixels(tmp_path: Path) -> None:
-    reading = read_outline(save(tmp_path, draw(scale=20)))
-    assert reading.size == (2000, 2000)
-    assert any("2 x 2 pixels became one" in note for note in reading.notes)
-    assert iou(reading.outline, SHAPE * 20) > 0.995
-
-
-def test_exif_orientation(tmp_path: Path) -> None:
-    exif = Image.Exif()
-    exif[0x0112] = 6  # turn by 90 degrees clockwise to show
-    path = save(tmp_path, draw().crop((0, 0, 90, 100)), "turned.jpg", exif=exif, quality=95)
-    reading = read_outline(path)
-    assert reading.size == (100, 90)
-    turned = np.stack([100 - SHAPE[:, 1], SHAPE[:, 0]], axis=1)
-    assert iou(reading.outline, turned) > 0.97
-    assert "turned the image as its EXIF orientation asks" in reading.notes
 
 
 def test_first_frame_of_an_animation(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ from orbiflow.tiles import (
     CLASSES,
     IsohedralClass,
     Tile,
-    aspects,
     certify,
     colouring,
     copies_inside,
@@ -144,12 +143,6 @@ def test_window_inside_one_tile() -> None:
     tile = Tile(isohedral_class("IH7").template(), isohedral_class("IH7").group())
     (only,) = patch(tile, (0.1, 0.1, 0.2, 0.2))
     assert only.is_close(identity(2))
-
-
-def test_foreign_isometry() -> None:
-    tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
-    with refused("Isometry", "p1"):
-        aspects(tile, [translation((0.1, 0.0))])
 
 
 @pytest.mark.parametrize("window", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, np.nan, 1), (0, 0, 1)])
