@@ -52,7 +52,7 @@ def test_files_and_frames_are_read_alike(fit: Any) -> None:
     known = model.conditional_density_.covariates.columns
     declaration = said["report"]["given"]["declaration"]
     assert declaration == model.conditional_density_.covariates.declaration
-    assert [own.kind for own in known] == ["cycle:24", "linear", "3 words"]
+    assert [str(own.role) for own in known] == ["cycle:24", "linear", "word"]
 
 
 def test_times_are_refused(fit: Any) -> None:
@@ -76,11 +76,3 @@ def test_codes_are_refused_in_all_columns(fit: Any, role: tuple[str, str]) -> No
     assert rows_of(said) == ROWS - 1
     wrong.loc[3, "elevation"] = 999.9  # no farther from the others than an elevation may be
     assert rows_of(fit(wrong, *ask)) == ROWS
-
-
-def test_two_values_are_doubted(orbiflow: Any, tmp_path: Path) -> None:
-    table = TABLE.assign(rain=RNG.integers(0, 2, ROWS))
-    table.to_csv(tmp_path / "table.csv", index=False)
-    words = ("density", "fit", tmp_path / "table.csv", "--space", "torus", "--unit", "degrees")
-    how = ("--columns", "phi,rain=linear", "--components", "mixture")
-    assert "'rain' has two values alone" in orbiflow(*words, *how, "-o", tmp_path / "two").out

@@ -32,6 +32,7 @@ class CircularRegression(ConditionalPart):
     """
 
     kind = "regression"
+    stored = ("means", "slopes", "spreads")
 
     def __init__(self, space: Space, means: Tensor, slopes: Tensor, spreads: Tensor) -> None:
         self.space, self.means, self.slopes, self.spreads = space, means, slopes, spreads
@@ -63,12 +64,6 @@ class CircularRegression(ConditionalPart):
         mean, kappa = self._shape(x)
         length = mean_cosines(kappa)
         return torch.cat([length * mean.cos(), length * mean.sin()], dim=1)
-
-    def header(self) -> dict[str, Any]:
-        return {}
-
-    def tensors(self) -> dict[str, Tensor]:
-        return {"means": self.means, "slopes": self.slopes, "spreads": self.spreads}
 
     @classmethod
     def from_header(

@@ -20,6 +20,7 @@ from orbiflow.density.models.mixture import mixture_of
 from orbiflow.density.models.neural_mixture import NeuralMixture
 from orbiflow.density.spaces import CHART, Covariates, Space, Values
 from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import from_json, to_json
 from orbiflow.typed_torch import listed
 
 
@@ -127,7 +128,7 @@ class ConditionalDensity:
     def header(self) -> dict[str, Any]:
         """Return what makes the density again, together with `tensors`; ready for JSON."""
         parts = [{"kind": own.kind, **own.header()} for own in self.parts]
-        return {"covariates": self.covariates.to_json(), "parts": parts}
+        return {"covariates": to_json(self.covariates), "parts": parts}
 
     def tensors(self) -> dict[str, Tensor]:
         """Return all tensors by name."""
@@ -142,7 +143,7 @@ class ConditionalDensity:
         cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
     ) -> Self:
         """Make the density again; raise `OrbiflowError` for what cannot be."""
-        covariates = Covariates.from_json(header["covariates"])
+        covariates = from_json(Covariates, header["covariates"], "covariates")
         parts = [
             PARTS[own["kind"]].from_header(space, covariates.number, own, within(tensors, f"{k}."))
             for k, own in enumerate(header["parts"])

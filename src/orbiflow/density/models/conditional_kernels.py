@@ -73,6 +73,7 @@ class ConditionalKernels(ConditionalPart):
     """
 
     kind = "kernels"
+    stored = ("points", "weights", "x", "widths", "concentrations", "shares")
 
     def __init__(self, space: Space, rows: KnownRows, shape: KernelShape) -> None:
         self.space, self.rows, self.shape = space, rows, shape
@@ -140,11 +141,6 @@ class ConditionalKernels(ConditionalPart):
 
     def header(self) -> dict[str, Any]:
         return {"scales": list(KERNEL_SCALES)}
-
-    def tensors(self) -> dict[str, Tensor]:
-        names = ("x", "widths", "concentrations", "shares")
-        found = {name: getattr(self, name) for name in names} | {"points": self.points}
-        return found if self.weights is None else {**found, "weights": self.weights}
 
     @classmethod
     def from_header(

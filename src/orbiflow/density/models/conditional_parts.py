@@ -21,9 +21,11 @@ class ConditionalPart(ABC):
     """A density of points of a space where features of covariates are known.
 
     - `kind`: Its name in files and reports.
+    - `stored`: The names of the tensors that make it again.
     """
 
     kind: ClassVar[str]
+    stored: ClassVar[tuple[str, ...]] = ()
     space: Space
 
     @abstractmethod
@@ -39,13 +41,14 @@ class ConditionalPart(ABC):
         """Return the means (N, 2 d) of the features of a torus' points where features are x (N, m)."""
         return torch.stack([_mean_features(self.at(own)) for own in x])
 
-    @abstractmethod
     def header(self) -> dict[str, Any]:
         """Return what makes it again, together with `tensors`; ready for JSON."""
+        return {}
 
-    @abstractmethod
     def tensors(self) -> dict[str, Tensor]:
         """Return its tensors by name."""
+        pairs = ((name, getattr(self, name)) for name in self.stored)
+        return {name: tensor for name, tensor in pairs if tensor is not None}
 
     @classmethod
     @abstractmethod

@@ -104,9 +104,6 @@ class NeuralMixture(ConditionalPart):
         """Return some of the F mixtures."""
         return NeuralMixture(self.space, [own[first : first + count] for own in self.layers])
 
-    def header(self) -> dict[str, Any]:
-        return {}
-
     def tensors(self) -> dict[str, Tensor]:
         return dict(zip(LAYERS, self.layers, strict=True))
 

@@ -7,7 +7,6 @@ from .covariates import SPREAD as SPREAD
 from .covariates import Covariate as Covariate
 from .covariates import Covariates as Covariates
 from .covariates import Values as Values
-from .covariates import is_text as is_text
 from .data_columns import DataColumns as DataColumns
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from orbiflow.density.data import (
 )
 from orbiflow.density.spaces.axes import Line
 from orbiflow.errors import OrbiflowError
-from orbiflow.settings import as_number
 
 Values = NDArray[Any]
 """The cells (N,) of a column: numbers, or words."""
@@ -52,9 +51,20 @@ class Covariate:
 
     name: str
     line: Line | None = None
-    range: tuple[float, float] = (-math.inf, math.inf)
+    range: tuple[float, float] = (0.0, 0.0)
     period: float | None = None
     words: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if (
+            sorted(set(self.words)) != list(self.words)
+            or len(self.words) > MOST_WORDS
+            or bool(self.words) + (self.period is not None) + (self.line is not None) != 1
+            or not (self.period is None or 0 < self.period < math.inf)
+        ):
+            raise OrbiflowError(f"{self.name!r} is no covariate: words, a period or a line")
+        if self.line is not None:
+            Line.checked(list(self.line))
 
     @classmethod
     def of(cls, name: str, cells: Values, role: Role) -> Covariate:
@@ -86,13 +96,6 @@ class Covariate:
         if self.words:
             return Role("word")
         return Role("cycle", period=self.period) if self.line is None else self.line.role
-
-    @property
-    def kind(self) -> str:
-        """What it is, in words."""
-        if self.words:
-            return f"{len(self.words)} words"
-        return str(self.role)
 
     @property
     def width(self) -> int:
@@ -152,13 +155,15 @@ class Covariate:
 class Covariates:
     """All columns that are known."""
 
-    columns: tuple[Covariate, ...] = field(default_factory=tuple[Covariate, ...])
+    columns: tuple[Covariate, ...]
+
+    def __post_init__(self) -> None:
+        if not self.columns or len(set(self.names)) < len(self.columns):
+            raise OrbiflowError("given holds no column, or two of one name: name what is known")
 
     @classmethod
     def of(cls, cells: Mapping[str, Values], roles: Mapping[str, Role]) -> Covariates:
         """Return the covariates that columns of cells are, each of its role."""
-        if not cells:
-            raise OrbiflowError("given holds no column: name one or more that are known")
         return cls(tuple(Covariate.of(name, own, roles[name]) for name, own in cells.items()))
 
     @property
@@ -210,52 +215,6 @@ class Covariates:
         for own in self.columns:
             own.check(cells[own.name])
         return [doubt for own in self.columns if (doubt := own.doubt(cells[own.name]))]
-
-    def to_json(self) -> list[dict[str, Any]]:
-        """Return what makes them again, ready for JSON."""
-        found: list[dict[str, Any]] = []
-        for own in self.columns:
-            entry = {"name": own.name, "period": own.period, "words": own.words}
-            if own.line is not None:
-                entry |= {"line": own.line.to_json(), "range": own.range}
-            found.append(entry)
-        return found
-
-    @classmethod
-    def from_json(cls, entries: Any) -> Covariates:
-        """Make the covariates of `to_json` again; raise `OrbiflowError` for others."""
-        found: list[Covariate] = []
-        for one in entries:
-            words, period, line = tuple(one["words"]), one["period"], one.get("line")
-            if (
-                not isinstance(one["name"], str)
-                or not all(isinstance(word, str) for word in words)
-                or sorted(set(words)) != list(words)
-                or len(words) > MOST_WORDS
-                or (bool(words) + (period is not None) + (line is not None)) != 1
-            ):
-                raise OrbiflowError("covariates that are none")
-            if period is not None and not as_number(period, "period") > 0:
-                raise OrbiflowError("a period that is none")
-            if line is not None:
-                low, high = (as_number(end, "range") for end in one["range"])
-                found.append(Covariate(one["name"], Line.checked(line), (low, high)))
-            else:
-                found.append(Covariate(one["name"], period=period, words=words))
-        if not found or len({own.name for own in found}) < len(found):
-            raise OrbiflowError("no covariates, or two of one name")
-        return cls(tuple(found))
-
-
-def is_text(cells: Values) -> bool:
-    """Return whether cells (N,) are words rather than numbers.
-
-    >>> is_text(np.array(["a", "b"])), is_text(np.array([1, 2])), is_text(np.array([True, False]))
-    (True, False, True)
-    """
-    if cells.dtype.kind == "O":
-        return any(isinstance(cell, str | bool) for cell in cells)
-    return cells.dtype.kind in "USb"
 
 
 def _text(name: str, cells: Values) -> NDArray[np.str_]:
