@@ -19,7 +19,6 @@ from orbiflow.density.data.units import (
     TURNS,
     VECTORS,
     is_angular,
-    words_of,
 )
 from orbiflow.errors import SettingError, literal
 
@@ -49,9 +48,6 @@ FEW_ROWS = 10
 
 FULL_SHARE_OF_TURN = 0.75
 """Share of a turn of radians that values fill where they seem to be radians."""
-
-NEAR_NULL = 1.0
-"""Degrees from latitude 0, longitude 0 within which there are no other places where these are a gap."""
 
 
 def is_code(value: float) -> bool:
@@ -245,7 +241,7 @@ def check_values(
             check_turn(column, role.turn, role.kind, are_new=are_new)
             doubts += doubts_of_ends(column) if role.kind != "cycle" and not are_new else []
         elif role is not None and role.is_real:
-            doubts += check_real(column, role) + ([] if are_new else _doubts_of_two(column))
+            doubts += check_real(column, role)
     if space in DIRECTIONS and len(coordinates) == 2:
         return doubts + _check_places(*coordinates, space=space, unit=unit)
     for column in coordinates:
@@ -256,54 +252,31 @@ def check_values(
     return doubts
 
 
-def _doubts_of_two(column: Checked) -> list[str]:
-    """Return a doubt about real numbers of two values alone, which a word has."""
-    distinct = np.unique(column.known)
-    values = " and ".join(f"{value:g}" for value in distinct[:2])
-    return [
-        f"{column.name!r} has two values alone, {values}, as a word such as yes or no has: a density "
-        "of real numbers says little of it; make it a covariate, or leave it out"
-    ] * (len(distinct) == 2)
-
-
 def _check_places(lat: Checked, lon: Checked, *, space: str, unit: str | None) -> list[str]:
-    """Refuse places that there are not, and what fills radians or hours; return doubts."""
+    """Refuse places that there are not, and what fills radians; return doubts."""
     far = float(lat.known[np.abs(lat.known).argmax()]) if len(lat.known) else 0.0
     if abs(far) > 90 * (1 + TURN_TOLERANCE):
         cure = "and latitudes are within -90 and 90: specify with {columns} which column they are"
         raise lat.refusal([far], cure, codes_among(lat.values, 90.0))
     check_turn(lon, 360.0, "longitude")
     whole = np.isfinite(lat.values) & np.isfinite(lon.values)
-    lats, lons = lat.values[whole], lon.values[whole]
-    doubts: list[str] = []
-    null = (lats == 0) & (lons == 0)
-    others = np.maximum(abs(lats), abs(lons))[~null]
-    if space == "sphere" and null.sum() > 1 and others.min(initial=np.inf) >= NEAR_NULL:
-        doubts.append(
-            f"{lat.name} and {lon.name} are both exactly 0 in {null.sum()} rows, far from all others: "
-            "if that stands for a missing place, leave these rows out"
-        )
-    if unit is not None or len(lats) < FEW_ROWS:
-        return doubts
-    high, most, wide = float(abs(lats).max()), float(abs(lons).max()), float(np.ptp(lons))
-    is_small = high <= math.pi / 2 + TURN_TOLERANCE and most <= 2 * math.pi * (1 + TURN_TOLERANCE)
-    if is_small and wide > FULL_SHARE_OF_TURN * 2 * math.pi:
+    lats, lons = np.abs(lat.values[whole]), lon.values[whole]
+    turn, is_read = TURNS["radians"], unit is not None or len(lats) < FEW_ROWS
+    if (
+        is_read
+        or lats.max() > turn / 4 + TURN_TOLERANCE
+        or abs(lons).max() > turn * (1 + TURN_TOLERANCE)
+    ):
+        return []
+    both = f"{lat.name!r} within pi/2 and {lon.name!r} within 2 pi"
+    if np.ptp(lons) > FULL_SHARE_OF_TURN * turn:
         raise SettingError(
-            literal(f"{lat.name!r} is within pi/2 and {lon.name!r} fills 2 pi, as radians do, ")
+            literal(f"{both} fill radians, ")
             + f"and the {space} takes degrees: convert them (numpy.degrees), or give {{unit}} degrees"
         )
-    is_wide = wide > 20 or (wide > 12 and float(np.ptp(lats)) > 40)
-    if lons.min() >= 0 and most < 24 and is_wide and "ra" in words_of(lon.name):
-        raise SettingError(
-            literal(f"{lon.name!r} is within 0 and 24, as hours are: ")
-            + "multiply it by 15, or give {unit} degrees if it is in degrees"
-        )
-    if is_small:
-        doubts.append(
-            f"all of {lat.name!r} are within pi/2 and of {lon.name!r} within 2 pi, and they were read "
-            "as degrees: if they are radians, convert them; if not, give the unit degrees"
-        )
-    return doubts
+    return [
+        f"{both} were read as degrees: if they are radians, convert them; if not, give the unit degrees"
+    ]
 
 
 def fraction_doubts(values: Array, lengths: Sequence[float]) -> list[str]:
