@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 from orbiflow.density import (
     MODEL,
     REPORT,
+    REPORTED,
     DensityEstimator,
     FitReport,
     density_to_bytes,
@@ -159,7 +160,7 @@ def _save_estimator(estimator: DensityEstimator, path: Path) -> Path:
         "report": {"error": estimator.density_.error} if report is None else to_json(report),
     }
     if report is not None:
-        document["settings"] = {name: getattr(estimator, name) for name in _SETTINGS}
+        document["settings"] = {name: getattr(estimator, name) for name in REPORTED}
     folder = ResultFolder(path, written_files)
     with folder.replaced() as staged:
         write_atomic(staged / MODEL, content)
@@ -177,16 +178,12 @@ def _estimator(path: Path) -> DensityEstimator:
         if "settings" in document:  # a marginal or a conditional was not fitted
             report = from_json(FitReport, document["report"], "report")
             given = dict(document["settings"])
-            settings = {name: given[name] for name in _SETTINGS if name in given}
+            settings = {name: given[name] for name in REPORTED if name in given}
         if unit := density.space.settings().get("unit"):
             settings["unit"] = unit
         return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)
     except (KeyError, TypeError, ValueError) as error:
         raise InputFileError(f"{beside}: not the report of a density: {error}") from error
-
-
-_SETTINGS = ("components", "effort", "repeats", "missing", "max_frequency", "segments", "seed")
-"""Those of a fit that the estimator has as well."""
 
 
 def _solids(path: Path, name: str, uncertified: bool) -> EscherSolid | list[EscherSolid]:

@@ -27,6 +27,7 @@ from .fitting.repeats import places as places
 from .fitting.report import FitReport as FitReport
 from .fitting.report import Progress as Progress
 from .fitting.rows import weighed as weighed
+from .fitting.settings import REPORTED as REPORTED
 from .fitting.settings import ComponentSettings as ComponentSettings
 from .fitting.settings import DensitySettings as DensitySettings
 from .fitting.settings import FlowSettings as FlowSettings

@@ -36,6 +36,7 @@ from .rows import mean_of as mean_of
 from .rows import weighed as weighed
 from .settings import COMPONENTS as COMPONENTS
 from .settings import KNOWN as KNOWN
+from .settings import REPORTED as REPORTED
 from .settings import ComponentSettings as ComponentSettings
 from .settings import DensitySettings as DensitySettings
 from .settings import FlowSettings as FlowSettings

@@ -25,6 +25,11 @@ FAST_COMPONENTS = ("kernels", "mixture")
 PARAMETRIC = KNOWN[5:]
 """Parametric families: alone each is a fit of its own, beside others it is one of the candidates."""
 
+REPORTED = (
+    "components", "effort", "repeats", "missing", "max_frequency", "segments", "seed",
+)  # fmt: skip
+"""Settings of a fit that its report repeats, and an estimator has again when it is loaded."""
+
 FLOW = HelpHeading("Flow")
 
 

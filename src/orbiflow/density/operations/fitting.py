@@ -29,11 +29,6 @@ MOST_SCORED = 20_000
 """Rows over which the mean log density is taken: up to here all of them, for a few hundredths of the
 fit's time at most; of 100,000 rows of six angles it would be two fifths."""
 
-REPORTED = (
-    "components", "effort", "repeats", "missing", "max_frequency", "segments", "seed",
-)  # fmt: skip
-"""Settings that the report repeats."""
-
 
 class FitSettings(DensitySettings, SpaceSettings, group="Density"):
     """Where the data live, and how a density is fitted."""
@@ -212,7 +207,7 @@ def _document(
         "space": {"name": space.name, **space.settings()},
         "columns": rows.columns,
         "declaration": rows.declaration,
-        "settings": {name: asked[name] for name in REPORTED},
+        "settings": {name: asked[name] for name in fitting.REPORTED},
         "log_likelihood": {
             "natural": _mean_score(estimator, rows.values[scored], weights),
             "natural_rows": len(scored),

@@ -97,8 +97,7 @@ def density_picture(
     count = None if places is None else (min(most, len(places)), len(places))
     caption = ground.caption(notes, count)
     room = ground.room(sheet, label, [tick.text for tick in bar_ticks(shade)])
-    if ground.caption_below:
-        room = room.with_words(caption, sheet)
+    room = room.with_words(caption, sheet)
     frame = frames.make_frame(sheet, room, ground.aspect)
     image = colouring.draw(frame.axes)
     colouring.draw_regions(frame.axes, regions, sheet)
@@ -111,7 +110,8 @@ def density_picture(
     frames.colour_bar(image, frame, sheet, label, shade)
     title = f"Density on the {space_title(ground.space)}"
     if not sheet.printed:
-        ground.write_on_screen(frame, sheet, title, notes, count)
+        ground.write_title(frame, sheet, title)
+        frames.write_caption(frame.figure, caption, sheet)
     return Picture(frame.figure, sheet, title, caption)
 
 

@@ -260,13 +260,11 @@ class Ground(ABC):
 
     - `width`, `aspect`: Its width in units of the axes, and its width over its height.
     - `title_gap`: Distance of a panel's title, in sizes of the text.
-    - `caption_below`: Whether the caption of a single picture is below it on a screen.
     """
 
     space: Space
     width = aspect = 1.0
     title_gap = 0.7
-    caption_below = True
     outline: Array | None = None
 
     @abstractmethod
@@ -323,18 +321,6 @@ class Ground(ABC):
     def fill(self, axes: Axes) -> None:
         """Fill the ground with one light colour."""
         axes.set_facecolor(LIGHT)
-
-    def write_on_screen(
-        self,
-        frame: frames.FigureFrame,
-        sheet: Sheet,
-        title: str,
-        notes: Sequence[str],
-        dots: tuple[int, int] | None,
-    ) -> None:
-        """Write the title and the caption."""
-        self.write_title(frame, sheet, title)
-        frames.write_caption(frame.figure, self.caption(notes, dots), sheet)
 
     def write_title(self, frame: frames.FigureFrame, sheet: Sheet, title: str) -> None:
         """Write the title above the picture."""

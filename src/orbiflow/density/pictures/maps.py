@@ -18,7 +18,7 @@ from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.colours import round_pixel
 from orbiflow.density.pictures.frames import INK, LETTER_EMS, chart_points, degrees_text
 from orbiflow.density.pictures.grounds import LIGHT, Ground, Pixels
-from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
+from orbiflow.density.pictures.projections import Azimuthal, Projection
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
 from orbiflow.drawing import Sheet
 
@@ -45,7 +45,7 @@ class Map(Ground):
         self.outline = self.ring = projection.outline()
         width, height = np.ptp(self.ring, axis=0)
         self.width, self.aspect = float(width), float(width / height)
-        self.is_disc = isinstance(projection, Azimuthal)
+        self.is_disc = projection.is_disc
         self.title_gap = 2.2 if self.is_disc else 0.6
 
     def places(self, points: Tensor) -> Array:
@@ -117,10 +117,7 @@ class Map(Ground):
         labels = _Labels(axes, self, sheet, 72 * side / self.width, panel.light)
         if self.coastlines:
             self._draw_coastlines(axes, sheet, _TOLERANCE / labels.size, panel.light)
-        if isinstance(projection, WorldMap):
-            labels.along_the_sides(lats, lons)
-        else:
-            labels.along_the_rim(lats, lons)
+        (labels.along_the_rim if self.is_disc else labels.along_the_sides)(lats, lons)
 
     def _draw_coastlines(self, axes: Axes, sheet: Sheet, apart: float, light: bool) -> None:
         from matplotlib.collections import LineCollection
@@ -184,7 +181,7 @@ class Map(Ground):
     def _subtitle(self) -> str:
         """The projection as a title has it."""
         projection = self.projection
-        if not (isinstance(projection, Azimuthal) and projection.flipped):
+        if not projection.flipped:
             return projection.title
         return (
             "Schmidt net (equal-area)"
@@ -245,7 +242,7 @@ class _Labels:
     def __init__(self, axes: Axes, ground: Map, sheet: Sheet, size: float, light: bool) -> None:
         projection = ground.projection
         self.axes, self.projection, self.sheet, self.light = axes, projection, sheet, light
-        self.size, self.is_net = size, isinstance(projection, Azimuthal) and projection.flipped
+        self.size, self.is_net = size, projection.flipped
         self.from_zero = self.is_net or cast(RoundSpace, ground.space).from_zero
         self.north_south, self.east_west = ("", "") if self.is_net else ("NS", "EW")
         self.boxes: list[Array] = []
@@ -263,7 +260,7 @@ class _Labels:
         for lat in lats:
             end = projection.forward(np.array([[lat, west]]))[0]
             self._outside(self.latitude(lat), end, (-gap, 0.0), ha="right", va="center")
-        inside = isinstance(projection, Mollweide)
+        inside = projection.has_pole_points
         middle, at = projection.center[1], 0.0 if inside else -90.0
         ends = projection.forward(np.array([[at, middle], [at, middle + 60.0]]))
         room = self.size * float(np.ptp(ends[:, 0]))

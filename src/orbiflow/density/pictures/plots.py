@@ -24,7 +24,7 @@ from orbiflow.density.pictures.coastlines import coastlines_for, simplified
 from orbiflow.density.pictures.colours import COLOURS
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
 from orbiflow.density.pictures.figures import plane_ground
-from orbiflow.density.pictures.frames import INK, real_spans, view_of
+from orbiflow.density.pictures.frames import real_spans, view_of
 from orbiflow.density.pictures.grounds import region_lines
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import PlateCarree, chosen_map
@@ -248,7 +248,7 @@ class _Shown:
         if self.map is None:
             return {"density": square}
         grounds: dict[str, figures.Ground] = {"density": Map(space, self.map, self.coastlines)}
-        if space.name == "sphere" and not isinstance(self.map, PlateCarree):
+        if space.name == "sphere" and self.map.name != PlateCarree.name:
             plain = PlateCarree((0.0, self.map.center[1]))
             grounds["latlon"] = Map(space, plain, self.coastlines)
         return {**grounds, "square": square}
@@ -280,13 +280,11 @@ SIZE = (360, 240)
 """Width and height in pixels, half as many again as a page shows."""
 
 SHEET = Sheet(SIZE[0] / 100, 8.0, dpi=100)
-BARS = "#b9c4d0"
 PIXELS, MAP_PIXELS = 120, 14_000
 """Points along a side at which a density is evaluated, and of a map in all."""
 
 SMALL_SAMPLES, SMALL_SEED = 4_000, 0
-MAX_PAIRS = 6
-"""Number of angles up to which pairs are drawn, instead of stripes."""
+"""Samples of a density of other than two dimensions, a stripe for each column, and their seed."""
 
 
 @torch.no_grad()
@@ -304,15 +302,12 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     figure = SHEET.figure(SIZE[1] / 100)
     if space.has_chart and space.dim == 2:
         _draw_plane(figure, density, whole)
-    elif space.has_square and space.dim == 1:
-        _draw_angle(figure, density, whole)
     else:
         drawn = density.sample((SMALL_SAMPLES,), torch.Generator().manual_seed(SMALL_SEED))
         places = view_of(space).places(drawn) if space.has_chart else (drawn.numpy() + 1) / 2
         if space.has_chart and not space.has_square:
             places = (places - places.min(axis=0)) / np.ptp(places, axis=0)
-        draw = _draw_pairs if places.shape[1] <= MAX_PAIRS else _draw_stripes
-        draw(figure, places)
+        _draw_stripes(figure, places)
     return SHEET.file(figure)
 
 
@@ -330,44 +325,8 @@ def _draw_plane(figure: Figure, density: Density, data: Array) -> None:
     axes.set_axis_off()
 
 
-def _draw_angle(figure: Figure, density: Density, data: Array) -> None:
-    """Draw bars of the data under the density's line, from minus half a turn to half a turn."""
-    view = view_of(density.space)
-    count = min(72, max(12, round(2 * len(data) ** (1 / 3))))
-    places = view.places(density.space.to_chart(data))[:, 0]
-    t = torch.linspace(0, 1, SIZE[0], dtype=torch.float64)
-    line = (
-        density.log_prob(view.to_chart(t[:, None]), measure="natural").exp().numpy() * view.volume
-    )
-    axes = figure.add_axes((0.02, 0.03, 0.96, 0.94))
-    bars, *_ = axes.hist(places, count, range=(0, 1), density=True, rwidth=0.95, color=BARS)
-    axes.plot(t, line, color=INK, linewidth=1.5)
-    top = float(np.max(bars))
-    axes.set(xlim=(0, 1), ylim=(0, 1.05 * min(max(top, float(line.max())), 4 * top)))
-    axes.set_axis_off()
-
-
-def _draw_pairs(figure: Figure, places: Array) -> None:
-    """Draw every pair of angles below the diagonal, each alone on it."""
-    dim, side = places.shape[1], SIZE[1] // places.shape[1]
-    room = (1 - SIZE[1] / SIZE[0]) / 2
-    edges = {"left": room, "right": 1 - room, "bottom": 0, "top": 1, "wspace": 0.05, "hspace": 0.05}
-    panels = figure.subplots(dim, dim, squeeze=False, gridspec_kw=edges)
-    for (row, column), axes in np.ndenumerate(panels):
-        axes.set_axis_off()
-        if row == column:
-            axes.hist(places[:, row], side // 2, range=(0, 1), color=BARS)
-            axes.set_xlim(0, 1)
-        elif row > column:
-            bins = max(12, side // 3)
-            counts, _ = np.histogramdd(places[:, [row, column]], (bins, bins), ((0, 1), (0, 1)))
-            # a square root: most cells of many angles are nearly empty
-            shades, most = np.sqrt(counts), max(1.0, float(np.quantile(counts, 0.995))) ** 0.5
-            axes.imshow(shades, COLOURS, interpolation="bicubic", vmax=most, origin="lower")
-
-
 def _draw_stripes(figure: Figure, places: Array) -> None:
-    """Draw a stripe for each angle, from the top, each as bright as its largest bin."""
+    """Draw a stripe for each column, from the top, each as bright as its largest bin."""
     edges = {"left": 0, "right": 1, "bottom": 0, "top": 1, "hspace": 0.05}
     panels = figure.subplots(places.shape[1], 1, squeeze=False, gridspec_kw=edges)
     for axes, column in zip(panels.flat, places.T, strict=True):

@@ -29,10 +29,13 @@ class _Centred:
     """A map of directions about `center`, a latitude and a longitude.
 
     - `name`: Its name in settings. `title`: Its name in a sentence.
+    - `is_disc`: Whether it is a disc. `has_pole_points`: Whether the poles are points of its rim.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
+    is_disc: ClassVar[bool] = False
+    has_pole_points: ClassVar[bool] = False
 
     center: tuple[float, float] = (0.0, 0.0)
 
@@ -79,6 +82,7 @@ class Azimuthal(_Centred, ABC):
       the top: a net of structural geology and palaeomagnetism.
     """
 
+    is_disc = True
     radius: float = 90.0
     flipped: bool = False
 
@@ -190,6 +194,8 @@ _NEWTON = 12
 class WorldMap(_Centred, ABC):
     """A map of the whole sphere, cut along the meridian opposite the map's own."""
 
+    flipped: ClassVar[bool] = False
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.center[0]:
@@ -284,6 +290,7 @@ class Mollweide(WorldMap):
     d = pi / 2 - theta, that is 2 d - sin 2 d = pi (1 - sin lat), which loses no digits there.
     """
 
+    has_pole_points = True
     name, title = "mollweide", "the Mollweide projection (equal-area)"
 
     def height(self, lat: Array) -> Array:

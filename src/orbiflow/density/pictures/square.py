@@ -25,7 +25,6 @@ from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, symmetry_e
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 _GRID, _FINE_GRID = 240, 360
@@ -37,8 +36,8 @@ EDGE_COLOURS = ("#d95f02", "#1f78b4")
 HEAD = 0.035
 """Length of an arrow's head on a screen, in sides of the square."""
 
-SCREEN = frames.Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
-"""Room on a screen, with a title above and a legend of five lines below."""
+SCREEN = frames.Room(6.67, 3.6, 11.52, 4.2, 3.33, 1.52)
+"""Room on a screen, with a title above."""
 
 TURNS, SIGNS = {2: "half", 4: "quarter"}, {2: "Lenses", 4: "Squares"}
 """Names of the turns of cone points, and of their signs."""
@@ -48,8 +47,6 @@ CROWDED = "dots crowd where the square shrinks areas"
 
 class Square(Ground):
     """The canonical square of a two-dimensional space."""
-
-    caption_below = False
 
     def __init__(self, space: Space, settings: PlotSettings) -> None:
         frames.require_plane(space)
@@ -120,20 +117,8 @@ class Square(Ground):
             for order in self._orders
         ]
         parts += ["Dots are points"] if dots else []
-        return frames.sentences([*parts, *self._notes(notes, bool(dots))])
-
-    def write_on_screen(
-        self,
-        frame: frames.FigureFrame,
-        sheet: Sheet,
-        title: str,
-        notes: Sequence[str],
-        dots: tuple[int, int] | None,
-    ) -> None:
-        """Write the title, and a legend with notes."""
-        self.write_title(frame, sheet, title)
-        words = frames.sentences(self._notes(notes, bool(dots)))
-        self._draw_legend(frame.figure, sheet, words, bool(dots))
+        parts += [CROWDED] if dots and self.space.is_round else []
+        return frames.sentences([*parts, *notes])
 
     @property
     def _has_ticks(self) -> bool:
@@ -142,9 +127,6 @@ class Square(Ground):
     @property
     def _orders(self) -> list[int]:
         return sorted({order for _, order in cone_points(self.space.group)}, reverse=True)
-
-    def _notes(self, notes: Sequence[str], dots: bool) -> list[str]:
-        return [*([CROWDED] if dots and self.space.is_round else []), *notes]
 
     def _draw_ticks(self, axes: Axes, sheet: Sheet, side: float, labelled: bool) -> None:
         size = sheet.text
@@ -176,34 +158,6 @@ class Square(Ground):
             xytext=(0, sheet.text * (2 * corner[1] - 1)), textcoords="offset points",
             ha="right" if corner[0] else "left", va="bottom" if corner[1] else "top",
             fontsize=sheet.small, color=frames.INK,
-        )  # fmt: skip
-
-    def _draw_legend(self, figure: Figure, sheet: Sheet, notes: str, dots: bool) -> None:
-        """Draw a legend of edges, cone points and dots above the notes, in the lower left corner."""
-        from matplotlib.lines import Line2D
-
-        size = sheet.text
-        entries = [
-            Line2D([], [], color=colour, linewidth=0.28 * size, marker=">",
-                   label=f"both {name} edges are one edge")
-            for colour, name in zip(EDGE_COLOURS, ("orange", "blue"), strict=True)
-            if not frames.real_spans(self.space)
-        ]  # fmt: skip
-        style: dict[str, Any] = {"linestyle": "none"}
-        for order in self._orders:
-            sign = center_sign(order, 1.0)
-            style |= {"marker": np.concatenate([sign, sign[:1]]), "markersize": size}
-            text = f"cone point of a {TURNS[order]} turn: no flow moves it"
-            entries.append(Line2D([], [], color=CENTER_COLOURS[order], label=text, **style))
-        if dots:
-            style = {"markerfacecolor": "#ffffff", "markeredgecolor": frames.INK}
-            entries.append(Line2D([], [], marker="o", label="points", linestyle="none", **style))
-        frames.write_caption(figure, notes, sheet)
-        lines = len(frames.caption_lines(notes, sheet))
-        up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]
-        figure.legend(
-            handles=entries, loc="lower left", bbox_to_anchor=(0.02, up), ncols=2, frameon=False,
-            fontsize=sheet.small, borderaxespad=0.3,
         )  # fmt: skip
 
 
@@ -262,8 +216,6 @@ DOMAIN, CELL = "#ffd166", "#111111"
 class Cell(Square):
     """A lattice cell of a plane group in the data's coordinates, about the fundamental domain."""
 
-    caption_below = True
-
     def __init__(self, space: Space, settings: PlotSettings) -> None:
         group = space.data_group
         if group is None or space.dim != 2:
@@ -302,11 +254,6 @@ class Cell(Square):
         extent = (self.low[0], self.high[0], self.low[1], self.high[1])
         size, every = f"1/{count} of the longer side", np.ones((rows, columns), bool)
         return Pixels(points, every, every.ravel(), None, side, size, extent)
-
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
-        if sheet.printed:
-            return super().room(sheet, label, ticks)
-        return frames.Room(6.67, 3.6, 11.52, 4.2, 3.33, 1.52)
 
     def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
         """Draw ticks, outlines, and the marks of the group's centres and lines."""
@@ -348,5 +295,3 @@ class Cell(Square):
         ]
         parts += ["Dots are points, in the domain"] if dots else []
         return frames.sentences([*parts, *notes])
-
-    write_on_screen = Ground.write_on_screen  # no legend
