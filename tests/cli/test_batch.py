@@ -50,7 +50,8 @@ def test_every_pair_of_a_folder(tmp_path: Path, orbiflow) -> None:
     left = {path.name for path in (own / name).iterdir()}
     assert left == {*TILE_FILES, "overlay-2.png", "model-2.safetensors"}
     ElementTree.parse(own / name / "tiling.svg")
-    orbiflow.done("export", own, "--cut", "pieces", "-o", tmp_path / "pieces.svg")
+    small = ("--area", "120x80mm")
+    orbiflow.done("export", own, "--cut", "pieces", *small, "-o", tmp_path / "pieces.svg")
     assert (tmp_path / "pieces-2.svg").is_file()
     again = orbiflow.refused(*command[:2], "--ratio", "1", "--out", tmp_path / "other")
     names(again.err, "--ratio")

@@ -69,15 +69,6 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
     assert drawn.read_text() == first
 
 
-def test_plots(tmp_path: Path, orbiflow, fitted) -> None:
-    data, model, out = table(tmp_path), fitted("sphere"), tmp_path / "plots"
-    orbiflow.done("density", "plot", "--model", model, "--data", data, "--out", out)
-    names = {path.name for path in out.iterdir()}
-    pictures = {"density.png", "latlon.png", "square.png", "samples.png"}
-    assert names - {"flow.png"} == pictures | {"surface.html"}
-    assert (out / "surface.html").read_text().lstrip().lower().startswith("<!doctype html>")
-
-
 def test_plots_for_papers(tmp_path: Path, orbiflow, fitted) -> None:
     data, model, out = table(tmp_path), fitted("sphere"), tmp_path / "plots.pdf"
     plot = ("density", "plot", "--model", model, "--data", data)
@@ -90,6 +81,7 @@ def test_plots_for_papers(tmp_path: Path, orbiflow, fitted) -> None:
     orbiflow.done(*plot, "--format", "svg", "--width", "9cm", "--out", folder)
     figures = {"density.svg", "latlon.svg", "square.svg", "samples.svg", "surface.html"}
     assert {path.name for path in folder.iterdir()} - {"flow.svg"} == figures
+    assert (folder / "surface.html").read_text().lstrip().lower().startswith("<!doctype html>")
     assert 'width="255.1' in (folder / "latlon.svg").read_text()
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     for options, about in (

@@ -139,7 +139,7 @@ def test_rows_of_one_group_stay_together(orbiflow) -> None:
     for kind in "ab":
         own = [lines[0], *(line for line in lines if line.startswith(kind))]
         Path(f"{kind}.csv").write_text("\n".join(own))
-    how = (*HOW, "--permutations", "199", "--columns")
+    how = (*HOW, "--permutations", "119", "--columns")
     found = {}
     for name, options in {
         "rows": ("phi", "-d", "nests.csv", "--by", "kind"),

@@ -92,7 +92,9 @@ def test_tiles_lie_upright_on_the_silhouette(folder: Path, document: dict[str, A
         assert flipped.intersection(drawn).area / flipped.union(drawn).area < own
 
 
-def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
+def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow, monkeypatch) -> None:
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
+    monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 4)
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
     options = ["--classes", "28", "--figures", *FEW]

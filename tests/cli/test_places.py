@@ -149,5 +149,5 @@ def test_text_may_be_called_otherwise(name: str, here: Path, orbiflow: Run) -> N
 
 
 def test_a_picture_without_an_ending(here: Path, orbiflow: Run) -> None:
-    orbiflow.done("classes", "--out", "c")
+    orbiflow.done("classes", "--classes", "IH4", "--out", "c")
     assert (here / "c").read_bytes().startswith(b"\x89PNG")
