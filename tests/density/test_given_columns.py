@@ -179,13 +179,6 @@ def test_a_series_is_a_column() -> None:
         DensityEstimator(**KIND).fit(phi.rename(None))
 
 
-def test_two_values_are_doubted_where_a_density_is_asked_for() -> None:
-    table = pandas.DataFrame({"phi": ANGLES[:, 0], "rain": LEVELS > 1}).astype(float)
-    with warned("rain", kind=DataWarning):
-        DensityEstimator(**KIND, columns={"phi": "angle", "rain": "linear"}).fit(table)
-    assert kinds({"rain": table["rain"]}, columns={"rain": "linear"}) == []
-
-
 def test_whole_hours_with_gaps() -> None:
     hours = RNG.integers(0, 24, 240).astype(float)
     table = pandas.DataFrame({"phi": np.degrees(RNG.vonmises(hours / 4, 5)), "hour": hours})
