@@ -53,9 +53,9 @@ class AngleRegressor(DensityEstimator):
 
     def predict(self, X: Any) -> Array:
         """The mean directions (N,) or (N, d) where the covariates are X (N, c), within half a turn."""
-        own = self.conditional_density_
-        rows = len(next(iter(columns_given(X, own.covariates.names).values())))
-        turns = own.mean_directions(self._x(X, rows)).numpy()
+        density = self.conditional_density_
+        rows = len(next(iter(columns_given(X, density.covariates.names).values())))
+        turns = density.mean_directions(self._x(X, rows)).numpy()
         angles = turns * self._period()
         return angles[:, 0] if self.is_flat_ else angles
 
@@ -72,10 +72,11 @@ class AngleRegressor(DensityEstimator):
             np.ones(len(angles)) if sample_weight is None else as_numbers(sample_weight, "weights")
         )
         radians = 2 * np.pi / self._period()
-        own, found = angles * radians, _table(self.predict(X)) * radians
-        mean = np.angle((weights[:, None] * np.exp(1j * own)).sum(axis=0))
+        radians_of, predicted = angles * radians, _table(self.predict(X)) * radians
+        mean = np.angle((weights[:, None] * np.exp(1j * radians_of)).sum(axis=0))
         left, all_of_it = (
-            float((weights[:, None] * (1 - np.cos(own - at))).sum()) for at in (found, mean)
+            float((weights[:, None] * (1 - np.cos(radians_of - at))).sum())
+            for at in (predicted, mean)
         )
         return 1 - left / all_of_it if all_of_it else 0.0
 

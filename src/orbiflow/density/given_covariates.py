@@ -63,24 +63,24 @@ class GivenCovariates(FittedFigures):
 
     def _samples_given(self, count: int, given: Any, generator: torch.Generator) -> torch.Tensor:
         """Return samples (n, d) where covariates are as one row or as many say."""
-        own = self.conditional_density_
-        cells = _rows_given(given, own.covariates.names, count)
+        density = self.conditional_density_
+        cells = _rows_given(given, density.covariates.names, count)
         x = self._x(cells, len(next(iter(cells.values()))))
-        points = torch.empty((count, own.space.chart_dim), dtype=torch.float64)
+        points = torch.empty((count, density.space.chart_dim), dtype=torch.float64)
         _, first, number = np.unique(x.numpy(), axis=0, return_index=True, return_inverse=True)
         places = np.broadcast_to(number.ravel(), count)
         for k, row in enumerate(first.tolist()):
             those = np.flatnonzero(places == k)
-            points[those] = own.at(x[row]).sample((len(those),), generator).double()
+            points[those] = density.at(x[row]).sample((len(those),), generator).double()
         return points
 
     def _density_at(self, given: Mapping[str, Any]) -> Density:
         """Return the density where covariates have the values that are given by their names."""
-        own = self.conditional_density_
-        if unknown := [name for name in given if name not in own.covariates.names]:
-            known = ", ".join(own.covariates.names)
-            raise OrbiflowError(f"no covariate {unknown[0]!r}; there are {known}")
-        return own.at(self._x({name: np.array([value]) for name, value in given.items()}, 1)[0])
+        density = self.conditional_density_
+        if unknown := [name for name in given if name not in density.covariates.names]:
+            names = ", ".join(density.covariates.names)
+            raise OrbiflowError(f"no covariate {unknown[0]!r}; there are {names}")
+        return density.at(self._x({name: np.array([value]) for name, value in given.items()}, 1)[0])
 
     def trend_along(
         self,
@@ -104,15 +104,15 @@ class GivenCovariates(FittedFigures):
         self, cells: Mapping[str, Values], declared: Asked, are_asked: bool
     ) -> Covariates:
         """Return what covariates of a fit are; warn of what is doubtful."""
-        asked = {
+        declarations = {
             **asked_roles(self.columns),
             **{k: r for k, r in declared.items() if r is not None},
         }
-        roles = given_roles(list(cells), cells, asked, self.unit, are_asked=are_asked)
-        found = Covariates.of(cells, roles)
-        for doubt in found.fit_doubts(cells):
+        roles = given_roles(list(cells), cells, declarations, self.unit, are_asked=are_asked)
+        covariates = Covariates.of(cells, roles)
+        for doubt in covariates.fit_doubts(cells):
             warnings.warn(doubt, DataWarning, stacklevel=3)
-        return found
+        return covariates
 
     def _x(self, given: Any, rows: int) -> torch.Tensor:
         covariates = self.conditional_density_.covariates
@@ -161,15 +161,17 @@ def columns_given(given: Any, names: Sequence[str] | None = None) -> dict[str, V
                 f"given: expected {', '.join(called)}, got {table.shape[1]} columns"
             )
         pairs = list(zip(called, table.T, strict=True))
-    found = {str(name): np.asarray(cells_of(cells)) for name, cells in pairs}
+    columns = {str(name): np.asarray(cells_of(cells)) for name, cells in pairs}
     if names is not None:
-        if lacking := [name for name in names if name not in found]:
-            raise OrbiflowError(f"given: there is no {', '.join(lacking)} among {', '.join(found)}")
-        found = {name: found[name] for name in names}
-    shapes = {cells.shape for cells in found.values()}
+        if lacking := [name for name in names if name not in columns]:
+            raise OrbiflowError(
+                f"given: there is no {', '.join(lacking)} among {', '.join(columns)}"
+            )
+        columns = {name: columns[name] for name in names}
+    shapes = {cells.shape for cells in columns.values()}
     if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
         raise OrbiflowError(f"given: the columns must be of one length, got {sorted(shapes)}")
-    return found
+    return columns
 
 
 def _rows_given(given: Any, names: Sequence[str], count: int) -> dict[str, Values]:
@@ -180,9 +182,9 @@ def _rows_given(given: Any, names: Sequence[str], count: int) -> dict[str, Value
         rows = [np.repeat(cells, most) if len(cells) == 1 else cells for cells in rows]
         given = dict(zip(given, rows, strict=True))
     cells = columns_given(given, names)
-    found = len(next(iter(cells.values())))
-    if found not in (1, count):
+    rows = len(next(iter(cells.values())))
+    if rows not in (1, count):
         raise OrbiflowError(
-            f"given has {found} rows, and n_samples is {count}: give one row, or one for each sample"
+            f"given has {rows} rows, and n_samples is {count}: give one row, or one for each sample"
         )
     return cells

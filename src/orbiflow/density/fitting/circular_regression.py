@@ -33,26 +33,26 @@ def fit_regression(space: Torus, rows: Rows, x: Tensor) -> CircularRegression:
         return CircularRegression(space, means, slopes.reshape(d, k), spreads.reshape(d, 1 + k))
 
     def loss(values: Array) -> tuple[float, Array]:
-        own = torch.tensor(values, requires_grad=True)
-        now = made(own)
+        parameters = torch.tensor(values, requires_grad=True)
+        now = made(parameters)
         ridge = RIDGE * (now.slopes.square().mean() + now.spreads[:, 1:].square().mean())
         value = ridge - (shares @ now.logs(rows.points, x)).sum()
-        (gradient,) = torch.autograd.grad(value, own)
+        (gradient,) = torch.autograd.grad(value, parameters)
         return float(value.detach()), gradient.numpy()
 
     mean = torch.atan2(shares @ angle.sin(), shares @ angle.cos())
-    found: list[CircularRegression] = []
+    fits: list[CircularRegression] = []
     for start in (mean, mean + math.pi):
         first = np.concatenate([start.numpy(), np.zeros(d * k + d * (1 + k))])
         best = optimize.minimize(
             loss, first, jac=True, method="L-BFGS-B", options={"maxiter": STEPS, "ftol": LEAST_GAIN}
         ).x
-        found.append(made(torch.tensor(best)))
-    logs = torch.stack([shares @ own.logs(rows.points, x) for own in found])
+        fits.append(made(torch.tensor(best)))
+    logs = torch.stack([shares @ fit.logs(rows.points, x) for fit in fits])
     better = logs.argmax(dim=0)
     every = torch.arange(d)
     means, slopes, spreads = (
-        torch.stack([getattr(own, name) for own in found])[better, every]
+        torch.stack([getattr(fit, name) for fit in fits])[better, every]
         for name in ("means", "slopes", "spreads")
     )
     return CircularRegression(space, means, slopes, spreads)

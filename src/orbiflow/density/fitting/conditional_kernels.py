@@ -37,24 +37,24 @@ def fit_kernels(space: Space, rows: Rows, x: Tensor, number: Tensor) -> Conditio
     The widths make `ASKED` rows likeliest by the kernels of the others, of groups by those of others.
     """
     some, near = rows[:NEAR], x[:NEAR]
-    asked = torch.arange(min(ASKED, len(some)))
+    scored = torch.arange(min(ASKED, len(some)))
     group = torch.arange(len(some)) if some.groups is None else some.groups
-    apart = group[asked, None] == group
+    apart = group[scored, None] == group
     count, width = int(number.max()) + 1, len(space.spheres)
-    weights = None if some.weights is None else some.weights[asked]
+    weights = None if some.weights is None else some.weights[scored]
 
-    known = KnownRows(some.points, some.weights, near, number)
+    kernel_rows = KnownRows(some.points, some.weights, near, number)
 
     def made(values: Tensor) -> ConditionalKernels:
         widths, kappa, shares = torch.split(values, [count, width, len(KERNEL_SCALES)])
         shape = KernelShape(widths.exp(), kappa.exp(), torch.softmax(shares, 0))
-        return ConditionalKernels(space, known, shape)
+        return ConditionalKernels(space, kernel_rows, shape)
 
     def loss(values: Array) -> tuple[float, Array]:
-        own = torch.tensor(values, requires_grad=True)
-        logs = made(own).logs(some.points[asked], near[asked], apart)
+        parameters = torch.tensor(values, requires_grad=True)
+        logs = made(parameters).logs(some.points[scored], near[scored], apart)
         mean = logs.mean() if weights is None else weights @ logs / weights.sum()
-        (gradient,) = torch.autograd.grad(-mean, own)
+        (gradient,) = torch.autograd.grad(-mean, parameters)
         return -float(mean.detach()), gradient.numpy()
 
     start = [*[math.log(0.5)] * count, *[math.log(20.0)] * width, 0.5, 0.0, -0.5]
@@ -63,9 +63,9 @@ def fit_kernels(space: Space, rows: Rows, x: Tensor, number: Tensor) -> Conditio
         *[(LEAST_LOG_KAPPA, MOST_LOG_KAPPA)] * width,
         *[(-6.0, 6.0)] * len(KERNEL_SCALES),
     ]
-    found = optimize.minimize(
+    result = optimize.minimize(
         loss, np.array(start), jac=True, method="L-BFGS-B", bounds=bounds,
         options={"maxiter": MOST_STEPS},
     )  # fmt: skip
-    best = made(torch.tensor(found.x))
+    best = made(torch.tensor(result.x))
     return best.with_rows(rows.points, rows.weights, x)

@@ -97,8 +97,8 @@ class _Task:
     @torch.no_grad()
     def logs(self, part: ConditionalPart, fold: int) -> Tensor:
         """Return what a part says of the rows by which it is judged."""
-        own = self.held(fold)
-        return part.log_prob(self.rows.points[own], self.x[own])
+        rows = self.held(fold)
+        return part.log_prob(self.rows.points[rows], self.x[rows])
 
 
 Fit = Callable[[Tensor, int | None], ConditionalPart]
@@ -180,8 +180,8 @@ def fit_conditional(
         len(held),
         *gain_of(both, logs[0], counts),
         tuple(
-            PartEvidence(kind, share, *gain_of(own, logs[0], counts))
-            for kind, share, own in zip(fits, listed(shares), logs, strict=True)
+            PartEvidence(kind, share, *gain_of(scores, logs[0], counts))
+            for kind, share, scores in zip(fits, listed(shares), logs, strict=True)
         ),
         _by_word(density, cells, task.numbers[held].numpy(), (both - logs[0]).numpy()),
         tuple(untried),
@@ -205,25 +205,25 @@ def _fits(
             else kernels.with_rows(task.rows.points[rest], task.rows[rest].weights, task.x[rest])
         )
 
-    found: dict[str, Fit] = {
+    fits: dict[str, Fit] = {
         Unconditional.kind: lambda _, fold: Unconditional(without(fold)),
         ConditionalKernels.kind: about,
     }
     if not task.settings.is_fast:
         networks = _networks(task, tell)
-        found[NeuralMixture.kind] = lambda _, fold: (
+        fits[NeuralMixture.kind] = lambda _, fold: (
             networks if fold is None else networks.alone(NETWORKS * fold, NETWORKS)
         )
     if isinstance(space, Torus):
-        found[CircularRegression.kind] = lambda rest, _: fit_regression(
+        fits[CircularRegression.kind] = lambda rest, _: fit_regression(
             space, task.rows[rest], task.x[rest]
         )
         if not task.settings.is_fast and is_joint_possible(space, task.number):
             joint = _joint(task)
-            found[JointDensity.kind] = lambda _, fold: JointDensity(
+            fits[JointDensity.kind] = lambda _, fold: JointDensity(
                 space, joint.density if fold is None else joint.without(fold), task.number
             )
-    return found
+    return fits
 
 
 def _task(
@@ -244,8 +244,8 @@ def _task(
     how: dict[str, Any] = {"weights": weights, "groups": groups}
     if not settings.parametric:
         chosen = [name for name in settings.allowed if name != "flow"] or ["kernels", "mixture"]
-        kept: dict[str, Any] = {"components": tuple(chosen), "effort": settings.effort}
-        joint = DensitySettings(**kept, repeats=settings.repeats, seed=settings.seed)
+        allowed: dict[str, Any] = {"components": tuple(chosen), "effort": settings.effort}
+        joint = DensitySettings(**allowed, repeats=settings.repeats, seed=settings.seed)
         plain = pooled
         if settings.flow_alone:
             plain = _quietly(lambda: fit_in_folds(space, points, joint, **how))
@@ -255,13 +255,15 @@ def _task(
         _, weights, groups = alongside(points=points, **how)
         labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(points)))
         generator = torch.Generator().manual_seed(settings.seed)
-        own: dict[str, Any] = {"generator": generator, "fast": settings.is_fast}
-        folds = folds_of(weighed(points, weights, labels), together=False, **own)
+        how: dict[str, Any] = {"generator": generator, "fast": settings.is_fast}
+        folds = folds_of(weighed(points, weights, labels), together=False, **how)
 
         def outside(fold: int) -> Density:
             rest = folds.train(fold)
-            own = None if rest.weights is None else rest.weights.numpy()
-            return _quietly(lambda: fit_chosen(space, rest.points, settings, weights=own)).density
+            counts = None if rest.weights is None else rest.weights.numpy()
+            return _quietly(
+                lambda: fit_chosen(space, rest.points, settings, weights=counts)
+            ).density
 
     assert folds is not None
     assert folds.rows.numbers is not None
@@ -282,10 +284,10 @@ def _networks(task: _Task, tell: Callable[[float], None]) -> NeuralMixture:
     used = [fold for fold in range(task.folds.used) for _ in range(NETWORKS)]
     apart = [(number + 1) % count for number in used]
     train = [
-        torch.nonzero((fold != held) & (fold != kept))[:, 0]
-        for held, kept in zip(used, apart, strict=True)
+        torch.nonzero((fold != held) & (fold != apart_fold))[:, 0]
+        for held, apart_fold in zip(used, apart, strict=True)
     ]
-    stop = [task.where(kept) for kept in apart]
+    stop = [task.where(apart_fold) for apart_fold in apart]
     return fit_networks(task.space, task.rows, task.x, train, stop, task.settings.seed, tell)
 
 
@@ -317,19 +319,19 @@ def _joint(task: _Task) -> ChosenFit:
     without = "network" if torus.dim <= MOST_CHAINED else "chains"
     components = [name for name in task.settings.allowed if name != without]
     settings = task.settings.replace(components=tuple(components))
-    found = _quietly(lambda: fit_in_folds(torus, points[some], settings, folds=folds))
-    evidence, folds = found.evidence, found.folds
+    fit = _quietly(lambda: fit_in_folds(torus, points[some], settings, folds=folds))
+    evidence, folds = fit.evidence, fit.folds
     assert evidence is not None
     assert folds is not None
     evidence = for_conditionals(evidence, folds, space.dim)
-    return replace(found, density=evidence.assembled(), evidence=evidence)
+    return replace(fit, density=evidence.assembled(), evidence=evidence)
 
 
 def _by_word(
     density: ConditionalDensity, cells: Mapping[str, Values], held: NDArray[Any], gains: Array
 ) -> dict[str, tuple[WordEvidence, ...]]:
     """Return what each word is worth, by gains (n,) of rows held out; `held` are their places."""
-    found: dict[str, tuple[WordEvidence, ...]] = {}
+    evidence: dict[str, tuple[WordEvidence, ...]] = {}
     for column in density.covariates.columns:
         if not column.words:
             continue
@@ -345,5 +347,5 @@ def _by_word(
             error = float(some.std(ddof=1) / np.sqrt(len(some))) if len(some) > 1 else None
             count = int((texts == word).sum())
             entries.append(WordEvidence(word, count, gain, error, tuple(mean)))
-        found[column.name] = tuple(entries)
-    return found
+        evidence[column.name] = tuple(entries)
+    return evidence

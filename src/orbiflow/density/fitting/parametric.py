@@ -208,16 +208,9 @@ def _factors(
             f"{{columns}} must name the {len(space.columns)} columns of the space, got {len(names)}"
         )
     if not isinstance(space, Torus):
-        periods = tuple(360.0 if column == "lon" else 0.0 for column in space.columns)
-        if isinstance(space, RotationSpace) and space.form not in (
-            "quaternion",
-            "vector",
-            "matrix",
-        ):
-            periods = (space.period,) * 3
         unit = _unit_of(space)
         limits = tuple(_largest(column, unit) for column in space.columns)
-        writing = Writing(partial(_written, space), names, periods, limits, unit)
+        writing = Writing(partial(_written, space), names, space.periods, limits, unit)
         return [("", space.features(points)[0], (writing,))]
     found: list[tuple[str, Tensor, tuple[Writing, ...]]] = []
     for axis, column in enumerate(names):
@@ -225,7 +218,7 @@ def _factors(
         vectors = torch.stack([angles.cos(), angles.sin()], dim=1)
         write = partial(_written_angle, space, axis, 2 * axis * (name == SINE))
         writing = Writing(
-            write, (column,), (space.axes[axis].period,), (math.inf,), str(space.unit)
+            write, (column,), space.periods[axis : axis + 1], (math.inf,), str(space.unit)
         )
         found.append((column, vectors, (writing,)))
     if name == SINE:

@@ -24,7 +24,7 @@ from orbiflow.density.fitting.rounding import (
     step_of,
 )
 from orbiflow.density.inference import chart_of_rows
-from orbiflow.density.spaces import Space, Torus, whole_turn
+from orbiflow.density.spaces import Space
 from orbiflow.errors import Advice, literal
 
 SAME_PLACE = 1e-13
@@ -163,7 +163,7 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
     data = _coordinates(space, points)
     if data is None or len(counts) < FEWEST_OF_STEPS:
         return found
-    turns = [_turn(space, k) for k in range(data.shape[1])]
+    turns = [*space.periods]
     steps = [step_of(own, turn) for own, turn in zip(data.T, turns, strict=True)]
     columns = list(zip(data.T, steps, turns, strict=True))
     if len(counts) < FEWEST_VALUES and not all(  # few may be states, but not parts of a turn
@@ -229,16 +229,16 @@ def spread_evenly(
     on the evaluation of generative models, 2016). On tori, points may lack angles (NaN).
     """
     data = space.from_chart(points)
-    turns = [_turn(space, k) for k in range(data.shape[1])]
+    turns = [*space.periods]
     chance = torch.rand(len(points), dtype=torch.float64, generator=generator).numpy()
     noise = torch.rand(len(points), len(turns), dtype=torch.float64, generator=generator) - 0.5
     noise *= torch.as_tensor(found.steps_at(data, turns, chance))
-    if isinstance(space, Torus) and space.is_of_angles:
-        return space.project(points + noise / space.period)
+    if space.is_of_angles:
+        return space.project(points + noise / noise.new_tensor(turns))
     data += noise.numpy()
     if space.is_round:
         data[:, 0] = data[:, 0].clip(-90, 90)
-    return chart_of_rows(space, data, may_lack=isinstance(space, Torus))
+    return chart_of_rows(space, data, may_lack=bool(space.axes))
 
 
 def _coordinates(space: Space, points: Tensor) -> Array | None:
@@ -249,12 +249,3 @@ def _coordinates(space: Space, points: Tensor) -> Array | None:
     if space.is_round:  # at a pole any longitude is as good
         data[abs(data[:, 0]) > 90 - POLE_DEGREES, 1] = 0.0
     return data
-
-
-def _turn(space: Space, number: int) -> float:
-    """Return the period of a column of the data, 0 if it has none."""
-    if space.is_round:
-        return 360.0 * (number == 1)
-    if space.axes:
-        return space.axes[number].period
-    return 0.0 if space.unit in (None, "units") else whole_turn(str(space.unit))

@@ -194,5 +194,5 @@ def uniform_logs(space: Space, data: ArrayLike) -> Tensor:
     table = np.asarray(data, dtype=np.float64)
     if math.isfinite(space.volume):
         return torch.full((len(table),), -math.log(space.volume), dtype=torch.float64)
-    points = chart_of_rows(space, table, may_lack=isinstance(space, Torus))
+    points = chart_of_rows(space, table, may_lack=bool(space.axes))
     return at_observed(UniformDensity(space), points, measure="natural")

@@ -20,7 +20,7 @@ from orbiflow.density.data import (
 )
 from orbiflow.density.inference.angles import at_observed
 from orbiflow.density.models import Density
-from orbiflow.density.spaces import Line, Space, Torus
+from orbiflow.density.spaces import Line, Space
 from orbiflow.errors import OrbiflowError
 
 FEW_ROWS = 10
@@ -106,10 +106,8 @@ def given_doubts(space: Space, given: Mapping[str, float], names: Sequence[str])
     Raises:
         SettingError: For values that a column cannot have.
     """
-    if not isinstance(space, Torus):
-        return []
     doubts: list[str] = []
-    for name, role in zip(names, space.roles(space.dim), strict=True):
+    for name, role in zip(names, space.roles(len(names)), strict=True) if space.axes else ():
         if name not in given or role is None:
             continue
         column = Checked(name, np.array([given[name]]), _given)

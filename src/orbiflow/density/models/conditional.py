@@ -63,8 +63,8 @@ class Unconditional(ConditionalPart):
 
 
 PARTS: dict[str, type[ConditionalPart]] = {
-    own.kind: own
-    for own in (Unconditional, ConditionalKernels, NeuralMixture, CircularRegression, JointDensity)
+    part.kind: part
+    for part in (Unconditional, ConditionalKernels, NeuralMixture, CircularRegression, JointDensity)
 }
 """What a conditional density may be made of, by kind."""
 
@@ -113,10 +113,10 @@ class ConditionalDensity:
     def at(self, context: Context) -> Density:
         """Return the density where covariates are as one row says, a mixture that can be saved."""
         (x,) = self.context(context)
-        found: list[tuple[float, Density]] = []
+        weighted: list[tuple[float, Density]] = []
         for weight, part in zip(listed(self.weights), self.parts, strict=True):
-            found += [(weight * share, own) for share, own in part.at(x).parts()]
-        return mixture_of(found)
+            weighted += [(weight * share, density) for share, density in part.at(x).parts()]
+        return mixture_of(weighted)
 
     def mean_directions(self, context: Context) -> Tensor:
         """Return the mean directions (N, d) of a torus' angles in turns."""
@@ -127,16 +127,16 @@ class ConditionalDensity:
 
     def header(self) -> dict[str, Any]:
         """Return what makes the density again, together with `tensors`; ready for JSON."""
-        parts = [{"kind": own.kind, **own.header()} for own in self.parts]
+        parts = [{"kind": part.kind, **part.header()} for part in self.parts]
         return {"covariates": to_json(self.covariates), "parts": parts}
 
     def tensors(self) -> dict[str, Tensor]:
         """Return all tensors by name."""
-        found = {"weights": self.weights}
+        named = {"weights": self.weights}
         for number, part in enumerate(self.parts):
-            own = part.tensors().items()
-            found |= {f"{number}.{name}": tensor for name, tensor in own}
-        return found
+            tensors = part.tensors().items()
+            named |= {f"{number}.{name}": tensor for name, tensor in tensors}
+        return named
 
     @classmethod
     def from_header(
@@ -145,8 +145,10 @@ class ConditionalDensity:
         """Make the density again; raise `OrbiflowError` for what cannot be."""
         covariates = from_json(Covariates, header["covariates"], "covariates")
         parts = [
-            PARTS[own["kind"]].from_header(space, covariates.number, own, within(tensors, f"{k}."))
-            for k, own in enumerate(header["parts"])
+            PARTS[entry["kind"]].from_header(
+                space, covariates.number, entry, within(tensors, f"{k}.")
+            )
+            for k, entry in enumerate(header["parts"])
         ]
         weights = tensors["weights"]
         if (

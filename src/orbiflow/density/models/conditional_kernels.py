@@ -83,7 +83,7 @@ class ConditionalKernels(ConditionalPart):
     def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
         size = max(1, BLOCK_ENTRIES // len(self.points))
         blocks = zip(torch.split(points, size), torch.split(x, size), strict=True)
-        logs = [self.logs(part, own) for part, own in blocks]
+        logs = [self.logs(part, features) for part, features in blocks]
         return on_chart(self.space, points, torch.cat(logs))
 
     def logs(self, points: Tensor, x: Tensor, apart: Tensor | None = None) -> Tensor:
@@ -108,20 +108,24 @@ class ConditionalKernels(ConditionalPart):
     def _near(self, x: Tensor) -> Tensor:
         """Return the logarithms (M, N) of how much rows count where features are x (M, m)."""
         width = self.widths[self.number]
-        one, other = x / width, self.x / width
-        near = one @ other.mT - other.square().sum(dim=1) / 2 - one.square().sum(dim=1)[:, None] / 2
+        first, other = x / width, self.x / width
+        near = (
+            first @ other.mT
+            - other.square().sum(dim=1) / 2
+            - first.square().sum(dim=1)[:, None] / 2
+        )
         return near if self.weights is None else near + self.weights.log()
 
     @torch.no_grad()
     def at(self, x: Tensor) -> AdaptiveKernels:
         weights = torch.softmax(self._near(x[None])[0], dim=0)
-        kept = weights >= LEAST_SHARE * weights.max()
-        weights = weights[kept] / weights[kept].sum()
+        near = weights >= LEAST_SHARE * weights.max()
+        weights = weights[near] / weights[near].sum()
         scales = torch.tensor(KERNEL_SCALES, dtype=torch.float64)
         kappa = self.concentrations / scales[:, None]
         return AdaptiveKernels(
             self.space,
-            self.points[kept].repeat(len(KERNEL_SCALES), 1),
+            self.points[near].repeat(len(KERNEL_SCALES), 1),
             kappa.repeat_interleave(len(weights), dim=0),
             (self.shares[:, None] * weights).flatten(),
         )
@@ -156,7 +160,7 @@ class ConditionalKernels(ConditionalPart):
         points, x, *others = checked(tensors, shapes, "conditional kernels")
         if (
             not 1 <= count <= MOST_ROWS
-            or not all(bool((own > 0).all()) for own in others)
+            or not all(bool((tensor > 0).all()) for tensor in others)
             or abs(float(others[2].sum()) - 1) > 1e-6
             or header.get("scales") != list(KERNEL_SCALES)
         ):

@@ -39,7 +39,7 @@ class ConditionalPart(ABC):
     @torch.no_grad()
     def mean_features(self, x: Tensor) -> Tensor:
         """Return the means (N, 2 d) of the features of a torus' points where features are x (N, m)."""
-        return torch.stack([_mean_features(self.at(own)) for own in x])
+        return torch.stack([_mean_features(self.at(row)) for row in x])
 
     def header(self) -> dict[str, Any]:
         """Return what makes it again, together with `tensors`; ready for JSON."""
@@ -72,11 +72,11 @@ def on_chart(space: Space, points: Tensor, logs: Tensor) -> Tensor:
 
 def _mean_features(density: Density) -> Tensor:
     """Return the means (2 d,) of cosines and of sines of a torus' angles."""
-    angle, found = 2 * math.pi * cells()[:, 0], list[Tensor]()
+    angle, means = 2 * math.pi * cells()[:, 0], list[Tensor]()
     for axis in range(density.space.dim):
         weights = cell_masses(density, axis)
-        found.append(torch.stack([weights @ angle.cos(), weights @ angle.sin()]))
-    return torch.stack(found, dim=1).flatten()
+        means.append(torch.stack([weights @ angle.cos(), weights @ angle.sin()]))
+    return torch.stack(means, dim=1).flatten()
 
 
 def mean_cosines(kappa: Tensor) -> Tensor:
@@ -88,10 +88,12 @@ def checked(
     tensors: Mapping[str, Tensor], shapes: Mapping[str, Sequence[int]], what: str
 ) -> list[Tensor]:
     """Return tensors by name, in the order of their shapes; raise `OrbiflowError` for others."""
-    found = [tensors[name] for name in shapes]
+    ordered = [tensors[name] for name in shapes]
     if not all(
-        own.shape == tuple(shape) and own.dtype == torch.float64 and bool(own.isfinite().all())
-        for own, shape in zip(found, shapes.values(), strict=True)
+        tensor.shape == tuple(shape)
+        and tensor.dtype == torch.float64
+        and bool(tensor.isfinite().all())
+        for tensor, shape in zip(ordered, shapes.values(), strict=True)
     ):
         raise OrbiflowError(f"{what} of other shapes or values")
-    return found
+    return ordered

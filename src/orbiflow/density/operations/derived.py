@@ -78,35 +78,38 @@ class Partial:
         pairs = [(name, number_of(name, text)) for name, text in map(pair_of, texts)]
         density, names = saved.density, saved.columns
         if not pairs:
-            kept = range(len(names)) if columns is None else saved.axes(columns, tell)
+            numbers = range(len(names)) if columns is None else saved.axes(columns, tell)
             whole = density if isinstance(density, Mixture) else Mixture([density], [1.0])
             if columns is not None:
-                names, axes = self._chosen(kept)
+                names, axes = self._chosen(numbers)
                 whole = inference.marginal(density, axes)
             return self._write(whole, list(names), {"given": dict(saved.at)})
         given = saved.axes([name for name, _ in pairs], tell)
         values = [(axis, value) for axis, (_, value) in zip(given, pairs, strict=True)]
-        known = {names[axis]: value for axis, value in values}
+        conditions = {names[axis]: value for axis, value in values}
         chart = inference.given_named(density.space, values, names)
-        kept = [axis for axis in range(len(names)) if axis not in given]
+        numbers = [axis for axis in range(len(names)) if axis not in given]
         if columns is not None:
-            kept = saved.axes(columns, tell)
-            if both := [names[axis] for axis in kept if axis in given]:
+            numbers = saved.axes(columns, tell)
+            if both := [names[axis] for axis in numbers if axis in given]:
                 raise SettingError(
                     literal(repr(both[0]))
                     + " is both among {columns} and {at}; name it in one of them"
                 )
-        for doubt in inference.given_doubts(density.space, known, names):
+        for doubt in inference.given_doubts(density.space, conditions, names):
             tell(runtime.Note(f"WARNING: {doubt}"))
-        kept_names, axes = self._chosen(kept)
+        kept_names, axes = self._chosen(numbers)
         self.progress(0.0, "integrating")
         part = inference.conditional(density, chart, axes, **self.how)
         evidence = evidence_of(density, chart)
         rare = "; few data lie there, or none" if evidence < -3 else ""
-        words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
+        words = ", ".join(f"{name} = {value:g}" for name, value in conditions.items())
         ratio = f"{math.exp(evidence):.3g} times that of the uniform density{rare}"
         tell(runtime.Note(f"the density at {words} is {ratio}"))
-        origin = {"given": {**saved.at, **known}, "log_density_of_given_over_uniform": evidence}
+        origin = {
+            "given": {**saved.at, **conditions},
+            "log_density_of_given_over_uniform": evidence,
+        }
         return self._write(part, kept_names, origin)
 
     def _before_files(self, share: float, what: str) -> None:
@@ -168,15 +171,15 @@ def evidence_of(density: Density, given: dict[int, float]) -> float:
 
 def _sample_notes(density: Mixture) -> list[str]:
     """Return of what is drawn with weights how many draws count, in words."""
-    found: list[str] = []
-    for own, weight in zip(density.components, density.weights.tolist(), strict=True):
-        share = own.effective_share()
+    notes: list[str] = []
+    for component, weight in zip(density.components, density.weights.tolist(), strict=True):
+        share = component.effective_share()
         if share < 1:
-            found.append(
+            notes.append(
                 f"{100 * weight:.1f}% of the samples are chosen among weighed draws, of which "
                 f"{100 * share:.2g}% count (effective sample size)"
             )
-    return found
+    return notes
 
 
 def _words(density: Density, names: list[str], out: Path) -> str:

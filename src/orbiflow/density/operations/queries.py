@@ -88,13 +88,13 @@ def score(
         rows = saved.rows(data, reading, on_event, covariates)
         progress = runtime.progress_events(on_event, cancel)
         if covariates:
-            found = score_given(saved.density, rows, settings, progress, on_event)
+            scores = score_given(saved.density, rows, settings, progress, on_event)
         else:
-            known = saved.axes(settings.given, on_event) if settings.given else ()
-            if len(known) == len(saved.columns):
+            axes = saved.axes(settings.given, on_event) if settings.given else ()
+            if len(axes) == len(saved.columns):
                 raise SettingError("{given} names all columns: nothing is left to have a density")
-            found = score_rows(saved.density, rows, settings, progress, may_lack, known)
-        columns, mean, over, notes = found
+            scores = score_rows(saved.density, rows, settings, progress, may_lack, axes)
+        columns, mean, over, notes = scores
     weighted = "" if rows.weights is None else ", weighted"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
     table = tables.append_columns(rows, columns)
@@ -135,8 +135,8 @@ def score_rows(
 
     space, values = density.space, rows.values
     points = inference.chart_of_rows(space, values, may_lack=may_lack)
-    known = ~points.isnan()
-    whole = known.all(dim=1).numpy()
+    present = ~points.isnan()
+    whole = present.all(dim=1).numpy()
     name = "log_prob" if whole.all() else "log_prob_marginal"
     notes: list[str] = []
     columns = {name: _log_densities(density, points, settings, progress)}
@@ -154,7 +154,7 @@ def score_rows(
         columns["hdr"] = regions.DensityLevels(density, samples=count).hdr_of(scores)
         notes.append(_region_note(count))
     if not whole.all():
-        notes.append(_missing_note(known, name))
+        notes.append(_missing_note(present, name))
     over = f"{len(whole)} rows" if whole.all() else f"the {whole.sum()} whole rows"
     return columns, mean_of_whole(columns[name], rows.weights, whole), over, notes
 
@@ -169,12 +169,12 @@ def score_given(
     """Return log densities (N,) of rows, each where its covariates are, as `score_rows`."""
     from orbiflow.density import inference
 
-    known = density.given
-    assert known is not None
-    cells = dict(zip(known.covariates.names, rows.given.values(), strict=True))
+    given = density.given
+    assert given is not None
+    cells = dict(zip(given.covariates.names, rows.given.values(), strict=True))
     try:
-        x = known.covariates.features(cells)
-        doubts = known.covariates.doubts(cells)
+        x = given.covariates.features(cells)
+        doubts = given.covariates.doubts(cells)
     except OrbiflowError as error:
         text = f"{rows.source.where}{error}; leave such rows out, or score without what is given"
         raise InputFileError(text) from error
@@ -183,7 +183,7 @@ def score_given(
     points = inference.chart_of_rows(density.space, rows.values, may_lack=False)
 
     def score_block(some: slice) -> Tensor:
-        return known.log_prob(points[some], x[some], measure=settings.measure)
+        return given.log_prob(points[some], x[some], measure=settings.measure)
 
     logs = _in_blocks(score_block, len(points), BLOCK_GIVEN, progress)
     mean = mean_of_whole(logs, rows.weights, rows.whole)
@@ -197,12 +197,12 @@ def _in_blocks(
     import numpy as np
     import torch
 
-    found: list[Array] = []
+    blocks: list[Array] = []
     for start in range(0, count, size):
         with torch.no_grad():
-            found.append(score(slice(start, start + size)).double().numpy())
+            blocks.append(score(slice(start, start + size)).double().numpy())
         progress(min(1.0, (start + size) / count), "scoring")
-    return np.concatenate(found)
+    return np.concatenate(blocks)
 
 
 def _only(points: Tensor, given: Sequence[int]) -> Tensor:
@@ -231,14 +231,14 @@ def _gradients(
     import numpy as np
 
     values = rows.values
-    found: list[Array] = []
+    blocks: list[Array] = []
     for start in range(0, len(values), BLOCK_GRADIENT):
         part = values[start : start + BLOCK_GRADIENT]
-        found.append(models.log_density_gradient(density, part)[1])
+        blocks.append(models.log_density_gradient(density, part)[1])
         share = (start + len(part)) / len(values)
         progress(SCORED_SHARE + (1 - SCORED_SHARE) * share, "finding gradients")
     names = [f"log_prob_by_{name}" for name in rows.columns]
-    return dict(zip(names, np.concatenate(found).T, strict=True))
+    return dict(zip(names, np.concatenate(blocks).T, strict=True))
 
 
 def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[Any]) -> float:
@@ -262,12 +262,12 @@ def _region_note(samples: int) -> Advice:
     )
 
 
-def _missing_note(known: Tensor, name: str) -> str:
+def _missing_note(present: Tensor, name: str) -> str:
     """Return in words how many rows lack angles, and what their log density is."""
-    lacking, empty = int((~known.all(dim=1)).sum()), int((~known.any(dim=1)).sum())
+    lacking, empty = int((~present.all(dim=1)).sum()), int((~present.any(dim=1)).sum())
     nothing = f"; {empty} of them have none, hence 0" if empty else ""
     return (
-        f"{lacking} of {len(known)} rows lack some angles: {name} is the log density of those "
+        f"{lacking} of {len(present)} rows lack some angles: {name} is the log density of those "
         f"that they have{nothing}"
     )
 

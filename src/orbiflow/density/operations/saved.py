@@ -64,11 +64,11 @@ class SavedDensity:
         """Return the density where covariates are as texts say, and the texts of other columns."""
         given = self.density.given
         names = [] if given is None else [name.casefold() for name in given.covariates.names]
-        known = [pair for text in texts if (pair := pair_of(text))[0].casefold() in names]
+        pairs = [pair for text in texts if (pair := pair_of(text))[0].casefold() in names]
         others = [text for text in texts if pair_of(text)[0].casefold() not in names]
-        if given is None or not known:
+        if given is None or not pairs:
             return self, others
-        cells = values_of(given, known)
+        cells = values_of(given, pairs)
         for doubt in given.covariates.doubts(cells):
             tell(Note(f"WARNING: {doubt}"))
         at = {name: cell[0].item() for name, cell in cells.items()}
@@ -109,15 +109,15 @@ class SavedDensity:
         unnamed = [re.fullmatch(r"column(\d+)", name) for name in names]
         if all(unnamed):
             numbers = {match[1]: axis for axis, match in enumerate(unnamed) if match}
-        asked = [name if name.casefold() in lower else numbers.get(name, name) for name in wanted]
-        axes = inference.axes_named(asked, names)
+        lookups = [name if name.casefold() in lower else numbers.get(name, name) for name in wanted]
+        axes = inference.axes_named(lookups, names)
         for name, axis in zip(wanted, axes, strict=True):
             if name.isdigit() and not all(unnamed):
                 place = f"number {name} among the model's columns ({', '.join(names)})"
                 tell(Note(f"took {name} for {names[axis]}, {place}"))
         return axes
 
-    def covariates_named(self, asked: Sequence[str]) -> list[str]:
+    def covariates_named(self, declared: Sequence[str]) -> list[str]:
         """Return the covariates of the fit, if these are what is asked for; none if none of them is.
 
         Raises `SettingError` if some of them are, and others are not, and for other roles than the
@@ -127,7 +127,7 @@ class SavedDensity:
         fitted: dict[str, Covariate] = {}
         if given is not None:
             fitted = {column.name.casefold(): column for column in given.covariates.columns}
-        roles = {str(name).casefold(): role for name, role in data.asked_roles(asked).items()}
+        roles = {str(name).casefold(): role for name, role in data.asked_roles(declared).items()}
         if given is None or not roles.keys() & fitted.keys():
             return []
         names = given.covariates.names

@@ -116,9 +116,9 @@ class Covariate:
 
     def _known(self, words: NDArray[np.str_]) -> NDArray[np.intp]:
         """Return the numbers (N,) of words; refuse those that the fit has not seen."""
-        known = np.array(self.words)
-        at = np.searchsorted(known, words).clip(max=len(known) - 1)
-        if unknown := sorted(set(words[known[at] != words].tolist())):
+        every = np.array(self.words)
+        at = np.searchsorted(every, words).clip(max=len(every) - 1)
+        if unknown := sorted(set(words[every[at] != words].tolist())):
             raise OrbiflowError(
                 f"{self.name!r} has {_some(unknown)}, and the fit has seen {_some(self.words)}"
             )
@@ -164,26 +164,26 @@ class Covariates:
     @classmethod
     def of(cls, cells: Mapping[str, Values], roles: Mapping[str, Role]) -> Covariates:
         """Return the covariates that columns of cells are, each of its role."""
-        return cls(tuple(Covariate.of(name, own, roles[name]) for name, own in cells.items()))
+        return cls(tuple(Covariate.of(name, column, roles[name]) for name, column in cells.items()))
 
     @property
     def names(self) -> list[str]:
         """What they are called."""
-        return [own.name for own in self.columns]
+        return [column.name for column in self.columns]
 
     def column(self, name: str) -> Covariate:
         """Return the covariate of a name."""
-        return next(own for own in self.columns if own.name == name)
+        return next(column for column in self.columns if column.name == name)
 
     @property
     def width(self) -> int:
         """The number of all features."""
-        return sum(own.width for own in self.columns)
+        return sum(column.width for column in self.columns)
 
     @property
     def number(self) -> Tensor:
         """The number (width,) of the column of each feature."""
-        widths = torch.tensor([own.width for own in self.columns])
+        widths = torch.tensor([column.width for column in self.columns])
         return torch.arange(len(widths)).repeat_interleave(widths)
 
     @property
@@ -193,18 +193,18 @@ class Covariates:
 
     def features(self, cells: Mapping[str, Values], rows: int | None = None) -> Tensor:
         """Return what models see of cells, in float64: (N, width); check the number of `rows`."""
-        x = torch.cat([own.features(cells[own.name]) for own in self.columns], dim=1)
+        x = torch.cat([column.features(cells[column.name]) for column in self.columns], dim=1)
         if rows is not None and len(x) != rows:
             raise OrbiflowError(f"given: expected {rows} rows, as the data have, got {len(x)}")
         return x
 
     def fit_doubts(self, cells: Mapping[str, Values]) -> list[str]:
         """Return what makes one doubt the cells of a fit."""
-        own = [one for one in self.columns if one.line is not None]
+        lines = [column for column in self.columns if column.line is not None]
         return [
             doubt
-            for one in own
-            for doubt in check_real(_checked(one.name, cells[one.name]), one.role)
+            for column in lines
+            for doubt in check_real(_checked(column.name, cells[column.name]), column.role)
         ]
 
     def doubts(self, cells: Mapping[str, Values]) -> list[str]:
@@ -212,9 +212,9 @@ class Covariates:
 
         Raises `SettingError` for values that contradict what the columns are.
         """
-        for own in self.columns:
-            own.check(cells[own.name])
-        return [doubt for own in self.columns if (doubt := own.doubt(cells[own.name]))]
+        for column in self.columns:
+            column.check(cells[column.name])
+        return [doubt for column in self.columns if (doubt := column.doubt(cells[column.name]))]
 
 
 def _text(name: str, cells: Values) -> NDArray[np.str_]:

@@ -40,6 +40,10 @@ class _AngleSpace(Space):
     def to_chart(self, data: ArrayLike) -> Tensor:
         return self.project(self.cover(data))
 
+    @property
+    def periods(self) -> tuple[float, ...]:
+        return (self.period,) * self.dim
+
     def step_angle(self, step: float) -> float:
         return 2 * math.pi * step / self.period
 
@@ -143,6 +147,10 @@ class Torus(_AngleSpace):
     def roles(self, width: int) -> tuple[Role | None, ...]:
         del width
         return tuple(axis.role for axis in self.axes)
+
+    @property
+    def periods(self) -> tuple[float, ...]:
+        return tuple(axis.period for axis in self.axes)
 
     @property
     def volume(self) -> float:

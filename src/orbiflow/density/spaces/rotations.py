@@ -99,6 +99,10 @@ class RotationSpace(UnitVectorSpace):
         self.columns = FORMS.get(form, ("angle1", "angle2", "angle3"))
         super().__init__(_products(self.crystal_rotations, self.specimen_rotations))
 
+    @property
+    def periods(self) -> tuple[float, ...]:
+        return tuple(self.period * (self.form in EULER) for _ in self.columns)
+
     def data_unit(self, width: int) -> str | None:
         return self.angle_unit if is_angular(self.name, width, self.form_of(width)) else None
 

@@ -239,6 +239,10 @@ class RoundSpace(Space):
         self.group = named_group(self.name)
 
     @property
+    def periods(self) -> tuple[float, ...]:
+        return tuple(360.0 * (column == "lon") for column in self.columns)
+
+    @property
     def volume(self) -> float:
         return self.power * math.pi
 

@@ -291,6 +291,11 @@ class Space(ABC):
         """Return what each of so many columns of data is; None is a coordinate of the space."""
         return (None,) * width
 
+    @property
+    def periods(self) -> tuple[float, ...]:
+        """After what each column of the data begins again, 0 where it does not."""
+        return (0.0,) * len(self.columns)
+
     def data_unit(self, width: int) -> str | None:
         """Return the unit of data of so many columns, None if they have none."""
         del width
