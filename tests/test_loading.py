@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import orbiflow
+from density.quick_fits import quick_fits_fixture  # noqa: F401
 from orbiflow.density import DensityEstimator
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.loading import LoadedRun
@@ -99,8 +100,10 @@ class Frame:
         return self.values if dtype is None else self.values.astype(dtype)
 
 
-@pytest.mark.parametrize("name", ["fit", "fit.safetensors"])
-@pytest.mark.parametrize("columns", [["phi", "psi"], None])
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [("fit", ["phi", "psi"]), ("fit", None), ("fit.safetensors", ["phi", "psi"])],
+)
 def test_an_estimator_is_saved_with_its_names(
     tmp_path: Path, name: str, columns: list[str] | None
 ) -> None:

@@ -307,19 +307,21 @@ def test_weights_and_groups_count() -> None:
 
 def test_the_regressor_is_scikit_learns() -> None:
     rng = np.random.default_rng(7)
-    x = rng.normal(size=(120, 2))
+    x = rng.normal(size=(80, 2))
     angles = rng.vonmises(3 * np.tanh(x[:, 0]), 12.0)
-    own = AngleRegressor(**QUICK).fit(x[:80], angles[:80])
+    own = AngleRegressor(**QUICK).fit(x[:50], angles[:50])
     assert own.n_features_in_ == 2
-    assert own.predict(x[80:]).shape == (40,)
-    assert own.score(x[80:], angles[80:]) > 0.7
-    assert own.score(x[:60], own.predict(x[:60]) + np.pi) < 0
+    assert own.predict(x[50:]).shape == (30,)
+    assert own.score(x[50:], angles[50:]) > 0.7
+    assert own.score(x[:40], own.predict(x[:40]) + np.pi) < 0
     at = own.at(x1=0.3, x2=0.1)
     assert own.predict([[0.3, 0.1]])[0] == pytest.approx(at.mean()[0], abs=1e-4)
-    scaled = make_pipeline(StandardScaler(), clone(own)).fit(x[:80], angles[:80])
-    assert scaled.score(x[80:], angles[80:]) > 0.7
-    search = GridSearchCV(AngleRegressor(unit="radians"), {"components": ["kernels"]}, cv=2)
-    assert search.fit(x[:80], angles[:80]).best_score_ > 0.5
+    scaled = make_pipeline(StandardScaler(), clone(own)).fit(x[:50], angles[:50])
+    assert scaled.score(x[50:], angles[50:]) > 0.7
+    search = GridSearchCV(
+        AngleRegressor(unit="radians"), {"components": ["kernels"]}, cv=2, refit=False
+    )
+    assert search.fit(x, angles).best_score_ > 0.5
 
 
 def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:
