@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from orbiflow.tiles import ArtSettings, EscherTile, Frame, TileMap, as_map
-from orbiflow.tiles.motifs import CarriedPicture
+from orbiflow.drawing import palette
+from orbiflow.tiles import ArtSettings, EscherTile, Frame, Made, TileMap, Uses, as_map
+from orbiflow.tiles.motifs import CarriedPicture, Over, motifs_on
+from orbiflow.tiles.page import Motif
 from orbiflow.tiles.result_file import group_json
 from orbiflow.tiles.search.bent_map import map_of_bent
 from outlines import animal, bent_squirrel, flowless
@@ -27,6 +29,34 @@ def squirrel(name: str) -> EscherTile:
     placed = own.tile.transformed(frame.linear, frame.offset)
     maps = TileMap(frame=frame, bending=map_of_bent(own.bent, own.factor, own.shift, own.tile))
     return EscherTile(placed, y_down=target.y_down, name=f"squirrel-{name}", map_source=maps)
+
+
+def pixels_of(made: Made) -> np.ndarray:
+    """Artwork as pixels (height, width, 3)."""
+    return np.asarray(made.image())
+
+
+def motif_on(tile: EscherTile, settings: ArtSettings, *overs: Over) -> Motif:
+    """What lies on a tile of one figure, in its units."""
+    chosen = palette(settings.palette)
+    return motifs_on(tile, settings, chosen, overs, tint=0.0, density=1.0).motifs[0]
+
+
+def copies_of(made: Made) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where artwork of one figure has copies: linear parts and offsets in mm from the symbol, the
+    rings, and the number of each one's colour."""
+    scene, linear, offsets, colours = made.scenes[0], [], [], []
+    filled = [own for own in scene.layers if own.role == "tiles" and own.style.fill]
+    for layer in filled:
+        for uses in layer.items:
+            assert isinstance(uses, Uses)
+            linear.append(uses.linear[uses.which])
+            offsets.append(uses.offsets)
+            colours.append(np.full(len(uses), int(layer.name.removeprefix("colour ")) - 1))
+    parts, places = np.concatenate(linear), np.concatenate(offsets)
+    symbol = scene.symbols["tile"].pieces[:, 0]
+    rings = np.einsum("mij,nj->mni", parts, symbol) + places[:, None]
+    return parts, places, rings, np.concatenate(colours)
 
 
 def art_settings(**options: Any) -> ArtSettings:

@@ -13,8 +13,30 @@ from hypothesis import strategies as st
 from bent_tiles import bent_tile
 from orbiflow.arrays import Array
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import CLASSES, Tile, isohedral_class
+from orbiflow.tiles import (
+    CLASSES,
+    ExportSettings,
+    Scene,
+    Tile,
+    exported,
+    isohedral_class,
+    write_scene,
+)
 from orbiflow.tiles.result_file import group_json
+
+
+def scenes(
+    tile: Any, settings: ExportSettings, picture: str | Path | None = None, **how: Any
+) -> tuple[list[Scene], tuple[str, ...]]:
+    """The sheets of an export, and what the user should know."""
+    made = exported(tile, settings, (picture,), **how)
+    return list(made.scenes), made.notes
+
+
+def sheet_content(scene: Scene, settings: ExportSettings) -> str | bytes:
+    """The content of a sheet's file."""
+    form = settings.file_format
+    return write_scene(scene, form, tolerance=settings.fine, dpi=settings.dpi)
 
 
 class Line(NamedTuple):

@@ -25,7 +25,7 @@ def small_searches() -> Iterator[None]:
         patch.setitem(LikenessSearch.efforts, "fast", FEW)  # pyright: ignore[reportArgumentType]
         for name, value in {"placements": 10, "held": 3, "finalists": 1, "rounds": 2}.items():
             patch.setitem(SKETCH, name, value)
-        for module in ("drawing.raster", "tiles.write.png"):
+        for module in ("drawing.raster", "tiles.write.painting"):
             patch.setattr(f"orbiflow.{module}.FINER", 1)
         yield
 

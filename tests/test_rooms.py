@@ -47,7 +47,7 @@ EXCEPTIONS: dict[str, str] = {}
 
 TESTS = Path(__file__).parent
 TESTED = {
-    "tiles/art": ("tiles.make", "tiles.motifs"),
+    "tiles/art": ("tiles.make", "tiles.motifs", "tiles.page"),
     "tiles/exporting": ("tiles.make", "tiles.page"),
     "tiles/flowing": ("tiles.search",),
     "tiles/search": ("tiles.flowing",),

@@ -27,8 +27,8 @@ TOPICS = {
         "read_result "
     ),
     "What is made of a tile": (
-        "ExportSettings export ArtSettings art artwork render_artwork with_map read_over "
-        "SolidSettings solid make_solid AnimationSettings animate scenes Scene write_scene "
+        "ExportSettings export ArtSettings art artwork with_map read_over "
+        "SolidSettings solid make_solid AnimationSettings animate exported Made Scene write_scene "
         "tile_picture tiling_picture tilings_png overlay_picture bending_picture "
     ),
     "Solids that fill space": (

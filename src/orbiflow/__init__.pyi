@@ -93,10 +93,10 @@ from .tiles.flowing.tile_model import TileModel as TileModel
 from .tiles.flowing.tile_model import load_model as load_model
 from .tiles.flowing.tile_model import trainable as trainable
 from .tiles.make.art import artwork as artwork
-from .tiles.make.art import render_artwork as render_artwork
 from .tiles.make.art_settings import ArtSettings as ArtSettings
 from .tiles.make.export_settings import ExportSettings as ExportSettings
-from .tiles.make.exporting import scenes as scenes
+from .tiles.make.exporting import exported as exported
+from .tiles.make.made import Made as Made
 from .tiles.motifs.carried import read_over as read_over
 from .tiles.motifs.carried import with_map as with_map
 from .tiles.motion.settings import AnimationSettings as AnimationSettings

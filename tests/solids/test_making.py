@@ -8,7 +8,7 @@ from manifold3d import Manifold
 
 from orbiflow.solids import Mesh
 from orbiflow.solids.bodies import as_body, as_mesh, common_volume
-from orbiflow.solids.making import Made, make_block, make_puzzle, make_stack, make_tile
+from orbiflow.solids.making import PrintedParts, make_block, make_puzzle, make_stack, make_tile
 from orbiflow.solids.offsets import offset_body
 from orbiflow.solids.print_advice import lying, overhang_share, print_advice
 from orbiflow.solids.sweeping import lifted
@@ -110,7 +110,7 @@ def test_a_copy_fits_into_the_starting_block(own: Any) -> None:
         assert common_volume(block, tile.translate((x, y, 0))) > 1
 
 
-def box_and_pieces(made: Made) -> tuple[Manifold, list[Manifold]]:
+def box_and_pieces(made: PrintedParts) -> tuple[Manifold, list[Manifold]]:
     return made.parts["box"], [made.parts[f"piece {k}"] for k in range(1, len(made.parts))]
 
 

@@ -54,6 +54,8 @@ def in_bands(
         draw(band, top, rows)
         if mode == "P":
             part = band.convert("RGB").reduce(FINER)
+        elif isinstance(ground, tuple) and ground[3] == 255:
+            part = band.reduce(FINER)
         else:  # transparent pixels have no colour
             part = band.convert("RGBa").reduce(FINER).convert("RGBA")
         whole.paste(part, (0, top))

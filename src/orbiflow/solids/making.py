@@ -41,7 +41,7 @@ GRAIN = 0.01
 
 
 @dataclass(frozen=True)
-class Made:
+class PrintedParts:
     """Parts to print, in mm.
 
     - `parts`: Closed bodies by name.
@@ -71,7 +71,7 @@ class Made:
         return write_stl(self.bodies(), title)
 
 
-def make(own: EscherSolid, settings: BuildSettings) -> Made:
+def make(own: EscherSolid, settings: BuildSettings) -> PrintedParts:
     """Return what settings ask for."""
     gap, wall, floor = settings.clearance, settings.wall, settings.floor
     match settings.kind:
@@ -92,7 +92,9 @@ def make(own: EscherSolid, settings: BuildSettings) -> Made:
             )
 
 
-def make_tile(own: EscherSolid, *, clearance: float = CLEARANCE, nozzle: float = 0.4) -> Made:
+def make_tile(
+    own: EscherSolid, *, clearance: float = CLEARANCE, nozzle: float = 0.4
+) -> PrintedParts:
     """Return one tile, smaller all around by half of the clearance, as it is best printed.
 
     Args:
@@ -106,10 +108,10 @@ def make_tile(own: EscherSolid, *, clearance: float = CLEARANCE, nozzle: float =
     body = offset_body(mesh, -clearance / 2)
     body = _on_bed(moved_body(body, lying(mesh)))
     advice = print_advice(body, nozzle=nozzle, name="The tile")
-    return Made({"tile": body}, {"tile": STACK_PALETTE.fill(0)}, notes=advice.sentences)
+    return PrintedParts({"tile": body}, {"tile": STACK_PALETTE.fill(0)}, notes=advice.sentences)
 
 
-def make_stack(own: EscherSolid, *, copies: int = 8, clearance: float = CLEARANCE) -> Made:
+def make_stack(own: EscherSolid, *, copies: int = 8, clearance: float = CLEARANCE) -> PrintedParts:
     """Return a stack of copies as they fill space, a part for each colour, standing like the figure.
 
     Args:
@@ -133,7 +135,9 @@ def make_stack(own: EscherSolid, *, copies: int = 8, clearance: float = CLEARANC
         places.setdefault(name, []).append(np.column_stack([turn, here - turn @ there]))
         colours[name] = STACK_PALETTE.fill(number)
     parts = {name: placed[k].translate((-corner).tolist()) for name, k in firsts.items()}
-    return Made(parts, colours, places, [f"{copies} copies with a gap of {clearance:g} mm."])
+    return PrintedParts(
+        parts, colours, places, [f"{copies} copies with a gap of {clearance:g} mm."]
+    )
 
 
 def make_block(
@@ -143,7 +147,7 @@ def make_block(
     wall: float = WALL,
     floor: float = FLOOR,
     leaving: Leaving | None = None,
-) -> Made:
+) -> PrintedParts:
     """Return a block to start a stack on: its bottom is flat, and a copy fits into its top.
 
     The block is what copies below fill, cut off by a box. The copy is let in from above, in the
@@ -181,7 +185,9 @@ def make_block(
     tile = moved_body(offset_body(_in_mm(own.tile, own), -clearance / 2), turn)
     parts = _all_on_bed({"starting block": base, "tile": tile})
     notes += print_advice(parts["starting block"], name="The starting block").sentences
-    return Made(parts, {"starting block": "#d9d3c7", "tile": STACK_PALETTE.fill(0)}, notes=notes)
+    return PrintedParts(
+        parts, {"starting block": "#d9d3c7", "tile": STACK_PALETTE.fill(0)}, notes=notes
+    )
 
 
 def _copies_above(own: EscherSolid, body: Manifold, turn: Array, block: Manifold) -> list[Manifold]:
@@ -206,7 +212,7 @@ def make_puzzle(
     wall: float = WALL,
     floor: float = FLOOR,
     assembled: bool = False,
-) -> Made:
+) -> PrintedParts:
     """Return copies to put together, and an open box in which they sit when they are.
 
     The box's inside is cut by the pieces themselves, and open upwards: in the direction in which
@@ -242,7 +248,7 @@ def make_puzzle(
         colours[name] = STACK_PALETTE.fill(colour_number(own.group, copy))
     parts = _all_on_bed(parts)
     notes = [assembly.words, *notes, *print_advice(parts["box"], name="The box").sentences]
-    return Made(parts, colours, notes=notes)
+    return PrintedParts(parts, colours, notes=notes)
 
 
 def _box_direction(

@@ -27,12 +27,11 @@ from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.solids import BALLS, SolidSettings
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.make import Artwork, Exported
+    from orbiflow.tiles.make import Made
     from orbiflow.tiles.solids import Solid
     from orbiflow.tiles.tile import EscherTile, TileSource
-    from orbiflow.tiles.worlds import WorldArt
 else:  # what annotations mean when they are read, without heavy imports
-    Artwork = Exported = Solid = WorldArt = Outcome
+    Made = Solid = Outcome
     TileSource = Annotated[
         Any, InMemory("the folder of a run, its result.json, or a tile's folder")
     ]
@@ -82,7 +81,7 @@ def export(
     second_picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
-) -> Exported:
+) -> Made:
     """Write a tiling in real size: to print, to cut with a laser, to draw, to put on a page.
 
     Lengths are numbers with a unit: mm, cm, in or pt.
@@ -108,20 +107,16 @@ def export(
     pictures = picture, second_picture
     given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)
     on_event(Progress(0.0, "laying out"))
-    sheets, notes = make.scenes(
-        given, settings, picture=picture, second_picture=second_picture, force=force
-    )
-    contents: list[str | bytes] = []  # all, before the first file
-    for k, sheet in enumerate(sheets):
-        cancel.check()
-        on_event(Progress((1 + k) / (1 + len(sheets)), "writing"))
-        contents.append(make.sheet_content(sheet, settings))
+    made = make.exported(given, settings, pictures, force=force)
+    return _finished(made, out, on_event, cancel)
+
+
+def _finished(made: Made, out: Path, on_event: Sink, cancel: Cancel) -> Made:
+    """Write what was made; return what came of it."""
     cancel.check()
-    names = make.sheet_names(out, len(contents))
-    files = tuple(write_atomic(name, text) for name, text in zip(names, contents, strict=True))
-    made = make.Exported(settings=settings, files=(), scenes=tuple(sheets), notes=notes)
-    done = made.written(files)
-    _tell(on_event, (*notes, done.words), *files)
+    on_event(Progress(0.2, "writing"))
+    done = made.written(out, cancel)
+    _tell(on_event, (*done.notes, done.words), *done.files)
     return done
 
 
@@ -143,7 +138,7 @@ def art(
     begin: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
-) -> Artwork | WorldArt:
+) -> Made:
     """Carry a picture of the silhouette onto its tile and repeat it over the plane.
 
     Without a picture tiles are coloured by a palette, and lines can be engraved in them.
@@ -190,20 +185,10 @@ def art(
         both = zip(pictures, (given, first), strict=True)
         overs = [own for over, figure in both for own in motifs.read_overs((over,), figure)]
     if settings.world or settings.metamorphosis:
-        made: Artwork | WorldArt = worlds.world_artwork(given, settings, *overs, begin=first)
-        cancel.check()
-        on_event(Progress(0.2, "drawing"))
-        content = worlds.world_file(made, settings.file_format, cancel=cancel)
+        made = worlds.world_artwork(given, settings, *overs, begin=first, cancel=cancel)
     else:
         made = make.artwork(given, settings, *overs)
-        cancel.check()
-        on_event(Progress(0.2, "drawing"))
-        content = make.art_file(made, settings.file_format, cancel=cancel)
-    cancel.check()
-    write_atomic(out, content)
-    done = made.written(out)
-    _tell(on_event, (*made.notes, done.words), out)
-    return done
+    return _finished(made, out, on_event, cancel)
 
 
 @operation("solid")

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from artworks import EYE, squirrel
-from exported import tile_of, tiles
-from orbiflow.tiles import Curve, ExportSettings, Scene, Tile, scenes
+from exported import scenes, tile_of, tiles
+from orbiflow.tiles import Curve, ExportSettings, Scene, Tile
 from orbiflow.tiles.make import exporting
 from orbiflow.tiles.make.cut_order import in_cutting_order, ordered_lines
 from orbiflow.tiles.page import Layer, PathPart, Style, fitted, outline, turning

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from exported import tile_of
+from exported import scenes, tile_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import MILLIMETRES, PAGES, Length, LengthOrZero, PageSize, length
 from orbiflow.settings.kinds import RefusedValue, kind_of
 from orbiflow.settings.units import length_or_none, page_size, signed_length, size
-from orbiflow.tiles import ExportSettings, scenes
+from orbiflow.tiles import ExportSettings
 from refusals import refused
 
 

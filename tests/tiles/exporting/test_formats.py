@@ -11,9 +11,9 @@ import pytest
 import shapely
 from PIL import Image
 
-from exported import dxf_lines, tile_of
+from exported import dxf_lines, scenes, sheet_content, tile_of
 from orbiflow.errors import CertificationError
-from orbiflow.tiles import EscherTile, ExportSettings, Tile, edges, export, scenes, sheet_content
+from orbiflow.tiles import EscherTile, ExportSettings, Tile, edges, export
 from refusals import refused
 
 TILE = tile_of("IH3")

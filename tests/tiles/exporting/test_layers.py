@@ -18,8 +18,8 @@ from PIL import Image
 from scipy.spatial import KDTree
 
 from artworks import EYE, face, squirrel
-from exported import Line, dxf_lines, svg_lines
-from orbiflow.tiles import ExportSettings, Scene, scenes, sheet_content
+from exported import Line, dxf_lines, scenes, sheet_content, svg_lines
+from orbiflow.tiles import ExportSettings, Scene
 from orbiflow.tiles.make.drawings import burnt
 from orbiflow.tiles.page import Curve, Motif, PathPart, Style, boundary, region_of
 from refusals import refused

@@ -12,9 +12,9 @@ from scipy.spatial.distance import pdist
 from shapely.affinity import translate
 
 from artworks import squirrel
-from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
+from exported import dxf_lines, polygons, scenes, sheet_content, svg_lines, tile_of, tiles
 from orbiflow.errors import SettingError
-from orbiflow.tiles import ExportSettings, Scene, Tile, as_tile, polygons_in, scenes, sheet_content
+from orbiflow.tiles import ExportSettings, Scene, Tile, as_tile, polygons_in
 from orbiflow.tiles.make import cut_ring
 from orbiflow.tiles.make.jigsaws import LEAST_SHARE
 from orbiflow.tiles.make.layout import layout

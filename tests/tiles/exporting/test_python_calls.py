@@ -52,7 +52,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, found: EscherTile) -> Path:
 
 def drawing(tile: Any, out: Path, settings: ArtSettings, **options: Any) -> Path:
     """The file that `art` writes."""
-    assert art(tile, out, settings, **options).shown > 0
+    assert art(tile, out, settings, **options).tiles > 0
     return out
 
 

@@ -8,8 +8,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from artworks import art_settings, squirrel, upside_down
-from exported import Line, dxf_lines, polygons, svg_lines, tile_of
+from artworks import art_settings, pixels_of, squirrel, upside_down
+from exported import Line, dxf_lines, polygons, scenes, sheet_content, svg_lines, tile_of
 from orbiflow.drawing import palette, rgb
 from orbiflow.errors import SettingError
 from orbiflow.tiles import (
@@ -17,15 +17,12 @@ from orbiflow.tiles import (
     ArtSettings,
     EscherTile,
     ExportSettings,
+    Made,
     Scene,
     Uses,
     artwork,
     as_tile,
-    render_artwork,
-    scenes,
-    sheet_content,
 )
-from orbiflow.tiles.make import Artwork, art_scene
 from orbiflow.tiles.make.layout import layout
 from orbiflow.tiles.make.sheets import ARM, OVERLAP
 from orbiflow.tiles.make.templates import numbered_edges
@@ -114,9 +111,9 @@ def test_beds_that_are_too_small(area, bed, about) -> None:
 PAGE: dict[str, Any] = {"area": "211.7x148mm", "tile_size": "37mm"}
 
 
-def painted_rings(art: Artwork) -> np.ndarray:
+def painted_rings(art: Made) -> np.ndarray:
     """The tiles (M, N, 2) of artwork in mm."""
-    scene = art_scene(art)
+    scene = art.scenes[0]
     fills = [item for layer in scene.layers for item in layer.items if layer.style.fill]
     return np.concatenate(
         [
@@ -167,11 +164,11 @@ def test_whole_tiles_alone_are_painted() -> None:
     rings = painted_rings(art)
     assert rings.min() > 0
     assert (rings < (211.7, 148)).all()
-    assert art.shown == len(rings)
+    assert art.tiles == len(rings)
     # on the paper of the palette, nothing but these tiles
-    pixels = np.asarray(render_artwork(art))[2::8, 2::8]
+    pixels = np.asarray(pixels_of(art))[2::8, 2::8]
     rows, columns = np.indices(pixels.shape[:2]) * 8 + 2.5
-    region = shapely.union_all(np.asarray(shapely.polygons(rings))).buffer(0.4)
+    region = shapely.union_all(np.asarray(shapely.polygons(rings))).buffer(0.7)
     inside = shapely.contains_xy(region, columns * 25.4 / 60, rows * 25.4 / 60)
     on_paper = (pixels == rgb(palette("earth").paper)).all(axis=2)
     assert on_paper[~inside].all()

@@ -10,9 +10,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from exported import Line, dxf_lines, svg_lines, tile_of, tiles
+from exported import Line, dxf_lines, scenes, sheet_content, svg_lines, tile_of, tiles
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import ExportSettings, Scene, Tile, edges, scenes, sheet_content
+from orbiflow.tiles import ExportSettings, Scene, Tile, edges
 from orbiflow.tiles.make.skeletons import trails
 from refusals import refused
 

@@ -15,16 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
-from orbiflow.tiles import (
-    CLASSES,
-    EscherTile,
-    ExportSettings,
-    Tile,
-    colouring,
-    scenes,
-    sheet_content,
-)
+from exported import dxf_lines, polygons, scenes, sheet_content, svg_lines, tile_of, tiles
+from orbiflow.tiles import CLASSES, EscherTile, ExportSettings, Tile, colouring
 from orbiflow.tiles.page import longer_side
 from orbiflow.tiles.write import write_scene
 from refusals import refused

@@ -190,7 +190,8 @@ def test_what_lies_on_the_tiles_goes_where_their_bodies_go(bent, kind: Any, shar
     seen = drawn[y[shown].astype(int), x[shown].astype(int)]
     apart = np.abs(seen - expected[shown]).max(axis=1)
     assert shown.sum() > 5
-    assert np.quantile(apart, 0.9) < 12
+    assert np.median(apart) < 4
+    assert np.quantile(apart, 0.9) < 16  # where the body is narrow, a pixel is many shades
 
 
 def test_frames_with_a_picture_are_full_and_of_one_palette(bent: EscherTile) -> None:

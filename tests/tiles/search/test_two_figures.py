@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from exported import svg_lines
+from artworks import pixels_of
+from exported import scenes, svg_lines
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError
 from orbiflow.runtime import Cancel, Event, Preview, TileFound
 from orbiflow.symmetry import wallpaper_group
@@ -34,10 +35,8 @@ from orbiflow.tiles import (
     fidelity,
     make_solid,
     read_result,
-    render_artwork,
     report,
     save_tiles,
-    scenes,
     signed_area,
     write_run,
     write_scene,
@@ -184,7 +183,7 @@ def test_each_figure_carries_its_own_picture() -> None:
     overs = [_flat(p.figure, colour) for p, colour in zip(tile.parts, ("red", "blue"), strict=True)]
     given: dict[str, Any] = {"area": "300x200px", "tile_size": "90px", "outline": "none"}
     settings = ArtSettings(**given)
-    pixels = render_artwork(artwork(tile, settings, *overs)).reshape(-1, 3)
+    pixels = pixels_of(artwork(tile, settings, *overs)).reshape(-1, 3)
     red, blue = ((pixels == colour).all(axis=1).mean() for colour in ([255, 0, 0], [0, 0, 255]))
     area = [abs(own.signed_area) for own in tile.tiling.prototiles]
     assert red + blue > 0.85

@@ -195,7 +195,7 @@ def test_pages_are_full_and_not_mirrored(model: Any, name: str, y_down: bool) ->
     ring = orient(given_tile.tile.polygon, counter_clockwise=True)
     first = found.places(found.vectors(ring), np.arange(1))[0]
     assert (signed_area(first) > 0) == y_down  # as on a page of the plane, whose y points down
-    scene = world_scene(found, palette("lagoon")._replace(paper="#ff00ff"), pixels=4)
+    scene = world_scene(found, palette("lagoon")._replace(paper="#ff00ff"))
     shown: list[Any] = [
         own for layer in scene.layers for own in layer.items if layer.name.startswith("colour")
     ]

@@ -150,9 +150,6 @@ class ArtSettings(PageSettings, MotifSettings, TintSettings, group="Picture"):
     ] = 1
     """How many changes there are across the page: with 2, the tile becomes polygons again."""
 
-    samples: Annotated[int, Range(1, 8), Hidden()] = 3
-    """Number of samples along each side of a pixel."""
-
     def defaults(self) -> Mapping[str, Any]:
         square = self.world in ("sphere", "disc", "spiral")
         return {**super().defaults(), "area": "2400x2400px" if square else "3000x2000px"}

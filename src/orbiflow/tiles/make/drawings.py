@@ -13,7 +13,7 @@ from orbiflow.drawing import lightness, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.make.layout import BLACK, BLUE, Layout, line_style
-from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
+from orbiflow.tiles.motifs import Over, carried_picture, drawn_motif
 from orbiflow.tiles.page import (
     INK,
     USUAL_WIDTH,
@@ -44,7 +44,7 @@ def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
     chosen = palette(settings.palette if settings.coloured else "ink")
     own = settings.of_figure(number)
     motif = drawn_motif(given, own, chosen, over.drawing, hairlines=not settings.coloured)
-    rasters = motif.rasters
+    rasters = ()
     if over.picture is not None:
         if settings.purpose == "plotter":
             raise OrbiflowError(
@@ -52,7 +52,7 @@ def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
                 "and strokes alone"
             )
         density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
-        rasters = (carried_raster(over.picture, given, density * place.scale),)
+        rasters = (carried_picture(over.picture, given, density * place.scale),)
     return Motif(motif.parts, rasters).moved(*place)
 
 

@@ -1,22 +1,22 @@
-"""What an export puts on its sheets, the kinds of cut, and the files that it wrote."""
+"""What an export puts on its sheets, and the kinds of cut."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from orbiflow import __version__
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Outcome
 from orbiflow.tiles.likeness import narrowest_neck
 from orbiflow.tiles.make.cut_order import in_cutting_order
 from orbiflow.tiles.make.drawings import drawn_on, with_drawing
 from orbiflow.tiles.make.export_settings import ExportSettings
 from orbiflow.tiles.make.jigsaws import jigsaw_scenes
 from orbiflow.tiles.make.layout import Layout, layout, tiling_scene
+from orbiflow.tiles.make.made import Made
 from orbiflow.tiles.make.offsets import place_on
 from orbiflow.tiles.make.pieces import pieces_scenes
 from orbiflow.tiles.make.sheets import calibrated, registered, split
@@ -33,7 +33,7 @@ from orbiflow.tiles.page import Scene, flattened, shades
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring
-from orbiflow.tiles.write import LINES_ALONE, write_png, write_scene
+from orbiflow.tiles.write import LINES_ALONE
 
 VISIBLE = 0.05  # the least width in mm of a line that shows on a screen
 
@@ -44,7 +44,7 @@ class Maker(NamedTuple):
     """How one kind of cut is made."""
 
     scenes: Callable[[Layout], list[Scene]]
-    called: str  # what is counted on its sheets
+    counted: str  # what is counted on its sheets
     calibrated: slice = LAST  # the sheets that have a strip for the calibration mark
     splits: bool = False  # whether what is larger than the bed is split, cutting tiles
 
@@ -59,82 +59,41 @@ MAKERS = {
 """The kinds of cut: to add one, write its scenes in a file here, name it here and in `cut`."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Exported(Outcome):
-    """The result of an export.
-
-    - `settings`: How it was drawn.
-    - `files`: The files that were written, one for each sheet.
-    - `scenes`: What is on each sheet.
-    - `notes`: What the user should know.
-    """
-
-    settings: ExportSettings
-    files: tuple[Path, ...]
-    scenes: tuple[Scene, ...]
-    notes: tuple[str, ...]
-
-    @property
-    def tiles(self) -> int:
-        """The number of tiles on all sheets; a tile cut where sheets meet counts on each."""
-        return sum(len(scene.tiles) for scene in self.scenes)
-
-    @property
-    def tile_size(self) -> float:
-        """The longer side in mm of a tile's smallest rectangle."""
-        return self.scenes[0].facts["tile_size"]
-
-    def written(self, files: tuple[Path, ...]) -> Exported:
-        """Return what came of writing the sheets to files, with its facts as JSON has them."""
-        name, size = self.scenes[0].facts["class"] or "", self.tile_size
-        facts = {"files": list(map(str, files)), "tiles": self.tiles, "class": name}
-        return replace(self, files=files, summary={**facts, "tile_size": size})
-
-    @property
-    def words(self) -> str:
-        """What was written, in a sentence."""
-        facts, page, first = self.scenes[0].facts, self.settings.page, self.files[0]
-        count, what = facts.get("pieces", self.tiles), MAKERS[facts["cut"]].called
-        where = str(first)
-        if len(self.files) > 1:
-            where = f"{len(self.files)} sheets, {first} to {self.files[-1].name}"
-        return (
-            f"written {where}: {count} {what} of {facts['class'] or 'a tile'}, "
-            f"{self.tile_size:.4g} mm, on {page[0]:g} x {page[1]:g} mm"
-        )
-
-    def _repr_png_(self) -> bytes:
-        """Return what a notebook shows: the first sheet, some 600 pixels wide."""
-        sheet = self.scenes[0]
-        return write_png(sheet, dpi=600 * 25.4 / max(sheet.width, sheet.height))
-
-
-def scenes(
+def exported(
     tile: TileSource,
     settings: ExportSettings,
+    pictures: Sequence[str | Path | None] = (),
     *,
-    picture: str | Path | None = None,
-    second_picture: str | Path | None = None,
     force: bool = False,
-) -> tuple[list[Scene], tuple[str, ...]]:
-    """Return the sheets of an export, and what the user should know; it raises what `export` does."""
+) -> Made:
+    """Return the sheets of an export, before they are written; it raises what `export` does.
+
+    `pictures` are the files of what lies over the silhouette of each of the tile's figures.
+    """
     given = as_tile(tile)
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; {force} exports it, marked so"
     )
-    placed, notes = laid_out(given, settings, (picture, second_picture))
+    placed, notes = laid_out(given, settings, pictures)
     settings, maker = placed.settings, MAKERS[placed.settings.cut]
-    made = _made(placed, maker)
-    notes = (*notes, *_colour_notes(given, settings), *made[0].told)
-    made = [_described(scene, given, settings, certificate) for scene in made]
+    sheets = _sheets(placed, maker)
+    notes = (*notes, *_colour_notes(given, settings), *sheets[0].told)
+    sheets = [_described(scene, given, settings, certificate) for scene in sheets]
     if settings.marks:
-        made = [registered(scene) for scene in made]
+        sheets = [registered(scene) for scene in sheets]
     if settings.calibrate:
-        made[maker.calibrated] = [calibrated(scene) for scene in made[maker.calibrated]]
-    return made, notes
+        sheets[maker.calibrated] = [calibrated(scene) for scene in sheets[maker.calibrated]]
+    return Made(
+        tile=placed.tile,
+        settings=settings,
+        scenes=tuple(sheets),
+        counted=maker.counted,
+        tiles=sum(len(scene.tiles) for scene in sheets),
+        notes=notes,
+    )
 
 
-def _made(placed: Layout, maker: Maker) -> list[Scene]:
+def _sheets(placed: Layout, maker: Maker) -> list[Scene]:
     settings, fine = placed.settings, placed.fine
     made = [with_drawing(scene, placed) for scene in maker.scenes(placed)]
     if maker.splits and settings.bed is not None:
@@ -225,21 +184,3 @@ def _neck_notes(placed: Layout) -> tuple[str, ...]:
             neck_there = f"a neck {place_on(ring, neck.place)} is {neck.width:.2f} mm wide"
             found.append(f"{name or 'the tile'} is thinner than {limit:g} mm: {neck_there}")
     return tuple(found)
-
-
-def sheet_content(scene: Scene, settings: ExportSettings) -> str | bytes:
-    """Return the content of a sheet's file."""
-    form, fine = settings.file_format, settings.fine
-    return write_scene(scene, form, tolerance=fine, dpi=settings.dpi)
-
-
-def sheet_names(out: Path, count: int) -> list[Path]:
-    """Return a name for each sheet, numbered if there are several.
-
-    >>> [path.name for path in sheet_names(Path("cut.svg"), 2)]
-    ['cut-1.svg', 'cut-2.svg']
-    """
-    if count == 1:
-        return [out]
-    digits = len(str(count))
-    return [out.with_name(f"{out.stem}-{k:0{digits}d}{out.suffix}") for k in range(1, count + 1)]

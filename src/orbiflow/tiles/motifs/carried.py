@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby, zip_longest
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 import shapely
-from numpy.typing import NDArray
 from PIL import Image
 
-from orbiflow.arrays import Array, Integers
-from orbiflow.drawing import Palette, png_bytes
+from orbiflow.arrays import Array
+from orbiflow.drawing import Palette
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError
 from orbiflow.settings import as_path
 from orbiflow.tiles import search
-from orbiflow.tiles.geometry import triangle_sides
 from orbiflow.tiles.motifs.artwork import TooManyPoints, read_parts, whole_picture
 from orbiflow.tiles.motifs.engraving import engraved, eye
-from orbiflow.tiles.motifs.raster import Grid, Paint, bilinear, inside_ring, region_sides, runs
 from orbiflow.tiles.motifs.settings import MotifSettings
-from orbiflow.tiles.page import INK, Motif, PathPart, Raster, Style
+from orbiflow.tiles.page import Motif, Pixels, Warped, inside_ring
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.silhouette import (
     Covered,
@@ -37,7 +34,6 @@ from orbiflow.tiles.silhouette import (
 )
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tile_map import TileMap
-from orbiflow.tiles.write import PixelSheet, painted, shape_of
 
 
 def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
@@ -140,25 +136,21 @@ def read_picture(path: Path, tile: EscherTile) -> CarriedPicture:
     return CarriedPicture(image, covered, tuple(notes))
 
 
-def carried_picture(picture: CarriedPicture, tile: EscherTile, grid: Grid) -> tuple[Array, Array]:
-    """Carry a picture onto a tile's raster; its colours extend a little beyond the outline.
+def carried_picture(picture: CarriedPicture, tile: EscherTile, density: float) -> Warped:
+    """Return a picture on a tile, in its units, of about `density` pixels along one.
 
-    Returns colours (height, width, 3) times their opacity, and the opacity (height, width).
+    Its colours extend a little beyond the outline.
     """
-    small = picture.reduced(1 / grid.density)
+    small = picture.reduced(1 / density)
     bending, frame = tile.require_map()
     images, rest = frame.to_input(bending.images), frame.to_input(bending.rest)
-    places, _ = carried_places(grid, images, rest, bending.triangles)
-    straight = np.asarray(small.image, dtype=np.float32) / 255
-    straight[..., :3] *= straight[..., 3:]
-    straight = _spread(straight, small.covered.shares(tile.silhouette_outline) * small.image.size)
-    at = (small.covered.shares(places) * small.image.size).astype(np.float32)
-    result = bilinear(straight, at.reshape(-1, 2)).reshape(*places.shape[:2], 4)
-    return result[..., :3], result[..., 3]
+    outline, size = small.covered.shares(tile.silhouette_outline), small.image.size
+    pixels = _spread(np.asarray(small.image), outline * size)
+    return Warped(pixels, small.covered.shares(rest) * size, images, bending.triangles)
 
 
-def _spread(colours: Array, outline: Array) -> Array:
-    """Extend the colours (height, width, 4) just inside an outline, in pixels, to all outside it.
+def _spread(colours: Pixels, outline: Array) -> Pixels:
+    """Extend the colours just inside an outline, in pixels, to all outside it.
 
     So neither the background of a cut-out shows nor the outline's pixels that it mixed with.
     """
@@ -176,30 +168,6 @@ def _spread(colours: Array, outline: Array) -> Array:
         scipy.ndimage.distance_transform_edt(~kept, return_distances=False, return_indices=True)
     )
     return colours[rows, columns]
-
-
-def carried_places(
-    grid: Grid, images: Array, rest: Array, triangles: Integers
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the point (height, width, 2) that is carried to each texel, and which texels have one.
-
-    Triangles (T, 3) of points `rest` (V, 2) are carried to those of `images` (V, 2), of a grid's units.
-    """
-    images = grid.texels(images)
-    found = runs(region_sides(images, triangles), 0, grid.height, grid.width)
-    linear = triangle_sides(rest, triangles) @ np.linalg.inv(triangle_sides(images, triangles))
-    first = triangles[:, 0]
-    offset = rest[first] - np.einsum("tij,tj->ti", linear, images[first])
-    own = np.maximum(found.label, 0)
-    columns = np.tile(np.arange(grid.width) + 0.5, grid.height)
-    # along a run only x changes
-    start = offset[own] + linear[own, :, 1] * (found.row + 0.5)[:, None]
-    places = np.stack(
-        [found.spread(start[:, k]) + found.spread(linear[own, k, 0]) * columns for k in (0, 1)],
-        axis=-1,
-    )
-    held = found.spread(found.label >= 0)
-    return places.reshape(grid.height, grid.width, 2), held.reshape(grid.height, grid.width)
 
 
 # Greatest distance of flattened curves from the drawing's, in sizes of the silhouette
@@ -312,29 +280,6 @@ def read_overs(
     ]
 
 
-def paint_motif(paint: Paint, motif: Motif) -> None:
-    """Draw a motif, antialiased, over a painting."""
-    grid = paint.grid
-    placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
-    for inked, parts in groupby(placed.parts, key=lambda part: INK in part.style):
-        canvas = _canvas(list(parts), grid)
-        alpha = canvas[..., 3]
-        if inked:
-            paint.ink(alpha)
-        else:
-            paint.lay(canvas[..., :3] * alpha[..., None], alpha)
-
-
-def _canvas(parts: list[PathPart], grid: Grid) -> Array:
-    """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
-    shapes = []
-    for part in parts:
-        fill, stroke = ("#000000" if colour == INK else colour for colour in part.style[:2])
-        shapes.append(shape_of(part._replace(style=Style(fill, stroke, part.style.width))))
-    drawn = painted([PixelSheet(tuple(shapes))], (grid.width, grid.height))
-    return np.asarray(drawn, dtype=np.float32) / 255
-
-
 def drawn_motif(
     tile: EscherTile,
     settings: MotifSettings,
@@ -354,28 +299,3 @@ def drawn_motif(
     if settings.strokes is not None:
         parts += engraved(tile, settings.strokes, around, hairlines=hairlines)
     return Motif(parts + tuple(part for one in around for part in one.parts))
-
-
-def picture_paint(
-    picture: CarriedPicture | None, tile: EscherTile, density: float, colours: int = 1
-) -> Paint:
-    """Paint a tile's raster of `density` texels along its unit with a picture alone."""
-    polygon = tile.tile.polygon
-    paint = Paint(Grid.over(polygon, density, colours))
-    if picture is not None:
-        paint.lay(*carried_picture(picture, tile, paint.grid))
-        paint.bleed(paint.grid.inside(polygon))
-    return paint
-
-
-def carried_raster(
-    picture: CarriedPicture, tile: EscherTile, density: float, colours: int = 1
-) -> Raster:
-    """Return a picture carried onto a tile, in its units, with `density` pixels along one."""
-    paint = picture_paint(picture, tile, density, colours)
-    values, grid = paint.values, paint.grid
-    alpha = 1 - values[..., 3:4]
-    straight = values[..., :3] / np.maximum(alpha, 1e-6)
-    both = np.concatenate([straight, alpha], axis=2)
-    image = Image.fromarray((both * 255 + 0.5).clip(0, 255).astype(np.uint8), "RGBA")
-    return Raster(png_bytes(image), image.size, np.eye(2) / grid.density, grid.corner)

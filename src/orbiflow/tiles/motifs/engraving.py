@@ -20,9 +20,8 @@ from orbiflow.tiles.geometry import (
     resampled,
     signed_area,
 )
-from orbiflow.tiles.motifs.raster import Grid
 from orbiflow.tiles.motifs.settings import Strokes
-from orbiflow.tiles.page import INK, Curve, PathPart, Style
+from orbiflow.tiles.page import INK, Curve, Grid, PathPart, Style
 from orbiflow.tiles.silhouette import outside
 from orbiflow.tiles.tile import EscherTile
 
@@ -39,7 +38,7 @@ class TileDepths:
 
     @cached_property
     def _grid(self) -> Grid:
-        return Grid.over(self.ring, GRID_DENSITY, 1)
+        return Grid.over(self.ring, GRID_DENSITY)
 
     @cached_property
     def _depth(self) -> Array:

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette
+from orbiflow.drawing import Palette, rgb
 from orbiflow.errors import Advice
-from orbiflow.tiles.motifs.carried import Over
-from orbiflow.tiles.motifs.on_figures import figure_paint
-from orbiflow.tiles.motifs.raster import rgb_of
-from orbiflow.tiles.page import Motif
+from orbiflow.tiles.motifs.carried import Over, carried_picture
+from orbiflow.tiles.page import Motif, inside_ring
 from orbiflow.tiles.silhouette import lab_of
 from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.write import texture
 
 MIN_LIGHTNESS_DIFFERENCE = 20.0  # of 100, in CIE Lab: less is hard to tell apart in a line
 MIN_SHARE_APART = 0.25  # of a tile: what of it must differ so much from the line around it
@@ -30,7 +29,7 @@ def are_told_apart(colours: Array, inside: NDArray[np.bool_], outline: str) -> b
         inside: Which of its pixels (H, W) are of the tile.
         outline: The colour of the line, as #rrggbb.
     """
-    lightness, line = lab_of(colours[inside])[:, 0], float(lab_of(rgb_of(outline))[0])
+    lightness, line = lab_of(colours[inside])[:, 0], float(lab_of(np.array(rgb(outline)) / 255)[0])
     differs = np.abs(lightness - line) >= MIN_LIGHTNESS_DIFFERENCE
     return bool(differs.size) and float(differs.mean()) >= MIN_SHARE_APART
 
@@ -43,11 +42,17 @@ def notes_on_dark_pictures(
     for part, over in zip(tile.figures, overs, strict=False):
         if over is None or not (over.picture or over.drawing):
             continue
-        density = TEXELS_ACROSS / float(np.sqrt(abs(part.figure.tile.signed_area)))
-        drawn = over.drawing or Motif()
-        paint = figure_paint(over.picture, drawn, part.figure, density, 1)
-        inside = paint.grid.inside(part.figure.tile.polygon)
-        if not are_told_apart(paint.coloured(chosen, 1)[0], inside, chosen.outline):
+        figure = part.figure
+        density = TEXELS_ACROSS / float(np.sqrt(abs(figure.tile.signed_area)))
+        drawn, rasters = over.drawing or Motif(), ()
+        if over.picture is not None:
+            rasters = (carried_picture(over.picture, figure, density),)
+        polygon = figure.tile.polygon
+        seen = texture(Motif(drawn.parts, rasters), polygon, density, ink=chosen.ink(0))
+        opacity, ground = seen.pixels[..., 3:] / 255, np.array(rgb(chosen.fill(0))) / 255
+        colours = opacity * seen.pixels[..., :3] / 255 + (1 - opacity) * ground
+        inside = inside_ring((polygon - seen.offset) / seen.linear[0, 0], *colours.shape[:2])
+        if not are_told_apart(colours, inside, chosen.outline):
             found.append(
                 "the picture is as dark as the lines around tiles, and its copies can hardly be told "
                 "apart: leave it out, or choose lines of another colour, such as {palette} "

@@ -104,9 +104,8 @@ def motion(given: EscherTile, settings: AnimationSettings, *overs: Over) -> Moti
     page, chosen = _page(given, settings), palette(settings.palette)
     dress = None
     if any(over.picture or over.drawing for over in overs) or settings.draws:
-        places = [page.place.after(part.place) for part in given.figures]
         count = max(page.count, 2)  # the tile that is alone at first has the second
-        dress = Dress.of(given, settings, overs, places, page.palette(chosen), count)
+        dress = Dress.of(given, settings, overs, page.place.scale, page.palette(chosen), count)
     bodies = () if dress is None else dress.bodies
     kinds: dict[str, Callable[[], Motion]] = {
         "morph": lambda: morph(given, page, bodies, steady=settings.format == "svg"),

@@ -7,31 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-import scipy
-from PIL import Image
-
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette
-from orbiflow.tiles.geometry import Place
-from orbiflow.tiles.motifs import (
-    MARGIN,
-    TEXELS_PER_PIXEL,
-    Grid,
-    Over,
-    bilinear,
-    carried_places,
-    figure_paint,
-    read_overs,
-    require_figures,
-    with_map,
-    worn,
-)
+from orbiflow.tiles.motifs import Over, motifs_on, read_overs, require_figures, with_map
 from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.page import Motif, Pixels, Warped, glass, tinted
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.write import texture
 
-STILL = 1e-9  # pixels by which a body moves that has not moved
+TEXELS_PER_PIXEL = 2.0
+"""Pixels of what lies on a tile along one of a frame."""
 
 
 class BendingFigure(NamedTuple):
@@ -49,44 +35,17 @@ class BendingFigure(NamedTuple):
         return cls(mesh.points, mesh.triangles)
 
 
-class Skin:
-    """What lies on a figure, in each colour that its copies have."""
+class Skin(NamedTuple):
+    """What lies on a figure, in each colour that its copies have, and where its body lies in it."""
 
-    def __init__(self, body: BendingFigure, grid: Grid, colours: Array) -> None:
-        self._triangles, self._colours = body.triangles, colours
-        self._places = grid.texels(body.points)
-        self._at, self._bent = np.zeros((0, 2)), list[Image.Image]()
-        self._grid = grid
+    pixels: tuple[Pixels, ...]
+    texels: Array
+    triangles: Integers
 
-    def bent(self, body: Array) -> tuple[list[Image.Image], Grid]:
-        """Return the skin where its body's points are (V, 2), in pixels: a picture of each colour."""
-        if self._at.shape != body.shape or abs(self._at - body).max() > STILL:
-            self._at, self._grid = body, Grid.over(body, TEXELS_PER_PIXEL, len(self._colours))
-            self._bent = self._drawn(body)
-        return self._bent, self._grid
-
-    def _drawn(self, body: Array) -> list[Image.Image]:
-        grid = self._grid
-        places, inside = carried_places(grid, body, self._places, self._triangles)
-        if not inside.any():
-            return [Image.new("RGBA", (grid.width, grid.height))] * len(self._colours)
-        # colours go on a little beyond the outline, so that none is mixed with nothing there
-        near = np.asarray(
-            scipy.ndimage.binary_dilation(inside, np.ones((3, 3), dtype=int), MARGIN - 1)
-        )
-        rows, columns = np.asarray(
-            scipy.ndimage.distance_transform_edt(
-                ~inside, return_distances=False, return_indices=True
-            )
-        )[:, near]
-        at = places[rows, columns].astype(np.float32)
-        drawn = list[Image.Image]()
-        for own in self._colours:
-            pixels = np.zeros((grid.height, grid.width, 4), dtype=np.uint8)
-            pixels[near, :3] = (bilinear(own, at) * 255 + 0.5).clip(0, 255)
-            pixels[..., 3] = 255 * inside
-            drawn.append(Image.fromarray(pixels, "RGBA"))
-        return drawn
+    def on(self, body: Array, colour: int, within: str) -> Motif:
+        """Return it on its body's points (V, 2) as they are in a frame, cut off by a symbol."""
+        bent = Warped(self.pixels[colour], self.texels, body, self.triangles)
+        return Motif(rasters=(bent,), within=within)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,19 +61,26 @@ class Dress:
         tile: EscherTile,
         settings: AnimationSettings,
         overs: Sequence[Over],
-        places: Sequence[Place],
+        scale: float,
         shaded: Palette,
         count: int,
     ) -> Dress:
-        """Paint all that lies on a tile's figures, whose units lie at `places`, in so many colours."""
-        on = worn(tile, settings, shaded, overs, settings.tint)
+        """Paint all that lies on a tile, at `scale` pixels along its unit, in so many colours."""
+        density = TEXELS_PER_PIXEL * scale
+        on = motifs_on(tile, settings, shaded, overs, tint=settings.tint, density=density)
         bodies, skins = list[BendingFigure](), list[Skin]()
-        own = zip(on.pictures, on.motifs, tile.figures, places, strict=True)
-        for picture, motif, part, place in own:
-            density, body = TEXELS_PER_PIXEL * place.scale, BendingFigure.of(part.figure)
-            paint = figure_paint(picture, motif, part.figure, density, count)
+        for motif, part in zip(on.motifs, tile.figures, strict=True):
+            body, ring = BendingFigure.of(part.figure), part.figure.tile.polygon
+            fine = density * part.place.scale
+            painted = [
+                texture(
+                    tinted(motif, glass(shaded.fill(k), on.tint)), ring, fine, ink=shaded.ink(k)
+                )
+                for k in range(count)
+            ]
+            texels = (body.points - painted[0].offset) / painted[0].linear[0, 0]
+            skins.append(Skin(tuple(own.pixels for own in painted), texels, body.triangles))
             bodies.append(body)
-            skins.append(Skin(body, paint.grid, paint.coloured(shaded, count, on.tint)))
         return cls(tuple(bodies), tuple(skins))
 
 
@@ -131,26 +97,3 @@ def dressed(
     tile = with_map(tile)
     require_figures(tile, settings, 1 + any(pictures[1:]))
     return tile, read_overs(pictures, tile)
-
-
-def lay_skin(
-    frame: Image.Image, picture: Image.Image, grid: Grid, linear: Array, offset: Array
-) -> None:
-    """Lay a skin on a frame, its points p at `linear` p + `offset` in pixels."""
-    width, height = grid.width / grid.density, grid.height / grid.density
-    corners = grid.corner + np.array([[0, 0], [width, 0], [width, height], [0, height]])
-    box = corners @ linear.T + offset
-    low = np.floor(box.min(axis=0)).astype(int).clip(0, frame.size)
-    high = np.ceil(box.max(axis=0)).astype(int).clip(0, frame.size)
-    if (high <= low).any():
-        return
-    inverse = grid.density * np.linalg.inv(linear)
-    start = inverse @ (low - offset) - grid.density * grid.corner
-    (a, b), (c, d) = inverse.tolist()
-    own = picture.transform(
-        (int(high[0] - low[0]), int(high[1] - low[1])),
-        Image.Transform.AFFINE,
-        (a, b, float(start[0]), c, d, float(start[1])),
-        resample=Image.Resampling.BILINEAR,
-    )
-    frame.paste(own, (int(low[0]), int(low[1])), own)

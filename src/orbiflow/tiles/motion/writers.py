@@ -20,13 +20,23 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, limited, png_bytes
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.motifs import Over
-from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Motion, Places, eased, frames, motion
+from orbiflow.tiles.motion.kinds import (
+    MOVE,
+    REST,
+    SHOW,
+    Motion,
+    Places,
+    SeenCopy,
+    eased,
+    frames,
+    motion,
+)
 from orbiflow.tiles.motion.settings import AnimationSettings
-from orbiflow.tiles.motion.skins import dressed, lay_skin
-from orbiflow.tiles.page import Curve, Layer, PathPart, Scene, Style, rectangle, symbol_of
+from orbiflow.tiles.motion.skins import dressed
+from orbiflow.tiles.page import Curve, Layer, Motif, Scene, Style, Uses, rectangle, symbol_of
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.tile import TileSource
-from orbiflow.tiles.write import Numbers, PixelSheet, painted, scene_image, shape_of
+from orbiflow.tiles.write import Numbers, scene_image
 
 GIF_COLOURS = 128  # of all frames of a GIF that shows pictures
 
@@ -56,50 +66,46 @@ def animation(
 
 
 def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
-    """Return one frame as a scene in pixels, in plain colours: growing tiles below the whole ones."""
+    """Return one frame as a scene in pixels, with what lies on tiles: growing ones below whole ones."""
     page, seen = motion.page, list(motion.seen(progress))
-    parts = [PathPart((rectangle(page.box),), Style(chosen.paper))]
+    rings, bodies = motion.outlines(progress), motion.bodies(progress)
+    symbols = {symbol_of(k): Curve.polyline(ring, closed=True) for k, ring in enumerate(rings)}
+    layers = [Layer("paper", "paper", Style(chosen.paper), (rectangle(page.box),))]
+    motifs: dict[str, Motif] = {}
     growing = [[own] for own in seen if not own.whole]
-    for layer in (*growing, [own for own in seen if own.whole]):
-        curves = [Curve.polyline(own.ring, closed=True) for own in layer]
-        fills = (Style(chosen.fill(own.colour)) for own in layer)
-        parts += [PathPart((curve,), fill) for curve, fill in zip(curves, fills, strict=True)]
-        parts += [PathPart((curve,), motion.line) for curve in curves if motion.line.width]
-    return Scene(*page.size, (Layer("frame", "tiles", Style(), tuple(parts)),))
+    for copies in (*growing, [own for own in seen if own.whole]):
+        kinds = sorted({(own.kind, own.colour) for own in copies})
+        for kind, colour in kinds:
+            mine = [own for own in copies if (own.kind, own.colour) == (kind, colour)]
+            uses = _uses(symbol_of(kind), mine)
+            layers.append(Layer("tiles", "tiles", Style(chosen.fill(colour)), (uses,)))
+            if motion.dress is not None:
+                skin, name = motion.dress.skins[kind], symbol_of(kind, f"skin-{colour}")
+                motifs[name] = skin.on(bodies[kind], colour, symbol_of(kind))
+                on = replace(uses, symbol=name)
+                layers.append(Layer("drawing", "drawing", Style(), (on,)))
+        if motion.line.width:
+            lines = [
+                _uses(symbol_of(k), [own for own in copies if own.kind == k])
+                for k in range(len(rings))
+            ]
+            layers.append(Layer("outlines", "tiles", motion.line, tuple(filter(len, lines))))
+    return Scene(*page.size, tuple(layers), symbols, motifs=motifs)
+
+
+def _uses(symbol: str, copies: Sequence[SeenCopy]) -> Uses:
+    """Return copies of a symbol, those that lie alike as of one aspect."""
+    linear = np.array([own.linear for own in copies]).reshape(-1, 2, 2)
+    _, first, which = np.unique(
+        np.round(linear.reshape(-1, 4), 9), axis=0, return_index=True, return_inverse=True
+    )
+    offsets = np.array([own.offset for own in copies]).reshape(-1, 2)
+    return Uses(symbol, linear[first], which.ravel(), offsets)
 
 
 def frame_image(motion: Motion, chosen: Palette, progress: float) -> Image.Image:
-    """Return one frame, with what lies on its tiles."""
-    if motion.dress is None:
-        return scene_image(frame_scene(motion, chosen, progress))
-    width, height = map(round, motion.page.size)
-    picture = Image.new("RGB", (width, height), chosen.paper)
-    bodies = zip(motion.dress.skins, motion.bodies(progress), strict=True)
-    worn, outlines = [skin.bent(body) for skin, body in bodies], list[Array]()
-    for own in motion.seen(progress):
-        skins, grid = worn[own.kind]
-        lay_skin(picture, skins[own.colour], grid, own.linear, own.offset)
-        if own.whole:
-            outlines.append(own.ring)
-        else:
-            _draw_outlines(picture, [own.ring], motion.line)
-    _draw_outlines(picture, outlines, motion.line)
-    return picture
-
-
-def _draw_outlines(picture: Image.Image, rings: Sequence[Array], line: Style) -> None:
-    """Draw outlines on a picture, or on the part of it where they are."""
-    if not rings or not line.width:
-        return
-    every = np.concatenate(rings)
-    low = np.floor(every.min(axis=0) - line.width).astype(int).clip(0, picture.size)
-    high = np.ceil(every.max(axis=0) + line.width).astype(int).clip(0, picture.size)
-    if (high <= low).any():
-        return
-    curves = (Curve.polyline(ring - low, closed=True) for ring in rings)
-    shapes = tuple(shape_of(PathPart((curve,), line)) for curve in curves)
-    drawn = painted([PixelSheet(shapes)], (int(high[0] - low[0]), int(high[1] - low[1])))
-    picture.paste(drawn, (int(low[0]), int(low[1])), drawn)
+    """Return one frame."""
+    return scene_image(frame_scene(motion, chosen, progress))
 
 
 def still(

@@ -24,6 +24,13 @@ from .page import rectangle_sides as rectangle_sides
 from .page import shades as shades
 from .page import symbol_of as symbol_of
 from .page import tiling_size as tiling_size
+from .rastering import MARGIN as MARGIN
+from .rastering import Grid as Grid
+from .rastering import Pixels as Pixels
+from .rastering import bleed as bleed
+from .rastering import carried as carried
+from .rastering import covered as covered
+from .rastering import inside_ring as inside_ring
 from .scene import INK as INK
 from .scene import Box as Box
 from .scene import Curve as Curve
@@ -36,6 +43,7 @@ from .scene import Raster as Raster
 from .scene import Scene as Scene
 from .scene import Style as Style
 from .scene import Uses as Uses
+from .scene import Warped as Warped
 from .scene import Words as Words
 from .scene import bezier as bezier
 from .scene import clipped as clipped
@@ -46,3 +54,5 @@ from .settings import ColourRule as ColourRule
 from .settings import PageSettings as PageSettings
 from .settings import usual_tolerance as usual_tolerance
 from .tinting import glass as glass
+from .tinting import tinted as tinted
+from .tinting import tinted_picture as tinted_picture

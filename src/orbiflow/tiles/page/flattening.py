@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import shapely
-from PIL import Image, ImageChops, ImageDraw
+from PIL import Image, ImageDraw
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import png_bytes
 from orbiflow.tiles.geometry import orient, polygons_in
 from orbiflow.tiles.page.fills import fill
 from orbiflow.tiles.page.scene import (
@@ -26,18 +24,18 @@ from orbiflow.tiles.page.scene import (
     Scene,
     Style,
     Uses,
+    Warped,
 )
 
 
-def flattened(scene: Scene, tolerance: float, *, cut_pictures: bool = True) -> Scene:
+def flattened(scene: Scene, tolerance: float) -> Scene:
     """Return a scene in which each copy of a motif has parts and pictures of its own.
 
-    Where the symbol or the page cuts a motif off, curves become polygons within `tolerance`. A writer
-    that draws layers in their window alone need not have the page cut pictures off.
+    Where the symbol or the page cuts a motif off, curves become polygons within `tolerance`.
     """
     own = {name: _within(motif, scene, tolerance) for name, motif in scene.motifs.items()}
     layers = tuple(
-        replace(layer, items=tuple(_items(layer, own, shapely.box(*scene.clip), cut_pictures)))
+        replace(layer, items=tuple(_items(layer, own, shapely.box(*scene.clip))))
         for layer in scene.layers
     )
     return replace(scene, layers=layers, motifs={}) if own else scene
@@ -64,20 +62,16 @@ def _within(motif: Motif, scene: Scene, tolerance: float) -> Motif:
     return cut_off(motif, shapely.Polygon(ring), whole_strokes=False)
 
 
-def _items(
-    layer: Layer, motifs: dict[str, Motif], window: shapely.Polygon, cut_pictures: bool
-) -> Iterator[Item]:
+def _items(layer: Layer, motifs: dict[str, Motif], window: shapely.Polygon) -> Iterator[Item]:
     for item in layer.items:
         if not isinstance(item, Uses) or item.symbol not in motifs:
             yield item
             continue
         for which, offset in zip(item.which, item.offsets, strict=True):
             placed = motifs[item.symbol].moved(item.linear[which], offset)
-            whole = placed.rasters
             if layer.clipped:
-                own = placed if cut_pictures else replace(placed, rasters=())
-                placed = cut_off(own, window)
-            yield from placed.rasters if cut_pictures else whole
+                placed = cut_off(placed, window)
+            yield from placed.rasters
             for part in placed.parts:
                 fill, stroke = (layer.ink if c == INK else c for c in part.style[:2])
                 yield part._replace(style=part.style._replace(fill=fill, stroke=stroke))
@@ -160,13 +154,14 @@ def polylines(lines: BaseGeometry) -> tuple[Curve, ...]:
     )
 
 
-def _masked(raster: Raster, area: shapely.Polygon) -> Raster:
+def _masked(picture: Raster | Warped, area: shapely.Polygon) -> Raster:
     """Return a picture that is transparent outside an area."""
+    raster = picture.raster() if isinstance(picture, Warped) else picture
     if area.covers(shapely.Polygon(raster.corners)):
         return raster
-    ring = shapely.get_coordinates(area.exterior) - raster.offset
-    image, mask = Image.open(io.BytesIO(raster.png)), Image.new("L", raster.size)
-    pixels = ring @ np.linalg.inv(raster.linear).T - 0.5
-    ImageDraw.Draw(mask).polygon([(x, y) for x, y in pixels.tolist()], fill=255)
-    image.putalpha(ImageChops.darker(image.getchannel("A"), mask))
-    return raster._replace(png=png_bytes(image))
+    ring, mask = shapely.get_coordinates(area.exterior) - raster.offset, Image.new("L", raster.size)
+    places = ring @ np.linalg.inv(raster.linear).T - 0.5
+    ImageDraw.Draw(mask).polygon([(x, y) for x, y in places.tolist()], fill=255)
+    pixels = raster.pixels.copy()
+    pixels[..., 3] = np.minimum(pixels[..., 3], np.asarray(mask))
+    return raster._replace(pixels=pixels)

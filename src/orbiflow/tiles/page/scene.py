@@ -5,7 +5,7 @@ Coordinates are in mm from the page's upper left corner, y down, as on a screen 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -13,9 +13,10 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.geometry import border, doubled_areas, polygons_in
+from orbiflow.tiles.page.rastering import MARGIN, Grid, Pixels, bleed, carried, covered
 
 if TYPE_CHECKING:
     from orbiflow.tiles.page.endless import Endless
@@ -155,12 +156,17 @@ class PathPart(NamedTuple):
 
 
 class Raster(NamedTuple):
-    """A picture of pixels, the file `png`; pixel (x, y) lies at linear (x, y) + offset."""
+    """A picture of pixels (height, width, 4); what is (x, y) in it lies at linear (x, y) + offset."""
 
-    png: bytes
-    size: tuple[int, int]
+    pixels: Pixels
     linear: Array
     offset: Array
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The width and height in pixels."""
+        height, width = self.pixels.shape[:2]
+        return width, height
 
     @property
     def corners(self) -> Array:
@@ -171,6 +177,39 @@ class Raster(NamedTuple):
     def moved(self, linear: Array, offset: Array) -> Raster:
         """Return the image under a map p -> linear p + offset."""
         return self._replace(linear=linear @ self.linear, offset=linear @ self.offset + offset)
+
+
+class Warped(NamedTuple):
+    """A picture of pixels (height, width, 4) on a mesh that bends it."""
+
+    pixels: Pixels
+    texels: Array  # where points (V, 2) of the mesh lie in it
+    points: Array  # where they are seen (V, 2)
+    triangles: Integers  # of the mesh (T, 3)
+    opacity: float = 1.0
+
+    @property
+    def corners(self) -> Array:
+        """Two corners (2, 2) of the box around it."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+    def moved(self, linear: Array, offset: Array) -> Warped:
+        """Return the image under a map p -> linear p + offset."""
+        return self._replace(points=self.points @ linear.T + offset)
+
+    def raster(self) -> Raster:
+        """Return it as it is seen, with as many pixels as it has, and a little beyond its edge."""
+        areas = (
+            np.abs(doubled_areas(own, self.triangles)).sum() for own in (self.texels, self.points)
+        )
+        grid = Grid.over(self.points, float(np.sqrt(next(areas) / next(areas))))
+        size = grid.width, grid.height
+        shown, inside = carried(
+            self.pixels, self.texels, grid.texels(self.points), self.triangles, size
+        )
+        ring = grid.texels(self.points)[border(self.triangles)]
+        bleed(shown, inside, covered(ring, size, MARGIN - 1))
+        return Raster(shown, np.eye(2) / grid.density, grid.corner)
 
 
 class Words(NamedTuple):
@@ -188,7 +227,7 @@ class Motif:
     """A drawing of many parts that every copy of a tile carries."""
 
     parts: tuple[PathPart, ...] = ()  # what is drawn, from the bottom up
-    rasters: tuple[Raster, ...] = ()  # pictures of pixels under the parts
+    rasters: tuple[Raster | Warped, ...] = ()  # pictures of pixels under the parts
     within: str | None = None  # the name of the symbol that cuts the drawing off, if any
 
     def moved(self, linear: Array, offset: Array) -> Motif:
@@ -234,7 +273,7 @@ class Uses:
             yield Curve(pieces, curve.straight, curve.closed)
 
 
-Item = Curve | Uses | PathPart | Raster | Words
+Item = Curve | Uses | PathPart | Raster | Warped | Words
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,6 +317,7 @@ class Scene:
     told: tuple[str, ...] = ()  # what the user should know of how it was made
     motifs: dict[str, Motif] = field(default_factory=dict)  # drawings by name, for `Uses`
     endless: Endless | None = None  # the whole tiling, if it is shown in colours
+    web_page: Callable[[], str] | None = None  # what makes the page to turn a curved world by hand
 
     @property
     def clip(self) -> Box:
@@ -306,7 +346,7 @@ class Scene:
                 yield from item.curves
             elif isinstance(item, Curve):
                 yield item
-            elif isinstance(item, Raster):
+            elif isinstance(item, Raster | Warped):
                 raise OrbiflowError(
                     "DXF and JSON hold lines, and the picture is made of pixels; choose SVG or PDF, "
                     "or give an SVG drawing of fills and strokes alone as the picture"

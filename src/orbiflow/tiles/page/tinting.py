@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
-from PIL import Image
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import png_bytes, rgb
-from orbiflow.tiles.page.scene import INK, Motif, PathPart, Raster
+from orbiflow.drawing import rgb
+from orbiflow.tiles.page.scene import INK, Motif, PathPart, Raster, Warped
+
+Picture = TypeVar("Picture", bound=Raster | Warped)
 
 
 def glass(colour: str, tint: float) -> Array:
@@ -34,10 +35,12 @@ def tinted(motif: Motif, through: Array) -> Motif:
         style = own.style._replace(fill=seen(own.style.fill), stroke=seen(own.style.stroke))
         return own._replace(style=style)
 
-    def raster(own: Raster) -> Raster:
-        pixels = np.asarray(Image.open(io.BytesIO(own.png)).convert("RGBA")).astype(float)
-        pixels[..., :3] *= through
-        return own._replace(png=png_bytes(Image.fromarray((pixels + 0.5).astype(np.uint8), "RGBA")))
-
-    parts, rasters = tuple(map(part, motif.parts)), tuple(map(raster, motif.rasters))
+    parts = tuple(map(part, motif.parts))
+    rasters = tuple(tinted_picture(own, through) for own in motif.rasters)
     return replace(motif, parts=parts, rasters=rasters)
+
+
+def tinted_picture(picture: Picture, through: Array) -> Picture:
+    """Return a picture of pixels as seen through `glass`."""
+    seen = picture.pixels * np.array([*through, 1.0], dtype=np.float32) + np.float32(0.5)
+    return picture._replace(pixels=seen.astype(np.uint8))

@@ -9,9 +9,7 @@ from .unfolding import Unfolding as Unfolding
 from .unfolding import unfolded as unfolded
 from .unfolding import usual_orders as usual_orders
 from .views import WorldView as WorldView
-from .world_art import WorldArt as WorldArt
 from .world_art import world_artwork as world_artwork
-from .world_art import world_file as world_file
 from .world_art import world_of as world_of
 from .world_copies import colours as colours
 from .world_copies import copies as copies

@@ -6,18 +6,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from PIL import Image
 
 from orbiflow.arrays import Array, Integers
-from orbiflow.drawing import Palette, png_bytes
-from orbiflow.runtime import Cancel
-from orbiflow.tiles.geometry import Place, doubled_areas, orient
-from orbiflow.tiles.motifs import Grid, bilinear, carried_places
+from orbiflow.drawing import Palette
+from orbiflow.runtime import NEVER, Cancel
+from orbiflow.tiles.geometry import orient
 from orbiflow.tiles.page import (
     INK,
     Box,
@@ -28,6 +26,7 @@ from orbiflow.tiles.page import (
     Raster,
     Scene,
     Style,
+    Warped,
     bezier,
     boundary,
     cut_off,
@@ -57,7 +56,6 @@ LEAST_SHOWN = 0.25  # mm of what is drawn
 SEAM = 0.08  # mm of hairlines between filled copies
 LINE = 1 / 150  # of a copy's size: the width of its outline
 WIDEST_LINE = 0.4  # mm
-FLATTEST = 1e-3  # twice the area in pixels of triangles that are seen
 
 
 def motions_of(linear: Array, shift: Array) -> Array:
@@ -246,79 +244,36 @@ def _through(points: Array) -> Curve:
     return Curve(np.stack([a, one, two, d], axis=1), np.zeros(len(a), dtype=bool), closed=True)
 
 
-@dataclass(frozen=True, eq=False)
-class PrototilePainting:
-    """What lies on a prototile: a raster in each colour, as `Paint.coloured` returns it.
-
-    `place` takes the raster's units to the tiling's.
-    """
-
-    grid: Grid
-    colours: Array
-    place: Place
-
-
 class CopyMotifs(NamedTuple):
-    """What lies on the prototiles of copies: a motif and, of pixels, a painting of each, or none."""
+    """What lies on the prototiles of copies.
+
+    - `world`: The copies.
+    - `motifs`: What is drawn on each prototile.
+    - `pictures`: A picture of pixels of each prototile in each of its colours; or none.
+    """
 
     world: World
     motifs: Sequence[Motif]
-    paintings: Sequence[PrototilePainting] = ()
+    pictures: Sequence[Sequence[Raster]] = ()
 
-
-def pictured(
-    world: World,
-    paintings: Sequence[PrototilePainting],
-    pixels: float,
-    cancel: Cancel | None = None,
-) -> Raster:
-    """Return a picture of pixels of all copies with what is painted on them; nothing around them."""
-    cancel = cancel or Cancel()
-    width, height = (round(side * pixels) for side in world.view.size)
-    picture = Image.new("RGBA", (width, height))
-    levels = np.digitize(world.sizes, DETAIL_SIZES)
-    for kind, (own, painting) in enumerate(zip(world.tiling.prototiles, paintings, strict=True)):
-        back = painting.place.inverse
-        for level in np.unique(levels[world.faces]).tolist():
-            step = 3 * world.size / DETAIL_STEPS[level]
-            rough = shapely.simplify(shapely.Polygon(own.polygon), step / 10)
-            ring = orient(shapely.get_coordinates(rough)[:-1], counter_clockwise=True)
-            mesh = triangulate(with_points(ring, world.cones, step / 5), step)
-            texels, vectors = painting.grid.texels(back(mesh.points)), world.vectors(mesh.points)
-            for k in np.flatnonzero((levels == level) & world.faces).tolist():
+    def warped(self, cancel: Cancel) -> Iterator[Warped]:
+        """Yield the picture on each copy that is seen."""
+        world = self.world
+        levels = np.digitize(world.sizes, DETAIL_SIZES)
+        for own, pictures in zip(world.tiling.prototiles, self.pictures, strict=True):
+            for level in np.unique(levels[world.faces]).tolist():
                 cancel.check()
-                places = world.places(vectors, np.array([k]))[0] * pixels
-                colours = painting.colours[world.colour(k, kind)]
-                _lay(picture, places, texels, mesh.triangles, colours, float(world.fade[k]))
-    return Raster(png_bytes(picture), (width, height), np.eye(2) / pixels, np.zeros(2))
-
-
-def _lay(
-    picture: Image.Image,
-    places: Array,
-    texels: Array,
-    triangles: Integers,
-    colours: Array,
-    opacity: float,
-) -> None:
-    """Lay a raster on a picture, its triangles at other places, in pixels."""
-    low = np.floor(places.min(axis=0) - 1).clip(0, picture.size)
-    high = np.ceil(places.max(axis=0) + 1).clip(0, picture.size)
-    if not np.isfinite(places).all() or (high - low < 1).any():
-        return
-    width, height = (high - low).astype(int).tolist()
-    grid = Grid(low, 1.0, width, height)
-    areas = doubled_areas(places, triangles)
-    # not at the edge of a sphere, or behind it
-    sound = areas * np.sign(np.median(areas)) > FLATTEST
-    if not sound.any():
-        return
-    at, mask = carried_places(grid, places, texels, triangles[sound])
-    pixels = np.zeros((height, width, 4), dtype=np.uint8)
-    pixels[mask, :3] = (bilinear(colours, at[mask].astype(np.float32)) * 255 + 0.5).clip(0, 255)
-    pixels[..., 3] = round(255 * opacity) * mask
-    own = Image.fromarray(pixels, "RGBA")
-    picture.paste(own, (int(low[0]), int(low[1])), own)
+                step = 3 * world.size / DETAIL_STEPS[level]
+                rough = shapely.simplify(shapely.Polygon(own.polygon), step / 10)
+                ring = orient(shapely.get_coordinates(rough)[:-1], counter_clockwise=True)
+                mesh = triangulate(with_points(ring, world.cones, step / 5), step)
+                first = pictures[0]
+                texels = (mesh.points - first.offset) @ np.linalg.inv(first.linear).T
+                copies = np.flatnonzero((levels == level) & world.faces)
+                every = world.places(world.vectors(mesh.points), copies)
+                for k, places in zip(copies.tolist(), every, strict=True):
+                    pixels, fade = pictures[int(world.colours[k])].pixels, float(world.fade[k])
+                    yield Warped(pixels, texels, places, mesh.triangles, fade)
 
 
 def world_scene(
@@ -326,13 +281,20 @@ def world_scene(
     chosen: Palette,
     worn: Sequence[CopyMotifs] = (),
     *,
-    pixels: float,
     line: float | None = None,
-    title: str = "",
-    notes: tuple[str, ...] = (),
-    cancel: Cancel | None = None,
+    cancel: Cancel = NEVER,
+    **more: Any,
 ) -> Scene:
-    """Return a page of a world: fills, pictures of pixels, drawings, and outlines above all."""
+    """Return a page of a world: fills, pictures of pixels, drawings, and outlines above all.
+
+    Args:
+        world: The copies.
+        chosen: Their colours.
+        worn: What lies on them.
+        line: The width of outlines in mm. Default: what suits each copy's size.
+        cancel: What stops it.
+        more: Further fields of the scene.
+    """
     kinds = range(len(world.tiling.prototiles))
     outlines = [dict(world.outlines(kind)) for kind in kinds]
     page = rectangle(Box(0.0, 0.0, *world.view.size))
@@ -342,7 +304,7 @@ def world_scene(
     rings = (curve.flattened(TOLERANCE) for own in outlines for curve in own.values())
     under = PathPart(boundary(ground_of(rings)), ground)
     layers.append(Layer("ground", "paper", ground, (under,), clipped=True))
-    plain = not any(own.paintings or any(motif.parts for motif in own.motifs) for own in worn)
+    plain = not any(own.pictures or any(motif.parts for motif in own.motifs) for own in worn)
     widths = {k: _width(world, k, line) for own in outlines for k in own}
     for kind, own in enumerate(outlines):
         for colour in sorted(set(world.colours[list(own)].tolist())):
@@ -354,9 +316,8 @@ def world_scene(
                 curves = tuple(own[k] for k in mine if not width or widths[k] == width)
                 layers.append(Layer(name, "tiles", style, curves, clipped=True))
     for own in worn:
-        if own.paintings:
-            picture = pictured(own.world, own.paintings, pixels, cancel)
-            layers.append(Layer("pictures", "drawing", Style(), (picture,)))
+        if own.pictures:
+            layers.append(Layer("pictures", "drawing", Style(), tuple(own.warped(cancel))))
         for kind, motif in enumerate(own.motifs):
             drawn = sorted(own.world.drawn(motif, kind), key=lambda one: one[0])
             parts = tuple(_inked(part, chosen, own.world.colour(k, kind)) for k, part in drawn)
@@ -369,7 +330,7 @@ def world_scene(
     if world.view.border is not None:
         style = Style(None, chosen.outline, line or WIDEST_LINE)
         layers.append(Layer("edge", "tiles", style, (world.view.border,)))
-    return Scene(*world.view.size, tuple(layers), title=title, notes=notes)
+    return Scene(*world.view.size, tuple(layers), **more)
 
 
 def _width(world: World, copy: int, line: float | None) -> float:

@@ -6,12 +6,10 @@ from .formats import write_scene as write_scene
 from .html import canvas_page as canvas_page
 from .html import page_script as page_script
 from .json import write_json as write_json
+from .painting import INCH as INCH
 from .pdf import write_pdf as write_pdf
-from .png import INCH as INCH
-from .png import PixelSheet as PixelSheet
-from .png import painted as painted
 from .png import scene_image as scene_image
-from .png import shape_of as shape_of
+from .png import texture as texture
 from .png import write_png as write_png
 from .svg import Numbers as Numbers
 from .svg import write_svg as write_svg

@@ -9,7 +9,6 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-import shapely
 from markupsafe import Markup
 from PIL import Image
 
@@ -17,11 +16,11 @@ from orbiflow import __version__
 from orbiflow.arrays import Array
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.page import INK, Endless, Motif, Scene, cut_off
-from orbiflow.tiles.write.png import PixelSheet, painted, shape_of
+from orbiflow.tiles.page import INK, Endless, Motif, Raster, Scene
+from orbiflow.tiles.write.png import texture
 
 SIDE_PIXELS = 900  # of the longer side of a picture on a tile, at most
-PAD_PIXELS = 2  # around the outline, or what is below would show between two copies
+ROOM = 6  # pixels of it that lie beyond the outline
 QUALITY = 88  # of these pictures, in per cent
 SHARED = [f"studio/static/js/{name}.js" for name in ("tiling", "tinted", "svg", "view")]
 """The studio's own scripts that the page carries, before its own."""
@@ -30,9 +29,13 @@ SHARED = [f"studio/static/js/{name}.js" for name in ("tiling", "tinted", "svg", 
 def write_html(scene: Scene) -> str:
     """Return a self-contained web page with the scene's whole tiling, to be moved and coloured anew.
 
+    A sphere or the hyperbolic plane has a page of its own.
+
     Raises:
         OrbiflowError: If the scene is of lines to cut, which have no whole tiling.
     """
+    if scene.web_page is not None:
+        return scene.web_page()
     whole = scene.endless
     if whole is None:
         raise OrbiflowError("a web page shows all tiles in their colours; leave {cut} out")
@@ -75,36 +78,21 @@ def _skin(ring: Array, motif: Motif, whole: Endless) -> dict[str, Any] | None:
     """
     if not (motif.parts or motif.rasters):
         return None
-    low, size = ring.min(axis=0), np.ptp(ring, axis=0)
-    scale = (SIDE_PIXELS - 2 * PAD_PIXELS) / size.max()
-    start = low - PAD_PIXELS / scale
-    pixels = np.ceil(size * scale).astype(int) + 2 * PAD_PIXELS
-    area = shapely.Polygon(ring).buffer(PAD_PIXELS / scale)
-    placed = cut_off(motif, area, whole_strokes=False).moved(scale * np.eye(2), -scale * start)
-    inked = [part for part in placed.parts if INK in part.style]
-    plain = [part for part in placed.parts if INK not in part.style]
-    black = [
-        part._replace(style=part.style._replace(**_black(part.style._asdict()))) for part in inked
-    ]
-    shown = (int(pixels[0]), int(pixels[1]))
-    images = [
-        painted([PixelSheet((*rasters, *map(shape_of, parts)))], shown)
-        for rasters, parts in ((placed.rasters, plain), ((), black))
-    ]
+    inked = tuple(part for part in motif.parts if INK in part.style)
+    plain = tuple(part for part in motif.parts if INK not in part.style)
+    scale = (SIDE_PIXELS - ROOM) / np.ptp(ring, axis=0).max()
+    shown = texture(Motif(plain, motif.rasters), ring, scale)
+    ink = texture(Motif(inked), ring, scale) if inked else None
     return {
-        "picture": _address(images[0]),
-        "ink": _address(images[1]) if inked else None,
-        "matrix": [1 / scale, 0, 0, 1 / scale, *start.tolist()],
+        "picture": _address(shown),
+        "ink": None if ink is None else _address(ink),
+        "matrix": [*shown.linear.T.ravel().tolist(), *shown.offset.tolist()],
         "tinted": bool(whole.tint),
     }
 
 
-def _black(style: dict[str, Any]) -> dict[str, Any]:
-    return {name: "#000000" if own == INK else own for name, own in style.items()}
-
-
-def _address(image: Image.Image) -> str:
+def _address(picture: Raster) -> str:
     """Return a picture as an address that holds it."""
     file = io.BytesIO()
-    image.save(file, "WEBP", quality=QUALITY, method=4)
+    Image.fromarray(picture.pixels, "RGBA").save(file, "WEBP", quality=QUALITY, method=4)
     return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
-from orbiflow.tiles.page import Curve, Layer, PathPart, Raster, Scene, Style, Words, flattened
+from orbiflow.tiles.page import (
+    Curve,
+    Layer,
+    PathPart,
+    Raster,
+    Scene,
+    Style,
+    Warped,
+    Words,
+    flattened,
+)
+from orbiflow.tiles.write.painting import INCH, with_page_pictures
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
@@ -27,8 +38,11 @@ NON_ZERO = 1
 """The number of the rule by which holes run the other way."""
 
 
-def write_pdf(scene: Scene) -> bytes:
-    """Return the scene as a PDF of one page; the same scene gives the same bytes."""
+def write_pdf(scene: Scene, *, dpi: float = 300.0) -> bytes:
+    """Return the scene as a PDF of one page; the same scene gives the same bytes.
+
+    Pictures on meshes have `dpi` pixels an inch.
+    """
     from reportlab.pdfgen.canvas import Canvas
 
     buffer = io.BytesIO()
@@ -42,7 +56,7 @@ def write_pdf(scene: Scene) -> bytes:
     canvas.setLineJoin(ROUND)
     canvas.setLineCap(ROUND)
     page = _Page(canvas)
-    scene = flattened(scene, CUT_TOLERANCE)
+    scene = flattened(with_page_pictures(scene, dpi / INCH), CUT_TOLERANCE)
     for layer in scene.layers:
         canvas.saveState()
         if layer.clipped:
@@ -61,12 +75,12 @@ class _Page:
 
     def __init__(self, canvas: Canvas) -> None:
         self.canvas = canvas
-        self.pictures: dict[bytes, Image.Image] = {}
+        self.pictures: dict[int, Image.Image] = {}  # by the identity of their pixels
 
     def draw(self, scene: Scene, layer: Layer) -> None:
         """Draw the layer of a scene whose motifs are flattened."""
         for item in layer.items:
-            if isinstance(item, Raster):
+            if isinstance(item, Raster | Warped):
                 self.picture(item)
             elif isinstance(item, PathPart):
                 self.curves(item.curves, item.style, item.opacity)
@@ -105,18 +119,20 @@ class _Page:
         write(0, 0, words.text)
         canvas.restoreState()
 
-    def picture(self, raster: Raster) -> None:
+    def picture(self, picture: Raster | Warped) -> None:
         """Draw a picture of pixels."""
         from reportlab.lib.utils import ImageReader
 
-        if raster.png not in self.pictures:
-            self.pictures[raster.png] = Image.open(io.BytesIO(raster.png)).convert("RGBA")
+        raster = picture.raster() if isinstance(picture, Warped) else picture
+        key = id(raster.pixels)
+        if key not in self.pictures:
+            self.pictures[key] = Image.fromarray(raster.pixels, "RGBA")
         (a, c), (b, d) = raster.linear.tolist()
         width, height = raster.size
         self.canvas.saveState()
         self.canvas.transform(a, b, c, d, *raster.offset.tolist())
         self.canvas.transform(1, 0, 0, -1, 0, height)  # pictures have their first row at the top
-        image = ImageReader(self.pictures[raster.png])
+        image = ImageReader(self.pictures[key])
         self.canvas.drawImage(image, 0, 0, width, height, mask="auto")
         self.canvas.restoreState()
 

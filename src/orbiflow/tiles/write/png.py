@@ -2,34 +2,48 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import FINER, draw_line, fine_places, font, in_bands, limited, png_bytes, rgb
+from orbiflow.drawing import font, limited, png_bytes
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.page import (
     INK,
+    MARGIN,
     Box,
-    Curve,
+    Grid,
     Layer,
+    Motif,
     PathPart,
     Raster,
     Scene,
     Style,
+    Uses,
+    Warped,
     Words,
-    flattened,
+    bleed,
+    covered,
+    inside_ring,
 )
-
-INCH = 25.4
-"""An inch in mm."""
+from orbiflow.tiles.write.painting import (
+    FLATNESS,
+    INCH,
+    OutlineStamps,
+    PictureStamps,
+    PixelShape,
+    PixelSheet,
+    Stamps,
+    laid,
+    painted,
+    shape_of,
+    shape_reach,
+    with_page_pictures,
+)
 
 MOST_PIXELS = 100_000_000
 """Pixels of a page, at most."""
@@ -40,11 +54,11 @@ LONGEST_SIDE = 2**16 - 1
 GROUND = "#ffffff"
 """What a page's paper looks like where nothing is drawn."""
 
+TEXELS_PER_PIXEL = 2.0
+"""Pixels of what is painted once along a pixel of the page that it is copied to."""
+
 MOST_COLOURS = 32
 """Colours of a picture that is drawn with a palette, which is faster, at most."""
-
-FLATNESS = 0.1
-"""Distance in pixels of curves from the polygons that are drawn."""
 
 
 def write_png(scene: Scene, *, dpi: float = 300.0, small: bool = False) -> bytes:
@@ -81,10 +95,14 @@ def scene_image(scene: Scene, pixels: float = 1.0) -> Image.Image:
 def _drawn(scene: Scene, pixels: float) -> tuple[Image.Image, list[str]]:
     """Return a scene as a picture, and its colours if they are few and all is opaque."""
     size = round(scene.width * pixels), round(scene.height * pixels)
-    scene = flattened(scene, FLATNESS / pixels, cut_pictures=False)
-    sheets = [_sheet(scene, layer, pixels, size) for layer in scene.layers]
-    colours = _few_colours(sheets)
-    picture = painted(sheets, size, ground=GROUND, colours=colours).convert("RGB")
+    scene = with_page_pictures(scene, pixels)
+    textures = Textures(scene, pixels)
+    sheets = [_sheet(scene, layer, textures, size) for layer in scene.layers]
+    colours = _few_colours(scene)
+    items = [item for sheet in sheets for item in sheet.items]
+    plain = all(isinstance(item, PixelShape | OutlineStamps) for item in items)
+    picture = painted(sheets, size, ground=GROUND, colours=colours if plain else ())
+    picture = picture.convert("RGB")
     pen = ImageDraw.Draw(picture)
     for words in (item for layer in scene.layers for item in layer.items):
         if isinstance(words, Words):
@@ -94,219 +112,141 @@ def _drawn(scene: Scene, pixels: float) -> tuple[Image.Image, list[str]]:
     return picture, colours
 
 
-def _few_colours(sheets: Sequence[PixelSheet]) -> list[str]:
-    """Return the colours of layers without transparency and pictures, the ground's first; or none."""
-    shapes = [item for sheet in sheets for item in sheet.items]
-    if not all(isinstance(item, PixelShape) and item.opacity >= 1 for item in shapes):
+def _few_colours(scene: Scene) -> list[str]:
+    """Return the colours of a scene without transparency and pictures, the ground's first; or none."""
+    items = [item for layer in scene.layers for item in layer.items]
+    parts = [item for item in items if isinstance(item, PathPart)]
+    parts += [part for motif in scene.motifs.values() for part in motif.parts]
+    pictures = [item for item in items if isinstance(item, Raster | Warped)]
+    if pictures or any(motif.rasters for motif in scene.motifs.values()):
         return []
-    styles = [item.style for item in shapes if isinstance(item, PixelShape)]
-    used = (colour for style in styles for colour in style[:2] if colour)
-    colours = list(dict.fromkeys([GROUND, *used]))
+    if any(part.opacity < 1 for part in parts):
+        return []
+    styles = [own.style for own in (*scene.layers, *parts)]
+    used = {colour: None for style in styles for colour in style[:2] if colour and colour != INK}
+    inks = (layer.ink for layer in scene.layers if layer.ink)
+    colours = list(dict.fromkeys([GROUND, *used, *inks]))
     return colours if len(colours) <= MOST_COLOURS else []
 
 
-class PixelShape(NamedTuple):
-    """Curves that are drawn as one, as polygons and lines in pixels."""
-
-    rings: tuple[Array, ...]  # to fill; holes run the other way
-    lines: tuple[Array, ...]  # to stroke
-    style: Style  # with the stroke's width in pixels
-    opacity: float
-    low: float  # with `high`: the least and the largest y of what is drawn
-    high: float
-
-
-@dataclass(frozen=True, eq=False)
-class PixelSheet:
-    """What is drawn of a layer, from the bottom up, and the window that it shows in, in pixels."""
-
-    items: tuple[PixelShape | Raster, ...]
-    window: Box | None = None
-
-
-def _sheet(scene: Scene, layer: Layer, scale: float, size: tuple[int, int]) -> PixelSheet:
-    """Return a layer of a scene, whose motifs are flattened, at `scale` pixels a mm."""
-    window = None
+def _sheet(scene: Scene, layer: Layer, textures: Textures, size: tuple[int, int]) -> PixelSheet:
+    """Return a layer of a scene in pixels."""
+    window, scale = None, textures.scale
     if layer.clipped:
         left, top, right, bottom = (side * scale for side in scene.clip)
         if left > 0 or top > 0 or right < size[0] or bottom < size[1]:
             window = Box(left, top, right, bottom)
-    return PixelSheet(tuple(_items(scene, layer, scale)), window)
+    return PixelSheet(tuple(_items(scene, layer, textures)), window)
 
 
-def _items(scene: Scene, layer: Layer, scale: float) -> Iterator[PixelShape | Raster]:
+def _items(
+    scene: Scene, layer: Layer, textures: Textures
+) -> Iterator[PixelShape | Raster | Stamps]:
+    scale = textures.scale
+    bigger = scale * np.eye(2), np.zeros(2)
     for item in layer.items:
-        if isinstance(item, Words):
-            continue  # they are written last
+        if isinstance(item, Words | Warped):
+            continue  # words are written last, and pictures on meshes are one raster
         if isinstance(item, Raster):
-            yield item.moved(scale * np.eye(2), np.zeros(2))
+            yield item.moved(*bigger)
         elif isinstance(item, PathPart):
-            shape = shape_of(item.moved(scale * np.eye(2), np.zeros(2)), least_width=1.0)
+            shape = shape_of(item.moved(*bigger), least_width=1.0)
             yield from _lines(shape) if not shape.rings and shape.opacity >= 1 else [shape]
+        elif isinstance(item, Uses) and item.symbol in scene.motifs:
+            yield textures.stamps(item, layer.ink)
+        elif isinstance(item, Uses):
+            ring = scene.symbols[item.symbol].flattened(FLATNESS / scale) * scale
+            yield OutlineStamps(ring, _scaled(item, scale), _style(layer.style, scale))
         else:
-            curves = [item] if isinstance(item, Curve) else item.curves(scene.symbols[item.symbol])
-            for curve in curves:
-                moved = PathPart((curve,), layer.style).moved(scale * np.eye(2), np.zeros(2))
-                yield shape_of(moved, least_width=1.0)
+            part = PathPart((item,), _style(layer.style, scale))
+            yield shape_of(part.moved(*bigger)._replace(style=part.style))
 
 
-def shape_of(part: PathPart, *, least_width: float = 0.0) -> PixelShape:
-    """Return curves in pixels as what is drawn, with strokes at least so many pixels wide."""
-    points = [curve.flattened(FLATNESS) for curve in part.curves]
-    closed = [curve.closed for curve in part.curves]
-    lines = [np.concatenate([p, p[:1]]) if c else p for p, c in zip(points, closed, strict=True)]
-    width = max(part.style.width, least_width) if part.style.stroke else 0.0
-    rings = tuple(ring for ring in points if len(ring) > 2) if part.style.fill else ()
-    return PixelShape(
-        rings, tuple(lines), part.style._replace(width=width), part.opacity, *_reach(lines, width)
-    )
+def _scaled(uses: Uses, scale: float) -> Uses:
+    return replace(uses, offsets=scale * uses.offsets)
+
+
+def _style(style: Style, scale: float) -> Style:
+    """Return the style of curves in pixels: lines are at least a pixel wide, seams need none."""
+    width = style.width * scale
+    if style.stroke is None or (style.fill == style.stroke and width < 1):
+        return Style(style.fill)
+    return style._replace(width=max(width, 1.0))
 
 
 def _lines(shape: PixelShape) -> Iterator[PixelShape]:
     """Yield each line of a shape that is lines alone: most bands have few of many dashes."""
     for line in shape.lines:
-        low, high = _reach([line], shape.style.width)
+        low, high = shape_reach([line], shape.style.width)
         yield shape._replace(lines=(line,), low=low, high=high)
 
 
-def _reach(lines: Sequence[Array], width: float) -> tuple[float, float]:
-    heights = np.concatenate([line[:, 1] for line in lines])
-    return float(heights.min() - width), float(heights.max() + width)
+class Textures:
+    """What lies on the tiles of a scene, each painted once, at `scale` pixels a mm."""
+
+    def __init__(self, scene: Scene, scale: float) -> None:
+        self.scene, self.scale = scene, scale
+        self._known: dict[tuple[Motif, str | None], Raster] = {}
+
+    def stamps(self, uses: Uses, ink: str | None) -> PictureStamps:
+        """Return the copies of a motif in pixels."""
+        motif, scale, ring = self.scene.motifs[uses.symbol], self.scale, None
+        if motif.within is not None:
+            ring = self.scene.symbols[motif.within].flattened(FLATNESS / scale)
+        key = motif, ink if any(INK in part.style for part in motif.parts) else None
+        if key not in self._known:
+            points = self._box(uses.symbol) if ring is None else ring
+            how = {"ink": ink, "least_width": TEXELS_PER_PIXEL, "cut_off": ring is not None}
+            own = texture(motif, points, TEXELS_PER_PIXEL * scale, **how)
+            self._known[key] = own.moved(scale * np.eye(2), np.zeros(2))
+        ring = None if ring is None else ring * scale
+        return PictureStamps(self._known[key], _scaled(uses, scale), ring)
+
+    def _box(self, symbol: str) -> Array:
+        """Return two corners of the box around a motif, with the room that its lines need."""
+        points = self.scene.points(symbol)
+        widths = [part.style.width for part in self.scene.motifs[symbol].parts]
+        room = max(widths, default=0.0) / 2 + 1 / self.scale
+        return np.stack([points.min(axis=0) - room, points.max(axis=0) + room])
 
 
-def painted(
-    sheets: Sequence[PixelSheet],
-    size: tuple[int, int],
+def texture(
+    motif: Motif,
+    points: Array,
+    density: float,
     *,
-    ground: str | None = None,
-    colours: Sequence[str] = (),
-) -> Image.Image:
-    """Return layers, from the bottom up, as a picture in RGBA: on a ground, or on nothing.
+    ink: str | None = None,
+    least_width: float = 0.0,
+    cut_off: bool = True,
+) -> Raster:
+    """Return what lies on a tile as one picture of pixels.
 
-    If all its `colours` are known and nothing is transparent, the picture is drawn with a palette,
-    and in RGB.
+    Args:
+        motif: What lies on it.
+        points: Points (N, 2) around it.
+        density: The picture's pixels along a unit.
+        ink: The colour of what is drawn in ink. Default: black.
+        least_width: The least width of lines in the picture's pixels.
+        cut_off: Whether the points are an outline that cuts it off, beyond which its colours extend
+            a little.
     """
-    table: dict[str, Colour] = {colour: number for number, colour in enumerate(colours)}
-    start = (0, 0, 0, 0) if ground is None else (*rgb(ground), 255)
-    pngs = {item.png for sheet in sheets for item in sheet.items if isinstance(item, Raster)}
-    pictures = {png: Image.open(io.BytesIO(png)).convert("RGBA").convert("RGBa") for png in pngs}
-
-    def draw(band: Image.Image, top: int, rows: int) -> None:
-        if colours:
-            band.putpalette([value for colour in colours for value in rgb(colour)])
-        for sheet in sheets:
-            _draw_sheet(band, sheet, top, rows, pictures, table)
-
-    return in_bands("P", size, 0, draw) if colours else in_bands("RGBA", size, start, draw)
-
-
-Colour = int | tuple[int, int, int, int]
-"""A colour as Pillow takes it: its number in a palette, or red, green, blue and opacity."""
-
-
-def _colour(colour: str, table: Mapping[str, Colour]) -> Colour:
-    if table:
-        return table[colour]
-    return *rgb("#000000" if colour == INK else colour), 255  # a drawing's own ink is black
+    grid = Grid.over(points, density)
+    size = grid.width, grid.height
+    placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
+    picture = laid([own for own in placed.rasters if isinstance(own, Warped)], size).pixels
+    rasters = [own for own in placed.rasters if isinstance(own, Raster)]
+    if rasters or placed.parts:
+        inked = [_inked(part, ink or "#000000") for part in placed.parts]
+        shapes = [shape_of(part, least_width=least_width) for part in inked]
+        image = Image.fromarray(picture, "RGBA")
+        image.alpha_composite(painted([PixelSheet((*rasters, *shapes))], size))
+        picture = np.array(image)
+    if cut_off:
+        ring = grid.texels(points)
+        bleed(picture, inside_ring(ring, grid.height, grid.width), covered(ring, size, MARGIN - 1))
+    return Raster(picture, np.eye(2) / grid.density, grid.corner)
 
 
-def _draw_sheet(
-    band: Image.Image,
-    sheet: PixelSheet,
-    top: int,
-    rows: int,
-    pictures: Mapping[bytes, Image.Image],
-    table: Mapping[str, Colour],
-) -> None:
-    """Draw a layer on a band, FINER times as fine, of so many rows of pixels from `top` on."""
-    outside = [] if sheet.window is None else _outside(band, sheet.window, top)
-    kept = [(box, band.crop(box)) for box in outside]
-    for item in sheet.items:
-        if isinstance(item, Raster):
-            _draw_raster(band, item, pictures[item.png], top)
-            continue
-        if item.low <= top + rows and item.high >= top:
-            _draw_shape(band, item, top, table)
-    for box, before in kept:
-        band.paste(before, box)
-
-
-def _outside(band: Image.Image, window: Box, top: int) -> list[tuple[int, int, int, int]]:
-    """Return the rectangles of a band, which begins at a row, that a window leaves out."""
-    (left, upper), (right, lower) = (
-        np.rint((np.array(corner) - (0, top)) * FINER).astype(int).clip(0, band.size).tolist()
-        for corner in (window[:2], window[2:])
-    )
-    width, height = band.size
-    sides = (0, 0, width, upper), (0, lower, width, height), (0, upper, left, lower)
-    boxes = (*sides, (right, upper, width, lower))
-    return [box for box in boxes if box[2] > box[0] and box[3] > box[1]]
-
-
-def _draw_shape(
-    band: Image.Image, shape: PixelShape, top: int, table: Mapping[str, Colour]
-) -> None:
-    """Draw a shape on a band."""
-    rings = [fine_places(ring, top) for ring in shape.rings]
-    lines = [fine_places(line, top) for line in shape.lines]
-    canvas, corner = band, (0, 0)
-    if shape.opacity < 1:  # drawn apart, where it is
-        every, width = np.concatenate([*rings, *lines]), shape.style.width * FINER + 1
-        low = np.floor(every.min(axis=0) - width).astype(int).clip(0, band.size)
-        high = np.ceil(every.max(axis=0) + width).astype(int).clip(0, band.size)
-        if (high <= low).any():
-            return
-        corner = (int(low[0]), int(low[1]))
-        canvas = Image.new("RGBA", (int(high[0] - low[0]), int(high[1] - low[1])))
-        rings, lines = [ring - low for ring in rings], [line - low for line in lines]
-    pen = ImageDraw.Draw(canvas)
-    if shape.style.fill and rings:
-        _fill(canvas, pen, rings, _colour(shape.style.fill, table))
-    if shape.style.stroke:
-        colour = _colour(shape.style.stroke, table)
-        for line in lines:
-            draw_line(pen, line, shape.style.width * FINER, colour)
-    if canvas is not band:
-        canvas.putalpha(canvas.getchannel("A").point(lambda alpha: alpha * shape.opacity))
-        band.alpha_composite(canvas, corner)
-
-
-def _fill(
-    canvas: Image.Image, pen: ImageDraw.ImageDraw, rings: Sequence[Array], colour: Colour
-) -> None:
-    """Fill rings as one; those that run the other way than the largest are holes."""
-    if len(rings) == 1:
-        pen.polygon(rings[0].ravel().tolist(), fill=colour)
-        return
-    areas = [signed_area(ring) for ring in rings]
-    order = np.argsort(-np.abs(areas), kind="stable")
-    every = np.concatenate(rings)
-    low = np.floor(every.min(axis=0)).astype(int).clip(0, canvas.size)
-    high = np.ceil(every.max(axis=0) + 1).astype(int).clip(0, canvas.size)
-    mask = Image.new("1", tuple((high - low).tolist()))
-    cut = ImageDraw.Draw(mask)
-    for k in order.tolist():
-        filled = areas[k] * areas[order[0]] > 0
-        cut.polygon((rings[k] - low).ravel().tolist(), fill=int(filled))
-    canvas.paste(colour, tuple(low.tolist()), mask)
-
-
-def _draw_raster(band: Image.Image, raster: Raster, picture: Image.Image, top: int) -> None:
-    """Draw a picture of pixels on a band, linear between its pixels."""
-    linear, offset = raster.linear * FINER, (raster.offset - (0.0, top)) * FINER
-    corners = raster._replace(linear=linear, offset=offset).corners
-    low = np.floor(corners.min(axis=0)).astype(int).clip(0, band.size)
-    high = np.ceil(corners.max(axis=0)).astype(int).clip(0, band.size)
-    width, height = (high - low).tolist()
-    if width < 1 or height < 1:
-        return
-    inverse = np.linalg.inv(linear)
-    start = inverse @ (low - offset)
-    (a, b), (c, d) = inverse.tolist()
-    own = picture.transform(
-        (width, height),
-        Image.Transform.AFFINE,
-        (a, b, float(start[0]), c, d, float(start[1])),
-        resample=Image.Resampling.BILINEAR,
-    )
-    band.alpha_composite(own.convert("RGBA"), tuple(low.tolist()))
+def _inked(part: PathPart, ink: str) -> PathPart:
+    fill, stroke = (ink if colour == INK else colour for colour in part.style[:2])
+    return part._replace(style=part.style._replace(fill=fill, stroke=stroke))

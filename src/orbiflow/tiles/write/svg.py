@@ -12,9 +12,23 @@ from collections.abc import Iterator
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
+from PIL import Image
 
-from orbiflow.tiles.page import Curve, Layer, Motif, PathPart, Raster, Scene, Style, Uses, Words
+from orbiflow.drawing import png_bytes
+from orbiflow.tiles.page import (
+    Curve,
+    Layer,
+    Motif,
+    PathPart,
+    Raster,
+    Scene,
+    Style,
+    Uses,
+    Warped,
+    Words,
+)
 from orbiflow.tiles.write.formats import TOLERANCE
+from orbiflow.tiles.write.painting import INCH, with_page_pictures
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" \
@@ -23,11 +37,13 @@ width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">
 """
 
 
-def write_svg(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
+def write_svg(scene: Scene, *, tolerance: float = TOLERANCE, dpi: float = 300.0) -> str:
     """Return the scene as an SVG document, in which rounding moves points by far less than `tolerance`.
 
-    Edges that two tiles share have the same numbers up to the last decimal.
+    Edges that two tiles share have the same numbers up to the last decimal. Pictures on meshes have
+    `dpi` pixels an inch.
     """
+    scene = with_page_pictures(scene, dpi / INCH)
     number = Numbers(max(3, math.ceil(-math.log10(tolerance / 5))))
     parts = [_HEADER.format(width=number(scene.width), height=number(scene.height))]
     parts.append(f"  <title>{escape(scene.title)}</title>\n")
@@ -45,7 +61,7 @@ def write_svg(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
             elif isinstance(item, Words):
                 parts.append("    " + _words(item, number))
             else:
-                own = _image(item) if isinstance(item, Raster) else _part(item, number)
+                own = _part(item, number) if isinstance(item, PathPart) else _image(item)
                 parts.append("    " + own)
         parts.append("  </g>\n")
     parts.append("</svg>\n")
@@ -114,10 +130,12 @@ def _motif(name: str, motif: Motif, number: Numbers) -> str:
     return "".join(parts) + "    </g>\n"
 
 
-def _image(raster: Raster) -> str:
+def _image(picture: Raster | Warped) -> str:
+    raster = picture.raster() if isinstance(picture, Warped) else picture
     values = [*raster.linear.T.ravel().tolist(), *raster.offset.tolist()]
     place = ",".join(f"{value:.9g}" for value in values)
-    data = base64.b64encode(raster.png).decode("ascii")
+    png = png_bytes(Image.fromarray(raster.pixels, "RGBA"))
+    data = base64.b64encode(png).decode("ascii")
     width, height = raster.size
     return (
         f'<image width="{width}" height="{height}" transform="matrix({place})" '
