@@ -73,7 +73,7 @@ def upright(tile: EscherTile) -> Tiling:
 
 def figures_png(tiles: list[EscherTile]) -> bytes:
     """Return a picture of all figures of pairs, numbered in a random order, and print their names."""
-    figures = [part.figure for tile in tiles for part in tile.parts]
+    figures = [part.figure for tile in tiles for part in tile.figures]
     random.Random(0).shuffle(figures)
     side, columns = 300, 4
     picture = Image.new("RGB", (columns * side, -(-len(figures) // columns) * side), "white")

@@ -119,7 +119,7 @@ def test_tiles_of_a_stage_replace_those_before(home: Path, monkeypatch: pytest.M
     assert set(summary["gone"]) == {number for number in numbers if number >= 5000 + count}
     for number in numbers - set(summary["gone"]):
         tile = read_result(tile_folder(home, number))
-        assert (len(tile.parts), tile.certificate.valid) == (2, True)
+        assert (len(tile.figures), tile.certificate.valid) == (2, True)
     assert all(best_stage(home, number) is None for number in summary["gone"])
     with pytest.raises(OrbiflowError, match="look alike"):
         run(home, objective="overlap")
@@ -139,13 +139,13 @@ def test_a_card_has_both_figures_and_their_colours(pair: EscherTile) -> None:
     card = tile_card(pair, 1, "final")
     assert len(card["figures"]) == 2
     colours = colouring(pair.tiling)
-    for own, part in zip(card["figures"], pair.parts, strict=True):
+    for own, part in zip(card["figures"], pair.figures, strict=True):
         placed = part.prototile.polygon
         assert np.abs(np.array(own["polygon"]) - placed).max() < 1e-5 * np.abs(placed).max()
         assert own["stars"] == part.figure.rating.stars  # pyright: ignore[reportOptionalMemberAccess]
     assert card["colours"]["shares"] == list(colours.shares)
     assert len(card["group"]["figures"]) == len(card["group"]["cosets"]) == len(colours.table)
-    for own, part in zip(tile_view(card, pair)["figures"], pair.parts, strict=True):
+    for own, part in zip(tile_view(card, pair)["figures"], pair.figures, strict=True):
         a, b, c, d, e, f = own["place"]
         rest = np.array(own["map"]["rest"])
         there = np.stack([a * rest[:, 0] + c * rest[:, 1] + e, b * rest[:, 0] + d * rest[:, 1] + f])
@@ -173,13 +173,13 @@ def test_a_project_of_two_is_saved_opened_and_taken_away(client, home, pair, tmp
     project = open_project(tmp_path / "both.orbiflow")
     assert project.second is not None
     assert project.second.source == "backdrop-2.png"
-    assert len(project.tiles[0].parts) == 2
+    assert len(project.tiles[0].figures) == 2
     own = client.post("/api/projects/open", content=content).json()
     assert own["second"]["silhouette"]["outline"]
     assert own["second"]["input"] == {"name": "backdrop-2.png", "type": "png"}
     address = f"/api/projects/{own['id']}"
     eye, line = [[0.0, 0.0, 1.0]], {"colour": "#d02030", "width": 0.8}
-    figure = pair.parts[1].figure
+    figure = pair.figures[1].figure
     middle = figure.silhouette_outline.mean(axis=0)
     drawn = {**line, "points": [middle.tolist(), (middle + 1).tolist()]}
     view = {"drawing": {"strokes": [], "eyes": eye, "second": {"strokes": [drawn], "eyes": []}}}
@@ -205,7 +205,7 @@ def test_what_is_drawn_on_either_figure_goes_to_it(pair: EscherTile, tmp_path: P
     folder = save_tiles([pair], tmp_path / "tile")
     inside = [
         shapely.Polygon(part.figure.silhouette_outline).representative_point()
-        for part in pair.parts
+        for part in pair.figures
     ]
     one, two = ([own.x, own.y, 1.0] for own in inside)
     stroke = {"colour": "#d02030", "width": 1.0, "points": [two[:2], one[:2]]}
@@ -235,7 +235,7 @@ def test_a_pulled_pair_is_certified_and_keeps_both_maps(seed: int, reach: float)
     moved = space.start + reach * room * move / np.abs(space.polygon(move)).max()
     found = pulled(pair, moved)
     assert found.certificate.valid
-    for part, ring in zip(found.parts, space.rings, strict=True):
+    for part, ring in zip(found.figures, space.rings, strict=True):
         ends = space.polygon(moved)[ring]
         assert np.abs(part.prototile.polygon - ends).max() < 1e-9 * pair.tile.radius
         assert part.figure.map is not None

@@ -34,7 +34,7 @@ def cannot(project: str, tile: int, here: Studio) -> dict[str, list[dict[str, An
             own = read_result(tile_folder(home, number))
         except OrbiflowError as error:  # it has just been removed
             return str(error)
-        if own.parts and makes == "solid":
+        if len(own.figures) > 1 and makes == "solid":
             return "a ball is made of a tile of one figure"
         return why_not_in(own, world)
 

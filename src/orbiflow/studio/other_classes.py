@@ -37,7 +37,7 @@ def in_class(tile: EscherTile, name: str, told: Callable[[float], None]) -> Esch
         OrbiflowError: For two figures in one tile, or an unknown class.
         CertificationError: If the class has no tile that is like this one, in plain words.
     """
-    if tile.parts:
+    if len(tile.figures) > 1:
         raise OrbiflowError("two figures lie as they were found; search for other pairs")
     kind, ring = isohedral_class(name), tile.tile.polygon
     found = escherize_class(

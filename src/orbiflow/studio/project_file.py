@@ -190,10 +190,7 @@ def read_pictures(home: Path, document: Mapping[str, Any]) -> list[Target | None
 
 def _with_maps(tile: EscherTile) -> EscherTile:
     """Return a tile with its maps, or those of its figures, read."""
-    if not tile.parts:
-        return tile.changed(map_source=tile.map)
-    parts = (part._replace(figure=_with_maps(part.figure)) for part in tile.parts)
-    return tile.changed(parts=tuple(parts))
+    return tile.with_figures(lambda figure: figure.changed(map_source=figure.map))
 
 
 def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile, int, int | None]]:

@@ -78,8 +78,8 @@ class PullSpace:
         self.outline = TileVariations(divided_tile(tile.tile, POINTS))
         ring, matrix = self.outline.first.polygon, self.outline.matrix
         self.points, self.rings, self.kept = ring, [np.arange(len(ring))], [np.arange(len(ring))]
-        if tile.parts:
-            figures = [part.prototile.polygon for part in tile.parts]
+        figures = [part.prototile.polygon for part in tile.figures]
+        if len(figures) > 1:
             self.points, self.rings, self.kept = _divided_rings(ring, figures)
         free = matrix.shape[1] - len(self.outline.maps) - 2
         self._path = slice(free, free + 2 * (len(self.points) - len(ring)))
@@ -234,15 +234,15 @@ def pulled(
 
     move = _inner_move(space, given, inside) if len(inside) else None
 
-    if not tile.parts:
+    if len(tile.figures) == 1:
         found = moved_figure(tile, whole, on_the_way, COMPARED_POINTS, told, move)
     else:
         parts = list[Any]()
-        for part, ring, kept in zip(tile.parts, space.rings, space.kept, strict=True):
+        for part, ring, kept in zip(tile.figures, space.rings, space.kept, strict=True):
             back, before = part.place.inverse, part.figure
             corners = tuple(kept[list(before.tile.corners)].tolist())
             own = Tile(back(points[ring]), whole.group.conjugate(*back), corners=corners)
-            count = COMPARED_POINTS // len(tile.parts)
+            count = COMPARED_POINTS // len(tile.figures)
             way = partial(_own_ring, on_the_way, ring, back)
             inner = None if move is None else partial(_moved_in, part.place, move)
             figure = moved_figure(before, own, way, count, told, inner)
@@ -254,9 +254,9 @@ def pulled(
             silhouette=tile.silhouette,
             no_map=tile.no_map,
             notes=(PULLED,),
-            parts=tuple(parts),
+            division=tuple(parts),
         )
-        if all(part.figure.rating for part in found.parts):
+        if all(part.figure.rating for part in found.figures):
             found = replace(found, rating=Rating.of_likeness(found.score))
     if not found.certificate.valid:
         raise CertificationError("; ".join(found.certificate.reasons))

@@ -36,7 +36,7 @@ class Stroke(NamedTuple):
 
 def with_any_map(tile: EscherTile) -> EscherTile:
     """Return a tile that can be drawn on: one figure without a map is its own silhouette."""
-    if tile.parts or (tile.bending is not None and tile.frame is not None):
+    if len(tile.figures) > 1 or (tile.bending is not None and tile.frame is not None):
         return tile
     frame = Frame(np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
     mesh = triangulate(orient(frame.to_normal(tile.tile.polygon), counter_clockwise=True))

@@ -45,14 +45,14 @@ def tile_card(tile: EscherTile, number: int, stage: str) -> dict[str, Any]:
         **shown,
         **_outline(tile.tile.polygon),
     }
-    if tile.parts:
+    if len(tile.figures) > 1:
         card["figures"] = [
             {
                 "name": part.figure.name,
                 "stars": _rated(part.figure.rating or tile.rating)["stars"],
                 **_outline(part.prototile.polygon),
             }
-            for part in tile.parts
+            for part in tile.figures
         ]
     return card
 
@@ -81,7 +81,7 @@ def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
         "notes": list(dict.fromkeys([*tile.notes, *said])),
         "elements": elements_json(tile.tile.group, tile.tile.center),
     }
-    if not tile.parts:
+    if len(tile.figures) == 1:
         return {**view, **figure_view(tile, 0)}
     shown = [{**own, **figure_view(tile, k)} for k, own in enumerate(card["figures"])]
     return {**view, "figures": shown}

@@ -141,7 +141,7 @@ def _figures(tile: EscherTile, own: EscherTile) -> dict[str, str]:
     mismatch, bent = tile.certificate.edge_mismatch, own.likeness.deformation
     return {
         "class": f"{tile.name} ({tile.group_name})",
-        **({"figure": own.name} if tile.parts else {}),
+        **({"figure": own.name} if len(tile.figures) > 1 else {}),
         "score": f"{own.score:.3f}",
         "bent": "-" if bent is None else f"{bent:.3f}",
         "IoU": f"{own.likeness.metrics.iou:.4f}",

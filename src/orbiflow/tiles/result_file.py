@@ -120,7 +120,7 @@ def _measured(
 def _divided(whole: EscherTile, entries: list[dict[str, Any]], folder: Path | None) -> EscherTile:
     """Return a tile that figures divide."""
     parts = tuple(_part(whole, own, folder, k) for k, own in enumerate(entries))
-    found = whole.changed(parts=parts, map_source=None, no_map=NO_MAP)
+    found = whole.changed(division=parts, map_source=None, no_map=NO_MAP)
     area, whole_area = (
         sum(own.signed_area for own in found.tiling.prototiles),
         found.tile.signed_area,
@@ -318,7 +318,9 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
     search = tile.search
     # what is measured of a tile that figures divide is theirs
     own = (
-        {"parts": [_part_json(part) for part in tile.parts]} if tile.parts else _measures_json(tile)
+        {"parts": [_part_json(part) for part in tile.figures]}
+        if len(tile.figures) > 1
+        else _measures_json(tile)
     )
     return {
         "class": tile.isohedral_class,

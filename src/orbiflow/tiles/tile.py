@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -95,7 +96,7 @@ class EscherTile:
     - `rating`: Its stars among the tiles of its run.
     - `search`: How it was found.
     - `others`: More tiles of the class, if they were asked for.
-    - `parts`: The figures that divide it, each like a silhouette of its own; none if it is one figure.
+    - `division`: The figures that divide it, if there are several: see `figures`.
     """
 
     tile: Tile
@@ -112,7 +113,7 @@ class EscherTile:
     rating: Rating | None = None
     search: SearchFacts = UNSEARCHED
     others: tuple[EscherTile, ...] = ()
-    parts: tuple[Part, ...] = ()
+    division: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -130,15 +131,15 @@ class EscherTile:
 
     @property
     def figures(self) -> tuple[Part, ...]:
-        """The figures that divide it; one that is whole is its own."""
-        return self.parts or (Part(self, Place(np.eye(2), np.zeros(2))),)
+        """The figures that it shows, each like a silhouette of its own; one alone is the tile."""
+        return self.division or (Part(self, Place(np.eye(2), np.zeros(2))),)
 
     @cached_property
     def tiling(self) -> Tiling:
         """The group with a prototile for each of the `figures`."""
-        if not self.parts:
+        if not self.division:
             return self.tile.tiling
-        return Tiling(self.tile.group, [part.prototile for part in self.parts])
+        return Tiling(self.tile.group, [part.prototile for part in self.division])
 
     @cached_property
     def arrangement(self) -> str:
@@ -210,7 +211,7 @@ class EscherTile:
         the eye takes them for one.
         """
         known = self.likeness.known_score
-        if not self.parts or known is not None:
+        if not self.division or known is not None:
             return self.likeness.score
         mixed = mixing(self.tiling) if self.certificate.valid else 0.0
         return self.worst.score * mixing_factor(mixed)
@@ -223,15 +224,22 @@ class EscherTile:
     @property
     def likenesses(self) -> list[EscherTile]:
         """The figures that are to be like a silhouette: all but a background."""
-        return [part.figure for part in self.parts if not part.is_background] or [self]
+        return [part.figure for part in self.division if not part.is_background] or [self]
 
     def changed(self, **changes: Any) -> EscherTile:
         """Return the tile with other values of some fields, and a certificate that is known kept."""
         other = replace(self, **changes)
-        same = other.tile is self.tile and other.parts is self.parts
+        same = other.tile is self.tile and other.division is self.division
         if "certificate" in self.__dict__ and same:
             other.__dict__["certificate"] = self.certificate
         return other
+
+    def with_figures(self, change: Callable[[EscherTile], EscherTile]) -> EscherTile:
+        """Return the tile with each of its figures changed: itself, if it is one figure."""
+        if not self.division:
+            return change(self)
+        figures = (part._replace(figure=change(part.figure)) for part in self.division)
+        return self.changed(division=tuple(figures))
 
     def family(self) -> tuple[EscherTile, ...]:
         """Return this tile and the others of its class."""

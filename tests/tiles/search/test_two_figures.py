@@ -68,9 +68,9 @@ def test_both_figures_are_measured_and_the_worse_one_ranks() -> None:
     for tile in found.tiles:
         assert tile.certificate.valid
         assert tile.rating == tile.worst.rating
-        worst = min(part.figure.score for part in tile.parts)
+        worst = min(part.figure.score for part in tile.figures)
         assert tile.score == pytest.approx(worst * mixing_factor(mixing(tile.tiling)))
-        for part, target in zip(tile.parts, found.targets, strict=True):
+        for part, target in zip(tile.figures, found.targets, strict=True):
             assert part.figure.likeness.metrics.iou > 0.5
             assert part.figure.silhouette == target.report()
             assert part.figure.rating is not None
@@ -78,7 +78,7 @@ def test_both_figures_are_measured_and_the_worse_one_ranks() -> None:
 
 @given(seeds, st.integers(0, 1))
 def test_maps_of_both_figures_have_inverses(seed: int, number: int) -> None:
-    figure = pair().parts[number].figure
+    figure = pair().figures[number].figure
     rng = np.random.default_rng(seed)
     low, high = figure.silhouette_outline.min(axis=0), figure.silhouette_outline.max(axis=0)
     points = rng.uniform(low, high, (20, 2))
@@ -92,7 +92,7 @@ def test_maps_of_both_figures_have_inverses(seed: int, number: int) -> None:
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_maps_keep_what_the_marks_say(number: int) -> None:
-    figure = pair().parts[number].figure
+    figure = pair().figures[number].figure
     known = figure.likeness.fidelity
     assert known is not None
     rest, frame = figure.likeness.rest, figure.frame
@@ -109,7 +109,7 @@ def test_a_saved_pair_is_the_same(tmp_path: Path) -> None:
     folder = save_tiles([pair()], tmp_path / "run")
     again = read_result(folder)
     assert again.certificate.valid
-    for own, read in zip(pair().parts, again.parts, strict=True):
+    for own, read in zip(pair().figures, again.figures, strict=True):
         np.testing.assert_array_equal(own.figure.tile.polygon, read.figure.tile.polygon)
         np.testing.assert_array_equal(own.place.linear, read.place.linear)
         assert read.figure.bending is not None
@@ -180,7 +180,9 @@ def _flat(figure: EscherTile, colour: str) -> Over:
 
 def test_each_figure_carries_its_own_picture() -> None:
     tile = pair()
-    overs = [_flat(p.figure, colour) for p, colour in zip(tile.parts, ("red", "blue"), strict=True)]
+    overs = [
+        _flat(p.figure, colour) for p, colour in zip(tile.figures, ("red", "blue"), strict=True)
+    ]
     given: dict[str, Any] = {"area": "300x200px", "tile_size": "90px", "outline": "none"}
     settings = ArtSettings(**given)
     pixels = pixels_of(artwork(tile, settings, *overs)).reshape(-1, 3)
@@ -191,7 +193,7 @@ def test_each_figure_carries_its_own_picture() -> None:
 
 
 def test_a_second_picture_needs_a_second_figure() -> None:
-    one = pair().parts[0].figure
+    one = pair().figures[0].figure
     with refused("second_picture", kind=SettingError):
         artwork(one, ArtSettings(), None, _flat(one, "red"))
     with refused("second_eyes", kind=SettingError):
@@ -295,18 +297,18 @@ def test_a_background_may_have_any_shape(tmp_path: Path) -> None:
         found = escherize(animal(NAMES[0]), settings)
     assert found.targets == (found.target,)
     best = found.tiles[0]
-    figure, left = best.parts
+    figure, left = best.figures
     assert best.certificate.valid
     assert left.is_background
     assert best.worst is figure.figure
     assert figure.figure.score > pair().worst.score  # any shape is easier than another animal
     folder = write_run(found, tmp_path / "run")[0].parents[1]
     again = read_result(folder)
-    assert [part.is_background for part in again.parts] == [False, True]
+    assert [part.is_background for part in again.figures] == [False, True]
     assert not list(folder.rglob("overlay-2.png"))
     point = left.figure.tile.polygon.mean(axis=0)
     np.testing.assert_allclose(
-        again.parts[1].figure.forward(point), point, atol=1e-9 * np.ptp(point)
+        again.figures[1].figure.forward(point), point, atol=1e-9 * np.ptp(point)
     )
     assert (
         len(make_solid(again, SolidSettings(clearance=0, chamfer=0)).parts) == 2

@@ -173,7 +173,7 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
 def _neck_notes(placed: Layout) -> tuple[str, ...]:
     limit, found = placed.settings.warn_neck, list[str]()
     for part, ring in zip(placed.tile.figures, placed.prototiles, strict=True):
-        name = part.figure.name if placed.tile.parts else ""
+        name = part.figure.name if len(placed.tile.figures) > 1 else ""
         try:
             neck = narrowest_neck(ring) if limit else None
         except OrbiflowError as error:  # a forced tile may cross itself

@@ -48,10 +48,8 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
         InputFileError: As `read_result`, and if a model belongs to another tile.
     """
     tile = as_tile(source)
-    if tile.parts:
-        return tile.changed(
-            parts=tuple(part._replace(figure=with_map(part.figure)) for part in tile.parts)
-        )
+    if len(tile.figures) > 1:
+        return tile.with_figures(with_map)
     if tile.no_map or (tile.bending is not None and tile.frame is not None):
         return tile
     frame, bending, known = tile.frame, None, tile.map or TileMap()

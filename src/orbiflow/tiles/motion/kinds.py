@@ -142,7 +142,7 @@ def morph(
     It is a tiling throughout; if `steady`, the tile's lattice is there from the start.
     """
     tile, middle = given.tile, np.array(page.size) / 2
-    parts = [part.prototile.polygon for part in given.parts]
+    parts = [part.prototile.polygon for part in given.division]
     inner = [
         part.place(body.points) for part, body in zip(given.figures, bodies, strict=bool(bodies))
     ]
@@ -222,7 +222,7 @@ def bend(given: EscherTile, page: Page) -> Motion:
         ways.append(partial(_bent, BendingWay(bending), place, prototile.center))
         borders.append(border(bending.triangles))
     places, kinds, colours = _still_places(page)
-    silhouettes = "silhouettes bend" if given.parts else "silhouette bends"
+    silhouettes = "silhouettes bend" if len(given.figures) > 1 else "silhouette bends"
 
     @lru_cache(maxsize=2)  # of a frame, for its outlines and its bodies
     def bodies(progress: float) -> list[Array]:

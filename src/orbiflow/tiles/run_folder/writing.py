@@ -97,7 +97,7 @@ def write_tile_folder(
         "field.pdf": lambda: field(Sheet.column()),
     }
     for number, (own, target) in enumerate(zip(result.likenesses, targets, strict=True)):
-        label = own.name if result.parts else label
+        label = own.name if len(result.figures) > 1 else label
         more: dict[str, Callable[[], str | bytes]] = {
             "overlay.png": partial(_overlay, own, target, label),
             "overlay.pdf": partial(_overlay, own, target, label, printed),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import zip_longest
 
 import numpy as np
 import shapely
@@ -159,12 +160,12 @@ def rated(tiles: Sequence[EscherTile], *targets: Target) -> list[EscherTile]:
 
 
 def _rated(tile: EscherTile, targets: Sequence[Target]) -> EscherTile:
-    if tile.parts:
-        own = tuple(
-            part._replace(figure=_rated(part.figure, [target]))
-            for part, target in zip(tile.parts, targets, strict=False)
-        )
-        tile = tile.changed(parts=own + tile.parts[len(own) :])
+    if len(tile.figures) > 1:
+        figures = [
+            part if target is None else part._replace(figure=_rated(part.figure, [target]))
+            for part, target in zip_longest(tile.figures, targets)  # a background has none
+        ]
+        tile = tile.changed(division=tuple(figures))
         return tile.changed(rating=tile.worst.rating)
     if is_mere_line(targets[0]):
         return tile.changed(rating=Rating(1))

@@ -61,7 +61,7 @@ def finished_pair(
         silhouette=originals[0].report(),
         no_map=NO_MAP,
         normal=union.transformed(*ways[0]),
-        parts=tuple(parts),
+        division=tuple(parts),
     )
 
 

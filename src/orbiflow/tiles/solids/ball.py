@@ -34,7 +34,7 @@ def ball_of(
     Raises:
         OrbiflowError: If the tile has no pattern on the sphere, or nothing is left of it.
     """
-    if tile.parts:
+    if len(tile.figures) > 1:
         raise OrbiflowError("a ball is made of a tile of one figure")
     found, seen = in_world(tile, settings.order, 1)
     motions = copies(found, lambda own: np.ones(len(own), dtype=bool), 500)

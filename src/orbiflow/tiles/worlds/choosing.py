@@ -82,7 +82,7 @@ def in_world(
     Raises:
         OrbiflowError: As `unfolded` and `usual_orders`.
     """
-    if tile.parts or tile.bending is None:
+    if len(tile.figures) > 1 or tile.bending is None:
         return _unfolded(tile, orders, sign, distortion), ()
     seen = WorldLikeness(tile)
     found = _unfolded(tile, orders, sign, lambda own: -seen.mark(own))
@@ -107,7 +107,7 @@ def best_in_world(
     """
     best, highest, spare = None, -np.inf, None
     for tile in tiles:
-        if tile.parts or tile.bending is None:
+        if len(tile.figures) > 1 or tile.bending is None:
             continue
         seen = WorldLikeness(tile)
         if seen.plane + BETTER < highest:

@@ -136,7 +136,7 @@ def metamorphosis(
     Raises:
         OrbiflowError: For a tile of two figures, or one whose class is not known or another.
     """
-    if tile.parts or (begin and begin.parts):
+    if len(tile.figures) > 1 or (begin and len(begin.figures) > 1):
         raise OrbiflowError("a metamorphosis is of one figure; choose another tile")
     notes, origin = list[str](), "polygons"
     if begin is None:
@@ -248,7 +248,7 @@ def best_to_become(tiles: Sequence[EscherTile], begins: Sequence[EscherTile]) ->
         (one, two)
         for one in tiles
         for two in begins
-        if one.isohedral_class == two.isohedral_class and not one.parts and not two.parts
+        if one.isohedral_class == two.isohedral_class and len(one.figures) == len(two.figures) == 1
     ]
     return max(pairs, key=worth)[0] if pairs else None
 

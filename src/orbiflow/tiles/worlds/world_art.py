@@ -50,7 +50,7 @@ def world_artwork(
     tile = with_map(source)
     world, notes = world_of(tile, settings, begin)
     count, chosen = len(tile.figures) * world.count, palette(settings.palette)
-    if tile.parts:  # each figure has a colour of its own, and its shades
+    if len(tile.figures) > 1:  # each figure has a colour of its own, and its shades
         chosen = chosen.shaded((world.count,) * len(tile.figures))
     own_overs = overs if begin is None else overs[:1]
     require_figures(tile, settings, len(own_overs))
