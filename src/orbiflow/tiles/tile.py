@@ -62,8 +62,8 @@ class Part(NamedTuple):
         flip = np.array([1.0, -1.0 if y_down else 1.0])
         mesh = triangulate(orient(tile.polygon * flip, counter_clockwise=True))
         bending = Bending(mesh.points, mesh.points, mesh.triangles)
-        known = TileMap(frame=Frame(np.diag(flip), np.zeros(2)), bending=bending)
-        figure = EscherTile(tile, name="background", y_down=y_down, map_source=known)
+        still = TileMap(frame=Frame(np.diag(flip), np.zeros(2)), bending=bending)
+        figure = EscherTile(tile, name="background", y_down=y_down, map_source=still)
         return cls(figure, Place(np.eye(2), np.zeros(2)))
 
     @property
@@ -173,12 +173,12 @@ class EscherTile:
             return source
         if not source.is_file():
             return None
-        found = TileMap.read(source)
-        if not found.ends_on(self.tile):
+        tile_map = TileMap.read(source)
+        if not tile_map.ends_on(self.tile):
             raise InputFileError(
                 f"{source}: belongs to another tile than the one in result.json; search again"
             )
-        return found
+        return tile_map
 
     @property
     def bending(self) -> Bending | None:
@@ -210,8 +210,7 @@ class EscherTile:
         Of several figures it is the worst one's, less where copies of one figure lie side by side, as
         the eye takes them for one.
         """
-        known = self.likeness.known_score
-        if not self.division or known is not None:
+        if not self.division or self.likeness.known_score is not None:
             return self.likeness.score
         mixed = mixing(self.tiling) if self.certificate.valid else 0.0
         return self.worst.score * mixing_factor(mixed)

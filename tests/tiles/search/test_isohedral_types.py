@@ -55,7 +55,7 @@ def random_tile(kind: IsohedralClass, seed: int, size: float = 0.03) -> Tile:
     """A tile near the template: the template's parameters in the linear space, changed at random."""
     template = kind.template()
     lengths = np.full((1, len(template)), PER_EDGE)
-    space = TileSpace(kind, Placements(lengths, np.zeros(1, int), np.zeros(1), np.zeros(1)))
+    space = TileSpace(kind, Placements(lengths, np.zeros(1, int), np.zeros(1)))
     goal = complex_points(subdivided(template[None], PER_EDGE)[0])
     real, imaginary = space.matrices(0)
     stacked = np.concatenate([real, imaginary])

@@ -96,12 +96,12 @@ def bent_tiles(
 ) -> tuple[list[Bent], int]:
     """Return finalists, best first and without twins, and how many crossed themselves."""
     used = both[:1] if template_symmetries(kind)[1] else both
-    own = settings.of_class(wanted, symmetric=len(kind.stabiliser) > 1)
-    found = _finalists(used, kind, own, tell, cancel)
-    simple = _best_first([bent for bent in found if bent.factor])
-    crossed = [bent for bent in found if not bent.factor]
-    if own.carved and both[0].plain:
-        simple = _all_carved(kind, simple, crossed, own, cancel)
+    usual = settings.of_class(wanted, symmetric=len(kind.stabiliser) > 1)
+    finalists = _finalists(used, kind, usual, tell, cancel)
+    simple = _best_first([bent for bent in finalists if bent.factor])
+    crossed = [bent for bent in finalists if not bent.factor]
+    if usual.carved and both[0].plain:
+        simple = _all_carved(kind, simple, crossed, usual, cancel)
     return simple, len(crossed)
 
 
@@ -152,9 +152,9 @@ class _Lot(NamedTuple):
     def marks(self) -> list[float]:
         """The marks (C,) that people would give, less where a shape crosses itself."""
         rings = self.points[: self.body.size].T
-        simple = np.asarray(shapely.is_valid(shapely.polygons(plane_points(rings)))).tolist()
-        marks = [kept_of(self.body.measures, ring, 0.0).mark for ring in rings]
-        return [mark - CROSSING_MARKS * (not own) for mark, own in zip(marks, simple, strict=True)]
+        crossed = ~np.asarray(shapely.is_valid(shapely.polygons(plane_points(rings))))
+        marks = np.array([kept_of(self.body.measures, ring, 0.0).mark for ring in rings])
+        return (marks - CROSSING_MARKS * crossed).tolist()
 
     def take(self, index: Integers) -> _Lot:
         """Return those at `index`."""
@@ -195,13 +195,13 @@ def _finalists(
         going_on = _best_marked(lots, keep)
         lots = [_shifted(kind, lot, level, step, settings, cancel) for lot in going_on]
         tell(0.3 + 0.2 * (k + 1))
-    found: list[Bent] = []
+    finalists: list[Bent] = []
     for lot in _best_marked(lots, settings.finalists):
         for k in range(len(lot.placements.starts)):
             cancel.check()
             bent = _detailed(lot.take(np.array([k])), kind, settings)
-            found += [] if bent is None else [bent]
-    return found
+            finalists += [] if bent is None else [bent]
+    return finalists
 
 
 def _shifted(
@@ -209,8 +209,8 @@ def _shifted(
 ) -> _Lot:
     """Give a lot the points of a level, and move its corners by so many of them."""
     lot = lot.finer(level)
-    own = lot.body, kind, lot.placements, lot.points
-    drawn = shifted(*own, step, share=settings.share, cancel=cancel)
+    shapes = lot.body, kind, lot.placements, lot.points
+    drawn = shifted(*shapes, step, share=settings.share, cancel=cancel)
     return lot._replace(placements=drawn.placements, points=drawn.points)
 
 
@@ -305,7 +305,7 @@ def _bent(
     if not whole or not tile.in_order:
         return None
     simple = all(
-        shapely.is_valid(shapely.Polygon(own)) for own in (polygon, plane_points(outline[:, 0]))
+        shapely.is_valid(shapely.Polygon(ring)) for ring in (polygon, plane_points(outline[:, 0]))
     )
     return Bent(
         side,
@@ -358,8 +358,8 @@ class PlacedBent(NamedTuple):
         """
         side, bent = self.bent.orientation, self.bent
         rest = side.samples.fine * ((1.0, -1.0) if side.mirrored else (1.0, 1.0))
-        found = rest, self.place(bent.relaxed), self.place(bent.points[: len(rest)])
-        first, second, third = (ring[::-1] if side.mirrored else ring for ring in found)
+        oriented = rest, self.place(bent.relaxed), self.place(bent.points[: len(rest)])
+        first, second, third = (ring[::-1] if side.mirrored else ring for ring in oriented)
         return first, second, third
 
 
@@ -379,7 +379,7 @@ def fit_bending(
     """
     enough = 1 if per_class == 1 else 3 * per_class
     settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
-    found: list[Bent] = []
+    finalists: list[Bent] = []
     dropped = 0
     for phase, both in enumerate(phases):
 
@@ -387,11 +387,11 @@ def fit_bending(
             progress(0.9 * (phase + share) / count, math.nan)
 
         tiles, crossed = bent_tiles(both, kind, settings, tell, cancel, wanted=enough)
-        found, dropped = found + tiles, dropped + crossed
-    if not found:
+        finalists, dropped = finalists + tiles, dropped + crossed
+    if not finalists:
         raise CertificationError("all tiles near the silhouette cross themselves")
     # one to spare, if one is not certified
-    candidates = PlacedTiles(kind, target.normal, _best_first(found)[: enough + 1])
+    candidates = PlacedTiles(kind, target.normal, _best_first(finalists)[: enough + 1])
     return ClassFinalists(candidates, settings.placements, dropped, enough)
 
 

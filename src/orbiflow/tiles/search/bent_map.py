@@ -50,8 +50,8 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     along: Array = np.asarray(shapely.line_locate_point(line, vertices))
     places: Array = np.append((along - along[0]) % knots[-1], knots[-1])
     passed: Array = (knots - along[0]) % knots[-1]
-    own = np.interp(passed, places, np.arange(n + 1))
-    mesh, images = divided(side.fine.mesh, _unknown(side.fine.mesh, own), plane_points(z))
+    numbers = np.interp(passed, places, np.arange(n + 1))
+    mesh, images = divided(side.fine.mesh, _unknown(side.fine.mesh, numbers), plane_points(z))
     mesh, images = onto_polygon(
         mesh, images, tile.polygon * flip, bent.tile.corners, np.array(tile.corners)
     )
@@ -75,16 +75,16 @@ def onto_polygon(
     n, outline = mesh.size, mesh.size + len(mesh.sides)
     knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
     polygon = np.roll(polygon, -vertices[0], axis=0)
-    own, goal = (corners - corners[0]) % n, (vertices - vertices[0]) % len(polygon)
-    if len(own) != len(goal) or (np.diff(own) < 1).any() or (np.diff(goal) < 1).any():
+    starts, goal = (corners - corners[0]) % n, (vertices - vertices[0]) % len(polygon)
+    if len(starts) != len(goal) or (np.diff(starts) < 1).any() or (np.diff(goal) < 1).any():
         raise OrbiflowError("the corners of the outline and the polygon do not correspond")
-    places = _places(np.roll(images[:n], -corners[0], axis=0), polygon, knots, own, goal)
+    places = _places(np.roll(images[:n], -corners[0], axis=0), polygon, knots, starts, goal)
 
     share: Array = (shares(mesh) - corners[0]) % n
-    known = np.interp(share, np.arange(n + 1), knots)
-    places, fresh = _snapped(places, np.sort(known), knots[-1])
+    lengths = np.interp(share, np.arange(n + 1), knots)
+    places, fresh = _snapped(places, np.sort(lengths), knots[-1])
     closed = np.append(places, knots[-1])
-    along = np.concatenate([known, places[fresh]])
+    along = np.concatenate([lengths, places[fresh]])
     laid = np.stack(
         [np.interp(along, closed, np.append(column, column[0])) for column in polygon.T], axis=-1
     )
@@ -98,7 +98,7 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
     """Return where (Q,) the polygon's vertices belong on the ring, in arc length: increasing from 0."""
     lengths = arc_lengths(polygon)
     closed, loop = np.concatenate([ring, ring[:1]]), np.concatenate([polygon, polygon[:1]])
-    found = np.empty(len(polygon))
+    places = np.empty(len(polygon))
     ends = zip(own, [*own[1:], len(ring)], goal, [*goal[1:], len(polygon)], strict=True)
     for a, b, p, q in ends:
         edge = shapely.LineString(closed[a : b + 1])
@@ -112,8 +112,8 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
         if (np.diff(at) <= SAME_PLACE * knots[-1]).any():
             # where the edge comes back to itself the nearest point may be out of order
             at = np.interp(lengths[p : q + 1], lengths[[p, q]], knots[[a, b]])
-        found[p:q] = at[:-1]
-    return found
+        places[p:q] = at[:-1]
+    return places
 
 
 def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[np.bool_]]:
@@ -154,11 +154,11 @@ def divided(mesh: SilhouetteMesh, at: Array, images: Array) -> tuple[SilhouetteM
     The points lie at `at` (m,), in vertices from the first. Where several divide the side of one
     triangle, each gets a point behind it, so that triangles can follow an outline that winds.
     """
-    known = shares(mesh)
-    order, outline, count = np.argsort(known), len(known), len(mesh.points) + len(at)
-    slots = np.searchsorted(known[order], at)
+    before = shares(mesh)
+    order, outline, count = np.argsort(before), len(before), len(mesh.points) + len(at)
+    slots = np.searchsorted(before[order], at)
     start, end = order[slots - 1], order[slots % outline]
-    part = ((at - known[start]) / ((known[end] - known[start]) % mesh.size))[:, None]
+    part = ((at - before[start]) / ((before[end] - before[start]) % mesh.size))[:, None]
     rows = np.where(mesh.triangles >= outline, mesh.triangles + len(at), mesh.triangles).tolist()
     owner = {(t[k - 1], t[k]): (i, k) for i, t in enumerate(rows) for k in range(3)}
     behind: list[tuple[int, int]] = []
@@ -177,9 +177,9 @@ def divided(mesh: SilhouetteMesh, at: Array, images: Array) -> tuple[SilhouetteM
 
     def extended(values: Array) -> Array:
         new = (1 - part) * values[start] + part * values[end]
-        found = np.concatenate([values[:outline], new, values[outline:]])
+        longer = np.concatenate([values[:outline], new, values[outline:]])
         return np.concatenate(
-            [found, found[np.array(behind, dtype=int).reshape(-1, 2)].mean(axis=1)]
+            [longer, longer[np.array(behind, dtype=int).reshape(-1, 2)].mean(axis=1)]
         )
 
     side = np.minimum(np.floor(at).astype(np.int64), mesh.size - 1)
@@ -311,9 +311,9 @@ def _matching(tile: Array, goal: Array) -> Array:
             options[k, k:] = best[: SILHOUETTE_POINTS + 1 - k] + pay[k]
         taken[i] = options.argmin(axis=0)
         best = options.min(axis=0) + cost[i]
-    found = np.empty(TILE_POINTS + 1)
+    points = np.empty(TILE_POINTS + 1)
     place = SILHOUETTE_POINTS
     for i in range(TILE_POINTS, -1, -1):
-        found[i] = place
+        points[i] = place
         place -= taken[i, place]
-    return found
+    return points

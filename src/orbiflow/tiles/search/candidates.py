@@ -63,17 +63,17 @@ class Prototiles:
         """
         placed = plane_points(tiles.vertices)
         inverse = np.linalg.inv(tiles.linear)
-        own = (placed - tiles.offset[:, None]) @ np.swapaxes(inverse, 1, 2)
+        rings = (placed - tiles.offset[:, None]) @ np.swapaxes(inverse, 1, 2)
         pieces = count // placed.shape[1]
         angle, log_scale, stretch = _pose(kind, tiles.linear)
         return cls(
-            subdivided(own, pieces),
+            subdivided(rings, pieces),
             tiles.corners * pieces,
             -angle if mirrored else angle,
             log_scale,
             tiles.offset * (1.0, -1.0) if mirrored else tiles.offset,
             stretch,
-            np.full(len(own), mirrored),
+            np.full(len(rings), mirrored),
         )
 
 
@@ -148,17 +148,17 @@ def _moved_edges(
     closed = np.concatenate([before, before[:1]])
     first = [*(int(corner) * pieces for corner in corners), len(before)]
     spans: list[slice[int, int, None]] = []
-    for own in kind.edge_classes:
-        start, end = first[own.edge], first[own.edge + 1]
-        spans.append(slice(start, (start + end) // 2 + 1 if own.turn else end + 1))
+    for edge_class in kind.edge_classes:
+        start, end = first[edge_class.edge], first[edge_class.edge + 1]
+        spans.append(slice(start, (start + end) // 2 + 1 if edge_class.turn else end + 1))
     carried = moved(np.concatenate([closed[span] for span in spans]))
     ends = np.cumsum([span.stop - span.start for span in spans])
     edges: dict[int, Array] = {}
-    for own, half in zip(kind.edge_classes, np.split(carried, ends[:-1]), strict=True):
-        turn = own.turn
+    for edge_class, half in zip(kind.edge_classes, np.split(carried, ends[:-1]), strict=True):
+        turn = edge_class.turn
         edge = np.concatenate([half, turn.isometry(half)[-2::-1]]) if turn else half
-        edges[own.edge] = edge
-        for image in own.images:
+        edges[edge_class.edge] = edge
+        for image in edge_class.images:
             points = image.isometry(edge)
             edges[image.edge] = points[::-1] if image.reversed else points
     return [edges[i] for i in range(len(edges))]
@@ -167,17 +167,17 @@ def _moved_edges(
 def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float) -> list[Array]:
     """Return which samples of each edge to keep, both ends included: matching on identified edges."""
     masks: dict[int, Array] = {}
-    for own in kind.edge_classes:
-        curve = closed[own.edge]
-        if own.straight:
+    for edge_class in kind.edge_classes:
+        curve = closed[edge_class.edge]
+        if edge_class.straight:
             mask = np.isin(np.arange(len(curve)), (0, len(curve) - 1))
-        elif own.turn:
+        elif edge_class.turn:
             half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
             mask = np.concatenate([half, half[-2::-1]])
         else:
             mask = _simplified(curve, tolerance)
-        masks[own.edge] = mask
-        for image in own.images:
+        masks[edge_class.edge] = mask
+        for image in edge_class.images:
             masks[image.edge] = mask[::-1] if image.reversed else mask
     return [masks[i] for i in range(len(closed))]
 
@@ -255,18 +255,18 @@ class StillTiles(ClassCandidates):
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
         """Return the polygon of a candidate with its group, and a map without a flow."""
-        own = self.prototile(index)
-        c, s = np.cos(own.angle[0]), np.sin(own.angle[0])
-        sign = -1.0 if own.mirrored[0] else 1.0
-        turn = np.exp(own.log_scale[0]) * np.array([[c, -s * sign], [s, c * sign]])
+        start = self.prototile(index)
+        c, s = np.cos(start.angle[0]), np.sin(start.angle[0])
+        sign = -1.0 if start.mirrored[0] else 1.0
+        turn = np.exp(start.log_scale[0]) * np.array([[c, -s * sign], [s, c * sign]])
         # einsum rounds each product, as torch does for a flow's tile; matmul does not
-        linear = np.einsum("ij,jk->ik", turn, self.kind.stretch(own.stretch[0]))
+        linear = np.einsum("ij,jk->ik", turn, self.kind.stretch(start.stretch[0]))
         tile = simplest_tile(
             self.kind,
-            own.vertices[0],
-            own.corners[0].tolist(),
+            start.vertices[0],
+            start.corners[0].tolist(),
             linear,
-            own.offset[0],
+            start.offset[0],
             moved=lambda points: points,
             force=force,
         )

@@ -178,8 +178,8 @@ class _Hill:
     def tile(self, parameters: Array) -> tuple[Complex, tuple[Array, Array]]:
         """Return the vertices (m,), and the map from the group's own frame."""
         first = parameters[: self.count]
-        own = scipy.linalg.solve_triangular(self.root, first, lower=True, trans="T")
-        return self._vertices(parameters), self.space.group(0, own[: self.tile_count])
+        placed = scipy.linalg.solve_triangular(self.root, first, lower=True, trans="T")
+        return self._vertices(parameters), self.space.group(0, placed[: self.tile_count])
 
     def _vertices(self, parameters: Array) -> Complex:
         return (self.basis @ parameters[: self.count]).view(complex)
@@ -322,6 +322,8 @@ def cornered(places: Array, corners: Integers) -> tuple[Array, Integers]:
         for beyond in (at - CORNER_REACH - 1, at + CORNER_REACH + 1):
             if all(abs((beyond - k + n / 2) % n - n / 2) > CORNER_REACH for k in own.tolist()):
                 fixed[beyond % n] = 0.0
-    known = np.array(sorted(fixed))
-    shift = np.interp(np.arange(n), known, np.array([fixed[k] for k in known.tolist()]), period=n)
+    anchors = np.array(sorted(fixed))
+    shift = np.interp(
+        np.arange(n), anchors, np.array([fixed[k] for k in anchors.tolist()]), period=n
+    )
     return places + np.roll(shift, points[0]), (own + points[0]) % n

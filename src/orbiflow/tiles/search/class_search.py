@@ -58,7 +58,7 @@ class ClassTask:
             return ClassFailure(kind.name, str(error))
         facts = [replace(tile.search, seconds=time.perf_counter() - begin) for tile in chosen]
         best, *others = (
-            tile.changed(search=known) for tile, known in zip(chosen, facts, strict=True)
+            tile.changed(search=fact) for tile, fact in zip(chosen, facts, strict=True)
         )
         return best.changed(others=tuple(others))
 
@@ -159,8 +159,8 @@ class ClassSearch:
             functools.partial(_work_on, task), order, self.workers, context=context, cancel=cancel
         )
         with contextlib.closing(items) as news:
-            for one in news:
-                if one.done:
-                    self.record.level_outcome(one.value)
+            for item in news:
+                if item.done:
+                    self.record.level_outcome(item.value)
                 else:
-                    self.record.progress(order[one.index], *one.value)
+                    self.record.progress(order[item.index], *item.value)

@@ -89,9 +89,9 @@ def held_on_tiles(body: ElasticBody, space: TileSpace, z: Complex, rounds: int) 
     outline = np.empty((body.size, space.count), dtype=complex)
     for _ in range(rounds):
         forces = body.forces(z)
-        own = condensed.forces(forces)
+        pulls = condensed.forces(forces)
         for k, part in enumerate(parts):
-            outline[:, k] = part.solve(own[:, k])
+            outline[:, k] = part.solve(pulls[:, k])
         z = condensed.whole(outline, forces)
     groups = [space.group(k, part.parameters) for k, part in enumerate(parts)]
     return BentTiles(
@@ -133,13 +133,13 @@ class _Reduced:
 
     def __init__(self, matrix: Array, low: Complex, real: Array, imaginary: Array) -> None:
         self.real, self.imaginary = real, imaginary
-        own = real.T @ (matrix @ real) + imaginary.T @ (matrix @ imaginary)
+        stiffness = real.T @ (matrix @ real) + imaginary.T @ (matrix @ imaginary)
         less = low.conj().T @ (real + 1j * imaginary)
-        own -= (less.conj().T @ less).real
+        stiffness -= (less.conj().T @ less).real
         # IH1 does not care about the offset
-        own[np.diag_indices_from(own)] += 1e-10 * np.trace(own) / len(own)
-        self.factor = scipy.linalg.cho_factor(own, overwrite_a=True, check_finite=False)
-        self.parameters = np.zeros(len(own))
+        stiffness[np.diag_indices_from(stiffness)] += 1e-10 * np.trace(stiffness) / len(stiffness)
+        self.factor = scipy.linalg.cho_factor(stiffness, overwrite_a=True, check_finite=False)
+        self.parameters = np.zeros(len(stiffness))
 
     def solve(self, force: Complex) -> Complex:
         right = self.real.T @ force.real + self.imaginary.T @ force.imag
@@ -205,11 +205,11 @@ def orientations(
         def made(level: str, stiffness: Stiffness) -> Elastic:
             ring: Array = getattr(points, level)
             mesh = meshes[level]
-            own = mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
-            stiff = None if emphasis is None else emphasis.weight(own)
+            vertices = mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
+            stiff = None if emphasis is None else emphasis.weight(vertices)
             if pins is None:
                 return Elastic(ring, stiffness, stiff=stiff, mesh=mesh)
-            parts, angle = pins.parts(own, mesh.triangles), pins.keep_angle
+            parts, angle = pins.parts(vertices, mesh.triangles), pins.keep_angle
             return Pinned(ring, parts, stiffness, keep_angle=angle, stiff=stiff, mesh=mesh)
 
         return Orientation(mirrored, outline, points, made, emphasis is None and pins is None)
@@ -289,13 +289,13 @@ def _neighbours(
 ) -> tuple[Integers, Placements]:
     """Return owners (M,) and their neighbours, for those at `live`: the share of the nearest tiles."""
     longer, later = _moves(kind, step)
-    own = drawn.placements
+    placements = drawn.placements
     owners = np.repeat(live, len(later))
-    lengths = (own.lengths[live][:, None] + longer).reshape(len(owners), longer.shape[1])
-    starts = (own.starts[live][:, None] + later).ravel() % body.size
+    lengths = (placements.lengths[live][:, None] + longer).reshape(len(owners), longer.shape[1])
+    starts = (placements.starts[live][:, None] + later).ravel() % body.size
     fits = (lengths >= 2).all(axis=1)
     owners, lengths, starts = owners[fits], lengths[fits], starts[fits]
-    options = Placements(lengths, starts, own.turns[owners], own.gains[owners])
+    options = Placements(lengths, starts, placements.turns[owners])
     if share >= 1 or not len(owners):
         return owners, options
     apart = TileSpace(kind, options).distances(drawn.points[: body.size, owners].T)

@@ -60,9 +60,9 @@ def area_ratios(text: str) -> tuple[float, float]:
     >>> area_ratios("1"), area_ratios("0.8-1.25")
     ((1.0, 1.0), (0.8, 1.25))
     """
-    found = re.fullmatch(r"\s*([\d.]+)\s*(?:-\s*([\d.]+))?\s*", text)
+    match = re.fullmatch(r"\s*([\d.]+)\s*(?:-\s*([\d.]+))?\s*", text)
     try:
-        low, high = (float(part) for part in (found[1], found[2] or found[1])) if found else (0, 0)
+        low, high = (float(part) for part in (match[1], match[2] or match[1])) if match else (0, 0)
     except ValueError:
         low = high = 0
     if not LEAST_RATIO <= low <= high <= 1 / LEAST_RATIO:
@@ -141,8 +141,8 @@ class SearchSettings(Settings, group="Search"):
         kind: Any = getattr(import_module(module), name)
         shared = {entry.name for entry in fields(kind)} & {entry.name for entry in fields(self)}
         values = {name: getattr(self, name) for name in shared - {"method"}}
-        given = {name: value for name, value in values.items() if value is not None}
-        return kind.for_effort(self.effort, **given) if kind.efforts else kind(**given)
+        values = {name: value for name, value in values.items() if value is not None}
+        return kind.for_effort(self.effort, **values) if kind.efforts else kind(**values)
 
 
 class EscherizeSettings(SearchSettings, group="Search"):
@@ -206,19 +206,19 @@ class EscherizeSettings(SearchSettings, group="Search"):
         """Return the silhouette with what matters in it."""
         from orbiflow.tiles.search.search_method import Goal
 
-        own: dict[str, Any] = {
+        values: dict[str, Any] = {
             "emphasis": self.emphasis,
             "pin": self.pin,
             "keep_angle": self.pin_angle,
         }
-        return Goal.read(target, strength=self.strength, **own)
+        return Goal.read(target, strength=self.strength, **values)
 
     def second_goal(self, target: Target) -> Goal:
         """Return the same for the second silhouette."""
         from orbiflow.tiles.search.search_method import Goal
 
-        own: dict[str, Any] = {"emphasis": self.second_emphasis, "pin": self.second_pin}
-        return Goal.read(target, strength=self.strength, **own)
+        values: dict[str, Any] = {"emphasis": self.second_emphasis, "pin": self.second_pin}
+        return Goal.read(target, strength=self.strength, **values)
 
     @property
     def pair_search(self) -> PairSearch:
@@ -230,7 +230,7 @@ class EscherizeSettings(SearchSettings, group="Search"):
                 "two silhouettes are searched for likeness; leave out {objective} and {method}"
             )
         usual = BACKGROUND_RATIO if self.background else None
-        given = {"classes": self.classes, "ratio": self.ratio or usual}
-        given = {name: value for name, value in given.items() if value is not None}
-        known = {"min_neck": self.min_neck, "seed": self.seed, "workers": self.workers or 1}
-        return PairSearch.for_effort(self.effort, force=self.force, **known, **given)
+        values = {"classes": self.classes, "ratio": self.ratio or usual}
+        values = {name: value for name, value in values.items() if value is not None}
+        shared = {"min_neck": self.min_neck, "seed": self.seed, "workers": self.workers or 1}
+        return PairSearch.for_effort(self.effort, force=self.force, **shared, **values)

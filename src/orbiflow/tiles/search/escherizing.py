@@ -192,13 +192,13 @@ def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> li
     if classes is None:
         symmetric = SYMMETRIC_CLASSES.get(near.stabiliser, ()) if near else ()
         classes = (*CLASSES, *symmetric)
-    found: list[str] = []
+    names: list[str] = []
     for name in classes:
         if name.strip().lower() == "all":
-            found += [*CLASSES, *itertools.chain(*SYMMETRIC_CLASSES.values())]
+            names += [*CLASSES, *itertools.chain(*SYMMETRIC_CLASSES.values())]
         else:
-            found.append(isohedral_class(name).name)
-    return list(dict.fromkeys(found))
+            names.append(isohedral_class(name).name)
+    return list(dict.fromkeys(names))
 
 
 def _symmetry_notes(near: NearSymmetry | None, names: Sequence[str]) -> list[str]:

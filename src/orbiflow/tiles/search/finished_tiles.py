@@ -56,35 +56,35 @@ def best_tiles(
     than the share `smoothed` of its length rounded off.
     """
     original = original or target
-    found: list[EscherTile] = []
+    tiles: list[EscherTile] = []
     reasons: list[str] = []
     for index in range(fit.candidates.size):
         try:
             result = _result(target, fit, index, original, force=force)
-            known = replace(result.likeness, min_neck=min_neck, smoothed=smoothed)
-            result = result.changed(likeness=known)
+            likeness = replace(result.likeness, min_neck=min_neck, smoothed=smoothed)
+            result = result.changed(likeness=likeness)
             if not force:
                 result.certificate.require()
             if bent := fit.candidates.bent(index):
                 result = with_bent(target, result, bent, original)
-            found.append(result)
+            tiles.append(result)
         except CertificationError as error:
             reasons.append(str(error))
-        if len(found) == fit.enough:
+        if len(tiles) == fit.enough:
             break
-    if not found:
+    if not tiles:
         raise CertificationError("; ".join(dict.fromkeys(reasons)))
-    found.sort(key=lambda r: (not r.certificate.valid, -r.score))
+    tiles.sort(key=lambda r: (not r.certificate.valid, -r.score))
     dropped = fit.crossed + len(reasons)
-    return [result.changed(search=replace(result.search, dropped=dropped)) for result in found]
+    return [result.changed(search=replace(result.search, dropped=dropped)) for result in tiles]
 
 
 def _result(
     target: Target, fit: ClassFinalists, index: int, original: Target, *, force: bool
 ) -> EscherTile:
     tile, flow = fit.candidates.finished(index, force=force)
-    found = measured_tile(target, tile, flow, original)
-    return found.changed(search=SearchFacts(starts=fit.starts))
+    result = measured_tile(target, tile, flow, original)
+    return result.changed(search=SearchFacts(starts=fit.starts))
 
 
 def measured_tile(target: Target, tile: Tile, known: TileMap, original: Target) -> EscherTile:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -34,7 +34,7 @@ class Glue(NamedTuple):
 
     def times(self, multiple: int) -> Glue:
         """Return the same for outlines with so many times as many points."""
-        return Glue(*(multiple * own for own in self))
+        return Glue(*(multiple * number for number in self))
 
 
 class GluedBody(ElasticBody):
@@ -91,7 +91,7 @@ class GluedBody(ElasticBody):
         sizes = [part.size for part in self.figures]
         return one[(first + along) % sizes[0]], two[(second + length - along) % sizes[1]]
 
-    def joined(self, shapes: tuple[Complex, Complex]) -> Complex:
+    def joined(self, shapes: Sequence[Complex]) -> Complex:
         """Return shapes (N, C) of both from those of the figures, which meet in the middle."""
         total = np.zeros((self._count, shapes[0].shape[1]), dtype=complex)
         count = np.zeros((self._count, 1))
@@ -101,17 +101,17 @@ class GluedBody(ElasticBody):
         return np.divide(total, count, dtype=np.complex128)
 
     def forces(self, z: Complex) -> Complex:
-        found = np.zeros_like(z, dtype=complex)
+        total = np.zeros_like(z, dtype=complex)
         for places, part in zip(self.places, self.figures, strict=True):
-            found[places] += part.forces(z[places])
-        return found
+            total[places] += part.forces(z[places])
+        return total
 
     @cached_property
     def matrix(self) -> Array:
-        found = np.zeros((len(self), len(self)))
+        total = np.zeros((len(self), len(self)))
         for places, part in zip(self.places, self.figures, strict=True):
-            found[np.ix_(places, places)] += part.matrix
-        return found
+            total[np.ix_(places, places)] += part.matrix
+        return total
 
 
 Stiff = Callable[[Array], Array]

@@ -69,9 +69,9 @@ def sums_along(one: Complex, two: Complex, *, flips: bool, back: bool) -> Comple
     most = min(n, other)
     t, a = np.arange(n + most), np.arange(n)[:, None]
     b, k = np.arange(other), np.arange(most + 1)[:, None, None]
-    own = (one if flips else np.conj(one))[t % n][:, None]
+    first = (one if flips else np.conj(one))[t % n][:, None]
     # along each diagonal, by where it crosses the first row
-    products = own * two[(b - t[:, None] if back else b + t[:, None]) % other]
+    products = first * two[(b - t[:, None] if back else b + t[:, None]) % other]
     total = np.concatenate([np.zeros((1, other), dtype=complex), np.cumsum(products, axis=0)])
     diagonal = (b + a if back else b - a) % other
     return total[a + k, diagonal] - total[a, diagonal]
@@ -81,15 +81,15 @@ def glues(one: Complex, two: Complex, count: int) -> list[Glued]:
     """Return the best glues of outlines (n,) and (m,), of all lengths of the path alike, best first."""
     first, second = _steps(one), _steps(two)
     n, m = len(one), len(two)
-    squares = [np.append(0.0, np.cumsum(np.tile(abs(own) ** 2, 2))) for own in (first, second)]
+    squares = [np.append(0.0, np.cumsum(np.tile(abs(steps) ** 2, 2))) for steps in (first, second)]
     unit = (squares[0][n] + squares[1][m]) / (n + m)
     agreed = abs(sums_along(first, -second, flips=False, back=True))
     a, b = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
     lengths = range(max(3, round(SHORTEST_PATH * n)), int(LONGEST_PATH * min(n, m)))
-    found: list[Glued] = []
+    glued_runs: list[Glued] = []
 
-    def near(own: Glued, other: Glued) -> bool:
-        ends = zip(own.glue, other.glue, (n, m), strict=False)
+    def near(best: Glued, other: Glued) -> bool:
+        ends = zip(best.glue, other.glue, (n, m), strict=False)
         return max(abs((x - y + size / 2) % size - size / 2) for x, y, size in ends) < NEAR
 
     for length in lengths:
@@ -101,8 +101,8 @@ def glues(one: Complex, two: Complex, count: int) -> list[Glued]:
             (Glue(int(i), int(j), length), float(missed[k]))
             for (i, j), k in zip(ends, best, strict=True)
         )
-        found += unlike(_overlapping(one, two, glued), -(-3 * count // len(lengths)), near)
-    return sorted(found)[:count]
+        glued_runs += unlike(_overlapping(one, two, glued), -(-3 * count // len(lengths)), near)
+    return sorted(glued_runs)[:count]
 
 
 def _overlapping(
@@ -132,7 +132,7 @@ class _Layout(NamedTuple):
 
 @lru_cache(maxsize=128)
 def _layout(kind: IsohedralClass, n: int) -> _Layout:
-    alone = [own.edge for own in kind.edge_classes if len(own.edges) == 1]
+    alone = [edge_class.edge for edge_class in kind.edge_classes if len(edge_class.edges) == 1]
     first: list[int] = []
     for edge in alone:
         if edge + 1 in alone and edge - 1 not in first:
@@ -183,8 +183,8 @@ class _Tables:
         return sums_along(self.steps, self.steps, flips=flips, back=back)
 
     def _gains(self, back: bool, factor: complex) -> NDArray[np.float32]:
-        own = self.of(flips=False, back=back)
-        return (factor.real * own.real - factor.imag * own.imag).astype(np.float32).ravel()
+        sums = self.of(flips=False, back=back)
+        return (factor.real * sums.real - factor.imag * sums.imag).astype(np.float32).ravel()
 
     def _glides(self, back: bool, factor: complex) -> NDArray[np.complex64]:
         return (factor * self.of(flips=True, back=back)).astype(np.complex64).ravel()
@@ -199,10 +199,10 @@ class _Tables:
         turned = (factor * self.of(flips=False, back=True)[length, a, (a + length - 1) % n]).real
         best = np.full((n + 1, n), -np.inf, dtype=np.float32)
         first = np.zeros((n + 1, n), dtype=np.int64)
-        for own in range(1, n):
-            both = turned[own - 1] + turned[: n - own][:, (a + own) % n]
-            better = both > best[own + 1 :]
-            best[own + 1 :][better], first[own + 1 :][better] = both[better], own
+        for count in range(1, n):
+            both = turned[count - 1] + turned[: n - count][:, (a + count) % n]
+            better = both > best[count + 1 :]
+            best[count + 1 :][better], first[count + 1 :][better] = both[better], count
         return best.ravel(), first.ravel()
 
 
@@ -215,8 +215,8 @@ def _gains(
     glides: NDArray[np.complex64] | None = None
     for flips, back, factor, at in layout.parts:
         if flips:
-            found = tables.glides(back, factor).take(at)
-            glides = found if glides is None else glides + found
+            sums = tables.glides(back, factor).take(at)
+            glides = sums if glides is None else glides + sums
         else:
             gains += tables.gains(back, factor).take(at)
     for _, factor, at in layout.merged:
@@ -245,7 +245,7 @@ def placements(
     steps = _steps(union)
     whole = float((abs(steps) ** 2).sum())
     tables = _Tables(steps)
-    found: list[Placement] = []
+    options: list[Placement] = []
     for kind in kinds:
         gains, glides = _gains(kind, tables)
         flat = gains.ravel()
@@ -260,6 +260,6 @@ def placements(
             turn = 0.0 if glides is None else float(np.angle(glides[row, start]) / 2)
             residual = float(glued.missed + (whole - 2 * float(flat[at])) / unit)
             lengths = _complete(kind, tables, row, start)[None]
-            known = (np.array([number]) for number in (start, turn, -residual))
-            found.append(Placement(residual, glued.glue, kind, Placements(lengths, *known)))
-    return sorted(found, key=lambda own: own.residual)[:count]
+            corners = Placements(lengths, np.array([start]), np.array([turn]))
+            options.append(Placement(residual, glued.glue, kind, corners))
+    return sorted(options, key=lambda own: own.residual)[:count]

@@ -173,12 +173,14 @@ class LikenessSearch(Settings, SearchMethod):
 
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
         """Return the phases of each level of effort that this one holds."""
-        ends = sorted({*(own for own in EFFORTS.values() if own < self.phases), self.phases})
-        parts = [own for own in pairwise([0, *ends]) if own[1] > self.passed]
+        ends = sorted({*(level for level in EFFORTS.values() if level < self.phases), self.phases})
+        parts = [level for level in pairwise([0, *ends]) if level[1] > self.passed]
         methods = [replace(self, passed=max(a, self.passed), phases=b) for a, b in parts]
         # later phases are of a few classes
-        work = [1.0 if own.passed == 0 else (own.phases - own.passed) / 3 for own in methods]
-        return [(part / sum(work), own) for part, own in zip(work, methods, strict=True)]
+        work = [
+            1.0 if level.passed == 0 else (level.phases - level.passed) / 3 for level in methods
+        ]
+        return [(part / sum(work), level) for part, level in zip(work, methods, strict=True)]
 
     def is_promising(self, tile: EscherTile, best: EscherTile) -> bool:
         """Return whether the tile is at most `PROMISING` marks behind the best one."""

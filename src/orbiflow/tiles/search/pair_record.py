@@ -67,14 +67,14 @@ class PairRecord:
 
     def _finished(self, pairs: Sequence[BentPair]) -> list[EscherTile]:
         """Return pairs as tiles with their ratings, best first, no two of them alike."""
-        targets, originals = ([goal.target for goal in own] for own in (self._rounded, self.goals))
+        targets, originals = ([goal.target for goal in two] for two in (self._rounded, self.goals))
         facts = SearchFacts(self.method.objective, starts=self.method.placed)
         finish = partial(_finished, targets, originals, self._share)
-        found = Team(__name__, self.method.workers, ignore, NEVER).each(
+        finished = Team(__name__, self.method.workers, ignore, NEVER).each(
             finish, pairs, "finishing", 1.0
         )
         likely = [goal.target for goal in self.goals if not goal.is_background]
-        tiles = rated([tile.changed(search=facts) for tile in found], *likely)
+        tiles = rated([tile.changed(search=facts) for tile in finished], *likely)
         tiles.sort(key=lambda tile: -tile.score)
         kept = without_twins(tiles, self.method.finalists) if tiles else []
         return [tiles[k] for k in sorted(kept)]

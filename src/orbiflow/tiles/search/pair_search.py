@@ -104,7 +104,7 @@ class PairSearch(Settings):
         """
         every = [name.strip().lower() for name in self.classes] == ["all"]
         kinds = [isohedral_class(name) for name in (CLASSES if every else self.classes)]
-        if others := [own.name for own in kinds if own.name not in CLASSES]:
+        if others := [other.name for other in kinds if other.name not in CLASSES]:
             raise SettingError(
                 f"two figures share tiles of the nine classes {', '.join(CLASSES)}; leave "
                 f"{', '.join(others)} out of {{classes}}"
@@ -115,7 +115,7 @@ class PairSearch(Settings):
         """Return both silhouettes at all sizes, the second one as it is and mirrored."""
         one, two = (np.asarray(goal.target.normal) for goal in goals)
         first = float(np.random.default_rng(self.seed).random()) if self.seed else 0.0
-        known = {
+        shared = {
             "stiff": tuple(map(_stiff, goals)),
             "phase": MULTIPLES[-1] * first,
             "min_neck": min(least_neck(goal.target.normal, self.min_neck) for goal in goals),
@@ -126,14 +126,14 @@ class PairSearch(Settings):
         hands = (False,) if goals[1].is_background else (False, True)
         for more in MORE_POINTS:
             count = round(more * self.points)
-            found = [
-                Couple.of(one, two, ratio=float(ratio), mirrored=hand, count=count, **known)
+            couples = [
+                Couple.of(one, two, ratio=float(ratio), mirrored=hand, count=count, **shared)
                 for ratio, hand in product(ratios, hands)
             ]
             with contextlib.suppress(OrbiflowError):
-                for own, level in product(found, (0, 1, 2)):
-                    own.bodies(level)
-                return found
+                for couple, level in product(couples, (0, 1, 2)):
+                    couple.bodies(level)
+                return couples
         raise SettingError(
             "parts of a silhouette are too thin to be followed: draw them thicker, or round them off "
             "with {smooth} 0.01"
@@ -194,16 +194,16 @@ def search_pair(
         OrbiflowError: If a silhouette is too thin to be followed.
         Cancelled: If the token was cancelled.
     """
-    own = settings or PairSearch()
-    team = Team(__name__, own.workers, on_event, cancel)
-    starts, carved = _rough(own, own.couples(goals), team)
-    on_pairs("better", _certified(_ranked(carved)[: own.finalists]))
+    search = settings or PairSearch()
+    team = Team(__name__, search.workers, on_event, cancel)
+    starts, carved = _rough(search, search.couples(goals), team)
+    on_pairs("better", _certified(_ranked(carved)[: search.finalists]))
     before = dict(zip(map(id, carved), starts, strict=True))
-    ranked = unlike(_ranked(carved), own.ranked, BentPair.is_twin)
+    ranked = unlike(_ranked(carved), search.ranked, BentPair.is_twin)
     nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "moving corners", 0.9)
-    last = unlike(_ranked([*ranked, *nearby]), own.finalists, BentPair.is_twin)
+    last = unlike(_ranked([*ranked, *nearby]), search.finalists, BentPair.is_twin)
     done = team.each(_detailed, last, "carving with all detail", 1.0)
-    return [pair for pair in _ranked(done) if (own.force and pair.is_whole) or pair.certified]
+    return [pair for pair in _ranked(done) if (search.force and pair.is_whole) or pair.certified]
 
 
 def _certified(pairs: Sequence[BentPair]) -> list[BentPair]:
@@ -214,9 +214,11 @@ def _rough(
     settings: PairSearch, couples: Sequence[Couple], team: Team
 ) -> tuple[list[BentPair], list[BentPair]]:
     """Return pairs with half of the points, before they are carved and after it."""
-    found = team.each(partial(_placed, settings), couples, "gluing", 0.3)
-    kept = sorted(placement.residual for placed in found for placement in placed)[: settings.placed]
-    best = [[p for p in placed if p.residual <= kept[-1]] for placed in found]
+    options = team.each(partial(_placed, settings), couples, "gluing", 0.3)
+    kept = sorted(placement.residual for placed in options for placement in placed)[
+        : settings.placed
+    ]
+    best = [[p for p in placed if p.residual <= kept[-1]] for placed in options]
     jobs = list(zip(couples, best, strict=True))
     bending = team.each(partial(_bent, settings), jobs, "bending", 0.5)
     pairs = [pair for some in bending for pair in some]
@@ -231,14 +233,14 @@ def _rough(
 
 def _placed(settings: PairSearch, couple: Couple) -> list[Placement]:
     """Return placements of the best glues."""
-    one, two = (part.rest[: part.size] for part in couple.bodies(0))
-    steps = np.concatenate([np.roll(own, -1) - own for own in (one, two)])
+    first, second = (body.rest[: body.size] for body in couple.bodies(0))
+    steps = np.concatenate([np.roll(outline, -1) - outline for outline in (first, second)])
     unit = float((abs(steps) ** 2).mean())
-    found: list[Placement] = []
-    for own in glues(one, two, settings.glues):
-        body = glued_body(couple, 0, own.glue)
-        found += placements(body.rest[: body.size], own, settings.kinds, unit, settings.per_glue)
-    return found
+    placed: list[Placement] = []
+    for glued in glues(first, second, settings.glues):
+        body = glued_body(couple, 0, glued.glue)
+        placed += placements(body.rest[: body.size], glued, settings.kinds, unit, settings.per_glue)
+    return placed
 
 
 def _bent(settings: PairSearch, job: tuple[Couple, list[Placement]]) -> list[BentPair]:

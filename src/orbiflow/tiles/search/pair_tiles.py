@@ -39,10 +39,10 @@ def finished_pair(
     originals = originals or targets
     placed = [_placed(target, pair, k) for k, target in enumerate(targets)]
     frames = [Place(target.frame.linear, target.frame.offset) for target in targets]
-    ways = [_place(own, pair, k) for k, own in enumerate(placed)]
+    ways = [_place(bent, pair, k) for k, bent in enumerate(placed)]
     whole = frames[0].after(ways[0])
     parts: list[Part] = []
-    for k, (target, own, original) in enumerate(zip(targets, placed, originals, strict=True)):
+    for k, (target, bent, original) in enumerate(zip(targets, placed, originals, strict=True)):
         polygon = pair.polygons[k]
         if k == 1 and pair.couple.background:
             left = Tile(whole(polygon), parts[0].figure.tile.group)
@@ -50,8 +50,8 @@ def finished_pair(
             break
         tile = Tile(polygon, pair.tiling.group, corners=tuple(_corners(pair, k).tolist()))
         figure = measured_tile(target, tile.transformed(*ways[k]), TileMap(), original)
-        known = replace(figure.likeness, smoothed=smoothed, min_neck=pair.couple.min_neck)
-        figure = with_bent(target, figure.changed(likeness=known), own, original)
+        likeness = replace(figure.likeness, smoothed=smoothed, min_neck=pair.couple.min_neck)
+        figure = with_bent(target, figure.changed(likeness=likeness), bent, original)
         figure = figure.changed(name=PurePath(original.source).stem)
         parts.append(Part(figure, whole.after(frames[k].after(ways[k]).inverse)))
     union = _union(pair)

@@ -79,8 +79,8 @@ class BentPair:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a process tells another, with what it would work out again."""
-        known = {"_costs": self._costs, "marks": self.marks}
-        return {**vars(self), **known, **({"scores": self.scores} if self.tiles else {})}
+        results = {"_costs": self._costs, "marks": self.marks}
+        return {**vars(self), **results, **({"scores": self.scores} if self.tiles else {})}
 
     @cached_property
     def _costs(self) -> tuple[Array, bool]:
@@ -105,11 +105,11 @@ class BentPair:
     @cached_property
     def marks(self) -> tuple[float, float]:
         """The marks that people would give to both figures."""
-        one, two = (
+        first, second = (
             kept_of(figure.measures, ring, 0.0).mark
             for figure, ring in zip(self.body.figures, self.outlines, strict=True)
         )
-        return one, one if self.couple.background else two
+        return first, first if self.couple.background else second
 
     @property
     def promise(self) -> float:
@@ -124,8 +124,8 @@ class BentPair:
     @property
     def tiling(self) -> Tiling:
         """The tiling of both figures' polygons, once the union is a tile."""
-        one = self.tiles[0]
-        return Tiling(self.kind.group().conjugate(one.linear, one.offset), self.polygons)
+        figure = self.tiles[0]
+        return Tiling(self.kind.group().conjugate(figure.linear, figure.offset), self.polygons)
 
     @property
     def is_whole(self) -> bool:
@@ -189,8 +189,8 @@ def bent(couple: Couple, placements: Sequence[Placement], count: int) -> list[Be
 def held(pair: BentPair, rounds: int) -> BentPair:
     """Return the shape of least energy among the tiles of a pair's placement, in so many rounds."""
     tiles = held_on_tiles(pair.body, pair.space, pair.points[:, None], rounds)
-    known = tiles.placements, tiles.points[:, 0], tiles.linear[0], tiles.offset[0]
-    return _on_tile(pair, *known)
+    points, group = tiles.points[:, 0], (tiles.linear[0], tiles.offset[0])
+    return _on_tile(pair, tiles.placements, points, *group)
 
 
 def _on_tile(
@@ -211,13 +211,13 @@ def finer(pair: BentPair, level: int, *, rounds: int = HELD_ROUNDS) -> BentPair:
     glue, coarse = pair.glue.times(multiple), pair.placement
     body = glued_body(pair.couple, level, glue)
     shapes = (pair.points[places] for places in pair.body.places)
-    one, two = (
+    followers = [
         followed(old, figure, z[:, None], _turned(figure, old, z))
         for figure, old, z in zip(body.figures, pair.body.figures, shapes, strict=True)
-    )
+    ]
     corners = coarse._replace(lengths=coarse.lengths * multiple, starts=coarse.starts * multiple)
     space = TileSpace(pair.kind, corners)
-    z = sprung(body, space, body.joined((one, two)), 2)
+    z = sprung(body, space, body.joined(followers), 2)
     corners = corners._replace(turns=space.turns)
     more = BentPair(pair.couple, level, glue, pair.kind, corners, z[:, 0])
     if rounds:
@@ -278,7 +278,7 @@ PATH_MOVES = (
 @lru_cache(maxsize=256)
 def _changes(kind: IsohedralClass, total: int) -> Integers:
     """Return changes (M, K) of edges' lengths with a sum, by few steps."""
-    classes = [own.edges for own in kind.edge_classes]
+    classes = [edge_class.edges for edge_class in kind.edge_classes]
     changes: list[Integers] = []
     for steps in product(range(-2, 3), repeat=len(classes)):
         if sum(map(abs, steps)) <= MOST_CHANGED:
@@ -299,8 +299,8 @@ def moved(pair: BentPair, step: int = 1, *, most: int = 6, tried: int = 12) -> B
         glues: defaultdict[Glue, list[BentPair]] = defaultdict(list)
         for _, near in options[:tried]:
             glues[near.glue].append(near)
-        compared = [one for near in glues.values() for one in _compared(near)]
-        least, best = min(compared, key=lambda one: one[0], default=(cost, here))
+        compared = [pair for near in glues.values() for pair in _compared(near)]
+        least, best = min(compared, key=lambda pair: pair[0], default=(cost, here))
         if least > MAX_COST_RATIO * cost:
             break
         cost, here = least, best
@@ -334,11 +334,11 @@ def _neighbours(
         here.glue.length + longer,
     )
     change = _changes(here.kind, -2 * move[2]) * step
-    if not (3 <= glue.length < min(one.size for one in figures) - 3 and len(change)):
+    if not (3 <= glue.length < min(figure.size for figure in figures) - 3 and len(change)):
         return []
     body = glued_body(here.couple, here.level, glue)
-    one, two = (here.points[places][:, None] for places in here.body.places)
-    z = body.joined((one, two))
+    shapes = [here.points[places][:, None] for places in here.body.places]
+    z = body.joined(shapes)
     ends = np.concatenate([np.zeros((len(change), 1), np.int64), np.cumsum(change, axis=1)], axis=1)
     zero, rows = np.zeros(len(change), dtype=np.int64), list[Integers]()
     # the first corner keeps its place on the first or on the second figure, or another corner does
@@ -353,13 +353,13 @@ def _neighbours(
         options = options[(options != present).any(axis=1)]
     if not len(options):
         return []
-    turns, gains = (np.full(len(options), known[0]) for known in corners[2:])
-    near = Placements(options[:, :-1], options[:, -1], turns, gains)
+    turns = np.full(len(options), corners.turns[0])
+    near = Placements(options[:, :-1], options[:, -1], turns)
     away = TileSpace(here.kind, near).distances(np.repeat(z[: body.size].T, len(options), axis=0))
     # the path may not have been one
     torn = sum(
         float((abs(shape - z[places]) ** 2).sum())
-        for shape, places in zip((one, two), body.places, strict=True)
+        for shape, places in zip(shapes, body.places, strict=True)
     )
     return [
         (

@@ -131,10 +131,10 @@ class SearchMethod(ABC):
         kind = isohedral_class(
             next((name for name in PREFERRED_CLASSES if name in names), names[0])
         )
-        for share, own in Sketches(self).goals(goal):
+        for share, rounded in Sketches(self).goals(goal):
             with suppress(CertificationError):
-                fit = self.sketch(own, kind, cancel)._replace(enough=1)
-                return best_tiles(own.target, fit, original=goal.target, smoothed=share)[0]
+                fit = self.sketch(rounded, kind, cancel)._replace(enough=1)
+                return best_tiles(rounded.target, fit, original=goal.target, smoothed=share)[0]
         return None
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> ClassFinalists:  # noqa: ARG002

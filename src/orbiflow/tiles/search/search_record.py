@@ -89,8 +89,8 @@ class Record:
         share = max(self._done + self._share * share, self.shares[name])
         self.shares[name] = share = min(1.0, share)
         whole = sum(self.shares.values()) / len(self.shares)
-        known = loss if math.isfinite(loss) else None  # no NaN in JSON
-        self.on_event(Progress(whole, self._what, name, share, known))
+        finite = loss if math.isfinite(loss) else None  # no NaN in JSON
+        self.on_event(Progress(whole, self._what, name, share, finite))
 
     @property
     def _what(self) -> str:

@@ -51,10 +51,10 @@ def relations_of(kind: IsohedralClass) -> tuple[Relation, ...]:
 
     What an outline agrees with its mean is its length, squared, of which half is left out.
     """
-    found: list[Relation] = []
-    for own in kind.edge_classes:
-        start = EdgeImage(own.edge, identity(2), reversed=False)
-        members, folds = (start, *own.images), (start, *own.folds)
+    relations: list[Relation] = []
+    for edge_class in kind.edge_classes:
+        start = EdgeImage(edge_class.edge, identity(2), reversed=False)
+        members, folds = (start, *edge_class.images), (start, *edge_class.folds)
         share = 1 / (len(members) * len(folds))
         for x, y in combinations_with_replacement(range(len(members)), 2):
             for fold in folds:
@@ -65,8 +65,8 @@ def relations_of(kind: IsohedralClass) -> tuple[Relation, ...]:
                 weight = share - 0.5 if still else share if x == y else 2 * share
                 if weight:
                     factor, flips, _ = Element.of(element)
-                    found.append(Relation(first.edge, second.edge, factor, flips, back, weight))
-    return tuple(found)
+                    relations.append(Relation(first.edge, second.edge, factor, flips, back, weight))
+    return tuple(relations)
 
 
 class _Corner(NamedTuple):

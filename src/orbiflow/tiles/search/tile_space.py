@@ -38,7 +38,6 @@ class Placements(NamedTuple):
     lengths: Integers  # (C, K) steps of each edge, sum n
     starts: Integers  # (C,) point of the outline at the template's first corner
     turns: NDArray[np.float64]  # (C,) radians; turn of the glide axes, 0 without these
-    gains: NDArray[np.float64]  # (C,) at most 1, which is an outline that is a tile already
 
     def take(self, index: Integers) -> Placements:
         """Return those at `index`."""
@@ -78,11 +77,11 @@ def _best_placements(kind: IsohedralClass, points: bytes, keep: int) -> Placemen
     fresh = np.diff(np.round(flat[best], 10), prepend=np.inf) != 0
     best = best[fresh][:keep]
     rows, columns = np.unravel_index(best, gains.shape)
-    return Placements(lengths[rows], starts[columns], turns.ravel()[best], flat[best])
+    return Placements(lengths[rows], starts[columns], turns.ravel()[best])
 
 
 def _multiplicities(kind: IsohedralClass) -> list[int]:
-    return [len(own.edges) for own in kind.edge_classes]
+    return [len(edge_class.edges) for edge_class in kind.edge_classes]
 
 
 def _count(multiplicities: Sequence[int], total: int) -> int:
@@ -116,8 +115,8 @@ def edge_lengths(kind: IsohedralClass, total: int) -> Integers:
     """Return all (C, K) lengths of the template's edges with sum `total`, equal on identified edges."""
     parts = _compositions(_multiplicities(kind), total)
     lengths = np.zeros((len(parts), len(kind.template())), dtype=np.int64)
-    for column, own in enumerate(kind.edge_classes):
-        lengths[:, own.edges] = parts[:, [column]]
+    for column, edge_class in enumerate(kind.edge_classes):
+        lengths[:, edge_class.edges] = parts[:, [column]]
     return lengths
 
 
@@ -128,7 +127,7 @@ def _gains(
     n = len(steps)
     first = np.cumsum(lengths, axis=1) - lengths
     relations = relations_of(kind)
-    tables = {key: _sums_along(steps, *key) for key in {own[3:5] for own in relations}}
+    tables = {key: _sums_along(steps, *key) for key in {relation[3:5] for relation in relations}}
     gains = np.zeros((len(lengths), len(starts)))
     glides = np.zeros_like(gains, dtype=complex)
     for edge, mate, factor, flips, back, weight in relations:
@@ -211,13 +210,13 @@ class TileSpace:
         for edge, mate, factor, flips, back, weight in relations_of(self.kind):
             if not flips:
                 continue
-            own = lengths[:, [edge]]
-            j = np.arange(int(own.max()))
-            a, b = first[:, [edge]] + j, first[:, [mate]] + (own - 1 - j if back else j)
+            length = lengths[:, [edge]]
+            j = np.arange(int(length.max()))
+            a, b = first[:, [edge]] + j, first[:, [mate]] + (length - 1 - j if back else j)
             both = np.take_along_axis(steps, a % self.size, axis=1)
             both = both * np.take_along_axis(steps, b % self.size, axis=1)
             share = -weight if back else weight
-            total += share * np.conj(factor) * np.where(j < own, both, 0).sum(axis=1)
+            total += share * np.conj(factor) * np.where(j < length, both, 0).sum(axis=1)
         return np.angle(total) / 2
 
     def nearest(self, outlines: Complex) -> NearestTiles:
@@ -280,8 +279,8 @@ class TileSpace:
 
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
         """Return linear part (2, 2) and offset (2,) of the map from the group's frame."""
-        own = parameters[-self._rows.columns.shape[2] :]
-        linear, offset = self._groups(own[None], self._unit[[index]])
+        solution = parameters[-self._rows.columns.shape[2] :]
+        linear, offset = self._groups(solution[None], self._unit[[index]])
         return linear[0], offset[0]
 
     def _groups(self, solution: Array, unit: Complex) -> tuple[Array, Array]:
@@ -319,8 +318,8 @@ def _rows_of(kind: IsohedralClass, lengths: Integers) -> EdgeRows:
     columns = _columns(kind, orbits)
     m = int(columns.shape[2])
     none = np.zeros((count, 0))
-    known = orbits.source, orbits.factor, orbits.flips, orbits.fixed, orbits.mirror
-    rows = EdgeRows(*known, total.astype(float), columns, none, none, none)
+    orbit_rows = orbits.source, orbits.factor, orbits.flips, orbits.fixed, orbits.mirror
+    rows = EdgeRows(*orbit_rows, total.astype(float), columns, none, none, none)
     moved, basis = columns.copy(), columns.copy()
     for k in range(m):
         pulled = _unturn(orbits.factor, orbits.flips, columns[..., k])
@@ -348,10 +347,12 @@ def _means(rows: EdgeRows, values: Complex) -> Complex:
     means: Complex = np.empty(count * n, dtype=complex)
     for part, sums in ((values.real, means.real), (values.imag, means.imag)):
         sums[:] = np.bincount(flat.ravel(), part.ravel(), minlength=count * n)
-    found: Complex = means.reshape(count, n) / rows.total
+    middles: Complex = means.reshape(count, n) / rows.total
     if rows.mirror.any():
-        found = np.where(rows.mirror == 0, found, (found + rows.mirror * np.conj(found)) / 2)
-    return np.take_along_axis(found, rows.source, axis=1)
+        middles = np.where(
+            rows.mirror == 0, middles, (middles + rows.mirror * np.conj(middles)) / 2
+        )
+    return np.take_along_axis(middles, rows.source, axis=1)
 
 
 MAX_TABLE_BYTES = 64 * 2**20  # of the rows that are kept of a class and a number of vertices
@@ -372,7 +373,7 @@ class TileTable:
         if len(lengths) > self._most:
             return _rows_of(self._kind, lengths)
         lengths = np.ascontiguousarray(lengths, dtype=np.int64)
-        keys = [own.tobytes() for own in lengths]
+        keys = [row.tobytes() for row in lengths]
         with self._lock:
             fresh = {key: k for k, key in enumerate(keys) if key not in self._places}
             if fresh:
@@ -407,8 +408,8 @@ def table_of(kind: IsohedralClass, size: int) -> TileTable:
 
 def _columns(kind: IsohedralClass, orbits: Orbits) -> Complex:
     """Return (C, n, 2 + m): how offset and linear part move each vertex, its free vertex held."""
-    factor, mirror, one = orbits.factor, orbits.mirror, np.ones_like(orbits.factor)
-    offsets = [z * one for z in (1, 1j)]
+    factor, mirror, unit = orbits.factor, orbits.mirror, np.ones_like(orbits.factor)
+    offsets = [z * unit for z in (1, 1j)]
     columns = [
         np.where(orbits.fixed, z, z - _turn(factor, orbits.flips, z)) for z in offsets
     ] + _along_lattice(kind, orbits.shift)

@@ -23,8 +23,8 @@ SAME_POINT_DISTANCE = 1e-6  # in the lattice's basis: images this near to vertic
 
 def divided_tile(tile: Tile, points: int) -> Tile:
     """Return the tile with a vertex where a neighbour has one, and its longer sides divided."""
-    own = edge_to_edge(tile).prototiles[0]
-    ring, along = own.ring, arc_lengths(own.ring)
+    prototile = edge_to_edge(tile).prototiles[0]
+    ring, along = prototile.ring, arc_lengths(prototile.ring)
     if len(ring) > MAX_POINTS:
         raise OrbiflowError(
             f"the tile has {len(ring)} vertices, more than {MAX_POINTS}: simplify it"
@@ -34,7 +34,7 @@ def divided_tile(tile: Tile, points: int) -> Tile:
     first, side = np.cumsum(pieces) - pieces, np.repeat(np.arange(len(pieces)), pieces)
     share = (np.arange(len(side)) - first[side]) / pieces[side]
     polygon = ring[side] + share[:, None] * (np.roll(ring, -1, axis=0) - ring)[side]
-    corners = first[np.searchsorted(own.kept, own.corners)] if own.corners else ()
+    corners = first[np.searchsorted(prototile.kept, prototile.corners)] if prototile.corners else ()
     return Tile(polygon, tile.group, tile.isohedral_class, tuple(int(c) for c in corners))
 
 
@@ -78,8 +78,8 @@ class TileVariations:
         moved = np.stack([g(ring) for g in group.cosets])
         around: dict[str, Any] = {"boxsize": 1.0}  # which the stubs believe to be a matrix
         tree = KDTree(within_cell(ring), **around)
-        found: Any = tree.query_ball_point(within_cell(moved.reshape(-1, 2)), SAME_POINT_DISTANCE)
-        pairs = np.array([(i, k) for k, near in enumerate(found) for i in near], dtype=np.int64)
+        nearby: Any = tree.query_ball_point(within_cell(moved.reshape(-1, 2)), SAME_POINT_DISTANCE)
+        pairs = np.array([(i, k) for k, near in enumerate(nearby) for i in near], dtype=np.int64)
         vertex, coset, source = pairs[:, 0], *np.divmod(pairs[:, 1], len(ring))
         first = np.full(len(ring), len(ring))
         np.minimum.at(first, vertex, source)
