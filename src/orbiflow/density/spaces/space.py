@@ -473,24 +473,14 @@ def make_space(name: str, **options: Any) -> Space:
 
 
 def space_for(
-    name: str,
-    data: Array,
-    *,
-    unit: str = "radians",
-    seed: int = 0,
-    cell: Any = None,
-    fractional: bool = False,
-    form: str | None = None,
+    name: str, data: Array, *, unit: str = "radians", seed: int = 0, form: str | None = None
 ) -> Space:
-    """Return the space of a name that suits data (N, k).
-
-    `cell` and `fractional` are of a group, and `form` says how rotations are written.
-    """
+    """Return the space of a name that suits data (N, k); `form` says how rotations are written."""
     if form is not None:
         return make_space(name, form=form, unit=unit)
     if name in SPACE_CLASSES or not is_group_name(name):
         return space_class(name).for_data(data, unit=unit, seed=seed)
-    return make_space(name, cell=cell, fractional=fractional)
+    return make_space(name)
 
 
 def check_measure(measure: str, space: Space | None = None) -> None:
