@@ -14,7 +14,7 @@ from orbiflow.drawing import draw_line, png_bytes, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object, write_atomic
 from orbiflow.settings import as_array, as_number
-from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, open_image, orient, triangulate
+from orbiflow.tiles import EscherTile, TileMap, open_image
 
 MAX_STROKES, MAX_POINTS, MAX_EYES = 2000, 100_000, 60
 MAX_RINGS = 200  # around one part that is filled
@@ -38,10 +38,8 @@ def with_any_map(tile: EscherTile) -> EscherTile:
     """Return a tile that can be drawn on: one figure without a map is its own silhouette."""
     if len(tile.figures) > 1 or (tile.bending is not None and tile.frame is not None):
         return tile
-    frame = Frame(np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
-    mesh = triangulate(orient(frame.to_normal(tile.tile.polygon), counter_clockwise=True))
-    still = Bending(mesh.points, mesh.points, mesh.triangles)
-    return tile.changed(map_source=TileMap(frame=frame, bending=still), no_map="")
+    still = TileMap.still(tile.tile.polygon, y_down=tile.y_down)
+    return tile.changed(map_source=still, no_map="")
 
 
 def drawing_settings(

@@ -12,9 +12,9 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, literal
-from orbiflow.tiles.geometry import Place, border, orient
+from orbiflow.tiles.geometry import Place, border
 from orbiflow.tiles.likeness import Likeness, Rating, mixing_factor
-from orbiflow.tiles.silhouette import Bending, Covered, Frame, triangulate
+from orbiflow.tiles.silhouette import Bending, Covered, Frame
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import (
     Certificate,
@@ -59,10 +59,7 @@ class Part(NamedTuple):
     @classmethod
     def background(cls, tile: Tile, *, y_down: bool) -> Part:
         """Return what is left between figures: it is its own silhouette, in the whole's coordinates."""
-        flip = np.array([1.0, -1.0 if y_down else 1.0])
-        mesh = triangulate(orient(tile.polygon * flip, counter_clockwise=True))
-        bending = Bending(mesh.points, mesh.points, mesh.triangles)
-        still = TileMap(frame=Frame(np.diag(flip), np.zeros(2)), bending=bending)
+        still = TileMap.still(tile.polygon, y_down=y_down)
         figure = EscherTile(tile, name="background", y_down=y_down, map_source=still)
         return cls(figure, Place(np.eye(2), np.zeros(2)))
 
@@ -200,7 +197,7 @@ class EscherTile:
     @property
     def covered(self) -> Covered:
         """What a picture of the silhouette covers."""
-        frame = self.frame or Frame(np.diag([1.0, -1.0 if self.y_down else 1.0]), np.zeros(2))
+        frame = self.frame or Frame.upright(y_down=self.y_down)
         return frame.covered(self.silhouette_outline)
 
     @property

@@ -14,7 +14,8 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import array_bytes, read_arrays
 from orbiflow.settings import as_path
-from orbiflow.tiles.silhouette import Bending, Frame
+from orbiflow.tiles.geometry import orient
+from orbiflow.tiles.silhouette import Bending, Frame, triangulate
 from orbiflow.tiles.tilings import Tile
 
 FORMAT = "orbiflow-tile/1"
@@ -41,6 +42,13 @@ class TileMap:
     arrays: dict[str, Array] = field(default_factory=dict[str, Array])
     frame: Frame | None = None
     bending: Bending | None = None
+
+    @classmethod
+    def still(cls, polygon: Array, *, y_down: bool) -> TileMap:
+        """Return the map of a polygon (N, 2) that is its own silhouette: nothing moves."""
+        frame = Frame.upright(y_down=y_down)
+        mesh = triangulate(orient(frame.to_normal(polygon), counter_clockwise=True))
+        return cls(frame=frame, bending=Bending(mesh.points, mesh.points, mesh.triangles))
 
     @property
     def has_flow(self) -> bool:

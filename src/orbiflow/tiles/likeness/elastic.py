@@ -127,13 +127,14 @@ class ElasticBody(ABC):
     @cached_property
     def condensed(self) -> Condensed:
         """The body with its inner points eliminated, so that only the outline is free."""
-        return self._condensed(self.size)
+        return self._condensed_to(self.size)
 
-    def condensed_to(self, n: int) -> Condensed:
-        """Return the body with all but its first n points eliminated."""
-        return self.condensed if n == self.size else self._condensed(n)
+    @cached_property
+    def condensed_to_outlines(self) -> Condensed:
+        """The same with the outlines of all figures free."""
+        return self.condensed if self.outer == self.size else self._condensed_to(self.outer)
 
-    def _condensed(self, n: int) -> Condensed:
+    def _condensed_to(self, n: int) -> Condensed:
         inner = self.matrix[n:, n:]
         if not len(inner):
             none = np.zeros((0, n))
@@ -249,7 +250,7 @@ class Elastic(ElasticBody):
         """
         strain, bent = self._forgiven_misfits(z.reshape(-1, 1))
         body = copy.copy(self)
-        for name in ("matrix", "condensed"):
+        for name in ("matrix", "condensed", "condensed_to_outlines"):
             vars(body).pop(name, None)
         body._weigh(self._w / np.sqrt(1 + strain[:, 0]), self._rod_cost / np.sqrt(1 + bent[:, 0]))
         return body

@@ -69,7 +69,7 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
         said["no_map"] = str(error)
     if frame is None:
         size = np.sqrt(abs(tile.tile.signed_area))
-        frame = Frame(size * np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
+        frame = Frame.upright(size, y_down=tile.y_down)
     return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending), **said)
 
 

@@ -157,7 +157,7 @@ class _Hill:
         columns = np.zeros((body.outer, self.tile_count + 2 * within), dtype=complex)
         columns[: body.size, : self.tile_count] = real + 1j * imaginary
         columns[body.size :, self.tile_count :] = np.kron(np.eye(within), [1, 1j])
-        matrix = body.condensed_to(body.outer).outline
+        matrix = body.condensed_to_outlines.outline
         self.root = scipy.linalg.cholesky(_stiffness(matrix, columns, 1e-6), lower=True)
         basis = scipy.linalg.solve_triangular(self.root, columns.T, lower=True).T
         self.count = basis.shape[1]

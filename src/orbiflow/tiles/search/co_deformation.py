@@ -103,8 +103,8 @@ def held_on_tiles(body: ElasticBody, space: TileSpace, z: Complex, rounds: int) 
 
 
 def following(body: ElasticBody, outline: Complex, points: Complex) -> Complex:
-    """Return a shape (N,) near `points` (N,) whose first points are an outline (m,)."""
-    condensed, z = body.condensed_to(len(outline)), points[:, None]
+    """Return a shape (N,) near `points` (N,) whose points on outlines are given (m,)."""
+    condensed, z = body.condensed_to_outlines, points[:, None]
     for _ in range(FOLLOW_ROUNDS):
         z = condensed.whole(outline[:, None], body.forces(z))
     return z[:, 0]

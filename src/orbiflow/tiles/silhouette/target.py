@@ -122,6 +122,11 @@ class Frame:
         object.__setattr__(self, "size", size)
         object.__setattr__(self, "corner", _pair(self.corner, "corner"))
 
+    @classmethod
+    def upright(cls, size: float = 1.0, *, y_down: bool) -> Frame:
+        """Return the frame about the origin of coordinates whose y may point down, by a scale."""
+        return cls(size * np.diag([1.0, -1.0 if y_down else 1.0]), np.zeros(2))
+
     @property
     def y_down(self) -> bool:
         """Whether the input's y axis points down: the frame turns the plane over."""
