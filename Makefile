@@ -70,7 +70,8 @@ types: $(VENV)/.installed-dev
 lint-scripts: $(VENV)/.installed-dev
 	$(BIN)/deno fmt --check --quiet
 	$(BIN)/deno lint --quiet
-	$(BIN)/deno check --quiet src/orbiflow/studio/static/js src/orbiflow/tiles/write
+	$(BIN)/deno check --quiet src/orbiflow/studio/static/js src/orbiflow/tiles/write \
+		src/orbiflow/drawing/js
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/field.py --quick

@@ -13,7 +13,7 @@ EYE, BACK = (57.0, 54.0), (140.0, 90.0)  # of the turtle, in pixels of its pictu
 COMMON, RARE = 112, 140  # colours of the film: of surfaces, and of small things such as pens
 POINTER = ((0, 0), (0, 21), (5, 16), (9, 25), (13, 23), (9, 15), (16, 15))
 VIEW = """async ([tile, place, across]) => {
-    const { Camera, Tiling } = await import("/js/tiling.js");
+    const { Camera, Tiling } = await import("/drawing/js/tiling.js");
     const view = await (await fetch(tile)).json();
     const { x, y, width, height } = document.querySelector(place).getBoundingClientRect();
     const tiling = new Tiling(view), camera = Camera.fit(tiling, width, height, across);

@@ -138,7 +138,7 @@ def test_what_is_filled_reaches_into_sharp_tips(page: Any) -> None:
     rings = page.evaluate(
         """async (polygon) => {
             const { partAround } = await import("/js/closeup/bucket.js");
-            const { pathOf } = await import("/js/tiling.js");
+            const { pathOf } = await import("/drawing/js/tiling.js");
             return partAround({ polygon, path: pathOf(polygon) }, [], [10, 4]);
         }""",
         ring,

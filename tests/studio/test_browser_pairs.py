@@ -22,7 +22,7 @@ from studio.test_browser_start import READ, begun
 from studio_checks import serious_issues, untidy_parts
 
 PLACE = """async (address) => {
-    const { Camera, Tiling } = await import("/js/tiling.js");
+    const { Camera, Tiling } = await import("/drawing/js/tiling.js");
     const [view, space] = await Promise.all(
         ["", "/space"].map(async (end) => (await fetch(address + end)).json()));
     const { x, y, width, height } = document.querySelector(".closeup-canvas").getBoundingClientRect();
@@ -91,7 +91,7 @@ def test_a_pair_is_drawn_as_the_library_has_it(page, pair: EscherTile) -> None:
     page.goto("/")
     told = page.evaluate(
         """async (card) => {
-            const { Camera, shaded, Tiling } = await import("/js/tiling.js");
+            const { Camera, shaded, Tiling } = await import("/drawing/js/tiling.js");
             const tiling = new Tiling(card);
             const scale = 60 / Math.sqrt(tiling.area);
             const camera = new Camera({ ...tiling.middle, scale, turn: 0.3, yDown: false });

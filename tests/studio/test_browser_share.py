@@ -34,7 +34,7 @@ from studio_checks import serious_issues
 MOST_BYTES = 60_000  # of a page beside its pictures
 WIDE, HIGH = 700, 500
 COPIES = """async ([tiles, width, height]) => {
-  const { Camera, Tiling } = await import("/js/tiling.js");
+  const { Camera, Tiling } = await import("/drawing/js/tiling.js");
   return tiles.map((tile) => {
     const tiling = new Tiling(tile);
     const camera = Camera.fit(tiling, width, height, 6);

@@ -46,16 +46,15 @@ def in_bands(
         draw: Draws on a band that begins at a row of the picture and has so many of its rows.
     """
     width, height = size
-    whole = Image.new("RGB" if mode == "P" else mode, size)
+    is_opaque = mode == "P" or (isinstance(ground, tuple) and ground[3] == 255)
+    whole = Image.new("RGB" if is_opaque else mode, size)
     most = max(1, MAX_FINE_PIXELS // (width * FINER**2))
     for top in range(0, height, most):
         rows = min(most, height - top)
         band = Image.new(mode, (width * FINER, rows * FINER), ground)
         draw(band, top, rows)
-        if mode == "P":
+        if is_opaque:
             part = band.convert("RGB").reduce(FINER)
-        elif isinstance(ground, tuple) and ground[3] == 255:
-            part = band.reduce(FINER)
         else:  # transparent pixels have no colour
             part = band.convert("RGBa").reduce(FINER).convert("RGBA")
         whole.paste(part, (0, top))

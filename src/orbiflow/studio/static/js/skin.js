@@ -1,8 +1,8 @@
 /** What lies on a tile, as one picture of the prototile: the artwork, lines and eyes. */
 
 import { laidOn } from "./texture.js";
-import { inverse, moved } from "./tiling.js";
-import { Skin } from "./tinted.js";
+import { inverse, moved } from "../../../drawing/js/tiling.js";
+import { Skin } from "../../../drawing/js/tinted.js";
 
 const MOST = 1400; // pixels along a side
 const PAD = 4; // pixels around a figure

@@ -1,6 +1,6 @@
 /** A tiling whose tile and group move. */
 
-import { pathOf, Tiling } from "../tiling.js";
+import { pathOf, Tiling } from "../../../../drawing/js/tiling.js";
 
 const COARSE = 0.6; // pixels below which a side of the outline is left out
 

@@ -18,7 +18,7 @@ import {
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { shapeCards } from "../shapes/page.js";
 import { backdropOf } from "../skin.js";
-import { figuresOf } from "../tiling.js";
+import { figuresOf } from "../../../../drawing/js/tiling.js";
 import { alive, capital, named } from "../words.js";
 import { Carry } from "./carry.js";
 import { Dress } from "./dress.js";

@@ -8,7 +8,7 @@
  * and points are found in turns, the latter by conjugate gradients from where they are.
  */
 
-import { measured } from "../tiling.js";
+import { measured } from "../../../../drawing/js/tiling.js";
 import { everyPoint, weigh } from "./body.js";
 import { crosses } from "./crossing.js";
 import { dot, multiply, multiplyBack } from "./sparse.js";

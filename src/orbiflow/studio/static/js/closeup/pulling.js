@@ -1,6 +1,6 @@
 /** The tool that pulls a point of the outline. */
 
-import { inverse, moved } from "../tiling.js";
+import { inverse, moved } from "../../../../drawing/js/tiling.js";
 import { Puller } from "./pull.js";
 
 const GRIP = 18; // pixels around the outline in which a mouse takes hold

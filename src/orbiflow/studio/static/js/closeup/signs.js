@@ -1,6 +1,6 @@
 /** The symmetry of a tiling, drawn over it and said in plain sentences. */
 
-import { moved } from "../tiling.js";
+import { moved } from "../../../../drawing/js/tiling.js";
 import { beside } from "./lines.js";
 
 const COLOURS = { 2: "#c2410c", 3: "#6d28d9", 4: "#0f766e", 6: "#b91c1c" };
@@ -109,7 +109,7 @@ function centre(context, order, size) {
  *
  * @param {Elements} elements
  * @param {import("./live.js").LiveTiling} tiling
- * @param {import("../tiling.js").Camera} camera
+ * @param {import("../../../../drawing/js/tiling.js").Camera} camera
  * @param {number} width
  * @param {number} height
  */

@@ -1,7 +1,7 @@
 /** The canvas of the close-up: what lies under a place of it. */
 
-import { inverse, moved } from "../tiling.js";
-import { View } from "../view.js";
+import { inverse, moved } from "../../../../drawing/js/tiling.js";
+import { View } from "../../../../drawing/js/view.js";
 /** @import { LiveTiling } from "./live.js" */
 import { h, zooms } from "../dom.js";
 import { beside } from "./lines.js";

@@ -2,7 +2,7 @@
 
 import { button, h, put } from "../dom.js";
 import { skinsOf } from "../skin.js";
-import { figuresOf, paintCard } from "../tiling.js";
+import { figuresOf, paintCard } from "../../../../drawing/js/tiling.js";
 import { capital, sentence, STAGES, starText, starWords } from "../words.js";
 
 /**

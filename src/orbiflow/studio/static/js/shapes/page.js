@@ -2,7 +2,7 @@
 
 import { h, put, style, trying } from "../dom.js";
 import { lookOf, paletteOf } from "../look.js";
-import { paintCard } from "../tiling.js";
+import { paintCard } from "../../../../drawing/js/tiling.js";
 import { capital } from "../words.js";
 
 /** What a shape keeps of its own symmetry, however its edges are pulled. */

@@ -1,6 +1,6 @@
 /** The picture with what was read of it, and with what is painted over it. */
 
-import { pathOf } from "../tiling.js";
+import { pathOf } from "../../../../drawing/js/tiling.js";
 import { drawStroke } from "./marks.js";
 
 export const COLOURS = {

@@ -1,7 +1,7 @@
 /** The first page: bring a picture, go on with an earlier project, or take one of our animals. */
 
 import { aside, button, h, put, stack, style, trying } from "../dom.js";
-import { Camera, paint, sized, Tiling } from "../tiling.js";
+import { Camera, paint, sized, Tiling } from "../../../../drawing/js/tiling.js";
 import { Bringing } from "./bringing.js";
 import { Projects } from "./projects.js";
 import { sample } from "./sample.js";

@@ -1,7 +1,7 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
 import { button, h, newest, put, row, soft, stack, style, toast, trying, zooms } from "../dom.js";
-import { sized } from "../tiling.js";
+import { sized } from "../../../../drawing/js/tiling.js";
 import { wishes } from "../wishes.js";
 import { alive, sentence } from "../words.js";
 import { paintingControls, readingControls } from "./controls.js";

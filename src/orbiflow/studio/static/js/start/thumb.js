@@ -4,7 +4,7 @@ import { about } from "../api.js";
 import { h } from "../dom.js";
 import { lookOf, paletteOf } from "../look.js";
 import { Pictures, skinsOf } from "../skin.js";
-import { figuresOf, paintCard } from "../tiling.js";
+import { figuresOf, paintCard } from "../../../../drawing/js/tiling.js";
 
 /**
  * A canvas with the tiling of a project's best tile; empty until it is known, and where there is none any more.

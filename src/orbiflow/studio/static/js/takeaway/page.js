@@ -6,7 +6,7 @@ import { aside, choice, h, icon, put, section, stack, style, trying } from "../d
 import { form } from "../forms.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf, Pictures, skinsOf } from "../skin.js";
-import { figuresOf, paintCard } from "../tiling.js";
+import { figuresOf, paintCard } from "../../../../drawing/js/tiling.js";
 import { sentence } from "../words.js";
 import { COLOURLESS, colours, KINDS, lengthIn } from "./kinds.js";
 import { Making, picture } from "./made.js";

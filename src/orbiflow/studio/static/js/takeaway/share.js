@@ -1,8 +1,8 @@
 /** Share a tile: by a link that carries it, on the clipboard, on paper. */
 
 import { aside, button, row, section, toast, trying } from "../dom.js";
-import { copied, printed, svgOf } from "../svg.js";
-import { Camera, Tiling } from "../tiling.js";
+import { copied, printed, svgOf } from "../../../../drawing/js/svg.js";
+import { Camera, Tiling } from "../../../../drawing/js/tiling.js";
 
 const SIDES = { width: 1200, height: 900 }; // of a drawing to paste, in its own pixels
 const SHEET = { width: 1200, height: 1200 }; // of what is printed, which fills the sheet

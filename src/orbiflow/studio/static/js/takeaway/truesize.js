@@ -1,7 +1,7 @@
 /** The tile as large as it will be, on a screen that was measured with a bank card. */
 
 import { button, h, put, row, slider } from "../dom.js";
-import { figuresOf, measured, pathOf } from "../tiling.js";
+import { figuresOf, measured, pathOf } from "../../../../drawing/js/tiling.js";
 
 const CARD = [85.6, 53.98]; // mm: ISO/IEC 7810 ID-1
 const KEY = "orbiflow.px-per-mm";
