@@ -49,9 +49,9 @@ def cross_validate(
     `compare_scores` compares the log densities of several estimators at the same folds.
 
     Args:
-        estimator: A `DensityEstimator` or a `ConditionalEstimator`; it is not changed.
+        estimator: A `DensityEstimator`; it is not changed.
         rows: Data as for its `fit`.
-        given: What is known of them, as for `ConditionalEstimator.fit`.
+        given: What is known of them, as for `DensityEstimator.fit`.
         folds: The number of folds.
         sample_weight: How much each row counts (N,).
         groups: A label (N,) a row: rows of one are held out together. Default: those of a column that
