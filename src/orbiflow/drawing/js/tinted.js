@@ -43,6 +43,7 @@ export class Skin {
     context.fillRect(0, 0, made.width, made.height);
     Object.assign(context, { globalCompositeOperation: "destination-in", globalAlpha: 1 });
     context.drawImage(picture, 0, 0);
+    context.globalCompositeOperation = "source-over"; // for what is drawn on it next
     return made;
   }
 }
