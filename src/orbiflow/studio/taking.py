@@ -6,6 +6,7 @@ import base64
 import json
 import shutil
 import time
+import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -216,6 +217,8 @@ def take(
     preview = False
     with suppress(OrbiflowError):  # what was asked for is there
         preview = _preview(call, folder / written[0]["name"], folder, cancel)
+    if len(written) > 1:
+        written = _in_one_file([folder / file["name"] for file in written], folder / name)
     facts = {name: value for name, value in done.summary.items() if name not in ("file", "files")}
     return Outcome(
         {
@@ -227,6 +230,16 @@ def take(
             "made": time.time(),
         }
     )
+
+
+def _in_one_file(files: list[Path], name: Path) -> list[dict[str, Any]]:
+    """Pack files into one ZIP, so that whoever takes them away has them in one click."""
+    packed = name.with_suffix(".zip")
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in files:
+            archive.write(file, file.name)
+            file.unlink()
+    return [{"name": packed.name, "bytes": packed.stat().st_size}]
 
 
 def _asked(

@@ -1,8 +1,11 @@
 """Sheets for a bed, paper and margins: a tile lies in the same place in all of them."""
 
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pypdfium2
 import pytest
 import shapely
 from hypothesis import given, settings
@@ -12,6 +15,7 @@ from artworks import art_settings, pixels_of, squirrel, upside_down
 from exported import Line, dxf_lines, polygons, scenes, sheet_content, svg_lines, tile_of
 from orbiflow.drawing import palette, rgb
 from orbiflow.errors import SettingError
+from orbiflow.settings import PAGES
 from orbiflow.tiles import (
     CLASSES,
     ArtSettings,
@@ -22,8 +26,10 @@ from orbiflow.tiles import (
     Uses,
     artwork,
     as_tile,
+    exported,
 )
 from orbiflow.tiles.make.layout import layout
+from orbiflow.tiles.make.paper import LEAST_OVERLAP, paper_grid
 from orbiflow.tiles.make.sheets import ARM, OVERLAP
 from orbiflow.tiles.make.templates import numbered_edges
 from orbiflow.tiles.page import mark_corners
@@ -101,7 +107,7 @@ def test_what_the_bed_holds_is_one_sheet() -> None:
 
 @pytest.mark.parametrize(
     ("area", "bed", "about"),
-    [((300.0, 200.0), (30.0, 200.0), "30 mm"), ((3000.0, 3000.0), (100.0, 100.0), 400)],
+    [((300.0, 200.0), (29.0, 200.0), "29 mm"), ((3000.0, 3000.0), (100.0, 100.0), 400)],
 )
 def test_beds_that_are_too_small(area, bed, about) -> None:
     with refused(about):
@@ -297,3 +303,47 @@ def test_a_sheet_of_stickers(offset: float) -> None:
     assert len(marks) == 3
     with refused("marks", "margin", "0 mm", kind=SettingError):
         ExportSettings(cut="pieces", marks=True)
+
+
+def test_a_poster_is_pages_of_paper_that_make_it_up(tmp_path: Path) -> None:
+    """Read by pdfium: six sheets of A4 make A2, and nothing lies where printers leave paper empty."""
+    chosen = ExportSettings(purpose="print", area=PAGES["a2"], tile_size=60.0)
+    whole = pypdfium2.PdfDocument(exported(TILE, chosen).content(format="pdf"))
+    made = exported(TILE, chosen.replace(bed="A4")).written(tmp_path / "poster.pdf")
+    (file,) = made.files
+    pages = pypdfium2.PdfDocument(file)
+    assert len(pages) == 6
+    assert not pypdfium2.raw.FPDF_VIEWERREF_GetPrintScaling(pages.raw)
+    dots = 4  # in a millimetre
+    picture, *sheets = (
+        np.asarray(
+            page.render(scale=0.999999 * dots * 25.4 / 72).to_pil().convert("L"), dtype=float
+        )
+        for page in (whole[0], *pages)
+    )
+    glued = np.full_like(picture, np.nan)
+    for number, sheet in enumerate(sheets):
+        assert sheet.shape == (210 * dots, 297 * dots)
+        edges = [sheet[:19], sheet[-19:], sheet[:, :19], sheet[:, -19:]]
+        assert all((edge > 250).all() for edge in edges)
+        top, left = 197 * (number // 2) * dots, 205 * (number % 2) * dots
+        part = sheet[20:, 20:][: 200 * dots, : 215 * dots]
+        glued[top : top + len(part), left : left + part.shape[1]] = part
+    # crosses apart, which lie at the seams alone
+    assert (np.abs(glued - picture) > 40).mean() < 1e-3
+
+
+@settings(max_examples=30)
+@given(st.floats(220, 2000), st.floats(300, 2000), st.sampled_from(["a4", "letter", "a3"]))
+def test_paper_holds_the_whole_page(width: float, height: float, paper: str) -> None:
+    grid = paper_grid((width, height), PAGES[paper], None)
+    for parts, length, side in zip(
+        (grid.columns, grid.rows), (width, height), grid.paper, strict=True
+    ):
+        assert parts[0][0] == 0
+        assert parts[-1][1] == pytest.approx(length)
+        shared = [end - start for (_, end), (start, _) in pairwise(parts)]
+        assert all(LEAST_OVERLAP - 1e-9 <= strip <= OVERLAP + 1e-9 for strip in shared)
+        assert max(end - start for start, end in parts) <= side - 10 + 1e-9
+    asked = paper_grid((width, height), PAGES[paper], 20.0)
+    assert asked.sheets >= grid.sheets

@@ -93,8 +93,16 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
         PageSize | None,
         OnlyWith(cut=("none", "skeleton", "pieces"), because="others are one sheet"),
     ] = None
-    """Size of the machine's bed, or a page's name; a larger page becomes several files, of whole
-    tiles if they are cut out, else of parts to put together."""
+    """Size of the machine's bed or the printer's paper, or a page's name; a larger page becomes
+    several files, or sheets of paper in one PDF: of whole tiles if they are cut out, else of parts to
+    put together."""
+
+    overlap: Annotated[
+        Length | None,
+        OnlyWith(cut=("none", "skeleton"), because="others are not put together"),
+        DefaultText("10mm; for paper down to 3mm where that saves sheets"),
+    ] = None
+    """Width of the strip that neighbouring parts of a page share, beside what printers leave empty."""
 
     calibrate: bool = False
     """Add a mark of 100 mm on a layer of its own."""
@@ -187,6 +195,11 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
             )
         if self.file_format == "html" and self.bed is not None:
             raise SettingError("{format} html has no edge; leave {bed} out")
+        if self.overlap is not None and (self.bed is None or self.whole_sheets):
+            raise SettingError(
+                "{overlap} is of parts of a page that are put together, and there are none; "
+                "leave {overlap} out, or give {bed}"
+            )
         if self.outline == 0 and self.cut != "none":
             raise SettingError(f"{{outline}} none leaves {{cut}} {self.cut} without a line")
         has_palette = self.purpose == "stickers" or (self.cut == "none" and self.filled)
@@ -220,6 +233,11 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
     def whole_sheets(self) -> bool:
         """Whether each of several sheets holds whole tiles; else they are cut where sheets meet."""
         return self.cut == "pieces" or (self.cut == "skeleton" and not self.clip)
+
+    @property
+    def on_paper(self) -> bool:
+        """Whether a page that is larger than the bed becomes sheets of a printer's paper."""
+        return self.bed is not None and not self.whole_sheets and self.file_format == "pdf"
 
     @property
     def deviation(self) -> float:

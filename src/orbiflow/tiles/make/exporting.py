@@ -18,8 +18,9 @@ from orbiflow.tiles.make.jigsaws import jigsaw_scenes
 from orbiflow.tiles.make.layout import Layout, layout, tiling_scene
 from orbiflow.tiles.make.made import Made
 from orbiflow.tiles.make.offsets import place_on
+from orbiflow.tiles.make.paper import paper_sheets
 from orbiflow.tiles.make.pieces import pieces_scenes
-from orbiflow.tiles.make.sheets import calibrated, registered, split
+from orbiflow.tiles.make.sheets import OVERLAP, calibrated, registered, split
 from orbiflow.tiles.make.skeletons import skeleton_scenes
 from orbiflow.tiles.make.templates import template_scene
 from orbiflow.tiles.motifs import (
@@ -81,7 +82,7 @@ def exported(
     sheets = [_described(scene, given, settings, certificate) for scene in sheets]
     if settings.marks:
         sheets = [registered(scene) for scene in sheets]
-    if settings.calibrate:
+    if settings.calibrate and (len(sheets) == 1 or not settings.on_paper):
         sheets[maker.calibrated] = [calibrated(scene) for scene in sheets[maker.calibrated]]
     return Made(
         tile=placed.tile,
@@ -96,8 +97,11 @@ def exported(
 def _sheets(placed: Layout, maker: Maker) -> list[Scene]:
     settings, fine = placed.settings, placed.fine
     made = [with_drawing(scene, placed) for scene in maker.scenes(placed)]
-    if maker.splits and settings.bed is not None:
-        made = [sheet for scene in made for sheet in split(scene, settings.bed, fine)]
+    if settings.on_paper:
+        made = [sheet for scene in made for sheet in paper_sheets(scene, settings)]
+    elif maker.splits and settings.bed is not None:
+        overlap = settings.overlap or OVERLAP
+        made = [sheet for scene in made for sheet in split(scene, settings.bed, fine, overlap)]
     # a machine need not know copies
     painted = settings.cut == "none" and settings.filled
     made = made if painted else [flattened(scene, fine) for scene in made]

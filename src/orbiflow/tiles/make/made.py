@@ -13,7 +13,7 @@ from orbiflow.tiles.make.art_settings import ArtSettings
 from orbiflow.tiles.make.export_settings import ExportSettings
 from orbiflow.tiles.page import Scene
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.write import INCH, scene_image, write_png, write_scene
+from orbiflow.tiles.write import INCH, PAGED, TOLERANCE, scene_image, write_png, write_scene
 
 SHOWN_PIXELS = 600
 """Pixels of the longer side of what a notebook shows."""
@@ -30,7 +30,7 @@ class Made(Outcome):
     - `tiles`: The number of tiles on all sheets; one that is cut where sheets meet counts on each.
     - `world`: The world that they are in, if it is not the plane.
     - `notes`: What the user should know.
-    - `files`: The files that were written, one for each sheet.
+    - `files`: The files that were written: one for each sheet, or one of pages.
     """
 
     tile: EscherTile
@@ -48,18 +48,22 @@ class Made(Outcome):
         return self.scenes[0].facts.get("tile_size")
 
     def content(self, sheet: int = 0, format: str | None = None) -> str | bytes:
-        """Return the content of a sheet's file, in the settings' format unless another is given."""
+        """Return the content of a file, in the settings' format unless another is given.
+
+        It holds the sheet, and in a format of pages those that come after it.
+        """
         settings = self.settings
-        detail = {"tolerance": settings.fine} if isinstance(settings, ExportSettings) else {}
+        fine = settings.fine if isinstance(settings, ExportSettings) else TOLERANCE
         form = format or settings.file_format
-        return write_scene(self.scenes[sheet], form, dpi=settings.dpi, **detail)
+        first, *more = self.scenes[sheet : None if form in PAGED else sheet + 1]
+        return write_scene(first, form, more=more, tolerance=fine, dpi=settings.dpi)
 
     def image(self, sheet: int = 0) -> Image.Image:
         """Return a sheet as a picture in RGB, in the settings' resolution."""
         return scene_image(self.scenes[sheet], self.settings.pixels)
 
     def written(self, out: Path, cancel: Cancel = NEVER) -> Made:
-        """Write the sheets, numbered if there are several; return what came of it.
+        """Write the sheets, in numbered files if there are several; return what came of it.
 
         Every file is whole before the first is written.
 
@@ -68,7 +72,8 @@ class Made(Outcome):
             Cancelled: If it was cancelled; nothing is then written.
         """
         contents = list[str | bytes]()
-        for number in range(len(self.scenes)):
+        paged = self.settings.file_format in PAGED
+        for number in range(1 if paged else len(self.scenes)):
             cancel.check()
             contents.append(self.content(number))
         cancel.check()
@@ -85,9 +90,11 @@ class Made(Outcome):
     @property
     def words(self) -> str:
         """What was written, in a sentence."""
-        where = str(self.files[0])
-        if len(self.files) > 1:
-            where = f"{len(self.files)} sheets, {where} to {self.files[-1].name}"
+        where, sheets, files = str(self.files[0]), len(self.scenes), len(self.files)
+        if files > 1:
+            where = f"{files} sheets, {where} to {self.files[-1].name}"
+        elif sheets > 1:
+            where += f" of {sheets} pages"
         name, settings = self.tile.isohedral_class or "a tile", self.settings
         by, unit = (settings.pixels, "pixels") if isinstance(settings, ArtSettings) else (1.0, "mm")
         kind = f", {self.world}" if self.world else ""

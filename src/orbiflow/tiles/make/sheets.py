@@ -23,34 +23,59 @@ from orbiflow.tiles.page import (
     rectangle,
 )
 
-OVERLAP = 12.0  # width in mm of the strip that two neighbouring sheets share; the crosses lie in it
-ARM = 4.0  # half the width of a cross, in mm
+OVERLAP = 10.0  # usual width in mm of the strip that two neighbouring sheets share
+ARM = 4.0  # half the width in mm of a cross in that strip, if the strip is as wide
 
 MOST_SHEETS = 400
 
 MARK = Style(None, BLUE, 0.1)
 
 
-def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
+Spans = list[tuple[float, float]]
+"""The sheets' places along one side of a scene: where each starts and ends, in mm."""
+
+
+def split(
+    scene: Scene, bed: tuple[float, float], tolerance: float, overlap: float = OVERLAP
+) -> list[Scene]:
     """Split a scene into sheets no larger than the bed, row by row, unless the bed holds it.
 
-    Neighbouring sheets overlap by `OVERLAP`. Lines go from one sheet to the next in the middle of
-    the strip, where both sheets have the same crosses; no line is on two sheets. Curves become
-    polygons within `tolerance` where sheets meet.
+    Neighbouring sheets overlap. Lines go from one sheet to the next in the middle of the strip that
+    both share, where both have the same crosses; no line is on two sheets. Curves become polygons
+    within `tolerance` where sheets meet.
     """
     if scene.width <= bed[0] and scene.height <= bed[1]:
         return [scene]
-    columns, rows = _parts(scene.width, bed[0]), _parts(scene.height, bed[1])
-    _require_few(len(columns) * len(rows))
+    columns = spans(scene.width, bed[0], overlap)
+    rows = spans(scene.height, bed[1], overlap)
+    require_few(len(columns) * len(rows))
+    return sheets_of(scene, columns, rows, tolerance, shared=overlap / 2)
+
+
+def sheets_of(
+    scene: Scene, columns: Spans, rows: Spans, tolerance: float, shared: float, edge: float = 0.0
+) -> list[Scene]:
+    """Return the parts of a scene as scenes of their own, row by row, with crosses at their seams.
+
+    Each part leaves out the outer `shared` mm of the strips that it has in common with its neighbours,
+    and lies `edge` mm from the left and the top.
+    """
     crosses = _crosses(columns, rows)
     pages = [Box(left, top, right, bottom) for top, bottom in rows for left, right in columns]
     return [
-        _sheet(scene, page, crosses, tolerance, f"{k} of {len(pages)}")
+        replace(
+            _sheet(scene, page, crosses, tolerance, shared, edge),
+            notes=(
+                *scene.notes,
+                f"Sheet {k} of {len(pages)}; crosses are common to neighbouring sheets.",
+            ),
+        )
         for k, page in enumerate(pages, 1)
     ]
 
 
-def _require_few(sheets: int) -> None:
+def require_few(sheets: int) -> None:
+    """Check that no more sheets are needed than anybody would handle."""
     if sheets > MOST_SHEETS:
         raise OrbiflowError(
             f"the page needs {sheets} sheets of the bed's size; the most is {MOST_SHEETS}"
@@ -66,27 +91,25 @@ def counts_by_sheet(wanted: int, fit: int) -> list[int]:
     if not fit:
         raise OrbiflowError("the bed holds no whole tile; choose a smaller tile size")
     sheets = math.ceil(wanted / fit)
-    _require_few(sheets)
+    require_few(sheets)
     return [min(fit, wanted - k * fit) for k in range(sheets)]
 
 
-def _parts(length: float, bed: float) -> list[tuple[float, float]]:
+def spans(length: float, bed: float, overlap: float) -> Spans:
     """Return overlapping intervals of one length, `bed` at most, that cover 0 to `length`."""
     if length <= bed:
         return [(0.0, length)]
-    if bed < 3 * OVERLAP:
+    if bed < 3 * overlap:
         raise OrbiflowError(
-            f"a bed of {bed:g} mm is too narrow for sheets that overlap by {OVERLAP:g} mm; give one "
-            f"of at least {3 * OVERLAP:g} mm"
+            f"a bed of {bed:g} mm is too narrow for sheets that overlap by {overlap:g} mm; give one "
+            f"of at least {3 * overlap:g} mm"
         )
-    count = math.ceil((length - OVERLAP) / (bed - OVERLAP))
-    part = (length + (count - 1) * OVERLAP) / count
-    return [(k * (part - OVERLAP), k * (part - OVERLAP) + part) for k in range(count)]
+    count = math.ceil((length - overlap) / (bed - overlap) - 1e-9)
+    part = (length + (count - 1) * overlap) / count
+    return [(k * (part - overlap), k * (part - overlap) + part) for k in range(count)]
 
 
-def _crosses(
-    columns: list[tuple[float, float]], rows: list[tuple[float, float]]
-) -> list[tuple[float, float]]:
+def _crosses(columns: Spans, rows: Spans) -> list[tuple[float, float]]:
     """Return two crosses for each stretch of seam between two sheets."""
     x_seams, y_seams = (
         [(end + start) / 2 for (_, end), (start, _) in pairwise(parts)] for parts in (columns, rows)
@@ -99,26 +122,31 @@ def _crosses(
 
 
 def _sheet(
-    scene: Scene, page: Box, crosses: list[tuple[float, float]], tolerance: float, number: str
+    scene: Scene,
+    page: Box,
+    crosses: list[tuple[float, float]],
+    tolerance: float,
+    shared: float,
+    edge: float,
 ) -> Scene:
-    half = OVERLAP / 2
     # each side that is not the scene's own border is a seam
     seams = Box(
-        page.left + (half if page.left > 0 else 0.0),
-        page.top + (half if page.top > 0 else 0.0),
-        page.right - (half if page.right < scene.width - 1e-9 else 0.0),
-        page.bottom - (half if page.bottom < scene.height - 1e-9 else 0.0),
+        page.left + (shared if page.left > 0 else 0.0),
+        page.top + (shared if page.top > 0 else 0.0),
+        page.right - (shared if page.right < scene.width - 1e-9 else 0.0),
+        page.bottom - (shared if page.bottom < scene.height - 1e-9 else 0.0),
     )
     low, high = np.maximum(seams[:2], scene.clip[:2]), np.minimum(seams[2:], scene.clip[2:])
     window = Box(*low.tolist(), *high.tolist())
-    back = -np.array([page.left, page.top])
+    back = edge - np.array([page.left, page.top])
     layers = [_part(layer, scene, seams, window, back, tolerance) for layer in scene.layers]
-    marks = [
-        Curve.polyline(np.array([[x - dx, y - dy], [x + dx, y + dy]]) + back)
-        for x, y in crosses
-        if page.left + ARM < x < page.right - ARM and page.top + ARM < y < page.bottom - ARM
-        for dx, dy in ((ARM, 0.0), (0.0, ARM))
-    ]
+    marks = list[Curve]()
+    for x, y in crosses:
+        across = min(ARM, x - page.left, page.right - x)
+        down = min(ARM, y - page.top, page.bottom - y)
+        if min(across, down) > 0:
+            ends = np.array([[[-across, 0.0], [across, 0.0]], [[0.0, -down], [0.0, down]]])
+            marks += [Curve.polyline(line) for line in ends + back + np.array([x, y])]
     layers.append(Layer("registration", "mark", MARK, tuple(marks)))
     return replace(
         scene,
@@ -127,7 +155,6 @@ def _sheet(
         layers=tuple(layers),
         window=Box(*(np.array(window) + np.tile(back, 2)).tolist()),
         tiles=_tiles(scene, seams, back),
-        notes=(*scene.notes, f"Sheet {number}; crosses are common to neighbouring sheets."),
     )
 
 
@@ -173,12 +200,15 @@ def calibrated(scene: Scene) -> Scene:
             f"the calibration mark is 100 mm long and needs a page at least 110 mm wide, got "
             f"{scene.width:g} mm"
         )
-    y, left = scene.height - STRIP / 2, (scene.width - 100) / 2
-    lines = [[[left, y], [left + 100, y]]]
-    lines += [[[x, y - 2.5], [x, y + 2.5]] for x in (left, left + 50, left + 100)]
-    marks = tuple(Curve.polyline(line) for line in lines)
-    layer = Layer("calibration 100 mm", "mark", MARK, marks)
-    return scene.with_layers(layer)
+    return scene.with_layers(millimetre_rule((scene.width - 100) / 2, scene.height - STRIP / 2))
+
+
+def millimetre_rule(x: float, y: float, *, upright: bool = False) -> Layer:
+    """Return a mark exactly 100 mm long that starts at a point, to the right or downwards."""
+    lines = [[[0.0, 0.0], [100.0, 0.0]], *([[at, -2.5], [at, 2.5]] for at in (0.0, 50.0, 100.0))]
+    marks = np.array(lines)[..., ::-1] if upright else np.array(lines)
+    curves = tuple(Curve.polyline(line) for line in marks + np.array([x, y]))
+    return Layer("calibration 100 mm", "mark", MARK, curves)
 
 
 def registered(scene: Scene) -> Scene:

@@ -1,5 +1,7 @@
 from .dxf import write_dxf as write_dxf
 from .formats import LINES_ALONE as LINES_ALONE
+from .formats import PAGED as PAGED
+from .formats import TOLERANCE as TOLERANCE
 from .formats import WRITERS as WRITERS
 from .formats import SceneFormat as SceneFormat
 from .formats import write_scene as write_scene

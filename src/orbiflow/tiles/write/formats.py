@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,25 +23,34 @@ WRITERS: dict[str, str] = {
 }
 """The module and function that write a scene in each format, which is the ending of its files.
 
-A writer takes the scene, and by name `tolerance` in mm, of curves, and `dpi`, of pixels, as far as it
-has a use for them. It returns the file's content.
+A writer takes the scene, in formats of pages several, and by name `tolerance` in mm, of curves, and
+`dpi`, of pixels, as far as it has a use for them. It returns the file's content.
 """
 
 SceneFormat = Annotated[str, OneOf(WRITERS)]
 """The name of a format."""
+
+PAGED = frozenset({"pdf"})
+"""The formats whose files hold several pages."""
 
 LINES_ALONE = frozenset({"dxf", "json"})
 """The formats that hold no pictures of pixels."""
 
 
 def write_scene(
-    scene: Scene, format: str, *, tolerance: float = TOLERANCE, dpi: float = 300.0
+    scene: Scene,
+    format: str,
+    *,
+    more: Sequence[Scene] = (),
+    tolerance: float = TOLERANCE,
+    dpi: float = 300.0,
 ) -> str | bytes:
     """Return the content of a scene's file.
 
     Args:
         scene: The scene.
         format: The name of a format.
+        more: The pages after the first, in a format of pages.
         tolerance: The distance in mm of polylines from curves, in formats of lines.
         dpi: Pixels an inch, in formats of pixels.
     """
@@ -48,4 +58,4 @@ def write_scene(
     writer = getattr(import_module(module), name)
     detail = {"tolerance": tolerance, "dpi": dpi}
     known = writer.__kwdefaults__ or {}
-    return writer(scene, **{key: value for key, value in detail.items() if key in known})
+    return writer(scene, *more, **{key: value for key, value in detail.items() if key in known})

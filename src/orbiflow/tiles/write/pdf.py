@@ -38,44 +38,52 @@ NON_ZERO = 1
 """The number of the rule by which holes run the other way."""
 
 
-def write_pdf(scene: Scene, *, dpi: float = 300.0) -> bytes:
-    """Return the scene as a PDF of one page; the same scene gives the same bytes.
+def write_pdf(scene: Scene, *more: Scene, dpi: float = 300.0) -> bytes:
+    """Return a PDF with a page for each scene, to print in real size; the same give the same bytes.
 
     Pictures on meshes have `dpi` pixels an inch.
     """
     from reportlab.pdfgen.canvas import Canvas
 
     buffer = io.BytesIO()
-    size = scene.width * POINT, scene.height * POINT
-    canvas = Canvas(buffer, pagesize=size, invariant=True, pageCompression=1)
+    canvas = Canvas(buffer, invariant=True, pageCompression=1)
     canvas.setTitle(scene.title)
     canvas.setSubject(" ".join(scene.notes))
     canvas.setCreator("orbiflow")
-    # millimetres with y down from the upper left corner
-    canvas.transform(POINT, 0, 0, -POINT, 0, size[1])
-    canvas.setLineJoin(ROUND)
-    canvas.setLineCap(ROUND)
+    canvas.setViewerPreference("PrintScaling", "None")
     page = _Page(canvas)
-    scene = flattened(with_page_pictures(scene, dpi / INCH), CUT_TOLERANCE)
-    for layer in scene.layers:
-        canvas.saveState()
-        if layer.clipped:
-            box = scene.clip
-            window = canvas.beginPath()
-            window.rect(box.left, box.top, box.width, box.height)
-            canvas.clipPath(window, stroke=0, fill=0)
-        page.draw(scene, layer)
-        canvas.restoreState()
+    for own in (scene, *more):
+        page.show(own, dpi)
     canvas.save()
     return buffer.getvalue()
 
 
 class _Page:
-    """A page of a PDF on which layers are drawn, in mm."""
+    """The pages of a PDF, on which layers are drawn, in mm."""
 
     def __init__(self, canvas: Canvas) -> None:
         self.canvas = canvas
         self.pictures: dict[int, Image.Image] = {}  # by the identity of their pixels
+
+    def show(self, scene: Scene, dpi: float) -> None:
+        """Draw a scene on a page of its size."""
+        canvas, height = self.canvas, scene.height * POINT
+        canvas.setPageSize((scene.width * POINT, height))
+        # millimetres with y down from the upper left corner
+        canvas.transform(POINT, 0, 0, -POINT, 0, height)
+        canvas.setLineJoin(ROUND)
+        canvas.setLineCap(ROUND)
+        scene = flattened(with_page_pictures(scene, dpi / INCH), CUT_TOLERANCE)
+        for layer in scene.layers:
+            canvas.saveState()
+            if layer.clipped:
+                box = scene.clip
+                window = canvas.beginPath()
+                window.rect(box.left, box.top, box.width, box.height)
+                canvas.clipPath(window, stroke=0, fill=0)
+            self.draw(scene, layer)
+            canvas.restoreState()
+        canvas.showPage()
 
     def draw(self, scene: Scene, layer: Layer) -> None:
         """Draw the layer of a scene whose motifs are flattened."""
