@@ -71,6 +71,10 @@ class Cover:
         return orbits_of_bins(self.family, self._side)
 
     @cached_property
+    def _number(self) -> int:
+        return int(self._orbits.max()) + 1
+
+    @cached_property
     def _side(self) -> int:
         return self.fineness * BINS.get(self.family.order, MOST_BINS)
 
@@ -78,9 +82,12 @@ class Cover:
         """Return the share of space that the copies of a body in a pose cover."""
         inverse = np.linalg.inv(self.family.lattice(stretches))
         at = self.points @ (inverse @ turn).T + place
-        bins = ((at - np.floor(at)) * self._side).astype(np.intp) % self._side
-        counts = np.bincount(self._orbits[bins[:, 0], bins[:, 1], bins[:, 2]])
-        even = len(self.points) / (self._orbits.max() + 1)
+        at -= np.floor(at)
+        at *= self._side
+        x, y, z = np.ascontiguousarray(at.T).astype(np.intp)
+        x, y, z = (np.where(bins == self._side, 0, bins) for bins in (x, y, z))  # rounded up
+        counts = np.bincount(self._orbits.take((x * self._side + y) * self._side + z))
+        even = len(self.points) / self._number
         return float(np.minimum(counts, even).sum()) / len(self.points)
 
 
