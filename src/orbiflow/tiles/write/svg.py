@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from collections.abc import Iterator
+from itertools import islice
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from PIL import Image
 
+from orbiflow.arrays import Array
 from orbiflow.drawing import png_bytes
 from orbiflow.tiles.page import (
     Curve,
@@ -79,6 +82,19 @@ class Numbers:
         text = text.rstrip("0").rstrip(".") if self.decimals else text
         return "0" if text in ("-0", "") else text
 
+    def points(self, points: Array) -> list[str]:
+        """Return points (N, 2), each as two numbers with a comma between."""
+        texts = " ".join([f"%.{self.decimals}f"] * points.size) % tuple(points.ravel().tolist())
+        if self.decimals:
+            texts = _LAST_ZEROS.sub("", texts)
+        numbers = texts.split(" ")
+        numbers = ["0" if text == "-0" else text for text in numbers]
+        return [f"{x},{y}" for x, y in zip(numbers[::2], numbers[1::2], strict=True)]
+
+
+_LAST_ZEROS = re.compile(r"\.?0+(?= |$)")
+"""Zeros at the ends of numbers with decimals, that spaces divide."""
+
 
 def path_data(curve: Curve, number: Numbers | None = None) -> str:
     """Return the d attribute of a path, in absolute coordinates.
@@ -87,17 +103,17 @@ def path_data(curve: Curve, number: Numbers | None = None) -> str:
     'M0,0L2,0 2,1.5Z'
     """
     number = number or Numbers(3)
-    (x, y), last = curve.start.tolist(), len(curve.pieces) - 1
-    parts, before = [f"M{number(x)},{number(y)}"], ""
-    for k, (piece, straight) in enumerate(
-        zip(curve.pieces.tolist(), curve.straight.tolist(), strict=True)
-    ):
-        if straight and curve.closed and k == last:
-            break  # Z draws it
-        command = "L" if straight else "C"
-        points = piece[3:] if straight else piece[1:]
+    straight, pieces = curve.straight, curve.pieces
+    if len(straight) and straight[-1] and curve.closed:  # Z draws it
+        straight, pieces = straight[:-1], pieces[:-1]
+    drawn = np.ones(pieces.shape[:2], dtype=bool)  # what the command takes of start, tangents, end
+    drawn[:, 0], drawn[straight, 1:3] = False, False
+    points = iter(number.points(np.concatenate([curve.start[None], pieces[drawn]])))
+    parts, before = [f"M{next(points)}"], ""
+    for is_straight in straight.tolist():
+        command = "L" if is_straight else "C"
         parts.append(" " if command == before else command)
-        parts.append(" ".join(f"{number(x)},{number(y)}" for x, y in points))
+        parts.append(" ".join(islice(points, 1 if is_straight else 3)))
         before = command
     return "".join(parts) + ("Z" if curve.closed else "")
 
