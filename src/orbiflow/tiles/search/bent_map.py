@@ -160,7 +160,9 @@ def divided(mesh: SilhouetteMesh, at: Array, images: Array) -> tuple[SilhouetteM
     start, end = order[slots - 1], order[slots % outline]
     part = ((at - before[start]) / ((before[end] - before[start]) % mesh.size))[:, None]
     rows = np.where(mesh.triangles >= outline, mesh.triangles + len(at), mesh.triangles).tolist()
-    owner = {(t[k - 1], t[k]): (i, k) for i, t in enumerate(rows) for k in range(3)}
+    sides = np.array(rows)[:, [[2, 0], [0, 1], [1, 2]]]
+    on_outline = np.argwhere((sides < outline).all(axis=2)).tolist()
+    owner = {(rows[i][k - 1], rows[i][k]): (i, k) for i, k in on_outline}
     behind: list[tuple[int, int]] = []
     for slot in np.unique(slots):
         a, b = int(order[slot - 1]), int(order[slot % outline])

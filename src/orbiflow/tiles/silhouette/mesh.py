@@ -182,10 +182,12 @@ def _divided(mesh: SilhouetteMesh) -> SilhouetteMesh:
         middle = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]])
         points = np.concatenate([mesh.points, mesh.points.mean(axis=0, keepdims=True)])
         return replace(mesh, points=points, triangles=middle)
-    directed = {(t[k - 1], t[k]) for t in mesh.triangles.tolist() for k in range(3)}
-    crossing = sorted((a, b) for a, b in directed if a < b < on_outline and (b, a) in directed)
-    middle = {pair: len(mesh.points) + k for k, pair in enumerate(crossing)}
-    ends = np.array(crossing, dtype=np.int64).reshape(-1, 2)
+    sides = np.stack([np.roll(mesh.triangles, 1, axis=1), mesh.triangles], axis=-1).reshape(-1, 2)
+    first, second = sides[(sides < on_outline).all(axis=1)].T
+    crossing = np.intersect1d(first * on_outline + second, second * on_outline + first)
+    ends = np.stack(np.divmod(crossing, on_outline), axis=1)
+    ends = ends[ends[:, 0] < ends[:, 1]]
+    middle = {(a, b): len(mesh.points) + k for k, (a, b) in enumerate(ends.tolist())}
     triangles: list[tuple[int, int, int]] = []
     for a, b, c in mesh.triangles.tolist():
         triangles += _pieces(
