@@ -31,7 +31,7 @@ def small_fills() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         few = search.Effort(
             groups=2, tried=30, climbed=2, steps=12, per_group=1, polishing=4, quick=2, full=2,
-            rough=0.16, fine=0.13, grain=0.1, stages=((1.0, 3), (8.0, 3)),
+            closed=2, rough=0.16, fine=0.13, grain=0.1, stages=((1.0, 3), (8.0, 3)),
         )  # fmt: skip
         patch.setitem(search.EFFORTS, "fast", few)
         patch.setattr(search, "ball_of_cells", _few_cells)

@@ -142,7 +142,7 @@ def test_what_was_found_is_kept_where_a_search_is_stopped(tmp_path, monkeypatch)
     cancel, notes = Cancel(), list[str]()
 
     def listen(event: Event) -> None:
-        if isinstance(event, Progress) and event.what == "closing" and event.share > 0.4:
+        if isinstance(event, Progress) and event.what == "closing" and event.share > 0.6:
             cancel.cancel()
         elif isinstance(event, Note):
             notes.append(event.text)

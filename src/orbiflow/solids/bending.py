@@ -17,9 +17,11 @@ from orbiflow.solids.families import GroupFamily
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.poses import Pose
 
-STAGES = ((0.2, 10), (0.6, 10), (2.0, 12), (6.0, 14))
+Stages = tuple[tuple[float, int], ...]
+
+STAGES: Stages = ((0.2, 10), (0.6, 10), (2.0, 12), (6.0, 14))
 """How strongly the surface is pulled to where copies meet, and for how many steps."""
-QUICK_STAGES = ((0.3, 6), (1.0, 6), (3.0, 8))
+QUICK_STAGES: Stages = ((0.3, 6), (1.0, 6), (3.0, 8))
 
 REACH = 0.12  # the widest gap or overlap that is closed in one step
 INNER_REACH = 3.0  # from any place deep in a body to a node inside it, in spacings of its surface
@@ -160,7 +162,7 @@ def contacts(bent: BentBody) -> Contacts:
     return Contacts(copies, np.maximum(gaps, -REACH), copy, point)
 
 
-def bent(start: BentBody, stages: tuple[tuple[float, int], ...] = STAGES) -> BentBody:
+def bent(start: BentBody, stages: Stages = STAGES) -> BentBody:
     """Return a body bent until its copies meet.
 
     Each point of the surface is pulled over a share of the gap or overlap: who matters more yields

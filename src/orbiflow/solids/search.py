@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,12 +15,12 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel, Cancelled, Sink, Team, cores, ignore
 from orbiflow.settings import naming_extras
-from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, bent
+from orbiflow.solids.bending import QUICK_STAGES, STAGES, BentBody, Stages, bent
 from orbiflow.solids.body import Body, Weight
 from orbiflow.solids.closing import Function, ball_of_cells, box_around
 from orbiflow.solids.distance import SignedDistance, points_inside, surface_points
 from orbiflow.solids.families import USUAL_GROUPS, GroupFamily
-from orbiflow.solids.likeness import measured, rigid_motion
+from orbiflow.solids.likeness import SolidLikeness, measured, rigid_motion
 from orbiflow.solids.mesh import Mesh
 from orbiflow.solids.painting import Painting, checked_painting
 from orbiflow.solids.poses import FINENESS, Pose, best_poses, polished
@@ -53,7 +53,8 @@ class Effort(NamedTuple):
     - `tried`, `climbed`, `steps`, `per_group`: Of each, random poses, climbs and their steps, and poses
       that go on.
     - `polishing`: Steps of a second climb of those, with finer bins.
-    - `quick`, `full`: Of all, quick bends, and solids.
+    - `quick`, `full`, `closed`: Of all, quick bends, bends, and solids that are made of these; more if
+      more solids are wanted, or some cannot be made.
     - `rough`, `fine`: Spacings of a body's nodes in quick bends and in others.
     - `grain`: Spacing of the points on the bent surface that a solid is made of.
     - `stages`: Of the bends that solids are made of.
@@ -67,15 +68,16 @@ class Effort(NamedTuple):
     polishing: int
     quick: int
     full: int
+    closed: int
     rough: float = 0.085
     fine: float = 0.055
     grain: float = 0.02
-    stages: tuple[tuple[float, int], ...] = STAGES
+    stages: Stages = STAGES
 
 
 EFFORTS = {
-    "fast": Effort(4, 1000, 8, 250, 4, 300, 16, 4),
-    "normal": Effort(len(USUAL_GROUPS), 1500, 24, 500, 4, 400, 40, 12),
+    "fast": Effort(4, 1000, 8, 250, 4, 300, 16, 4, 2),
+    "normal": Effort(len(USUAL_GROUPS), 1500, 24, 500, 4, 400, 40, 12, 4),
 }
 
 
@@ -195,6 +197,8 @@ def fill(
     order = np.argsort([cost for cost, _ in quick], kind="stable")
     best = [poses[k] for k in order[: effort.full]]
     body = goal.body(effort.fine)
+    bodies = team.each(partial(_bent, goal, body, effort.stages), best, "bending in detail", 0.6)
+    waiting = _by_groups([own for own in bodies if own is not None])
     found = list[EscherSolid]()
 
     def keep(own: EscherSolid | None) -> None:
@@ -202,23 +206,56 @@ def fill(
             found.append(own)
             on_solid(own)
 
+    wanted = max(effort.closed, settings.tiles)
     try:
-        team.each(partial(_solid, goal, body, make, effort), best, "closing", 0.9, keep)
+        while waiting and len(found) < wanted:
+            missing = wanted - len(found)
+            some, waiting = waiting[:missing], waiting[missing:]
+            team.each(partial(_solid, goal, body, make, effort.grain), some, "closing", 0.9, keep)
     except Cancelled:
         if not found:
             raise
-    return _varied(sorted(found, key=_rank), settings.tiles)
+    return sorted(_by_groups(found)[: settings.tiles], key=_rank)
 
 
-def _rank(own: EscherSolid) -> float:
+class BentPose(NamedTuple):
+    """A body bent with all detail, of which a solid may be made.
+
+    - `family`, `stretches`, `nodes`: The body in its place, as of `BentBody`.
+    - `mesh`, `target`: The goal's surface, bent, and moved over it.
+    - `importance`: How much the points (N,) of the bent surface matter.
+    - `likeness`: How much it looks like the target. Solids of bodies that do so more do so more, too.
+    - `seconds`: How long it took.
+    """
+
+    family: GroupFamily
+    stretches: Array
+    nodes: Array
+    mesh: Mesh
+    target: Mesh
+    importance: Array
+    likeness: SolidLikeness
+    seconds: float
+
+    @property
+    def group_name(self) -> str:
+        """The name of its group."""
+        return self.family.name
+
+
+Kind = TypeVar("Kind", BentPose, EscherSolid)
+
+
+def _rank(own: BentPose | EscherSolid) -> float:
     return -own.likeness.score
 
 
-def _varied(solids: list[EscherSolid], count: int) -> list[EscherSolid]:
-    """Return so many solids, best first: the best of each group before others of one."""
-    firsts = {own.group_name: own for own in reversed(solids)}.values()
-    others = [own for own in solids if not any(own is first for first in firsts)]
-    return sorted([*sorted(firsts, key=_rank), *others][:count], key=_rank)
+def _by_groups(every: Sequence[Kind]) -> list[Kind]:
+    """Return all, the best first: the best of each group before others of one."""
+    ordered = sorted(every, key=_rank)
+    firsts = {own.group_name: own for own in reversed(ordered)}.values()
+    others = [own for own in ordered if not any(own is first for first in firsts)]
+    return [*sorted(firsts, key=_rank), *others]
 
 
 def starting_poses(
@@ -260,35 +297,42 @@ def coverage(found: BentBody) -> tuple[float, float]:
     return float((counts == 0).mean()), float(np.maximum(counts - 1, 0).mean())
 
 
-def _solid(
-    goal: SolidGoal, body: Body, make: TileMaker, effort: Effort, pose: Pose
-) -> EscherSolid | None:
-    """Return the solid of a pose, or None if it is not one piece without handles that fills space."""
+def _bent(goal: SolidGoal, body: Body, stages: Stages, pose: Pose) -> BentPose | None:
+    """Return the body of a pose, bent with all detail, or None if it came apart."""
     begin = time.process_time()
-    found = bent(BentBody.of(body, pose), effort.stages)
+    found = bent(BentBody.of(body, pose), stages)
     if not found.strain < MOST_STRAIN:
         return None
     fine = Mesh(body.carried(found.nodes, goal.mesh.points), goal.mesh.faces)
-    depth = _depth(fine, found, effort.grain)
-    group = pose.family.group(found.stretches)
-    tile = make(depth, fine, group)
-    if tile is None:
-        return None
     turn, shift = rigid_motion(body.rest, found.nodes)
     target = goal.mesh.moved(turn, shift)
-    near = cKDTree(found.surface.points).query(fine.points)[1]
-    likeness = measured(tile, target, fine, body.importance[near], found.strain)
-    seconds = time.process_time() - begin
+    importance = body.importance[cKDTree(found.surface.points).query(fine.points)[1]]
+    likeness = measured(fine, target, fine, importance, found.strain)
+    place = found.family, found.stretches, found.nodes
+    return BentPose(*place, fine, target, importance, likeness, time.process_time() - begin)
+
+
+def _solid(
+    goal: SolidGoal, body: Body, make: TileMaker, grain: float, own: BentPose
+) -> EscherSolid | None:
+    """Return the solid of a bent body, or None if it is not one piece without handles."""
+    begin = time.process_time()
+    found, group = BentBody(body, *own[:3]), own.family.group(own.stretches)
+    tile = make(_depth(own.mesh, found, grain), own.mesh, group)
+    if tile is None:
+        return None
+    turn, _ = rigid_motion(body.rest, own.nodes)
+    likeness = measured(tile, own.target, own.mesh, own.importance, own.likeness.strain)
     solid = EscherSolid(
         name=goal.name,
         group=group,
         tile=tile,
-        target=target,
-        bent=fine,
+        target=own.target,
+        bent=own.mesh,
         millimetres=goal.millimetres,
         likeness=likeness,
         upright=turn @ goal.axes,
-        seconds=seconds,
+        seconds=own.seconds + time.process_time() - begin,
     )
     return solid if solid.certificate.valid else None
 
