@@ -43,8 +43,8 @@ class Measures:
         share = np.sqrt(self.thick)
         self._share = share / share.sum()
         self._step = max(1, round(len(rest) / CHORDS))
-        self._turns = abs(_turns(self.rest, self._step))
-        self._fine_turns = [_turns(self.rest, step) for step in WRINKLE_STEPS]
+        self._turns = abs(_turns(_steps(self.rest, self._step), self._step))
+        self._fine_turns = [_turns(_steps(self.rest, step), step) for step in WRINKLE_STEPS]
         n = len(rest)
         short, long = (min(max(3, round(length * n / 2)), (n - 1) // 2) for length in PIECE_LENGTHS)
         self._pieces = _Pieces(self.rest, (short, long))
@@ -87,11 +87,12 @@ class Measures:
         for step, turns in zip(WRINKLE_STEPS, self._fine_turns, strict=True):
             weight = 1 / (step * len(WRINKLE_STEPS))
             meant = np.bincount(low, (1 - share) * turns, n) + np.bincount(high, share * turns, n)
-            change = (_turns(ring, step) - meant + np.pi) % (2 * np.pi) - np.pi
+            chords = _steps(ring, step)
+            change = (_turns(chords, step) - meant + np.pi) % (2 * np.pi) - np.pi
             size = np.sqrt(change**2 + LEAST_KINK**2)
             slope = weight * change / size
             total += weight * float((size - LEAST_KINK).sum())
-            along += _turned(ring, step, slope)
+            along += _turned(chords, step, slope)
             sliding += turns * (slope[low] - slope[high])
         return total, along, sliding
 
@@ -113,32 +114,37 @@ class Measures:
         return float(np.where(counts, log**2, LARGEST_STRETCH**2) @ self._weight), gradient
 
     def _thinned(self, z: Complex, discs: _Discs) -> Measured:
-        log = np.log(self.thick / discs.width)
+        width = discs.width
+        log = np.log(self.thick / width)
 
         def gradient() -> Complex:
-            return discs.gradient(z, -2 * self._weight * log / discs.width)
+            return discs.gradient(z, -2 * self._weight * log / width)
 
         return float(self._weight @ log**2), gradient
 
     def _merged(self, z: Complex, discs: _Discs) -> Measured:
-        log = np.maximum(np.log(self._free / discs.width), 0.0)
+        width = discs.width
+        log = np.maximum(np.log(self._free / width), 0.0)
 
         def gradient() -> Complex:
-            return discs.gradient(z, -2 * self._weight * log / discs.width)
+            return discs.gradient(z, -2 * self._weight * log / width)
 
         return float(self._weight @ log**2), gradient
 
     def _blunted(self, z: Complex) -> Measured:
-        turns = _turns(z, self._step)
+        chords = _steps(z, self._step)
+        turns = _turns(chords, self._step)
         less = self._turns - abs(turns)
 
         def gradient() -> Complex:
-            return _turned(z, self._step, np.where(less > 0, -np.sign(turns), 0.0) / self._step)
+            return _turned(
+                chords, self._step, np.where(less > 0, -np.sign(turns), 0.0) / self._step
+            )
 
         return float(np.maximum(less, 0).sum() / self._step), gradient
 
     def _moved(self, z: Complex) -> Measured:
-        own, goal, n = z - z.mean(), self._centered, len(z)
+        own, goal, n = z - z.sum() / len(z), self._centered, len(z)
         factor = _product(own, goal) / _product(own, own).real
         missed = factor * own - goal
 
@@ -226,7 +232,7 @@ class _Pieces:
 
 def _normal(z: Complex) -> tuple[float, Complex]:
     """Return the root of the area, and the outline about the origin with area 1."""
-    about = z - z.mean()
+    about = z - z.sum() / len(z)
     size = float(np.sqrt(abs(_product(about, _shifted(about, -1)).imag) / 2))
     return size, about / size
 
@@ -254,15 +260,14 @@ def _stepped(along: Complex, step: int) -> Complex:
     return _shifted(along, step) - along
 
 
-def _turns(z: Complex, step: int) -> Array:
+def _turns(chords: Complex, step: int) -> Array:
     """Return the angles (n,) in radians by which chords of some steps turn, counter-clockwise."""
-    chords = _steps(z, step)
-    return np.angle(chords * np.conj(_shifted(chords, step)))
+    turned = chords * np.conj(_shifted(chords, step))
+    return np.arctan2(turned.imag, turned.real)
 
 
-def _turned(z: Complex, step: int, along: Array) -> Complex:
-    """Return the gradient in the points of what has a gradient (n,) in `_turns`."""
-    chords = _steps(z, step)
+def _turned(chords: Complex, step: int, along: Array) -> Complex:
+    """Return the gradient in the points of what has a gradient (n,) in `_turns` of chords."""
     own = (along - _shifted(along, -step)) * 1j * chords / np.maximum(abs(chords) ** 2, 1e-300)
     return _stepped(own, step)
 

@@ -31,7 +31,6 @@ from orbiflow.tiles.silhouette.readers.reading import (
     read_head,
     unzipped,
 )
-from orbiflow.tiles.silhouette.readers.svg import read_svg
 from orbiflow.tiles.silhouette.readers.svg_documents import MAX_BYTES
 
 _HEAD_BYTES = 65536
@@ -71,7 +70,7 @@ _BY_NAME = {
     **{".svg": "svg", ".json": "json", ".geojson": "json", ".wkt": "wkt"},
     **dict.fromkeys((".dat", ".csv", ".tsv", ".txt", ".xy"), "points"),
 }
-_READERS = {"svg": read_svg, "json": read_json, "wkt": read_wkt, "points": read_points}
+_READERS = {"json": read_json, "wkt": read_wkt, "points": read_points}
 _READABLE = "a PNG, JPEG or WebP image, an SVG drawing, or a polygon (.json, .geojson, .dat, .csv)"
 
 
@@ -99,8 +98,15 @@ def read_outline(
         raise OrbiflowError(f"{name} applies to {what} only and {path} is {is_one}; leave it out")
     # extreme coordinates overflow in the geometry, whose result is then refused
     with np.errstate(all="ignore"):
-        reading = _READERS[kind](path)
+        reading = _read_svg(path) if kind == "svg" else _READERS[kind](path)
         return _hole_of(reading, path) if invert else _bridged(reading)
+
+
+def _read_svg(path: Source) -> Reading:
+    """Read a drawing, for which more has to be imported than for anything else."""
+    from orbiflow.tiles.silhouette.readers.svg import read_svg
+
+    return read_svg(path)
 
 
 def _hole_of(reading: Reading, path: Source) -> Reading:
