@@ -19,7 +19,6 @@ minimum of all marks climbs, since the mark of the better figure helps nobody.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
@@ -35,6 +34,8 @@ from orbiflow.tiles.search.tile_space import TileSpace
 SLIDING_STEPS, LAST_STEPS = 60, 20  # the largest numbers of steps while points slide, and after it
 STEPS_APART = 20  # of these, those after which it is looked anew where gaps are missing
 RACE_STEPS, MAX_BEHIND = 20, 0.05  # steps of carving, and marks behind another, after which it ends
+STALLED_STEPS, STALLED_GAIN = 5, 0.005  # steps that end it, if they gain fewer marks together
+HOPELESS_COST = 20.0  # in marks, after the first steps apart: too many gaps are missing
 SOFTNESS = 0.4  # marks by which one figure may be better before the others alone count
 NO_MARK = 20.0  # of a figure that may have any shape: above all marks, so that it never counts
 WRINKLE_COST = 0.12  # in marks a radian by which the tile turns elsewhere than the silhouette
@@ -76,18 +77,25 @@ class Race:
     def __init__(self) -> None:
         self._best = math.inf
 
-    def watch(self) -> Callable[..., None]:
-        """Return what is called after each step of one more tile; it raises `BehindError`."""
-        steps = itertools.count(1)
+    def enter(self, cost: float) -> None:
+        """Take what one more tile costs after so many steps, or raise `BehindError`."""
+        if cost > self._best + MAX_BEHIND:
+            raise BehindError
+        self._best = min(self._best, cost)
 
-        def watch(intermediate_result: scipy.optimize.OptimizeResult) -> None:
-            if next(steps) == RACE_STEPS:
-                cost = float(intermediate_result.fun)
-                if cost > self._best + MAX_BEHIND:
-                    raise BehindError
-                self._best = min(self._best, cost)
 
-        return watch
+def _watch(race: Race | None) -> Callable[..., None]:
+    """Return what is called after each step of a climb; it ends one that hardly rises any more."""
+    costs: list[float] = []
+
+    def watch(intermediate_result: scipy.optimize.OptimizeResult) -> None:
+        costs.append(float(intermediate_result.fun))
+        if race is not None and len(costs) == RACE_STEPS:
+            race.enter(costs[-1])
+        if len(costs) > STALLED_STEPS and costs[-1 - STALLED_STEPS] - costs[-1] < STALLED_GAIN:
+            raise StopIteration
+
+    return watch
 
 
 def carved(
@@ -104,23 +112,27 @@ def carved(
 
     It may cross itself. With `room`, in square roots of the area, parts of outlines move apart until
     there is so much between them. `most_steps` are those while points slide, and after it. The figures
-    that are `shapeless` may have any shape. Raises `BehindError` if it falls behind in a race.
+    that are `shapeless` may have any shape. Raises `BehindError` if it falls behind in a race, or if
+    parts are so far into each other that they do not come apart.
     """
     hill = _Hill(body, space, [figure.ring for figure in figures], shapeless)
 
     def climbed(start: Array, fixed: list[Array] | None = None) -> Array:
         steps = most_steps[0] if fixed is None else most_steps[1]
         rounds = max(1, steps // STEPS_APART) if room else 1
-        for _ in range(rounds):
-            start = scipy.optimize.minimize(
+        for number in range(rounds):
+            climb = scipy.optimize.minimize(
                 hill.lost,
                 start,
                 (fixed, hill.gaps(start, room) if room else []),
                 jac=True,
                 method="L-BFGS-B",
-                callback=race.watch() if race and fixed is None else None,
+                callback=_watch(None if fixed else race),
                 options={"maxiter": steps // rounds, "maxcor": 20},
-            ).x
+            )
+            if number == 0 and room and climb.fun > HOPELESS_COST:
+                raise BehindError
+            start = climb.x
         return start
 
     best = climbed(hill.start(figures))

@@ -28,7 +28,7 @@ from orbiflow.tiles.likeness import (
     score_of,
 )
 from orbiflow.tiles.search.bending import followed
-from orbiflow.tiles.search.carving import Carved, carved
+from orbiflow.tiles.search.carving import BehindError, Carved, carved
 from orbiflow.tiles.search.co_deformation import (
     COMPARISON_STRENGTH,
     CROSSING_COST,
@@ -256,7 +256,10 @@ def carved_pair(pair: BentPair, steps: int) -> BentPair:
     along = _carved(pair, steps, 0.0)
     if along.factor == 1:
         return along
-    return max(along, _carved(pair, steps, ROOM), key=lambda one: one.scores)
+    try:
+        return max(along, _carved(pair, steps, ROOM), key=lambda one: one.scores)
+    except BehindError:
+        return along
 
 
 def _carved(pair: BentPair, steps: int, room: float) -> BentPair:
