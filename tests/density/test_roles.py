@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from orbiflow.density import DensityEstimator, Role, RotationSpace, Torus, UndeclaredError
 from orbiflow.density.data import Declaration, asked_roles, proposed_role, role_named
 from orbiflow.density.tables import RowSettings, SpaceSettings, read_rows
-from orbiflow.errors import InputFileError, SettingError
+from orbiflow.errors import DataWarning, InputFileError, SettingError
 from orbiflow.runtime import ignore
 from refusals import refused
 
@@ -104,6 +104,10 @@ TABLES: dict[str, tuple[dict[str, Any], str, str]] = {
     "gon": ({"az_gon": DEGREES / 0.9 % 400}, "torus", "az_gon=cycle:400"),
     "right ascension in hours": ({"ra_hours": DEGREES % 360 / 15}, "torus", "ra_hours=cycle:24"),
     "axes": ({"fibre orientation": DEGREES % 180}, "torus", "fibre orientation=axial:degrees"),
+    "axes in degrees": ({"orientation_deg": DEGREES % 180}, "torus",
+                        "orientation_deg=axial:degrees"),
+    "a lineament that turned out to be a bearing": ({"strike (deg)": DEGREES % 360}, "torus",
+                                                    "strike (deg)=angle:degrees"),
     "strange names": ({"a": DEGREES, "b": DEGREES % 360}, "torus",
                       "a=angle:degrees,b=angle:degrees"),
     "strange radians": ({"a": TURN % (2 * np.pi)}, "torus", "a=angle:radians"),
@@ -123,6 +127,7 @@ TABLES: dict[str, tuple[dict[str, Any], str, str]] = {
                 "x,y,z"),
     "no names of places": ({"p": LAT, "q": LON}, "sphere", "p,q"),
     "poles": ({"trend": LON % 360, "plunge": LAT}, "projective-plane", "plunge,trend"),
+    "galactic places": ({"l": LON % 360, "b": LAT}, "sphere", "b,l"),
     "planes": ({"strike": LON % 360, "dip": LAT}, "projective-plane", "dip,dip_direction"),
     "patches": ({"phi": TURN, "theta": TURN[::-1]}, "klein-bottle", "theta,phi"),
     "patches in degrees": ({"theta_deg": DEGREES, "phi_deg": DEGREES[::-1]}, "klein-bottle",
@@ -188,6 +193,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str, str, str]] = {
     "the wrong order": ({"lon": LON, "lat": LAT}, "sphere", "lon,lat", "lat,lon"),
     "radians by name": ({"lat_rad": TURN / 4, "lon_rad": TURN}, "sphere", "lat_rad,lon_rad",
                         "radians"),
+    "hours for stars": ({"ra": DEGREES % 360 / 15, "dec": LAT}, "sphere", "dec,ra", "hours"),
+    "an angle from the pole": ({"theta": 90 - LAT, "phi": LON}, "sphere", "theta,phi", "theta"),
+    "radians from the pole": ({"p": TURN / 2 + 1.57, "q": np.linspace(0, 6.28, 60)}, "sphere",
+                              "p,q", "radians"),
     "a strange number": ({"phi_deg": DEGREES, "p": [*LON[:59], 9999.0]}, "torus",
                          "phi_deg,p=linear", "9999"),
 }  # fmt: skip
@@ -203,6 +212,37 @@ def test_values_that_contradict_what_is_declared_are_refused(case: str, tmp_path
     reading = RowSettings(columns=tuple(declared.split(",")))
     with refused(about, "table.csv"):
         read_rows(tmp_path / "table.csv", reading, ignore, where=SpaceSettings(space=space))
+
+
+@pytest.mark.parametrize("case", ["a latitude beyond", "no one turn"])
+def test_only_what_seems_to_be_a_code_is_proposed_as_one(case: str, tmp_path: Path) -> None:
+    columns = {"lat": [*LAT, 95.3], "lon": [*LON, 0.0]}
+    if case == "no one turn":  # -1 stands for flat ground
+        columns = {"aspect_deg": np.where(np.arange(60) % 9 == 0, -1.0, DEGREES % 360)}
+        columns["aspect_deg"][5] = 359.9
+    pandas.DataFrame(columns).to_csv(tmp_path / "table.csv", index=False)
+    where = SpaceSettings(space="sphere" if case == "a latitude beyond" else "torus")
+    with refused("table.csv") as caught:
+        read_rows(tmp_path / "table.csv", RowSettings(), ignore, where=where)
+    codes = str(caught.value).partition("missing_codes ")[2].split(" ")[0]
+    assert codes == ("" if case == "a latitude beyond" else "-1")
+
+
+def test_numbers_that_are_text_in_a_frame_are_refused() -> None:
+    frame = pandas.DataFrame({"DRCT": ["030", "VRB"] + ["120"] * 58, "speed": SPEED})
+    with refused("DRCT", "'030'"):
+        DensityEstimator(columns="DRCT=angle:degrees,speed=positive").fit(frame)
+    with refused("DRCT"):
+        DensityEstimator().fit(frame)
+
+
+@pytest.mark.parametrize(
+    "columns", [{"phi_deg": TURN}, {"c": np.cos(TURN).round(3), "s": np.sin(TURN).round(3)}]
+)
+def test_what_seems_to_be_something_else_is_doubted(columns: dict[str, Any]) -> None:
+    roles = "phi_deg" if "phi_deg" in columns else "c=linear,s=linear"
+    with pytest.warns(DataWarning):
+        DensityEstimator(columns=roles)._columns().read(pandas.DataFrame(columns))
 
 
 def test_weights_and_groups_are_columns() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from orbiflow.density.data.units import (
     TURNS,
     VECTORS,
     is_angular,
+    words_of,
 )
 from orbiflow.errors import SettingError, literal
 
@@ -46,8 +48,13 @@ than any other."""
 FEW_ROWS = 10
 """Fewer may all be small by accident."""
 
-FULL_SHARE_OF_TURN = 0.75
-"""Share of a turn of radians that values fill where they seem to be radians."""
+FULL_SHARE_OF_TURN, FULL_SHARE_OF_HOURS = 0.75, 0.9
+"""Share of a turn of radians, or of hours, that values fill where they seem to be of that unit."""
+
+HOURS_IN_TURN = 24.0
+
+ON_CIRCLE = 1e-3
+"""Distance from the unit circle within which a cosine and a sine lie, as they are rounded."""
 
 
 def is_code(value: float) -> bool:
@@ -133,9 +140,14 @@ class Checked(NamedTuple):
     def refusal(
         self, values: Sequence[float], cure: str, codes: Sequence[float] = ()
     ) -> ValuesError:
-        """Return the error for some of the values; `codes` are those that may be missing ones."""
+        """Return the error for some of the values; `codes` are those that may be missing ones.
+
+        Default: those that are written as codes are, or that repeat. A value is not to be left out
+        because it is the farthest of many.
+        """
         listed = " and ".join(map(self.row_of, values[:3]))
-        return ValuesError(literal(f"{self.name!r} has {listed}, ") + cure, codes or values)
+        seem = [v for v in values if is_code(v) or np.count_nonzero(self.values == v) > 1]
+        return ValuesError(literal(f"{self.name!r} has {listed}, ") + cure, codes or seem)
 
 
 def check_turn(column: Checked, turn: float, what: str, *, are_new: bool = False) -> None:
@@ -157,7 +169,7 @@ def check_turn(column: Checked, turn: float, what: str, *, are_new: bool = False
         return
     if high - low > most or (what == "cycle" and low < 0 and max(-low, high) > turn / 2):
         cure = f"which are of no one turn of {turn:.10g}: write all from 0 on or about 0"
-        raise column.refusal([low, high], cure, [far])
+        raise column.refusal([low, high], cure)
 
 
 def check_real(column: Checked, role: Role) -> list[str]:
@@ -207,6 +219,32 @@ def doubts_of_ends(column: Checked) -> list[str]:
     return doubts
 
 
+def _doubts_of_degrees(column: Checked) -> list[str]:
+    """Return a doubt where angles that were read as degrees fill a turn of radians."""
+    known, turn = column.known, TURNS["radians"]
+    fills = len(known) >= FEW_ROWS and np.ptp(known) > FULL_SHARE_OF_TURN * turn
+    if not fills or np.abs(known).max() > turn * (1 + TURN_TOLERANCE) or (known % 1 == 0).all():
+        return []
+    return [
+        f"{column.name!r} lies within 2 pi and was read as degrees: if these are radians, declare "
+        f"{column.name}=angle:radians"
+    ]
+
+
+def _doubts_of_circles(columns: Sequence[Checked]) -> list[str]:
+    """Return a doubt where two real columns are the cosine and the sine of an angle."""
+    doubts: list[str] = []
+    for one, other in combinations(columns, 2):
+        lengths = np.hypot(one.values, other.values)
+        lengths = lengths[np.isfinite(lengths)]
+        if len(lengths) >= FEW_ROWS and np.abs(lengths - 1).max() < ON_CIRCLE:
+            doubts.append(
+                f"{one.name!r} and {other.name!r} lie on a circle, as the cosine and the sine of an "
+                "angle do: a density of angles takes the angle itself (numpy.arctan2)"
+            )
+    return doubts
+
+
 def check_values(
     space: str,
     values: Array,
@@ -239,9 +277,13 @@ def check_values(
     for column, role in zip(columns, roles, strict=True):
         if role is not None and role.turn is not None:
             check_turn(column, role.turn, role.kind, are_new=are_new)
-            doubts += doubts_of_ends(column) if role.kind != "cycle" and not are_new else []
+            if role.kind != "cycle" and not are_new:
+                doubts += doubts_of_ends(column)
+                doubts += _doubts_of_degrees(column) if role.unit == "degrees" else []
         elif role is not None and role.is_real:
             doubts += check_real(column, role)
+    pairs = zip(columns, roles, strict=True)
+    doubts += _doubts_of_circles([own for own, role in pairs if role is not None and role.is_real])
     if space in DIRECTIONS and len(coordinates) == 2:
         return doubts + _check_places(*coordinates, space=space, unit=unit)
     for column in coordinates:
@@ -261,15 +303,20 @@ def _check_places(lat: Checked, lon: Checked, *, space: str, unit: str | None) -
     check_turn(lon, 360.0, "longitude")
     whole = np.isfinite(lat.values) & np.isfinite(lon.values)
     lats, lons = np.abs(lat.values[whole]), lon.values[whole]
-    turn, is_read = TURNS["radians"], unit is not None or len(lats) < FEW_ROWS
-    if (
-        is_read
-        or lats.max() > turn / 4 + TURN_TOLERANCE
-        or abs(lons).max() > turn * (1 + TURN_TOLERANCE)
-    ):
+    if unit is not None or len(lats) < FEW_ROWS:
         return []
-    both = f"{lat.name!r} within pi/2 and {lon.name!r} within 2 pi"
-    if np.ptp(lons) > FULL_SHARE_OF_TURN * turn:
+    turn, reach, width = TURNS["radians"] * (1 + TURN_TOLERANCE), np.abs(lons).max(), np.ptp(lons)
+    are_hours = lons.min() >= 0 and width > FULL_SHARE_OF_HOURS * HOURS_IN_TURN
+    if are_hours and reach <= HOURS_IN_TURN and "ra" in words_of(lon.name):
+        raise SettingError(
+            literal(f"{lon.name!r} goes from {lons.min():.4g} to {reach:.4g}, as hours do: ")
+            + "multiply it by 15, or give {unit} degrees if it is in degrees"
+        )
+    if lats.max() > turn / 2 or reach > turn:
+        return []
+    far = "pi/2" if lats.max() <= turn / 4 else "pi"
+    both = f"{lat.name!r} within {far} and {lon.name!r} within 2 pi"
+    if width > FULL_SHARE_OF_TURN * TURNS["radians"]:
         raise SettingError(
             literal(f"{both} fill radians, ")
             + f"and the {space} takes degrees: convert them (numpy.degrees), or give {{unit}} degrees"

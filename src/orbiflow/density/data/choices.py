@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from orbiflow.density.data.checks import codes_among
 from orbiflow.density.data.names import check_columns, chosen_arrangement, is_number_name
 from orbiflow.density.data.proposals import proposed_role, undeclared
@@ -138,10 +140,13 @@ class _Choice:
 
     def _left_out(self, columns: Collection[int]) -> list[str]:
         """Return a note on columns that are not used, and were not said to be none of the data."""
-        left = [k for k in self.free if k not in columns and self.table.is_numeric(k)]
-        return (
-            [f"left out {listing(self._names(left))}: name all columns to use them"] if left else []
-        )
+        left = [k for k in self.free if k not in columns]
+        numeric = [k for k in left if self.table.is_numeric(k)]
+        words = [k for k in left if k not in numeric and self._named(k) is None]
+        notes = [f"left out {listing(self._names(words))}: no numbers"] if words else []
+        if numeric:
+            notes.append(f"left out {listing(self._names(numeric))}: name all columns to use them")
+        return notes
 
     def as_known(self, roles_of: Callable[[int], Roles]) -> Columns:
         """Return the columns of a space or a fit that is there already."""
@@ -204,6 +209,14 @@ class _Choice:
                 *named,
             }  # cells of the latter that are no numbers are wrong
             wanted = {k: None for k in self.free if k in numeric}
+            for name in self._names(self.table.texts.difference(wanted).intersection(self.free)):
+                raise SettingError(
+                    literal(
+                        f"column {name!r} holds numbers as text: convert it (pandas.to_numeric)"
+                    )
+                    + ", or declare {columns} "
+                    + literal(f"{name}=ignore")
+                )
             notes = self._left_out(wanted)
         self._check_count(list(wanted), None)
         columns = {k: self._role(k, role) for k, role in wanted.items()}
@@ -255,6 +268,9 @@ class _Choice:
             "theta and phi" if space == "klein-bottle" else "a latitude and a longitude, or x,y,z"
         )
         count = 3 if space in DIRECTIONS and len(names) == 3 else 2
+        if space in DIRECTIONS and count == 2:  # what is beyond a latitude is none
+            reach = {name: self._reach(name) for name in names}
+            names = sorted(names, key=lambda name: reach[name] > 90)
         first = ",".join(names[:count]) or "NAME,NAME"
         raise UndeclaredError(
             literal(f"the {space} takes {what}, and the columns of numbers are {listing(names)}")
@@ -262,6 +278,11 @@ class _Choice:
             names,
             first,
         )
+
+    def _reach(self, name: str) -> float:
+        """Return the largest absolute value of a column."""
+        values = self.table.numbers(found_column(self.table, name))
+        return float(np.nanmax(np.abs(values), initial=0.0))
 
     def _check_count(
         self, columns: Sequence[int], widths: tuple[int, ...] | None, why: str = ""

@@ -153,6 +153,12 @@ def runs_of_draws(data: Any) -> NDArray[np.int64] | None:
     return (np.arange(chains)[:, None] * RUNS + np.arange(draws) * RUNS // draws).ravel()
 
 
+def has_categories(column: Any) -> bool:
+    """Return whether a column of pandas, polars or pyarrow holds categories."""
+    kind = getattr(column, "dtype", getattr(column, "type", None))
+    return kind is not None and str(kind).lower().startswith(CATEGORIES)
+
+
 def cells_of(column: Any) -> Any:
     """Return a column of pandas, polars or pyarrow as an array, and anything else as it is.
 
@@ -168,7 +174,7 @@ def cells_of(column: Any) -> Any:
     if isinstance(kind, np.dtype):
         return column if is_a(column, np.ndarray) else np.asarray(column)
     cells = column.to_pylist() if hasattr(column, "to_pylist") else list(column)
-    if str(kind).lower().startswith(CATEGORIES):
+    if has_categories(column):
         cells = [None if is_missing(cell) else word_of(cell) for cell in cells]
     return object_array(cells)
 
@@ -221,6 +227,7 @@ def missing_among(cells: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 DATES_CURE = "; give numbers, such as hours since a first moment, or hours of the day"
+TEXT_CURE = "; convert the column to numbers (pandas.to_numeric)"
 ANGLES_CURE = "; numpy.angle gives the angles of complex numbers"
 KINDS = {
     "b": "Booleans", "U": "text", "S": "text", "M": "dates", "m": "durations", "c": "complex numbers",
@@ -274,6 +281,7 @@ def _of_objects(array: NDArray[Any], what: str) -> Array:
             row = np.unravel_index(k, array.shape)[0] + 1 if array.ndim else 1
             cure = ANGLES_CURE * is_a(item, complex)
             cure += DATES_CURE * is_a(item, date | time | timedelta)
+            cure += TEXT_CURE * is_a(item, str)
             raise OrbiflowError(
                 f"{what}: expected numbers, got {described(item)} in row {row}{cure}"
             )

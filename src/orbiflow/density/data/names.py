@@ -200,9 +200,17 @@ takes latitude and longitude in the order Latitude (deg), Longitude (deg); give 
     if space in DIRECTIONS and len(names) == 2:
         for name in names:
             turn, unit = foreign_unit(name), unit_named(name)
-            if FROM_POLE.intersection(words_of(name)):
+            words = [word.translate(_GREEK) for word in words_of(name)]
+            if FROM_POLE.intersection(words):
                 raise SettingError(
                     literal(f"{name} is from the pole: give the latitude, 90 less it")
+                )
+            if "theta" in words:
+                raise SettingError(
+                    literal(
+                        f"{name} may be from the pole or around it: give columns that are called "
+                    )
+                    + "lat and lon, where lat is 90 less the angle from the pole"
                 )
             if turn is not None or unit not in (None, "degrees"):
                 unit = unit or f"a unit of {turn:g} to a turn"

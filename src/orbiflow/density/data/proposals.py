@@ -17,9 +17,9 @@ from orbiflow.arrays import Array
 from orbiflow.density.data.checks import codes_among
 from orbiflow.density.data.frames import as_numbers
 from orbiflow.density.data.names import LATITUDES, LONGITUDES
-from orbiflow.density.data.roles import WORDS, Asked, Role, role_named
+from orbiflow.density.data.roles import AXIAL, WORDS, Asked, Role, role_named
 from orbiflow.density.data.table import UndeclaredError, short
-from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, foreign_unit, words_of
+from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, foreign_unit, unit_named, words_of
 from orbiflow.errors import SettingError, literal
 from orbiflow.settings import is_a
 
@@ -40,12 +40,6 @@ OTHERS = frozenset((
 ))
 # fmt: on
 """Words for how often a row was seen or counts, and for other quantities than angles."""
-
-AXIAL = frozenset(
-    {"strike", "strikes", "orientation", "orientations", "axis", "axes", "axial", "fibre", "fibres"}
-    | {"fiber", "fibers", "lineation", "lineations", "lineament", "lineaments"}
-)
-"""Words for lines without an arrow, whose angles come back after half a turn: for proposals alone."""
 
 PARTS_OF_VECTORS = frozenset({"sin", "sine", "cos", "cosine", "u", "v"})
 
@@ -95,7 +89,7 @@ def proposed_role(
     if not is_axis and are_whole and low >= 0 and 6 < high <= TENS_IN_TURN and len(known) > 20:
         return f"cycle:{TENS_IN_TURN:g}"
     kind = "axial" if is_axis and high - low <= 180 else "angle"
-    return f"{kind}:{unit or 'degrees'}"
+    return f"{kind}:{unit_named(name) or unit or 'degrees'}"
 
 
 def unit_by_size(values: Array) -> str | None:

@@ -174,6 +174,13 @@ ROLES: dict[str, tuple[str, ...]] = {
 Which columns a sphere, axes, rotations and quotients take is in `names.py`.
 """
 
+AXIAL = frozenset(
+    {"strike", "strikes", "orientation", "orientations", "axis", "axes", "axial", "fibre", "fibres"}
+    | {"fiber", "fibers", "lineation", "lineations", "lineament", "lineaments"}
+)
+"""Words for lines without an arrow, whose angles come back after half a turn: such a column is asked
+for, whatever its unit."""
+
 _BY_WORD = {word: role for role, words in ROLES.items() for word in words}
 
 
@@ -185,9 +192,10 @@ def role_named(name: str) -> Role | None:
 
     >>> [str(role_named(name)) for name in ("phi_deg", "chi1", "x (rad)", "hour", "speed", "az_gon")]
     ['angle:degrees', 'angle', 'angle:radians', 'cycle:24', 'None', 'None']
+    >>> role_named("fibre orientation (deg)")  # of an axis, or of an arrow
     """
     words, unit = words_of(name), unit_named(name)
-    if foreign_unit(name) is not None:
+    if foreign_unit(name) is not None or AXIAL.intersection(words):
         return None
     word = next((_BY_WORD[key] for key in ["".join(words), *words] if key in _BY_WORD), None)
     role = Role.of(word or "angle")

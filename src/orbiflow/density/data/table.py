@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,7 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.frames import as_numbers, cells_of, check_lengths, columns_of, is_missing
+from orbiflow.density.data.frames import (
+    as_numbers,
+    cells_of,
+    check_lengths,
+    columns_of,
+    has_categories,
+    is_missing,
+)
 from orbiflow.density.data.units import number_of
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
 from orbiflow.settings import is_a
@@ -85,6 +93,7 @@ class DataTable:
     - `is_array`: Whether it is an array, whose columns are angles in radians unless declared.
     - `numeric`: Which columns are of numbers, if that is known without their cells.
     - `codes`: What stands for missing values as well, numbers or words.
+    - `texts`: Which columns of a frame are numbers that are written as text.
     - `text`: How it stands in a text file, None of others.
     """
 
@@ -96,6 +105,7 @@ class DataTable:
     is_array: bool = False
     numeric: frozenset[int] | None = None
     codes: tuple[str, ...] = ()
+    texts: frozenset[int] = frozenset()
     text: TextForm | None = None
     _parsed: dict[int, Array] = field(default_factory=dict[int, Array], init=False, repr=False)
 
@@ -115,7 +125,13 @@ class DataTable:
         check_lengths(parts, "data")
         called = tuple(name for name, _ in columns)
         is_named = all(is_a(name, str) for name in called)
-        return cls(called if is_named else tuple(numbered(len(called))), is_named, parts)
+        called = called if is_named else tuple(numbered(len(called)))
+        texts = frozenset(
+            k
+            for k, (cells, (_, column)) in enumerate(zip(parts, columns, strict=True))
+            if cells.dtype.kind in "OUT" and not has_categories(column) and _are_texts(cells)
+        )
+        return cls(called, is_named, parts, texts=texts)
 
     @property
     def is_file(self) -> bool:
@@ -195,6 +211,12 @@ class DataTable:
 def _are_numbers(cells: NDArray[Any]) -> bool:
     known = [cell for cell in cells if not is_missing(cell)]
     return bool(known) and all(is_a(c, Real) and not is_a(c, bool) for c in known)
+
+
+def _are_texts(cells: NDArray[Any]) -> bool:
+    """Return whether most cells are the text of a number."""
+    texts = [c for c in cells.tolist() if is_a(c, str) and not is_missing_word(c)]
+    return 2 * sum(math.isfinite(number_of(text)) for text in texts) > max(len(texts), 1)
 
 
 def numbered(count: int) -> list[str]:
