@@ -1,5 +1,7 @@
 """What is shared and taken away of a tile, in a real browser: pages opened from a disk, and offers."""
 
+import base64
+import io
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -173,6 +175,25 @@ def reddish(page: Any) -> float:
       }
       return (4 * count) / data.length;
     }""")
+
+
+def test_engraved_lines_are_on_the_page_and_can_be_hidden(alone: Any, tmp_path: Path) -> None:
+    out = tmp_path / "tile.html"
+    export(tile_of("IH4"), out, ExportSettings(engrave=True, outline=0))
+    opened(alone, out)
+    canvas = "document.querySelector('#view').toDataURL()"
+    alone.wait_for_timeout(60)
+    engraved = picture_of(alone.evaluate(canvas))
+    alone.uncheck("#skin")
+    alone.wait_for_timeout(60)
+    plain = picture_of(alone.evaluate(canvas))
+    assert 0.05 < (np.abs(engraved - plain).max(axis=-1) > 30).mean() < 0.8
+
+
+def picture_of(address: str) -> np.ndarray:
+    """Return the pixels of a picture in an address."""
+    data = base64.b64decode(address.partition(",")[2])
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
 
 def test_pinch_zooms_and_a_finger_moves(alone: Any, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import font, limited, png_bytes
+from orbiflow.drawing import font, limited, png_bytes, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.page import (
     INK,
@@ -197,12 +197,19 @@ class Textures:
         motif, scale, ring = self.scene.motifs[uses.symbol], self.scale, None
         if motif.within is not None:
             ring = self.scene.symbols[motif.within].flattened(FLATNESS / scale)
-        key = motif, ink if any(INK in part.style for part in motif.parts) else None
+        colours = {colour for part in motif.parts for colour in part.style[:2] if colour}
+        key = motif, ink if INK in colours else None
+        if key not in self._known and colours == {INK} and not motif.rasters:
+            other = next((own for (drawn, _), own in self._known.items() if drawn is motif), None)
+            if other is not None:  # the same in another ink
+                pixels = other.pixels.copy()
+                pixels[..., :3] = rgb(ink or "#000000")
+                self._known[key] = other._replace(pixels=pixels)
         if key not in self._known:
             points = self._box(uses.symbol) if ring is None else ring
             how = {"ink": ink, "least_width": TEXELS_PER_PIXEL, "cut_off": ring is not None}
-            own = texture(motif, points, TEXELS_PER_PIXEL * scale, **how)
-            self._known[key] = own.moved(scale * np.eye(2), np.zeros(2))
+            drawn = texture(motif, points, TEXELS_PER_PIXEL * scale, **how)
+            self._known[key] = drawn.moved(scale * np.eye(2), np.zeros(2))
         ring = None if ring is None else ring * scale
         return PictureStamps(self._known[key], _scaled(uses, scale), ring)
 
