@@ -56,13 +56,16 @@ def random_network(rng: np.random.Generator, space: Torus, parents: int = 2) -> 
     return VonMisesNetwork(space, factors)
 
 
-def random_kernels(rng: np.random.Generator, space: Torus, count: int = 4) -> AdaptiveKernels:
-    return AdaptiveKernels(
-        space,
-        torch.tensor(rng.uniform(size=(count, space.dim))),
-        torch.tensor(rng.uniform(0.5, 15.0, (count, space.dim))),
-        torch.tensor(rng.dirichlet(np.ones(count))),
-    )
+def random_kernels(
+    rng: np.random.Generator, space: Space, count: int = 4, low: float = 0.5, high: float = 15.0
+) -> AdaptiveKernels:
+    """Kernels about places anywhere, of concentrations between two numbers."""
+    if space.is_torus:
+        places = torch.tensor(rng.uniform(size=(count, space.dim)))
+    else:
+        places = space.uniform(count, torch.Generator().manual_seed(int(rng.integers(2**31))))
+    kappa = torch.tensor(rng.uniform(low, high, (count, len(space.spheres))))
+    return AdaptiveKernels(space, places, kappa, torch.tensor(rng.dirichlet(np.ones(count))))
 
 
 def blended(
@@ -120,6 +123,18 @@ def random_blend(
         chains=random_chains(rng, space) if chains else None,
         network=random_network(rng, space) if network else None,
     )
+
+
+def numbers(*values: float) -> torch.Tensor:
+    """Numbers of double precision."""
+    return torch.tensor(values, dtype=torch.float64)
+
+
+def two_clusters(space: Space, count: int, seed: int = 0) -> torch.Tensor:
+    """Canonical points (count, 2) about two places, of which the first has seven of ten."""
+    rng = np.random.default_rng(seed)
+    centers = np.where(rng.random((count, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]])
+    return space.project(torch.tensor(centers + 0.1 * rng.normal(size=(count, 2))))
 
 
 def even_grid(count: int, dim: int) -> torch.Tensor:

@@ -28,8 +28,6 @@ from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.drawing import Picture, Sheet
 
-SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
-
 
 @given(st.integers(0, 2**31), st.integers(2, 60), st.floats(0.01, 100), st.integers(2, 3))
 def test_widths_are_in_the_points_unit_and_repeated_points_are_one(seed, count, scale, dim) -> None:
@@ -83,10 +81,7 @@ def pixels(picture: Picture) -> np.ndarray:
     ]
 
 
-@pytest.mark.parametrize(
-    ("name", "count"),
-    [("torus", 20_000), ("klein-bottle", 100), ("sphere", 2000), ("projective-plane", 100)],
-)
+@pytest.mark.parametrize(("name", "count"), [("klein-bottle", 100), ("sphere", 2000)])
 def test_a_peak_is_seen_through_its_dots(name: str, count: int, monkeypatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 120)
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 20_000)
@@ -112,7 +107,7 @@ def test_a_peak_is_seen_through_its_dots(name: str, count: int, monkeypatch) -> 
     assert (off > 100).sum() > 5 * min(count, 300)  # dots are seen all the same
 
 
-@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize("name", ["torus", "sphere"])
 def test_the_page_has_the_dots_widths(name: str) -> None:
     density = peaked(name)
     drawn = density.sample((200,), torch.Generator().manual_seed(0))

@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,8 +50,8 @@ SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(rotation=TURN), Projec
 every_space = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 
 
-def example(space, dtype=torch.float64):
-    field = FourierField(space.group, 2, dtype=dtype)
+def example(space):
+    field = FourierField(space.group, 2, dtype=torch.float64)
     generator = torch.Generator().manual_seed(3)
     field.parameters_.data.normal_(0, 0.01, generator=generator)
     return FlowDensity(space, Flow([field], steps=2))
@@ -60,24 +61,14 @@ def points(count, seed=0):
     return torch.tensor(np.random.default_rng(seed).uniform(-2, 2, (count, 2)))
 
 
-def density_png(density, samples=None, *, width_px=1600, **options):
-    settings = PlotSettings(**options)
-    return density_picture(density, samples, settings, sheet=Sheet.screen(width_px)).file()
+def png(draw, *what, width_px=1600, samples=None, **options):
+    more = {} if samples is None else {"samples": samples}
+    settings, sheet = PlotSettings(**options), Sheet.screen(width_px)
+    return draw(*what, **more, settings=settings, sheet=sheet).file()
 
 
-def flow_png(density, *, width_px=1600, **options):
-    settings = PlotSettings(**options)
-    return flow_picture(density, settings, sheet=Sheet.screen(width_px)).file()
-
-
-def samples_png(density, data, drawn, *, width_px=1600, **options):
-    settings = PlotSettings(**options)
-    return samples_picture(density, data, drawn, settings, sheet=Sheet.screen(width_px)).file()
-
-
-def corner_png(density, data, drawn, *, width_px=1600, **options):
-    settings = PlotSettings(**options)
-    return corner_picture(density, data, drawn, settings, sheet=Sheet.screen(width_px)).file()
+density_png, flow_png = partial(png, density_picture), partial(png, flow_picture)
+samples_png, corner_png = partial(png, samples_picture), partial(png, corner_picture)
 
 
 def picture(png):
@@ -121,20 +112,6 @@ def test_the_same_samples_give_the_same_picture_and_other_ones_another():
     assert first != density_png(density, width_px=300)
 
 
-def test_all_measures_are_drawn_and_another_is_refused():
-    density = example(SPACES[2])
-    for measure in ("natural", "square", "uniform"):
-        assert density_png(density, measure=measure, width_px=200)
-    with refused("measure"):
-        density_png(density, measure="flat")
-
-
-def test_single_precision_is_drawn():
-    density = example(SPACES[1], torch.float32)
-    assert density_png(density, width_px=200)
-    assert flow_png(density, width_px=200)
-
-
 @pytest.mark.parametrize("dim", [1, 3])
 def test_other_dimensions_are_refused(dim):
     density = example(Torus(dim))
@@ -151,39 +128,13 @@ def test_samples_of_another_shape_are_refused():
             draw(example(SPACES[0]), samples=torch.zeros(4, 3))
 
 
-EDGES = {
-    "torus": [("left up", "right up"), ("bottom right", "top right")],
-    "klein-bottle": [("left up", "right up"), ("bottom right", "top left")],
-    "sphere": [("left up", "bottom right"), ("right down", "top left")],
-    "projective-plane": [("left up", "right down"), ("bottom right", "top left")],
-}
-
-
-def edge_name(edge):
-    (x, y), (u, v) = edge.round().astype(int)
-    if x == u:
-        return f"{'right' if x else 'left'} {'up' if v > y else 'down'}"
-    return f"{'top' if y else 'bottom'} {'right' if u > x else 'left'}"
-
-
-@every_space
-def test_edges_are_paired_as_the_space_identifies_them(space):
-    found = {tuple(sorted(edge_name(edge) for edge in pair)) for pair in edge_pairs(space.group)}
-    expected = [tuple(sorted(pair)) for pair in EDGES[space.name]]
-    swap = {"up": "down", "down": "up", "left": "right", "right": "left"}
-
-    def reversed_pair(pair):
-        parts = [name.split() for name in pair]
-        return tuple(sorted(f"{side} {swap[way]}" for side, way in parts))
-
-    assert len(found) == 2
-    assert all(pair in found or reversed_pair(pair) in found for pair in expected)
-
-
 @every_space
 def test_paired_edges_are_the_same_points(space):
-    t = torch.linspace(0.1, 0.9, 7, dtype=torch.float64)[:, None]
-    for pair in edge_pairs(space.group):
+    t, pairs = torch.linspace(0.1, 0.9, 7, dtype=torch.float64)[:, None], edge_pairs(space.group)
+    middles = np.mean([edge for pair in pairs for edge in pair], axis=1).round(6)
+    sides = {(0.0, 0.5), (1.0, 0.5), (0.5, 0.0), (0.5, 1.0)}
+    assert {(x, y) for x, y in middles.tolist()} == sides
+    for pair in pairs:
         first, second = (torch.tensor(edge) for edge in pair)
         one, other = (edge[0] + t * (edge[1] - edge[0]) for edge in (first, second))
         assert float(space.distance(one, other).max()) < 1e-6
@@ -278,15 +229,15 @@ def test_densities_with_kernels_are_drawn_and_say_what_is_averaged(space):
     assert density_png(density, width_px=250) != density_png(peaked(space, 10.0), width_px=250)
     assert flow_png(density, width_px=200)
     assert samples_png(density, points(9), density.sample((20,)), width_px=300)
-    assert "narrower than" in density_page(density)
+    assert "narrower than" in density_page(density, resolution=8)
     assert "narrower than" not in density_page(example(space), resolution=8)
 
 
 def test_a_flow_in_few_colours_is_small(monkeypatch):
     monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 12)  # lines of the whole length
-    png = few_colours(flow_png(example(SPACES[0]), width_px=800))
-    assert len(png) < 300_000
-    image = Image.open(io.BytesIO(png))
+    small = few_colours(flow_png(example(SPACES[0]), width_px=500))
+    assert len(small) < 150_000
+    image = Image.open(io.BytesIO(small))
     assert image.mode == "P"
 
 
@@ -295,7 +246,7 @@ def test_a_density_without_a_flow_has_no_picture_of_it():
         flow_png(UniformDensity(SPACES[0]))
 
 
-@pytest.mark.parametrize("dim", [1, 2, 3, 5])
+@pytest.mark.parametrize("dim", [1, 3])
 def test_pairs_of_angles(dim):
     density = UniformDensity(Torus(dim, unit="degrees"))
     data = torch.tensor(np.random.default_rng(0).random((40, dim)))
@@ -359,17 +310,6 @@ def test_colours_close_over_the_seams(space):
     apart = (one != other) & ~corner[one] & ~corner[other]
     assert apart.sum() == 2 * 2 * 11
     assert abs(values[one] - values[other])[apart].max() <= 2
-
-
-@every_space
-def test_density_is_the_same_at_both_copies_of_an_edge(space):
-    density, t = example(space), torch.linspace(0.05, 0.95, 9, dtype=torch.float64)[:, None]
-    for pair in edge_pairs(space.group):
-        first, second = (torch.tensor(edge) for edge in pair)
-        one, other = (edge[0] + t * (edge[1] - edge[0]) for edge in (first, second))
-        np.testing.assert_allclose(
-            density_at(density, one, "natural"), density_at(density, other, "natural"), rtol=1e-6
-        )
 
 
 def test_sphere_page_has_the_users_frame_and_coastlines():

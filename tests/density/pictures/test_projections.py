@@ -101,12 +101,6 @@ def test_equal_areas_are_equal_and_others_as_they_should_be(
         assert abs(wanted) == 1.0
 
 
-@given(worlds)
-def test_the_whole_sphere_has_its_area(projection: WorldMap) -> None:
-    if not isinstance(projection, Stereographic | PlateCarree):
-        assert area(projection.outline()) == pytest.approx(4 * math.pi, rel=3e-4)
-
-
 @given(discs)
 def test_stereographic_circles_and_equal_area_caps(projection: Azimuthal) -> None:
     cap = 2 * math.pi * (1 - math.cos(math.radians(projection.radius)))
@@ -287,14 +281,6 @@ def test_mesh_closes_to_the_right_surface(space):
 
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
-def test_welded_vertices_are_one_place(space):
-    grid, number = welded(space, 12)
-    places = immersion(space)(grid.points)
-    first = np.unique(number, return_index=True)[1]
-    np.testing.assert_allclose(places, places[first][number], atol=1e-9)
-
-
-@pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 def test_normals_are_unit_and_perpendicular(space):
     grid = mesh(space, 10)
     found = normals(space, grid.points)
@@ -304,20 +290,6 @@ def test_normals_are_unit_and_perpendicular(space):
     along = immersion(space)(points + step) - immersion(space)(points - step)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     assert abs((along * found[inner.numpy()]).sum(axis=1)).max() < 1e-4
-
-
-def test_normals_of_the_sphere_are_radial():
-    points = mesh(SPACES[2], 16).points
-    found = normals(SPACES[2], points)
-    radial = abs((found * SPACES[2].vectors(points)).sum(axis=1))
-    assert radial.min() > 0.99  # beside a cone point the normal is of a place near by
-
-
-@given(seeds)
-def test_boy_surface_is_the_same_at_opposite_vectors(seed):
-    vectors = np.random.default_rng(seed).normal(size=(30, 3))
-    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
-    np.testing.assert_allclose(boy_surface(-vectors), boy_surface(vectors), atol=1e-12)
 
 
 def test_boy_surface_is_continuous_over_the_equator_and_finite_at_the_triple_point():
@@ -344,7 +316,7 @@ def test_resolution_out_of_range_is_refused(resolution):
 
 
 # towards the reader on the outside of the ring, under it, and on the wall of its hole
-PLACES = [(0.1, 0.05), (0.7, 0.89), (0.4, 0.5), (0.85, 0.3), (0.55, 0.7), (0.25, 0.62)]
+PLACES = [(0.1, 0.05), (0.7, 0.89), (0.4, 0.5)]
 
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
