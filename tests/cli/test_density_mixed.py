@@ -44,27 +44,12 @@ def test_the_commands(tmp_path: Path, orbiflow, monkeypatch) -> None:
     orbiflow.done("density", "score", "rows.csv", "-m", "phi", "-o", "p.csv")
     less = np.loadtxt("p.csv", delimiter=",", skiprows=1, usecols=3)
     assert np.allclose(joint - less, given, atol=1e-6)
-    orbiflow.done(
-        "density", "trend", "-m", "fit", "--of", "length", "--along", "phi", "-n", 5, "-o", "t.csv"
-    )
-    table = np.loadtxt("t.csv", delimiter=",", skiprows=1)
-    assert table.shape == (5, 7)
-    assert (table[:, 2] < table[:, 1]).all()
-    assert Path("t.png").read_bytes()[:4] == b"\x89PNG"
-    cv = ["--components", "kernels", "--folds", 2, "-o", "cv"]
-    orbiflow.done("density", "cv", "rows.csv", *how, *cv)
-    found = json.loads(Path("cv/report.json").read_text())
-    assert found["uniform"] < 0
     for words, about in (
-        ("sphere --columns phi,temperature,length=linear", "90"),
         (
             "torus --unit degrees",
             "--columns phi=angle:degrees,length=positive,temperature=positive",
         ),
-        ("torus --columns phi,length=linear", "phi=angle:degrees,length=linear"),
-        ("torus --columns phi=angle:degrees,speed=linear", "speed"),
         ("torus --columns phi=cycle:0", "--columns phi cycle:0"),
-        ("torus --columns length=linear,length=cycle:2", "length"),
         ("torus --columns phi=positive", "phi line"),
     ):
         done = orbiflow.refused("density", "fit", "rows.csv", "--space", *words.split(), "-o", "no")
@@ -103,22 +88,3 @@ def test_columns_beside_places(tmp_path: Path, orbiflow, monkeypatch) -> None:
     assert table[[0, -1], 0].tolist() == [0, 365]
     assert table[1, 1] > table[3, 1] + 0.5
     orbiflow.refused("density", "summary", "rows.csv", *how[:-2], "-o", "s.json")
-
-
-def test_hours_on_a_torus(tmp_path: Path, orbiflow, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    rng = np.random.default_rng(0)
-    hour = rng.vonmises(3.0, 2.0, 80) * 12 / np.pi % 24
-    rows = np.column_stack([hour, np.degrees(rng.vonmises(0, 1, 80))])
-    np.savetxt("rows.csv", rows, delimiter=",", header="hour,heading", comments="")
-    how = ["--space", "torus", "--unit", "degrees"]  # an hour is a cycle by its name
-    orbiflow.done("density", "fit", "rows.csv", *how, "--components", "mixture", "-o", "fit")
-    orbiflow.done("density", "sample", "-m", "fit", "-n", 200, "-o", "s.csv")
-    drawn = np.loadtxt("s.csv", delimiter=",", skiprows=1)
-    assert ((drawn[:, 0] >= 0) & (drawn[:, 0] < 24)).all()
-    assert np.median(drawn[:, 0]) == pytest.approx(11.5, abs=1.5)
-    orbiflow.done("density", "conditional", "-m", "fit", "--at", "heading=0", "-o", "c")
-    table = np.loadtxt("c/density.csv", delimiter=",", skiprows=1)
-    assert table[0, 0] == 0
-    assert table[:, 1].sum() * 24 / len(table) == pytest.approx(1, abs=1e-6)
-    orbiflow.done("density", "plot", "-m", "fit", "-o", "p")

@@ -25,7 +25,6 @@ def test_angles_beyond_a_turn_mark_points_without_an_orientation(tmp_path, orbif
 WRONG = {
     ("torus", "--crystal", "432"): "--crystal torus",
     ("cubic-orientations", "--crystal", "622"): "cubic-orientations",
-    ("rotation-space", "--crystal", "2/m"): "--crystal 2/m",
     ("rotation-space", "--specimen", "cube"): "--specimen 432",
     ("rotation-space", "--form", "matrix"): "--form matrix 9 3",
 }
@@ -71,16 +70,8 @@ def test_rotations_of_another_form_than_the_model_are_refused(tmp_path, orbiflow
     for number, (header, values) in enumerate(tables):
         name = tmp_path / f"{number}.csv"
         np.savetxt(name, values, delimiter=",", header=header, comments="")
-    how = (
-        "--space",
-        "rotation-space",
-        "--crystal",
-        "222",
-        "--components",
-        "kernels",
-        "--unit",
-        "radians",
-    )
+    how = ("--space", "rotation-space", "--crystal", "222")
+    how = (*how, "--components", "kernels", "--unit", "radians")
     orbiflow.done("density", "fit", tmp_path / "0.csv", *how, "-o", tmp_path / "m")
     done = orbiflow(
         "density", "score", tmp_path / "1.csv", "-m", tmp_path / "m", "-o", tmp_path / "s.csv",

