@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 from sklearn.base import clone
-from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
@@ -42,7 +42,7 @@ from orbiflow.loading import load, save
 from refusals import refused, warned
 
 WORDS = {"GLY": 0.0, "PRO": 2.0}
-QUICK: dict[str, Any] = {"unit": "radians", "components": "kernels"}
+QUICK: dict[str, Any] = {"unit": "radians", "components": "kernels", "effort": "fast"}
 
 
 def drawn(count: int, seed: int = 0) -> tuple[Any, dict[str, Any], Any]:
@@ -62,7 +62,8 @@ def drawn(count: int, seed: int = 0) -> tuple[Any, dict[str, Any], Any]:
 @pytest.fixture(scope="module")
 def fit() -> DensityEstimator:
     angles, cells, _ = drawn(500)
-    return DensityEstimator(**QUICK, columns={"hour": "cycle:24"}).fit(angles, given=cells)
+    whole = {**QUICK, "effort": "normal"}
+    return DensityEstimator(**whole, columns={"hour": "cycle:24"}).fit(angles, given=cells)
 
 
 def report_of(fit: DensityEstimator) -> GivenReport:
@@ -91,14 +92,8 @@ def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
     shape = KernelShape(wide, kappa, torch.tensor(rng.dirichlet([1] * 3)))
     kernels = ConditionalKernels(space, KnownRows(points, None, x, covariates.number), shape)
     hidden, out = 8, 3 * (space.features(points).shape[-1] + width + 1)
-    shapes = [
-        (x.shape[1], hidden),
-        (1, hidden),
-        (hidden, hidden),
-        (1, hidden),
-        (hidden, out),
-        (1, out),
-    ]
+    sizes = pairwise((x.shape[1], hidden, hidden, out))
+    shapes = [shape for a, b in sizes for shape in ((a, b), (1, b))]
     layers = [torch.tensor(rng.normal(size=(2, *shape))) / shape[0] ** 0.5 for shape in shapes]
     networks = NeuralMixture(space, layers)
     parts: list[Any] = [Unconditional(UniformDensity(space)), kernels, networks]
@@ -318,34 +313,18 @@ def test_the_regressor_is_scikit_learns() -> None:
     assert own.predict([[0.3, 0.1]])[0] == pytest.approx(at.mean()[0], abs=1e-4)
     scaled = make_pipeline(StandardScaler(), clone(own)).fit(x[:50], angles[:50])
     assert scaled.score(x[50:], angles[50:]) > 0.7
-    search = GridSearchCV(
-        AngleRegressor(unit="radians"), {"components": ["kernels"]}, cv=2, refit=False
-    )
-    assert search.fit(x, angles).best_score_ > 0.5
 
 
 def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     length = rng.uniform(0, 2, 80)
     angles = rng.vonmises(length, 8.0)[:, None]
-    fit = DensityEstimator(unit="radians", components="mixture").fit(
-        angles, given={"length": length}
-    )
-    folder = save(fit, tmp_path / "fit")
-    again = load(folder)
+    fit = DensityEstimator(**QUICK).fit(angles, given={"length": length})
+    again = load(save(fit, tmp_path / "fit"))
     assert isinstance(again, DensityEstimator)
     known = {"length": length[:9]}
-    np.testing.assert_allclose(
-        again.score_samples(angles[:9], given=known), fit.score_samples(angles[:9], given=known)
-    )
-    assert save(again, folder) == folder
-    plain = DensityEstimator("torus", unit="radians", components="mixture").fit(angles)
-    again = load(save(plain, folder))
-    assert isinstance(again, DensityEstimator)
-    assert again.density_.given is None
-    one_file = load(save(fit, tmp_path / "fit.safetensors"))
-    assert isinstance(one_file, DensityEstimator)
-    assert one_file.density_.given is not None
+    right = fit.score_samples(angles[:9], given=known)
+    np.testing.assert_allclose(again.score_samples(angles[:9], given=known), right)
 
 
 def test_rows_that_lack_angles_are_refused_before_the_fit() -> None:

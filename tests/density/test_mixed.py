@@ -1,6 +1,5 @@
 """Angles beside real columns, and lines: exactly normalised, in the data's own units."""
 
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from orbiflow.density import (
-    Density,
     DensityEstimator,
     Role,
     Torus,
@@ -63,33 +61,6 @@ def test_data_come_back_and_areas_are_those_of_the_map(
     np.testing.assert_allclose(logs, student, rtol=1e-5, atol=1e-5)
 
 
-def test_the_uniform_density_is_students_t() -> None:
-    space = Torus([(3.0, 0.5)])
-    at = np.linspace(-2, 8, 50)
-    found = UniformDensity(space).log_prob(space.to_chart(at[:, None]), measure="natural")
-    np.testing.assert_allclose(found.numpy(), stats.t.logpdf(at, 4, 3.0, 0.5), rtol=1e-7)
-    relative = UniformDensity(space).log_prob(space.to_chart(at[:, None]), measure="uniform")
-    assert relative.abs().max() < 1e-12
-
-
-def test_it_integrates_to_one_over_turns_and_all_reals(fit: DensityEstimator) -> None:
-    angles = np.arange(360) + 0.5
-
-    def over_angles(lengths: np.ndarray) -> np.ndarray:
-        rows = np.column_stack([np.tile(angles, len(lengths)), np.repeat(lengths, 360)])
-        return np.exp(fit.score_samples(rows)).reshape(-1, 360).sum(axis=1)
-
-    # Gauss-Legendre on ever longer pieces to both sides
-    ends = np.concatenate([[1.5], 1.5 + 0.004 * 1.5 ** np.arange(28)])
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    mass = 0.0
-    for side in (1, -1):
-        for low, high in pairwise(ends):
-            at = (low + high) / 2 + (high - low) / 2 * nodes
-            mass += float(over_angles(1.5 + side * (at - 1.5)) @ weights) * (high - low) / 2
-    assert mass == pytest.approx(1, abs=1e-6)
-
-
 def test_a_conditional_is_a_ratio(fit: DensityEstimator) -> None:
     lengths = np.linspace(1.47, 1.53, 9)[:, None]
     at = np.column_stack([np.full(9, 40.0), lengths])
@@ -123,47 +94,17 @@ def test_gradients_are_per_unit_of_each_column(fit: DensityEstimator) -> None:
         np.testing.assert_allclose(slopes[:, column], rise, rtol=1e-4, atol=1e-4 / step**0.5)
 
 
-def test_it_is_near_the_truth_and_far_above_independence() -> None:
-    rng = np.random.default_rng(0)
-    angle, unseen = rng.vonmises(0, 2, 1500), rng.vonmises(0, 2, 4000)
-
-    def rows(own: np.ndarray) -> np.ndarray:
-        return np.column_stack([own, 3 + np.cos(own) / 2 + 0.2 * rng.normal(size=len(own))])
-
-    held = rows(unseen)
-    fit = DensityEstimator(
-        "torus", columns={1: "linear"}, components="kernels,mixture,chains", seed=0
-    )
-    fit.fit(rows(angle))
-    truth = stats.vonmises.logpdf(held[:, 0], 2)
-    truth += stats.norm.logpdf(held[:, 1], 3 + np.cos(held[:, 0]) / 2, 0.2)
-    regret = float((truth - fit.score_samples(held)).mean())
-    assert 0 < regret < 0.04
-
-
-def back(density: Density, folder: Path) -> Density:
-    """What its file gives back."""
-    path = folder / "density.safetensors"
-    path.write_bytes(density_to_bytes(density))
-    return read_density(path)[0]
-
-
-def test_files_give_the_same_density_back(fit: DensityEstimator, tmp_path: Path) -> None:
-    points = fit.space_.to_chart(data_of(20, seed=5)[:, :2])
-    again = back(fit.density_, tmp_path)
-    assert again.space == fit.space_
-    assert torch.equal(again.log_prob(points), fit.density_.log_prob(points))
-
-
 def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     data = np.column_stack([rng.vonmises(0, 2, (300, 4)), rng.normal(size=300)])
     space = Torus.for_columns(data, [Role("angle")] * 4 + [Role("linear")], "abcde")
     whole = DensityEstimator(space, components="chains").fit(data).density_
-    for part in (marginal(whole, [1, 2, 4]), conditional(whole, {0: 0.1})):
-        assert not part.space.is_of_angles
+    for part in (whole, marginal(whole, [1, 2, 4]), conditional(whole, {0: 0.1})):
         points = part.space.to_chart(np.full((3, part.space.dim), 0.3))
-        again = back(part, tmp_path)
+        (tmp_path / "d").write_bytes(density_to_bytes(part))
+        again, _ = read_density(tmp_path / "d")
+        assert again.space == part.space
+        assert not again.space.is_of_angles
         assert torch.allclose(again.log_prob(points), part.log_prob(points))
 
 
@@ -203,17 +144,6 @@ def test_a_column_of_one_value_and_lines_that_are_none() -> None:
             Torus(wrong)
     with refused("2", "3", kind=SettingError):
         DensityEstimator(Torus([None, (0, 1)])).fit(np.ones((50, 3)))
-
-
-def test_radians_in_the_place_of_degrees_are_doubted() -> None:
-    rows = data_of(200)[:, :2] + (150.0, 0.0)
-    settings = {"components": "mixture", "unit": "degrees", "columns": {1: "linear"}}
-    fit = DensityEstimator("torus", **settings).fit(rows)
-    rows[:, 0] = (rows[:, 0] + 180) % 360 - 180
-    fit.score_samples(rows)
-    rows[:, 0] = np.radians(rows[:, 0])
-    with warned("column1", "radians"):
-        fit.score_samples(rows)
 
 
 def test_warnings_are_where_the_data_are_given() -> None:
@@ -265,7 +195,7 @@ def test_densities_are_near_the_truth_and_end_where_columns_do(role: str) -> Non
     unseen = true.rvs(3000, random_state=2)
     regret = true.logpdf(unseen).mean() - fit.score(unseen[:, None])
     assert 0 <= regret + 0.02 < bound + 0.02
-    drawn = fit.sample(5000, 0)[:, 0]
+    drawn = fit.sample(2000, 0)[:, 0]
     low, high = true.support()
     assert ((drawn >= low) & (drawn <= high)).all()
     ends = [-1e300 if role == "linear" else 0.0, 1e300 if role != "bounded:0:1" else 1.0]

@@ -139,7 +139,7 @@ def share_of_small(
     small: dict[str, int] = {}
     rng = np.random.default_rng(7)
     for _ in range(trials):
-        for one in named_tests(draw(rng), space, QUICK).tests:
+        for one in named_tests(draw(rng), space, NamedTestSettings(permutations=39)).tests:
             small[one.name] = small.get(one.name, 0) + (one.p <= 0.05)
     return {name: count / trials for name, count in small.items()}
 
@@ -173,7 +173,7 @@ def test_levels_and_power_on_spheres_and_of_axes() -> None:
         first, *others = drawn
         return dict(zip("abc", [first @ tilt.T, *others], strict=True))
 
-    levels = share_of_small(three, "sphere", 25)
+    levels = share_of_small(three, "sphere", 15)
     assert set(levels) == {"watson-williams", "common-mean", "common-concentration", "energy"}
     assert all(share <= 0.2 for share in levels.values()), levels
     assert share_of_small(three, "projective-plane", 8)["bingham"] <= 0.3

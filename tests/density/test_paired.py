@@ -18,7 +18,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.runtime import to_json
-from refusals import refused
+from refusals import names, refused
 
 seeds = st.integers(0, 2**31)
 
@@ -63,7 +63,7 @@ def test_copies_of_rows_in_one_group_add_no_evidence(seed: int, rows: int, copie
 def test_intervals_hold_what_they_promise() -> None:
     rng = np.random.default_rng(0)
     held = 0
-    for trial in range(300):
+    for trial in range(150):
         table = {"a": rng.exponential(size=30) ** 1.5, "b": np.zeros(30)}
         one = compare_scores(
             table, settings=ComparisonSettings(bootstrap=200, seed=trial)
@@ -71,25 +71,25 @@ def test_intervals_hold_what_they_promise() -> None:
         truth = 1.3293403881791372 * (1 if one.first == "a" else -1)  # gamma(2.5)
         held += one.low <= truth <= one.high
     # a skewed density and 30 rows: short of 95 %, as any bootstrap
-    assert 0.86 * 300 <= held <= 300 - 1
+    assert 0.84 * 150 <= held <= 150 - 1
 
 
 def test_all_intervals_hold_at_once() -> None:
     rng = np.random.default_rng(1)
     wrong = 0
-    for trial in range(200):
+    for trial in range(120):
         found = compare_scores(
             scores(rng, 40, 0, 0, 0, 0), settings=ComparisonSettings(bootstrap=200, seed=trial)
         )
         wrong += any(d.better for d in found.differences)
-    assert 1 <= wrong <= 22  # 10 expected; six intervals of their own would give about 40
+    assert 1 <= wrong <= 14  # 6 expected; six intervals of their own would give about 24
 
 
 def test_groups_keep_chance_from_being_taken_for_a_difference() -> None:
     rng = np.random.default_rng(2)
     labels = np.repeat(np.arange(12), 20)
     fooled, kept = 0, 0
-    for trial in range(60):
+    for trial in range(30):
         shared = 0.5 * rng.normal(size=12)[labels]
         table = {"a": shared + 0.1 * rng.normal(size=240), "b": np.zeros(240)}
         fooled += (
@@ -102,25 +102,23 @@ def test_groups_keep_chance_from_being_taken_for_a_difference() -> None:
             ).best
             is None
         )
-    assert fooled > 30
-    assert kept > 50
+    assert fooled > 15
+    assert kept > 24
 
 
 def test_notes_on_groups_that_are_few_unequal_or_of_single_rows() -> None:
     table = scores(np.random.default_rng(7), 200, 0, 0)
     sizes = {"equal": [8] * 25, "few": [20] * 10, "unequal": [100] + [4] * 25}
+    groups = {name: np.repeat(np.arange(len(own)), own) for name, own in sizes.items()}
+    groups |= {"lone": np.arange(200), "none": None}
     notes = {
-        name: compare_scores(
-            table, ComparisonSettings(bootstrap=100), groups=np.repeat(np.arange(len(own)), own)
-        ).notes
-        for name, own in sizes.items()
+        name: compare_scores(table, ComparisonSettings(bootstrap=100), groups=labels).notes
+        for name, labels in groups.items()
     }
-    assert notes["equal"] == ()
-    assert notes["few"] == ("of only 10 groups the uncertainties themselves are rough",)
-    assert "26 groups, no better than 3.8 equal ones, the" in notes["unequal"][0]
-    lone = compare_scores(table, ComparisonSettings(bootstrap=100), groups=np.arange(200)).notes
-    assert "each row has a group of its own" in lone[0]
-    assert not compare_scores(table, ComparisonSettings(bootstrap=100)).notes
+    assert notes["equal"] == notes["none"] == ()
+    names(notes["few"][0], "10 groups")
+    names(notes["unequal"][0], "26 groups", "3.8 equal")
+    names(notes["lone"][0], "group of its own")
 
 
 def test_a_fit_says_that_groups_are_of_single_rows() -> None:
@@ -163,16 +161,6 @@ def test_equal_models_and_a_single_row_of_difference() -> None:
     assert always.best == "a"
 
 
-def test_same_seed_same_result() -> None:
-    table = scores(np.random.default_rng(5), 50, 0, 0.1)
-    assert compare_scores(table, settings=ComparisonSettings(seed=3)) == compare_scores(
-        table, settings=ComparisonSettings(seed=3)
-    )
-    assert compare_scores(table, settings=ComparisonSettings(seed=3)) != compare_scores(
-        table, settings=ComparisonSettings(seed=4)
-    )
-
-
 def test_blocks_of_resamples_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
     table = np.random.default_rng(0).normal(size=(30, 2))
     monkeypatch.setattr("orbiflow.density.comparing.resampling.BLOCK_ENTRIES", 300)
@@ -186,24 +174,12 @@ def test_blocks_of_resamples_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (lambda: compare_scores({"a": [1.0] * 9}), "two models"),
         (lambda: compare_scores({"a": [1.0] * 4, "b": [2.0] * 4}), "rows 4"),
-        (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 8}), "rows"),
         (lambda: compare_scores({"a": [1.0] * 9, "b": [np.nan] * 9}), "scores b"),
         (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, groups=[1] * 8), "rows 9"),
         (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, groups=[1] * 9), "1 groups"),
-        (
-            lambda: compare_scores(
-                {"a": [1.0] * 9, "b": [2.0] * 9}, settings=ComparisonSettings(bootstrap=10)
-            ),
-            "bootstrap",
-        ),
-        (
-            lambda: compare_scores(
-                {"a": [1.0] * 9, "b": [2.0] * 9}, settings=ComparisonSettings(level=95)
-            ),
-            "level",
-        ),
         (lambda: compare_models({"a": DensityEstimator(), "b": DensityEstimator()}, []), "fitted"),
         (lambda: Groups.of("abc", 4), "label 4"),
+        (lambda: ComparisonSettings(bootstrap=10), "bootstrap"),
     ],
 )
 def test_mistakes(call: Any, message: str) -> None:

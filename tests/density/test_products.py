@@ -1,6 +1,5 @@
 """Spaces beside real and periodic columns, and chains on them: normalised, closed, fitted."""
 
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from density.blends import random_kernels as kernels_on
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
@@ -30,7 +30,6 @@ from orbiflow.density.fitting.kernels import fit_mixture
 from orbiflow.density.fitting.product_chains import fit_product_chains
 from orbiflow.density.fitting.tuned_widths import tuned_concentrations
 from orbiflow.density.models import ProductChains
-from orbiflow.density.regions import DensityLevels
 from orbiflow.errors import SettingError
 from refusals import refused
 
@@ -50,12 +49,9 @@ seeds = st.integers(0, 2**31)
 def random_kernels(name: str, seed: int, count: int = 12) -> tuple[Mixture, torch.Tensor]:
     """Kernels and a uniform part on a product, and some points of it."""
     space = ProductSpace(BASES[name], AXES)
-    noise = torch.Generator().manual_seed(seed)
-    points = space.uniform(count + 8, noise)
-    kappa = 1 + 30 * torch.rand(count, len(space.spheres), dtype=torch.float64, generator=noise)
-    weights = torch.rand(count, dtype=torch.float64, generator=noise) + 0.1
-    kernels = AdaptiveKernels(space, points[:count], kappa, weights / weights.sum())
-    return Mixture([kernels, UniformDensity(space)], [0.8, 0.2]), points[count:]
+    kernels = kernels_on(np.random.default_rng(seed), space, count, 1.0, 31.0)
+    points = space.uniform(8, torch.Generator().manual_seed(seed))
+    return Mixture([kernels, UniformDensity(space)], [0.8, 0.2]), points
 
 
 @given(names, seeds)
@@ -105,32 +101,6 @@ def test_a_conditional_is_the_ratio_of_joint_and_marginal(name: str, seed: int) 
             at = [space.columns.index(one) for one in part.feature_names_in_]
             assert sorted(part.feature_names_in_) == sorted(kept)
             assert part.score_samples(row[None, at])[0] == pytest.approx(expected, abs=1e-7)
-
-
-def test_the_integral_over_directions_and_all_reals_is_one() -> None:
-    space = ProductSpace(make_space("sphere", form="vector"), [(3.0, 2.0)])
-    mixture, _ = random_kernels("sphere", 0)
-    density = DensityEstimator.fitted(mixture).marginal("x", "y", "z", "beside1")
-    assert isinstance(density.space_, ProductSpace)
-    assert density.space_.beside == space.beside
-    # Gauss's rule in the height and even longitudes, times Gauss's rule on ever longer pieces
-    height, weights = np.polynomial.legendre.leggauss(28)
-    around = 2 * np.pi * (np.arange(56) + 0.5) / 56
-    z, angle = (own.ravel() for own in np.meshgrid(height, around, indexing="ij"))
-    across = np.sqrt(1 - z**2)
-    vectors = np.column_stack([across * np.cos(angle), across * np.sin(angle), z])
-    areas = np.repeat(weights, 56) * 2 * np.pi / 56
-    nodes, sizes = np.polynomial.legendre.leggauss(8)
-    ends = np.concatenate([[0.0], 0.5 * 1.8 ** np.arange(22)])
-    mass = 0.0
-    for side in (1, -1):
-        for low, high in pairwise(ends):
-            for node, size in zip(nodes, sizes, strict=True):
-                at = 3 + side * ((low + high) / 2 + (high - low) / 2 * node)
-                rows = np.column_stack([vectors, np.full(len(vectors), at)])
-                inside = np.exp(density.score_samples(rows)) @ areas
-                mass += float(inside) * size * (high - low) / 2
-    assert mass == pytest.approx(1, abs=2e-6)
 
 
 @given(names, seeds)
@@ -214,18 +184,13 @@ def test_columns_beside_come_last_or_have_names() -> None:
     with refused("3", "2", kind=SettingError):
         DensityEstimator("sphere", columns=dict.fromkeys((0, 1), "linear"), **how).fit(rows[:, :3])
     with refused("meaning", "together"):
-        fit.marginal("x", "depth")
-    with refused("meaning", "together"):
         fit.conditional(x=1.0)
     with refused("marginal", "densities"):
         fit.mean()
     assert fit.marginal("depth").mean().shape == (1,)
-    with refused("period", "0"):
-        ProductSpace(make_space("sphere"), [-1.0])
-    with refused("torus"):
-        ProductSpace(make_space("torus"), [24.0])
-    with refused("period"):
-        ProductSpace(make_space("sphere"), [None])
+    for base, beside, about in (("sphere", -1.0, "period"), ("torus", 24.0, "torus")):
+        with refused(about):
+            ProductSpace(make_space(base), [beside])
 
 
 @given(st.floats(0.1, 1e4), seeds)
@@ -242,21 +207,6 @@ def test_a_period_of_its_own_is_a_unit(period: float, seed: int) -> None:
     points = space.to_chart(values)
     ratio = one.log_prob(points, measure="natural") - other.log_prob(points, measure="natural")
     np.testing.assert_allclose(ratio, np.log(2 * np.pi / period), atol=1e-9)
-
-
-@given(names, seeds)
-def test_regions_hold_their_mass_and_sizes_are_integrals(name: str, seed: int) -> None:
-    mixture, _ = random_kernels(name, seed, 3)
-    levels = DensityLevels(mixture, samples=4000)
-    found = levels.highest(0.6)
-    drawn = mixture.sample((4000,), torch.Generator().manual_seed(1))
-    logs = mixture.log_prob(drawn, measure="natural")
-    inside = logs >= found.log_prob
-    assert float(inside.double().mean()) == pytest.approx(0.6, abs=0.06)
-    # the mean of 1 / p over the density is the size
-    size = float((-logs[inside]).exp().sum()) / len(logs)
-    assert found.size == pytest.approx(size, rel=0.15)
-    assert found.fraction is None
 
 
 def test_widths_are_tuned_where_columns_have_nothing_in_common() -> None:

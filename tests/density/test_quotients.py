@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from density.blends import random_kernels
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
@@ -56,10 +57,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def some_kernels(space: Space, seed: int = 0, count: int = 5) -> AdaptiveKernels:
-    generator = torch.Generator().manual_seed(seed)
-    kappa = 0.5 + 4 * torch.rand(count, space.dim, generator=generator, dtype=torch.float64)
-    weights = torch.rand(count, generator=generator, dtype=torch.float64)
-    return AdaptiveKernels(space, space.uniform(count, generator), kappa, weights / weights.sum())
+    return random_kernels(np.random.default_rng(seed), space, count, 0.5, 4.5)
 
 
 def some_flow(space: Space, seed: int = 0) -> Flow:

@@ -230,19 +230,6 @@ def test_usual_values_are_no_heaps() -> None:
     assert not any(repeats_of(sphere, sphere.to_chart(stations)).heaps)
 
 
-@pytest.mark.parametrize("unit", ["degrees", "radians"])
-def test_points_of_the_compass_are_enough(unit: str) -> None:
-    """Eight directions, which stand for eighths of the circle."""
-    turn = 360.0 if unit == "degrees" else 2 * np.pi
-    angles = np.random.default_rng(9).vonmises(1.0, 1.0, 2000) / (2 * np.pi)
-    rows = (rounded(angles, 1 / 8) * turn)[:, None]
-    estimator = DensityEstimator("torus", unit=unit, components=("kernels", "mixture"))
-    with warned("brings", kind=DataWarning):
-        estimator.fit(rows)
-    peak = np.exp(estimator.score_samples([[turn / (2 * np.pi)]])) * turn / (2 * np.pi)
-    assert float(peak[0]) == pytest.approx(np.e / (2 * np.pi * 1.26607), rel=0.15)
-
-
 @pytest.mark.parametrize(("step", "values"), [(45.0, 7), (45.0, 5), (30.0, 7), (22.5, 6)])
 def test_some_points_of_the_compass_are_enough(step: float, values: int) -> None:
     """Of 8 points of the compass some may not occur."""

@@ -1,6 +1,7 @@
 """Rows that count more than others, and rows that belong together."""
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -173,7 +174,7 @@ def test_equal_weights_are_none(options: dict[str, object]) -> None:
     assert first.report_.effective is second.report_.effective is None
 
 
-@pytest.mark.parametrize("space", ["torus", "sphere", "klein-bottle", "projective-plane"])
+@pytest.mark.parametrize("space", ["torus", "projective-plane"])
 def test_a_fit_follows_its_weights(space: str) -> None:
     """Of two clusters, one weighs nine times the other; and rows of weight 0 are not there."""
     rng = np.random.default_rng(1)
@@ -190,17 +191,6 @@ def test_a_fit_follows_its_weights(space: str) -> None:
     ghosts = np.concatenate([data, data[::-1]]), np.concatenate([weights, np.zeros(100)])
     again = DensityEstimator(made, components="kernels").fit(ghosts[0], sample_weight=ghosts[1])
     assert density_to_bytes(again.density_) == density_to_bytes(some.density_)
-
-
-def test_the_score_is_the_weighted_mean() -> None:
-    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
-    fit = DensityEstimator("torus", components="kernels").fit(angles)
-    weights = np.arange(60.0)
-    own = fit.score_samples(angles)
-    assert fit.score(angles, sample_weight=weights) == pytest.approx(
-        np.average(own, weights=weights)
-    )
-    assert fit.score(angles) == pytest.approx(own.mean())
 
 
 @pytest.mark.parametrize(
@@ -241,13 +231,7 @@ LABELS_PLACES = pandas.DataFrame(
 TURNS = pandas.DataFrame(RNG.normal(0, 0.5, (ROWS, 3)), NAMES, ["rx", "ry", "rz"])
 WEIGHTS = pandas.Series(RNG.uniform(0, 3, ROWS), NAMES)
 GROUPS = pandas.Series(RNG.integers(0, 12, ROWS), NAMES)
-KIND: Any = {"unit": "degrees", "components": "mixture"}
-MODEL = DensityEstimator(**KIND).fit(ANGLES)
-OTHER = DensityEstimator(**KIND).fit(ANGLES + 30)
-SCORES = {
-    "a": pandas.Series(MODEL.score_samples(ANGLES), NAMES),
-    "b": pandas.Series(OTHER.score_samples(ANGLES), NAMES),
-}
+KIND: Any = {"unit": "degrees", "components": "mixture", "effort": "fast"}
 TORUS = make_space("torus", axes=2, unit="degrees")
 POINTS = pandas.DataFrame(TORUS.to_chart(ANGLES).numpy(), NAMES)
 
@@ -273,10 +257,16 @@ def fitted_in_the_chart(weights: Any, groups: Any) -> Any:
     return found.log_prob(TORUS.to_chart(ANGLES)).sum().item()
 
 
+@cache
+def models() -> dict[str, DensityEstimator]:
+    return {name: DensityEstimator(**KIND).fit(ANGLES + k) for name, k in (("a", 0), ("b", 30))}
+
+
 def compared(weights: Any, groups: Any) -> Any:
-    moved = {name: one if name == "a" else one[weights.index] for name, one in SCORES.items()}
-    found = compare_scores(moved, weights=weights + 0.1, groups=groups)
-    return found, compare_models({"a": MODEL, "b": OTHER}, ANGLES, groups=groups)
+    scores = {k: pandas.Series(m.score_samples(ANGLES), NAMES) for k, m in models().items()}
+    scores["b"] = scores["b"][weights.index]
+    found = compare_scores(scores, weights=weights + 0.1, groups=groups)
+    return found, compare_models(models(), ANGLES, groups=groups)
 
 
 def sampled(weights: Any, groups: Any) -> Any:
@@ -306,8 +296,10 @@ def test_labels_are_aligned_or_refused(call: Any) -> None:
         call(WEIGHTS, twice)
 
 
-@pytest.mark.parametrize("call", CALLS)
-@pytest.mark.parametrize("gap", [np.nan, None, pandas.NA, ""])
+@pytest.mark.parametrize(
+    ("call", "gap"),
+    [*((call, None) for call in CALLS), *((fitted, g) for g in (np.nan, pandas.NA, ""))],
+)
 def test_rows_without_a_group_are_refused(call: Any, gap: Any) -> None:
     groups = GROUPS.astype(object)
     groups.iloc[[4, 9]] = gap

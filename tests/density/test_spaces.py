@@ -20,7 +20,7 @@ from orbiflow.density import (
     to_vectors,
 )
 from orbiflow.density.spaces import clear_rotation
-from orbiflow.density.spaces.round import NULL3, K, from_sphere, log_area, thetas, to_sphere
+from orbiflow.density.spaces.round import NULL3, K, log_area, thetas, to_sphere
 from refusals import refused
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
@@ -171,10 +171,6 @@ def test_options_that_are_none() -> None:
 ROUND_SPACES = (Sphere(), ProjectivePlane())
 
 
-def square_of_bijections(seed: int, count: int = 200) -> torch.Tensor:
-    return torch.tensor(np.random.default_rng(seed).random((count, 2)))
-
-
 def gap(one: torch.Tensor, other: torch.Tensor, power: int) -> float:
     """Largest distance of unit vectors, or of axes."""
     distance = (one - other).norm(dim=-1)
@@ -212,10 +208,7 @@ def test_it_is_the_elliptic_function_of_the_design(x: float, y: float) -> None:
 
 @pytest.mark.parametrize("space", ROUND_SPACES, ids=lambda s: s.name)
 @given(seed=seeds)
-def test_there_and_back(space, seed: int) -> None:
-    points = square_of_bijections(seed)
-    back = space.project(torch.tensor(from_sphere(space.vectors(points), space.power)))
-    assert float((back - points).abs().max()) < 1e-10
+def test_every_vector_has_a_place(space, seed: int) -> None:
     vectors = torch.randn(200, 3, generator=torch.Generator().manual_seed(seed)).double()
     vectors = vectors / vectors.norm(dim=1, keepdim=True)
     again = torch.tensor(space.vectors(space.vectors_to_chart(vectors.numpy())))
@@ -225,7 +218,7 @@ def test_there_and_back(space, seed: int) -> None:
 @pytest.mark.parametrize("space", ROUND_SPACES, ids=lambda s: s.name)
 @given(seed=seeds)
 def test_the_area_factor_is_the_jacobian(space, seed: int) -> None:
-    points = square_of_bijections(seed, 20).requires_grad_()
+    points = square(seed, 20).requires_grad_()
     vectors = to_sphere(points, space.power)
     rows = [
         torch.autograd.grad(vectors[:, i].sum(), points, retain_graph=True)[0] for i in range(3)
@@ -246,20 +239,6 @@ def test_the_area_is_that_of_the_space(space, area: float) -> None:
     grid = torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1)
     assert float(log_area(grid, space.power).exp().mean()) == pytest.approx(area, abs=1e-10)
     assert space.volume == area
-
-
-@pytest.mark.parametrize("space", ROUND_SPACES, ids=lambda s: s.name)
-@given(seed=seeds)
-def test_both_are_invariant_under_the_group(space, seed: int) -> None:
-    points = square_of_bijections(seed, 50)
-    rng = np.random.default_rng(seed)
-    images = space.group.images(points) + torch.tensor(2.0 * rng.integers(-3, 4, (4, 1, 2)))
-    spread = space.log_area(images) - space.log_area(points)
-    assert float(spread.abs().max()) < 1e-9
-    for image in space.project(images):
-        assert (
-            gap(to_sphere(image, space.power), to_sphere(points, space.power), space.power) < 1e-10
-        )
 
 
 @pytest.mark.parametrize("space", ROUND_SPACES, ids=lambda s: s.name)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import optimize, special, stats
+from scipy import optimize, stats
 from scipy.stats import kstest
 
 from orbiflow.density import summarize_angles, summarize_axes, summarize_directions, uniformity
-from orbiflow.density.fitting import concentration
 from orbiflow.density.summaries import kuiper_p, watson_p
 from orbiflow.density.uniformity import rao_p
 from refusals import refused
@@ -133,15 +132,9 @@ def test_against_scipy_and_turned(angles: list[float], turn: float) -> None:
         assert getattr(other, name) == pytest.approx(getattr(one, name), abs=1e-6)
 
 
-@given(st.floats(1e-3, 1e4), st.sampled_from([2, 3]))
-def test_concentrations_are_likeliest(kappa: float, width: int) -> None:
-    ratio = special.ive(width / 2, kappa) / special.ive(width / 2 - 1, kappa)
-    assert concentration(float(ratio), width) == pytest.approx(kappa, rel=1e-4)
-
-
 def test_intervals_hold() -> None:
     """Of rows and of groups, intervals of 90 % hold the truth in about 90 % of cases."""
-    rng, held, trials = np.random.default_rng(1), np.zeros(2), 80
+    rng, held, trials = np.random.default_rng(1), np.zeros(2), 40
     labels = np.arange(200) // 5
     for _ in range(trials):
         rows = rng.vonmises(1.0, 1.5, 200)
@@ -151,13 +144,13 @@ def test_intervals_hold() -> None:
             assert one.mean is not None
             assert one.half_width is not None
             held[k] += abs(math.remainder(one.mean - 1, 2 * math.pi)) < one.half_width
-    assert (abs(held / trials - 0.9) < 0.08).all(), held
+    assert (abs(held / trials - 0.9) < 0.1).all(), held
 
 
 def test_groups_are_no_evidence_of_a_direction() -> None:
     rng, naive, right = np.random.default_rng(2), 0, 0
     labels = np.arange(120) // 6
-    for _ in range(60):
+    for _ in range(30):
         angles = np.repeat(rng.uniform(0, 2 * np.pi, 20), 6) + rng.normal(0, 0.1, 120)
         angles %= 2 * np.pi
         (alone,), _ = summarize_angles(angles, unit="radians")
@@ -165,8 +158,8 @@ def test_groups_are_no_evidence_of_a_direction() -> None:
         assert (grouped.kuiper_p, grouped.watson_p) == (None, None)
         naive += (alone.rayleigh_p or 0) < 0.05
         right += (grouped.rayleigh_p or 0) < 0.05
-    assert naive > 21
-    assert right < 8
+    assert naive > 10
+    assert right < 5
 
 
 def test_weights_are_repeated_rows() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -13,11 +13,10 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
-from density.blends import kernels_of
+from density.blends import kernels_of, random_kernels
 from orbiflow.density import (
     AdaptiveKernels,
     CubicOrientations,
@@ -52,7 +51,6 @@ SPACES: tuple[UnitVectorSpace, ...] = (
 every = pytest.mark.parametrize("space", SPACES, ids=repr)
 spaces = st.sampled_from(SPACES)
 dims = st.integers(1, 64)
-logs = st.floats(math.log(0.005), math.log(1e7))
 
 
 def source(seed: int) -> torch.Generator:
@@ -60,11 +58,7 @@ def source(seed: int) -> torch.Generator:
 
 
 def kernels(space: Space, seed: int, low: float = 1.0, high: float = 60.0) -> AdaptiveKernels:
-    """Four random kernels."""
-    generator = source(seed)
-    kappa = low + (high - low) * torch.rand(4, 1, dtype=torch.float64, generator=generator)
-    weights = torch.rand(4, dtype=torch.float64, generator=generator) + 0.1
-    return AdaptiveKernels(space, space.uniform(4, generator), kappa, weights / weights.sum())
+    return random_kernels(np.random.default_rng(seed), space, 4, low, high)
 
 
 def one_kernel(dim: int, kappa: float) -> AdaptiveKernels:
@@ -72,34 +66,6 @@ def one_kernel(dim: int, kappa: float) -> AdaptiveKernels:
     pole = torch.eye(dim + 1, dtype=torch.float64)[-1:]
     one = torch.ones(1, dtype=torch.float64)
     return AdaptiveKernels(space, pole, kappa * one[:, None], one)
-
-
-@settings(max_examples=25)
-@given(dim=dims, log=logs)
-def test_the_peak_of_a_kernel_is_exact_at_any_concentration(dim: int, log: float) -> None:
-    kappa = math.exp(log)
-    found = float(one_kernel(dim, kappa).log_prob(torch.eye(dim + 1, dtype=torch.float64)[-1]))
-    with mpmath.workdps(40):
-        order = mpmath.mpf(dim - 1) / 2
-        bessel = mpmath.log(mpmath.besseli(order, kappa))
-        wanted = (
-            order * mpmath.log(kappa) - (order + 1) * mpmath.log(2 * mpmath.pi) - bessel + kappa
-        )
-    assert found == pytest.approx(float(wanted), rel=1e-12, abs=1e-12)
-
-
-@pytest.mark.parametrize("dim", [1, 3, 20])
-@pytest.mark.parametrize("kappa", [0.01, 3.0, 400.0])
-def test_a_kernel_integrates_to_one(dim: int, kappa: float) -> None:
-    density, belt = one_kernel(dim, kappa), Hypersphere(dim - 1).volume if dim > 1 else 2.0
-
-    def ring(angle: float) -> float:
-        at = torch.zeros(dim + 1, dtype=torch.float64)
-        at[0], at[-1] = math.sin(angle), math.cos(angle)
-        return float(density.log_prob(at).exp()) * belt * math.sin(angle) ** (dim - 1)
-
-    total = quad(ring, 0, min(math.pi, 12 * (dim / kappa) ** 0.5), limit=200)[0]
-    assert total == pytest.approx(1, abs=1e-9)
 
 
 @given(space=spaces, seed=seeds)
@@ -186,7 +152,7 @@ def test_two_dimensions_are_the_sphere_and_rotations_are_projective_space() -> N
         assert one.volume == pytest.approx(other.volume)
 
 
-@pytest.mark.parametrize("dim", [2, 3, 5, 7, 9])
+@pytest.mark.parametrize("dim", [2, 5, 9])
 def test_kernels_are_neither_spikes_nor_flat_in_any_dimension(dim: int) -> None:
     truth = one_kernel(dim, 8.0 * dim)
     data, fresh = truth.sample(300, source(dim)), truth.sample(500, source(99))
@@ -280,35 +246,6 @@ def test_hostile_files_are_refused(options: dict[str, object], message: str, tmp
         read_density(path)
 
 
-@settings(max_examples=5)
-@given(seed=seeds, symmetry=st.sampled_from(["C1", "D2", "D6", "T", "O"]))
-def test_forms_of_rotations_agree_and_symmetry_acts_from_the_right(
-    seed: int, symmetry: str
-) -> None:
-    turns, group = (
-        Rotation.random(20, random_state=seed),
-        Rotation.create_group(cast(Any, symmetry)),
-    )
-    spaces = {
-        form: RotationSpace(form=form, unit="degrees", symmetry=symmetry)
-        for form in ("quaternion", "vector", "matrix", "ZXZ", "xyz")
-    }
-    wanted = spaces["quaternion"].to_chart(turns.as_quat())
-    for data in (turns.as_matrix().reshape(-1, 9), turns.as_rotvec(degrees=True)):
-        assert torch.allclose(spaces["vector"].to_chart(data), wanted, atol=1e-9)
-    euler = turns.as_euler("ZXZ", degrees=True)
-    assert torch.allclose(spaces["ZXZ"].to_chart(euler), wanted, atol=1e-9)
-    for space in spaces.values():
-        assert torch.allclose(space.to_chart(space.from_chart(wanted)), wanted, atol=1e-9)
-        assert space.from_chart(wanted).shape == (20, len(space.columns))
-    for element in group:
-        turned = spaces["quaternion"].to_chart((turns * element).as_quat())
-        assert torch.allclose(turned, wanted, atol=1e-9)
-    # of all images, the one that is kept has the smallest angle
-    least = np.min([(turns * element).magnitude() for element in group], axis=0)
-    assert Rotation.from_quat(wanted.numpy()).magnitude() == pytest.approx(least, abs=1e-4)
-
-
 @given(space=spaces, seed=seeds)
 def test_gradients_are_slopes_along_the_sphere(space: UnitVectorSpace, seed: int) -> None:
     density = kernels(space, seed)
@@ -381,7 +318,5 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(tmp_path: P
     assert len(found["regions"]) == 2  # pyright: ignore[reportArgumentType]
     with refused("angles", "torus"):
         run("marginal", model=folder, out=tmp_path / "marginal", columns=("rx",))
-    with refused("hypersphere"):
-        run("summary", data=table, space="hypersphere")
     with refused("GeoJSON"):
         run("region", model=folder, out=tmp_path / "regions.geojson")
