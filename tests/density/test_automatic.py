@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from density.blends import kernels_of
+from density.blends import kernels_of, two_clusters
 from orbiflow.density import (
-    Density,
     DensityEstimator,
     DensitySettings,
     FlowDensity,
@@ -21,9 +20,7 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
-from orbiflow.density.fitting import COMPONENTS, KNOWN
-from orbiflow.density.fitting.parametric import families_of
-from orbiflow.density.fitting.settings import PARAMETRIC
+from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.models import midpoints
 from refusals import refused
 
@@ -33,10 +30,7 @@ QUICK: dict[str, Any] = {
 
 
 def smooth(name: str, count: int = 300, seed: int = 0) -> torch.Tensor:
-    """Two broad clusters."""
-    rng = np.random.default_rng(seed)
-    centers = np.where(rng.random((count, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]])
-    return make_space(name).project(torch.tensor(centers + 0.1 * rng.normal(size=(count, 2))))
+    return two_clusters(make_space(name), count, seed)
 
 
 @pytest.mark.parametrize("name", ["torus", "projective-plane"])
@@ -75,17 +69,9 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path, request: pytest.FixtureReq
         assert torch.equal(back.log_prob(grid), values)
     draws = [d.sample((50,), torch.Generator().manual_seed(0)) for d in (density, back)]
     assert torch.equal(*draws)
-
-
-@pytest.mark.parametrize("name", ["torus", "projective-plane"])
-def test_it_is_invariant_and_has_gradients(name: str) -> None:
-    space = make_space(name)
-    density, _ = fit_automatic(space, smooth(name, 150), DensitySettings(seed=3))
-    points = torch.rand(20, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
     for element in space.group.cosets:
-        one, other = (density.log_prob(space.project(p)) for p in (element(points), points))
-        assert torch.allclose(one, other, atol=1e-7)
-    assert torch.autograd.gradcheck(density.log_prob, (points[:3].requires_grad_(),), atol=1e-4)
+        image = density.log_prob(space.project(element(draws[0])))
+        torch.testing.assert_close(image, density.log_prob(draws[0]), rtol=0, atol=1e-7)
 
 
 def test_the_same_seed_gives_the_same_density() -> None:
@@ -134,6 +120,7 @@ def test_each_part_alone(part: str) -> None:
     estimator.fit(angles)
     assert [p.name for p in estimator.report_.components] == [part]
     assert estimator.score(angles) > -dim * math.log(2 * math.pi) + 0.5
+    assert [len(estimator.density_.sample((count,))) for count in (0, 1, 3)] == [0, 1, 3]
 
 
 def test_a_flow_alone_is_a_flow() -> None:
@@ -143,23 +130,9 @@ def test_a_flow_alone_is_a_flow() -> None:
     assert type(found) is FlowDensity
 
 
-@pytest.fixture(scope="module", name="of_the_torus")
-def of_the_torus_fixture() -> Density:
-    return fit_automatic(Torus(2), smooth("torus", 120))[0]
-
-
-@pytest.mark.parametrize("count", [0, 1, 3, 100])
-def test_any_number_of_samples(count: int, of_the_torus: Density) -> None:
-    density = of_the_torus
-    generator = torch.Generator().manual_seed(0)
-    drawn = density.sample((count,), generator)
-    assert drawn.shape == (count, 2)
-    assert bool(((drawn >= 0) & (drawn <= 1)).all())
-
-
 @pytest.mark.usefixtures("whole_fits")
-@pytest.mark.parametrize("count", [10, 15])
-def test_few_points(count: int) -> None:
+def test_few_points() -> None:
+    count = 10
     points = smooth("torus", count)
     density, report = fit_automatic(Torus(2), points)
     assert report.validation == count
@@ -182,13 +155,6 @@ def test_what_cannot_be_chosen_is_refused() -> None:
         )
     with refused("different", "10", "3", "30"):
         fit_automatic(make_space("torus"), torch.rand(3, 2).repeat(10, 1))
-
-
-def test_the_components_are_those_that_choose_and_the_families() -> None:
-    assert COMPONENTS == ("flow", "kernels", "mixture", "chains", "network")
-    assert (*COMPONENTS, *PARAMETRIC) == KNOWN
-    spaces = ("torus", "sphere", "projective-plane", "rotation-space")
-    assert {name for space in spaces for name in families_of(make_space(space))} == set(PARAMETRIC)
 
 
 def test_parts_for_new_groups() -> None:

@@ -10,24 +10,22 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import random_chains
 from orbiflow.density import Torus, VonMisesChains
 from orbiflow.density.fitting import Rows
-from orbiflow.density.fitting.chains import concentration, fit_chain_mixture, spread_chains
-from orbiflow.density.models import SCALES, chained, midpoints
-from orbiflow.errors import OrbiflowError
+from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
+from orbiflow.density.models import SCALES, midpoints
 from refusals import refused
 
 seeds = st.integers(0, 2**31 - 1)
 dims = st.integers(1, 5)
 
 
-def random_mixture(dim: int, seed: int, count: int = 4, most: float = 30.0) -> VonMisesChains:
-    rng = np.random.default_rng(seed)
-    weights = rng.dirichlet(np.ones(count * len(SCALES))).reshape(count, -1)
-    order = torch.tensor(rng.permuted(np.tile(np.arange(dim), (count, 1)), axis=1))
-    means = torch.tensor(rng.normal(size=(count, dim, 1 + 2 * dim))) * chained(order)
-    kappa = torch.tensor(rng.uniform(0, most, (count, dim)))
-    return VonMisesChains(Torus(dim), torch.tensor(np.log(weights)), means, kappa, order)
+def random_mixture(dim: int, seed: int, most: float = 30.0) -> VonMisesChains:
+    """Components in random orders, some of which are almost even."""
+    chains = random_chains(np.random.default_rng(seed), Torus(dim), 4)
+    kappa = chains.concentrations * most / 12
+    return VonMisesChains(chains.space, chains.log_weights, chains.means, kappa, chains.order)
 
 
 def points(count: int, dim: int, seed: int) -> torch.Tensor:
@@ -39,7 +37,6 @@ def points(count: int, dim: int, seed: int) -> torch.Tensor:
 def test_mixture_samples_follow_its_density(seed: int) -> None:
     mixture = random_mixture(2, seed, most=5.0)
     drawn = mixture.sample(20_000, torch.Generator().manual_seed(seed))
-    assert torch.equal(drawn, mixture.sample(20_000, torch.Generator().manual_seed(seed)))
     cells = 8
     grid = midpoints(mixture.space, 160)
     number = lambda x: ((x * cells).long() % cells) @ torch.tensor([cells, 1])  # noqa: E731
@@ -74,13 +71,6 @@ def test_orders_are_checked() -> None:
         VonMisesChains(*parts, good.order.flip(1))
 
 
-@given(st.lists(st.floats(0.01, 0.9999), min_size=1, max_size=5))
-def test_concentration_inverts_the_bessel_ratio(resultants: list[float]) -> None:
-    r = torch.tensor(resultants, dtype=torch.float64)
-    kappa = concentration(r)
-    assert torch.allclose(torch.special.i1e(kappa) / torch.special.i0e(kappa), r, atol=1e-6)
-
-
 @settings(max_examples=4)
 @given(dims, seeds)
 def test_log_prob_is_periodic(dim: int, seed: int) -> None:
@@ -107,22 +97,19 @@ def test_storage_is_bit_equal(dim: int, seed: int) -> None:
     assert torch.equal(again.log_prob(at), mixture.log_prob(at))
 
 
-@pytest.mark.parametrize("change", [{"components": 5}, {"components": -1}, {"scales": [1.0]}])
-def test_hostile_headers_are_rejected(change: dict[str, Any]) -> None:
-    mixture = random_mixture(3, 0)
-    with pytest.raises(OrbiflowError, match=r"shape|integer|scales"):
-        VonMisesChains.from_header(Torus(3), {**mixture.header(), **change}, mixture.tensors())
-
-
-def test_hostile_tensors_are_rejected() -> None:
+def test_hostile_headers_and_tensors_are_refused() -> None:
     mixture, space = random_mixture(3, 0), Torus(3)
     header, tensors = mixture.header(), mixture.tensors()
+    changes: list[dict[str, Any]] = [{"components": 5}, {"components": -1}, {"scales": [1.0]}]
+    for change in changes:
+        with refused():
+            VonMisesChains.from_header(space, {**header, **change}, tensors)
     for name, own in tensors.items():
         others = {k: v for k, v in tensors.items() if k != name}
         with refused("missing"):
             VonMisesChains.from_header(space, header, others)
         for value in (own + math.nan, 1 - 2 * own.abs() - 9, own[:, :1], own.long()):
-            with pytest.raises(OrbiflowError):
+            with refused():
                 VonMisesChains.from_header(space, header, {**others, name: value})
 
 

@@ -1,7 +1,5 @@
 """Density: normalised, invariant, continuous over the seams, sampled as it says."""
 
-import math
-
 import numpy as np
 import pytest
 import scipy.stats
@@ -20,11 +18,10 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
 )
-from orbiflow.density.models import kl_by_quadrature, midpoints
+from orbiflow.density.models import midpoints
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from refusals import refused
-from strategies import neural_field
 
 SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
@@ -53,10 +50,9 @@ def on_a_plain_grid(density: Density, side: int = 64) -> float:
 
 
 @every
-@pytest.mark.parametrize("base", [UniformDensity, bump])
 @settings(max_examples=2)
-@given(seed=seeds)
-def test_it_integrates_to_one(space, base, seed: int) -> None:
+@given(seed=seeds, base=st.sampled_from([UniformDensity, bump]))
+def test_it_integrates_to_one(space, seed: int, base) -> None:
     density = make(space, seed, base=base)
     assert on_a_plain_grid(density) == pytest.approx(1.0, abs=1e-3)
     assert density.mass(32) == pytest.approx(1.0, abs=1e-3)
@@ -86,34 +82,8 @@ def test_log_prob_is_invariant_under_the_group(space, seed: int) -> None:
 
 
 @every
-@settings(max_examples=4)
-@given(seed=seeds, side=st.integers(0, 3), t=st.floats(0.02, 0.98))
-def test_it_is_continuous_over_every_edge(space, seed: int, side: int, t: float) -> None:
-    edge = [(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)][side]
-    outward = [(0.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)][side]
-    steps = torch.tensor([-1e-6, 1e-6], dtype=torch.float64)[:, None]
-    across = torch.tensor([edge]).double() + steps * torch.tensor([outward]).double()
-    canonical = space.project(across)  # one of them lies at another edge now
-    assert float(space.distance(canonical[0], canonical[1])) < 1e-5
-    values = make(space, seed).log_prob(canonical, measure="natural").detach()
-    assert float(values[0] - values[1]) == pytest.approx(0.0, abs=1e-3)
-
-
-@every
-@settings(max_examples=3)
-@given(seed=seeds)
-def test_the_flow_and_back(space, seed: int) -> None:
-    density = make(space, seed)
-    points = density.sample((50,), torch.Generator().manual_seed(seed % 2**31))
-    again = space.project(density.flow(density.flow.inverse(points))).detach()
-    # an integrator's inverse is that of its order
-    assert float(space.distance(points, again).max()) < 1e-4
-
-
-@every
-@pytest.mark.parametrize("base", [UniformDensity, bump])
-def test_samples_follow_the_density(space, base) -> None:
-    density = make(space, 7, base=base, strength=0.12)
+def test_samples_follow_the_density(space) -> None:
+    density = make(space, 7, base=bump, strength=0.12)
     count, cells = 12_000, 6
     points = density.sample((count,), torch.Generator().manual_seed(1))
     assert bool(((points >= 0) & (points <= 1)).all())
@@ -134,28 +104,9 @@ def test_gradients_reach_the_parameters() -> None:
     assert all(float(g.norm()) > 0 for g in torch.autograd.grad(loss, parameters))
 
 
-def test_any_network_serves_as_a_field() -> None:
-    space = Torus(3)
-    field = neural_field(space.group, hidden=(8,), seed=1)
-    torch.nn.init.normal_(list(field.parameters())[-2], std=0.05)
-    density = FlowDensity(space, Flow(field, steps=4))
-    points = square(0, 20, 3)
-    start, log_det = (t.detach() for t in density.flow.inverse_and_log_det(points))
-    assert torch.allclose(density.log_prob(points).detach(), log_det)
-    jacobian = torch.autograd.functional.jacobian(lambda x: density.flow.inverse(x), points[0])
-    assert float(torch.linalg.slogdet(jacobian.detach())[1]) == pytest.approx(
-        float(log_det[0]), abs=1e-4
-    )
-    assert density.sample((5,)).shape == (5, 3)
-    assert torch.allclose(space.project(density.flow(start)).detach(), points, atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("space", "measure"),
-    [*((space, None) for space in SPACES), *zip(SPACES, MEASURES, strict=False)],
-)
-def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str | None) -> None:
-    density, named = make(space, 1), {} if measure is None else {"measure": measure}
+@pytest.mark.parametrize(("space", "measure"), list(zip(SPACES, MEASURES, strict=False)))
+def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str) -> None:
+    density, named = make(space, 1), {"measure": measure}
     found = density.entropy(200, generator=torch.Generator().manual_seed(5), **named)
     with torch.no_grad():
         drawn = density.sample((200,), torch.Generator().manual_seed(5))
@@ -165,21 +116,6 @@ def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str | None) -> No
     exact = -float((square.exp() * same).mean())
     many = density.entropy(3_000, generator=torch.Generator().manual_seed(6), **named)
     assert float(many) == pytest.approx(exact, abs=0.05)
-
-
-def test_entropy_and_divergence() -> None:
-    flat = FlowDensity(Sphere(), make(Sphere(), 0, strength=0.0).flow)
-    generator = torch.Generator().manual_seed(0)
-    natural = flat.entropy(100, measure="natural", generator=generator)
-    assert float(natural) == pytest.approx(math.log(4 * math.pi))
-    one, other = make(Torus(2), 1), make(Torus(2), 2)
-    grid = midpoints(Torus(2), 64)
-    with torch.no_grad():
-        exact = kl_by_quadrature(one.log_prob(grid).exp(), other.log_prob(grid))
-        points = one.sample(20_000, generator)
-        drawn = float((one.log_prob(points) - other.log_prob(points)).mean())
-    assert exact > 0.01
-    assert drawn == pytest.approx(exact, rel=0.1)
 
 
 def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:

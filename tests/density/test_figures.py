@@ -59,14 +59,14 @@ def test_entropies_and_divergences_lie_within_their_errors(kappa: float) -> None
 
 
 def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> None:
-    drawn = pair.sample(40_000, random_state=0)
+    drawn = pair.sample(10_000, random_state=0)
     directions = np.angle(np.exp(1j * drawn).mean(axis=0))
-    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.02
+    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.04
     top = pair.score_samples(pair.mode()[None])
     assert top[0] >= pair.score_samples(drawn[:5000]).max() - 1e-9
     alone = pair.marginal(0)
     shares = np.sort(alone.cdf(drawn[:, :1]))
-    assert np.abs(shares - (np.arange(40_000) + 0.5) / 40_000).max() < 0.015
+    assert np.abs(shares - (np.arange(10_000) + 0.5) / 10_000).max() < 0.02
     assert np.allclose(
         alone.cdf(alone.quantile([0.1, 0.5, 0.9])[:, None]), [0.1, 0.5, 0.9], atol=1e-6
     )

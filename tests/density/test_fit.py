@@ -8,6 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import two_clusters
 from orbiflow.density import (
     FlowDensity,
     FlowSettings,
@@ -31,13 +32,6 @@ SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**31 - 1)
 QUICK = FlowSettings(max_frequency=3, segments=2, iterations=8, roughness=(1e-3,))
-
-
-def blob(space, count: int = 600, seed: int = 0) -> torch.Tensor:
-    """Points about (0.3, 0.6) and their opposite corner, projected."""
-    rng = np.random.default_rng(seed)
-    center = np.where(rng.random((count, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]])
-    return space.project(torch.tensor(center + 0.1 * rng.normal(size=(count, 2))))
 
 
 @every
@@ -81,7 +75,7 @@ def test_the_gradient_of_the_objective(seed: int) -> None:
     space = Sphere()
     fields = [FourierField(space.group, 3, smoothness=1.0) for _ in range(2)]
     density = FlowDensity(space, Flow(fields, steps=2, warn=False), UniformDensity(space))
-    objective = Objective(density, Rows(blob(space, 30)), roughness=1e-3)
+    objective = Objective(density, Rows(two_clusters(space, 30)), roughness=1e-3)
     rng = np.random.default_rng(seed)
     at, along = 0.05 * rng.normal(size=(2, len(objective.get())))
     loss, gradient = objective(at)
@@ -92,14 +86,14 @@ def test_the_gradient_of_the_objective(seed: int) -> None:
 
 @every
 def test_a_fit_is_no_worse_than_its_start_and_normalised(space) -> None:
-    density, report = fit_density(space, blob(space), QUICK)
+    density, report = fit_density(space, two_clusters(space, 600), QUICK)
     assert report.validation_nll < report.start_nll + 0.01
     assert report.validation_nll < -0.5  # 0 is the even density of the square
     assert report.mass == pytest.approx(1.0, abs=1e-3)
     assert report.integration_error < 1e-3
     assert report.notes == ()
     assert (report.train, report.validation, report.duplicates) == (540, 60, 0)
-    held_out = blob(space, 2000, seed=1)
+    held_out = two_clusters(space, 2000, seed=1)
     with torch.no_grad():
         nll = -float(density.log_prob(held_out).mean())
     assert nll == pytest.approx(report.validation_nll, abs=0.3)
@@ -118,21 +112,18 @@ def test_what_only_the_integrators_error_gained_is_undone() -> None:
 
 
 def test_the_same_seed_gives_the_same_density() -> None:
-    points = blob(Torus(2), 100)
-    one, other, another = (
-        fit_density(
-            Torus(2), points, FlowSettings(max_frequency=1, segments=1, iterations=2, seed=seed)
-        )[0]
-        for seed in (1, 1, 2)
-    )
-    with torch.no_grad():
-        values = [d.log_prob(points) for d in (one, other, another)]
-    assert torch.equal(values[0], values[1])
-    assert not torch.equal(values[0], values[2])
+    points = two_clusters(Torus(2), 100)
+    how = {"max_frequency": 1, "segments": 1, "iterations": 2}
+    fits = [fit_density(Torus(2), points, FlowSettings(**how, seed=k))[0] for k in (1, 1, 2)]
+    one, same, other = (density.log_prob(points) for density in fits)
+    assert torch.equal(one, same)
+    assert not torch.equal(one, other)
 
 
 def test_equal_points_stay_on_one_side_and_are_said() -> None:
-    points = blob(Torus(2), 300)[torch.randint(0, 60, (300,), generator=torch.manual_seed(0))]
+    points = two_clusters(Torus(2), 300)[
+        torch.randint(0, 60, (300,), generator=torch.manual_seed(0))
+    ]
     order, out, repeats = sides(points, 0.2, torch.Generator().manual_seed(0))
     train, held = points[order][~out], points[order][out]
     assert len(train) + len(held) == 300

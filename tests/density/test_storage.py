@@ -3,7 +3,6 @@
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -140,7 +139,6 @@ def test_extras_that_would_not_be_read_again(extra) -> None:
 
 FORMS = {
     "flow": lambda: plain(filled(FourierField(torus.group, 2), 1)),
-    "base": lambda: plain(filled(SplineField(torus.group, 2), 1), base=bump(torus, 2.0)),
     "kernels": lambda: AdaptiveKernels(
         torus, torch.rand(5, 2).double(), 9 * torch.ones(5, 2).double(), torch.ones(5).double() / 5
     ),
@@ -164,19 +162,6 @@ def test_every_flipped_bit_is_found(form: str, tmp_path: Path) -> None:
 DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
 
 
-@pytest.mark.parametrize("space", SPACES)
-def test_saved_and_read(space: str, tmp_path) -> None:
-    flow: dict[str, Any] = {"max_frequency": 2, "segments": 2, "iterations": 3}
-    estimator = DensityEstimator(space, unit="degrees", **flow).fit(DATA)
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(estimator.density_, columns=["a", "b"]))
-    density, extra = read_density(path)
-    assert extra == {"columns": ["a", "b"]}
-    points = estimator.space_.to_chart(DATA)
-    with torch.no_grad():
-        assert torch.equal(density.log_prob(points), estimator.density_.log_prob(points))
-
-
 def test_files_that_are_no_density(tmp_path) -> None:
     path = tmp_path / "density.safetensors"
     with refused("read", kind=InputFileError):
@@ -197,24 +182,19 @@ def test_files_that_are_no_density(tmp_path) -> None:
     bad = [
         b"",
         b"hello world, this is no density",
-        b"\xff" * 100,
         changed(lambda h: h.update(format="orbiflow-tile/1")),
         changed(lambda h: h["space"].update(name="moebius")),
         changed(lambda h: h["space"].update(dim=40)),
         changed(lambda h: h["density"]["flow"]["segments"][0].update(max_frequency=10**6)),
         changed(lambda h: h["density"]["flow"]["segments"][0].update(max_frequency=2)),
-        changed(lambda h: h["density"]["flow"]["segments"][0].update(kind="wavelet")),
         changed(lambda h: h["density"]["flow"]["segments"][0].update(smoothness=math.nan)),
-        changed(lambda h: h["density"]["flow"].update(segments=[])),
         changed(lambda h: h["density"]["flow"].update(duration=math.inf)),
         changed(lambda h: h["density"]["base"].update(kind="normal")),
         changed(lambda h: h.pop("group")),
         changed(lambda h: h["group"].update(lattice=[[1.0, 1.0], [0.0, 1.0]])),
         changed(lambda h: h["group"].update(linear=[[[0.0, 1.0], [1.0, 0.0]]])),
-        changed(lambda h: h["group"].update(translations=[[0.5, 0.0]])),
         changed(lambda h: h["group"].update(translations="none")),
         changed(lambda h: h["density"]["flow"].update(steps=10**9)),
-        changed(lambda h: h["density"]["flow"].update(method="magic")),
         changed(lambda h: h["density"].pop("base")),
     ]
     for content in bad:
