@@ -193,10 +193,10 @@ def test_a_fast_fit_says_what_it_left_out() -> None:
 @pytest.mark.parametrize("declared", [False, True])
 def test_an_estimator_is_cross_validated(declared: bool) -> None:
     rng = np.random.default_rng(3)
-    x = rng.uniform(-1, 1, 120)
+    x = rng.uniform(-1, 1, 80)
     angles = rng.vonmises(2 * x, 8.0)
     estimator = DensityEstimator(unit="radians", components="kernels", effort="fast")
-    label = np.arange(120) // 2
+    label = np.arange(80) // 2
     if declared:
         frame = pd.DataFrame({"dir": angles, "x": x, "site": label})
         estimator.columns = {"dir": "angle:radians", "site": "group"}

@@ -179,7 +179,8 @@ def test_five_angles() -> None:
     assert "chains" in estimator.density_.weight_of_kind
     assert estimator.report_.mass is None
     assert estimator.score(points[200:]) > -5 * np.log(360) + 3
-    for settings in ({"max_frequency": 16, "segments": 2}, {"iterations": 3}):
+    without: list[dict[str, Any]] = [{"max_frequency": 16, "segments": 2}, {"iterations": 3}]
+    for settings in without:
         with refused(*settings, "torus", 5):
             DensityEstimator("torus", unit="degrees", **settings).fit(points)
         with refused(*settings):

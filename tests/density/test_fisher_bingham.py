@@ -67,9 +67,7 @@ def test_constant_of_kent_is_kents_series() -> None:
         assert float(found) == pytest.approx(exact, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("kappa", "beta"), [(138, 84), (844, 422), (20, 30), (2381, 2798), (1e4, 6e3)]
-)
+@pytest.mark.parametrize(("kappa", "beta"), [(138, 84), (20, 30), (1e4, 6e3)])
 def test_constant_of_two_modes(kappa: float, beta: float) -> None:
     """Where a component of a lies across the highest eigenvalue, another contour may be needed."""
 

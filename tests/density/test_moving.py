@@ -71,7 +71,7 @@ def near(density: Density, seed: int, count: int = 40) -> torch.Tensor:
     return torch.cat([even, density.sample(count, generator)])
 
 
-@pytest.mark.parametrize("kind", range(7))
+@pytest.mark.parametrize("kind", [3, 4, 5, 6])
 def test_elsewhere_all_is_the_same(kind: int) -> None:
     """One of each kind: every operation passes through Python, which is slow."""
     seed = 1000 + kind

@@ -148,7 +148,7 @@ def test_levels_and_power_on_the_circle() -> None:
     levels = share_of_small(
         lambda rng: {"a": rng.vonmises(1, 2, (30, 1)), "b": rng.vonmises(1, 2, (40, 1))},
         "torus",
-        60,
+        30,
     )
     assert len(levels) == 8
     assert all(share <= 0.15 for share in levels.values()), levels  # 0.05 and 3.5 standard errors
@@ -173,12 +173,12 @@ def test_levels_and_power_on_spheres_and_of_axes() -> None:
         first, *others = drawn
         return dict(zip("abc", [first @ tilt.T, *others], strict=True))
 
-    levels = share_of_small(three, "sphere", 15)
+    levels = share_of_small(three, "sphere", 8)
     assert set(levels) == {"watson-williams", "common-mean", "common-concentration", "energy"}
     assert all(share <= 0.2 for share in levels.values()), levels
-    assert share_of_small(three, "projective-plane", 8)["bingham"] <= 0.3
+    assert share_of_small(three, "projective-plane", 4)["bingham"] <= 0.3
     for space in ("sphere", "projective-plane"):
-        power = share_of_small(lambda rng: three(rng, 0.6), space, 3)
+        power = share_of_small(lambda rng: three(rng, 0.6), space, 2)
         assert all(power[name] >= 0.75 for name in power if name != "common-concentration"), power
 
 

@@ -162,12 +162,17 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     assert slope == pytest.approx(also, abs=1e-9)
 
 
-@pytest.mark.parametrize("options", [{}, {"components": "flow"}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"components": "kernels"},
+        {"components": "flow", "max_frequency": 2, "segments": 1, "iterations": 3},
+    ],
+)
 def test_equal_weights_are_none(options: dict[str, object]) -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (310, 2))
-    few_waves = {"max_frequency": 2, "segments": 1, "iterations": 3}
     first, second = (
-        DensityEstimator("torus", **few_waves, **options).fit(angles, sample_weight=weight)  # type: ignore[arg-type]
+        DensityEstimator("torus", **options).fit(angles, sample_weight=weight)  # type: ignore[arg-type]
         for weight in (None, np.full(310, 0.3))
     )
     assert density_to_bytes(first.density_) == density_to_bytes(second.density_)

@@ -223,7 +223,7 @@ def test_peaks_narrower_than_a_pixel_keep_their_mass_wherever_they_lie(space, at
     assert is_sharp(density, square_pixel(space, 1 / 90))
 
 
-@every_space
+@pytest.mark.parametrize("space", SPACES[1:3], ids=lambda s: s.name)
 def test_densities_with_kernels_are_drawn_and_say_what_is_averaged(space):
     density = peaked(space, 1e6)
     assert density_png(density, width_px=250) != density_png(peaked(space, 10.0), width_px=250)

@@ -87,9 +87,9 @@ def test_one_pdf_has_a_page_a_figure(tmp_path: Path) -> None:
 
 def test_three_angles_are_drawn_in_pairs(tmp_path: Path) -> None:
     density = UniformDensity(Torus(3))
-    for settings in (PlotSettings(), PlotSettings(center=(np.pi, 0, -np.pi))):
-        plot_density(density, tmp_path / "plots", settings, data=np.zeros((9, 3)))
-        assert names(tmp_path / "plots") == {"samples.png"}
+    settings = PlotSettings(center=(np.pi, 0, -np.pi))
+    plot_density(density, tmp_path / "plots", settings, data=np.zeros((9, 3)))
+    assert names(tmp_path / "plots") == {"samples.png"}
     with refused("center", "3"):
         plot_density(density, tmp_path / "plots", PlotSettings(center=(0, 0)))
 
