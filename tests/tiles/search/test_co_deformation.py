@@ -23,7 +23,14 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.geometry import apart
 from orbiflow.tiles.likeness import Elastic
-from orbiflow.tiles.search import Goal, Placements, TileSpace, best_placements, co_deformation
+from orbiflow.tiles.search import (
+    Goal,
+    Placements,
+    TileSpace,
+    bending,
+    best_placements,
+    co_deformation,
+)
 from orbiflow.tiles.search.bending import TWIN_DISTANCE, bent_tiles
 from orbiflow.tiles.search.co_deformation import _moves, drawn_to_tiles, held_on_tiles, shifted
 from outlines import SMALL, animal, bent_squirrel, squirrel_orientations
@@ -119,6 +126,13 @@ def test_finalists_are_in_order_and_told() -> None:
     assert dropped <= 3
     again, _ = bent_tiles(*own)
     assert [bent.fidelity.score for bent in again] == scores
+
+
+def test_a_class_is_given_up_where_most_shapes_cross_themselves(monkeypatch) -> None:
+    own = squirrel_orientations(), CLASSES["IH5"], SMALL
+    monkeypatch.setattr(bending, "MAX_CROSSED_SHARE", -0.1)
+    assert bent_tiles(*own, may_give_up=True) == ([], 0)
+    assert bent_tiles(*own)[0]
 
 
 def test_finalists_are_the_best_of_all_bodies_and_no_twins() -> None:

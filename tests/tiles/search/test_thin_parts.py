@@ -167,6 +167,7 @@ def test_what_was_said_to_matter_is_not_rounded_off() -> None:
     own, plain = LikenessSearch(), Goal(HAIR)
     spot = (2.08, 3.5, 0.6)
     assert [share for share, _ in own.goals(plain)] == [0, *ROUNDED_SHARES]
+    assert [rounded.has_rounder for _, rounded in own.goals(plain)] == [True, True, False]
     assert [share for share, _ in Sketches(own).goals(plain)] == [*ROUNDED_SHARES, 0]
     pinned = replace(plain, pins=Pins.at(HAIR, [spot]))
     assert own.goals(pinned) == Sketches(own).goals(pinned) == [(0, pinned)]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import CertificationError
@@ -38,11 +39,11 @@ from orbiflow.tiles.search.co_deformation import (
 )
 from orbiflow.tiles.search.tile_orbits import template_symmetries
 from orbiflow.tiles.search.tile_space import NearestTiles, Placements, TileSpace, best_placements
-from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.likeness_search import LikenessSearch
+    from orbiflow.tiles.search.search_method import Goal
 
 TWIN_DISTANCE = 2e-4  # mean squared distance of two bent outlines below which they are twins
 FIRST_ROUNDS = 6  # steps of the minimisation for all that are held
@@ -52,6 +53,8 @@ RELAXED_STRENGTH = 1500.0  # strength of the springs that keep a relaxed outline
 MAX_REPAIRED = 1
 MAX_MARK_BEHIND = 0.25  # below the best mark of tiles that are not carved yet: what is carved, too
 CROSSING_MARKS = 0.5  # less for a shape that crosses itself, while it is one of many
+# The share of the best coarse shapes that cross themselves above which a rounder silhouette is searched
+MAX_CROSSED_SHARE = 0.6
 MIN_CARVED_GAP = 0.012  # the gaps that carving apart leaves at least, in square roots of the area
 
 Item = TypeVar("Item")
@@ -93,11 +96,16 @@ def bent_tiles(
     cancel: Cancel = NEVER,
     *,
     wanted: int = 1,
+    may_give_up: bool = False,
 ) -> tuple[list[Bent], int]:
-    """Return finalists, best first and without twins, and how many crossed themselves."""
+    """Return finalists, best first and without twins, and how many crossed themselves.
+
+    There are none if it `may_give_up` where hardly any coarse shape is without crossings.
+    """
     used = both[:1] if template_symmetries(kind)[1] else both
     usual = settings.of_class(wanted, symmetric=len(kind.stabiliser) > 1)
-    finalists = _finalists(used, kind, usual, tell, cancel)
+    most_crossed = MAX_CROSSED_SHARE if may_give_up else 1.0
+    finalists = _finalists(used, kind, usual, tell, cancel, most_crossed)
     simple = _best_first([bent for bent in finalists if bent.factor])
     crossed = [bent for bent in finalists if not bent.factor]
     if usual.carved and both[0].plain:
@@ -149,12 +157,17 @@ class _Lot(NamedTuple):
         return self.bodies[self.level]
 
     @property
+    def crossed(self) -> NDArray[np.bool_]:
+        """Which shapes (C,) cross themselves."""
+        rings = plane_points(self.points[: self.body.size].T)
+        return ~np.asarray(shapely.is_valid(shapely.polygons(rings)))
+
+    @property
     def marks(self) -> list[float]:
         """The marks (C,) that people would give, less where a shape crosses itself."""
         rings = self.points[: self.body.size].T
-        crossed = ~np.asarray(shapely.is_valid(shapely.polygons(plane_points(rings))))
         marks = np.array([kept_of(self.body.measures, ring, 0.0).mark for ring in rings])
-        return (marks - CROSSING_MARKS * crossed).tolist()
+        return (marks - CROSSING_MARKS * self.crossed).tolist()
 
     def take(self, index: Integers) -> _Lot:
         """Return those at `index`."""
@@ -175,10 +188,12 @@ def _finalists(
     settings: LikenessSearch,
     tell: Callable[[float], None],
     cancel: Cancel,
+    most_crossed: float,
 ) -> list[Bent]:
     """Work out the best of some orientations, with all stiffnesses; some cross themselves.
 
     All begin with few points; the best marks among them all go on to more points, and corners move.
+    There are none if more than a share `most_crossed` of the first of these cross themselves.
     """
     lots: list[_Lot] = []
     for body in settings.bodies:
@@ -193,6 +208,8 @@ def _finalists(
     steps = [(1, step, settings.starts), (1, max(1, step // 2), few), (2, 1, fewer)]
     for k, (level, step, keep) in enumerate(steps):
         going_on = _best_marked(lots, keep)
+        if k == 0 and np.concatenate([lot.crossed for lot in going_on]).mean() > most_crossed:
+            return []
         lots = [_shifted(kind, lot, level, step, settings, cancel) for lot in going_on]
         tell(0.3 + 0.2 * (k + 1))
     finalists: list[Bent] = []
@@ -364,7 +381,7 @@ class PlacedBent(NamedTuple):
 
 
 def fit_bending(
-    target: Target,
+    goal: Goal,
     kind: IsohedralClass,
     settings: LikenessSearch,
     phases: Iterable[Sequence[Orientation]],
@@ -373,12 +390,13 @@ def fit_bending(
     progress: OnProgress,
     cancel: Cancel,
 ) -> ClassFinalists:
-    """Fit tiles of one class to a target by letting the silhouette bend (design point 15).
+    """Fit tiles of one class to a silhouette by letting the silhouette bend (design point 15).
 
     Each of so many phases is the silhouette and its mirror image.
     """
     enough = 1 if per_class == 1 else 3 * per_class
-    settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
+    outline, gives_up = goal.target.normal, goal.has_rounder
+    settings = replace(settings, min_neck=least_neck(outline, settings.min_neck))
     finalists: list[Bent] = []
     dropped = 0
     for phase, both in enumerate(phases):
@@ -386,12 +404,14 @@ def fit_bending(
         def tell(share: float, phase: int = phase) -> None:
             progress(0.9 * (phase + share) / count, math.nan)
 
-        tiles, crossed = bent_tiles(both, kind, settings, tell, cancel, wanted=enough)
+        tiles, crossed = bent_tiles(
+            both, kind, settings, tell, cancel, wanted=enough, may_give_up=gives_up
+        )
         finalists, dropped = finalists + tiles, dropped + crossed
     if not finalists:
         raise CertificationError("all tiles near the silhouette cross themselves")
     # one to spare, if one is not certified
-    candidates = PlacedTiles(kind, target.normal, _best_first(finalists)[: enough + 1])
+    candidates = PlacedTiles(kind, outline, _best_first(finalists)[: enough + 1])
     return ClassFinalists(candidates, settings.placements, dropped, enough)
 
 

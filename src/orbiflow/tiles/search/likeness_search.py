@@ -123,15 +123,17 @@ class LikenessSearch(Settings, SearchMethod):
         """Let the silhouette bend into tiles of the class."""
         phases = range(self.passed, self.phases)
         both = (self.orientations(goal, kind.divisor, phase) for phase in phases)
-        return fit_bending(goal.target, kind, self, both, len(phases), per_class, progress, cancel)
+        return fit_bending(goal, kind, self, both, len(phases), per_class, progress, cancel)
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> ClassFinalists:
         """Let the silhouette bend in haste."""
-        return replace(self, passed=0, **SKETCH).fit(goal, kind, 1, silent, cancel)
+        own = replace(goal, has_rounder=False)  # of few shapes, most may cross
+        return replace(self, passed=0, **SKETCH).fit(own, kind, 1, silent, cancel)
 
     def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
         """Return the silhouette and, without emphasis and pins, it with thin parts rounded off."""
-        return [(share, rounded) for share, (rounded,) in rounded_goals([goal])]
+        goals = [(share, rounded) for share, (rounded,) in rounded_goals([goal])]
+        return [(share, replace(own, has_rounder=True)) for share, own in goals[:-1]] + goals[-1:]
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image, as the first phase has them."""

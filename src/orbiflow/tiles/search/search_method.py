@@ -35,6 +35,7 @@ class Goal:
     emphasis: Emphasis | None = None  # what must survive
     pins: Pins | None = None  # what must not bend
     is_background: bool = False  # whether any shape will do, as of what another figure leaves
+    has_rounder: bool = False  # whether a rounder silhouette follows, so that a search may give up
 
     @classmethod
     def background(cls) -> Self:
