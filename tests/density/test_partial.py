@@ -310,12 +310,15 @@ def test_a_rough_error_is_seen(seed: int) -> None:
 
 def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:
     first = marginal(random_blend(1, 3, network=False), [0, 1])
-    first.error = 0.02
-    assert marginal(first, 0).error >= 0.02
-    assert conditional(first, {1: 0.3}).error > 0.01
+    first.error, first.largest_error = 0.02, 0.03
+    one, other = marginal(first, 0), conditional(first, {1: 0.3})
+    assert one.error >= 0.02
+    assert other.error > 0.01
+    assert one.largest_error >= 0.03
+    assert other.largest_error >= 0.06  # of the joint density and of what is given
     (tmp_path / "d").write_bytes(density_to_bytes(first))
     again, _ = read_density(tmp_path / "d")
-    assert (again.error, again.largest_error) == (0.02, first.largest_error)
+    assert (again.error, again.largest_error) == (0.02, 0.03)
     assert again.space == first.space
 
 

@@ -185,6 +185,11 @@ def test_lines_of_one_longitude_meet_the_poles() -> None:
                                atol=1e-7)  # fmt: skip
 
 
+def test_the_equal_earth_is_as_wide_as_its_authors_say() -> None:
+    (x, _), (_, y) = EqualEarth().forward(np.array([[0.0, 179.9999], [90.0, 0.0]]))
+    assert x / y == pytest.approx(2.05458, abs=1e-5)  # Šavrič, Patterson and Jenny (2019)
+
+
 def test_the_map_that_suits() -> None:
     space = Sphere()
     here = space.to_chart(40 + 5 * np.random.default_rng(0).uniform(-1, 1, (99, 2)))
