@@ -36,7 +36,7 @@ def scenes(
 def sheet_content(scene: Scene, settings: ExportSettings) -> str | bytes:
     """The content of a sheet's file."""
     form = settings.file_format
-    return write_scene(scene, form, tolerance=settings.fine, dpi=settings.dpi)
+    return write_scene(scene, form, tolerance=settings.fine, dpi=settings.dpi, dxf=settings.dxf)
 
 
 class Line(NamedTuple):

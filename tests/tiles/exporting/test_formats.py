@@ -3,7 +3,9 @@
 import io
 import json
 import re
+from typing import Any
 
+import ezdxf
 import numpy as np
 import pypdfium2
 import pypdfium2.raw as pdfium
@@ -45,6 +47,25 @@ def test_dxf_is_sound(cut) -> None:
     points = np.concatenate([line.points for line in lines])
     assert (points >= 0).all()
     assert (points <= (300, 200)).all()
+
+
+def test_dxf_of_old_machines_has_the_same_lines() -> None:
+    old = content(format="dxf", dxf="r12", cut="pieces", calibrate=True)
+    new = content(format="dxf", cut="pieces", calibrate=True)
+    assert isinstance(old, str)
+    assert isinstance(new, str)
+    document = ezdxf.read(io.StringIO(old))
+    assert document.dxfversion == "AC1009"
+    assert not document.audit().has_errors
+    lines: list[Any] = list(document.modelspace())
+    assert {line.dxftype() for line in lines} == {"POLYLINE"}
+    assert all(re.fullmatch(r"[A-Z0-9_]{1,31}", line.dxf.layer) for line in lines)
+    for line, other in zip(lines, ezdxf.read(io.StringIO(new)).modelspace(), strict=True):
+        points = [(p.x, p.y) for p in line.points()]
+        np.testing.assert_allclose(points, list(other.get_points("xy")), atol=1e-9)
+        assert line.is_closed == other.closed
+    with refused("dxf"):
+        content(format="svg", dxf="r12")
 
 
 def test_the_calibration_mark_is_100_mm() -> None:

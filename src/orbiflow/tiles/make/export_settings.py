@@ -25,7 +25,7 @@ from orbiflow.settings import (
 )
 from orbiflow.tiles.motifs import MotifSettings, TintSettings
 from orbiflow.tiles.page import MARKS_EDGE, ColourRule, PageSettings, usual_tolerance
-from orbiflow.tiles.write import SceneFormat
+from orbiflow.tiles.write import DxfVersion, SceneFormat
 
 PIECES = HelpHeading("Pieces")
 FINE = 0.01  # in mm: a step of a machine
@@ -116,6 +116,9 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
     """Say where the tile is thinner than this, such as 2mm; 0 says nothing."""
 
     dpi: Annotated[float, Range(1, 10_000), OnlyWith(format=("png", None))] = 300.0
+
+    dxf: Annotated[DxfVersion, OnlyWith(format=("dxf", None))] = "r2010"
+    """Version of DXF; r12 is read by old machines."""
 
     offset: Annotated[
         SignedLength,

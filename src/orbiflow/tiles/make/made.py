@@ -53,10 +53,12 @@ class Made(Outcome):
         It holds the sheet, and in a format of pages those that come after it.
         """
         settings = self.settings
-        fine = settings.fine if isinstance(settings, ExportSettings) else TOLERANCE
+        own = {"tolerance": TOLERANCE}
+        if isinstance(settings, ExportSettings):
+            own = {"tolerance": settings.fine, "dxf": settings.dxf}
         form = format or settings.file_format
         first, *more = self.scenes[sheet : None if form in PAGED else sheet + 1]
-        return write_scene(first, form, more=more, tolerance=fine, dpi=settings.dpi)
+        return write_scene(first, form, more=more, dpi=settings.dpi, **own)
 
     def image(self, sheet: int = 0) -> Image.Image:
         """Return a sheet as a picture in RGB, in the settings' resolution."""

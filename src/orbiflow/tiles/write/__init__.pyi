@@ -3,6 +3,7 @@ from .formats import LINES_ALONE as LINES_ALONE
 from .formats import PAGED as PAGED
 from .formats import TOLERANCE as TOLERANCE
 from .formats import WRITERS as WRITERS
+from .formats import DxfVersion as DxfVersion
 from .formats import SceneFormat as SceneFormat
 from .formats import write_scene as write_scene
 from .html import canvas_page as canvas_page

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from orbiflow.tiles.page import Curve, Layer, Scene, clipped, flattened
-from orbiflow.tiles.write.formats import TOLERANCE
+from orbiflow.tiles.write.formats import TOLERANCE, DxfVersion
 
 
-def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
-    """Return the scene as DXF (R2010), which cutters, CAD and Inkscape read.
+def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE, dxf: DxfVersion = "r2010") -> str:
+    """Return the scene as DXF of a version, which cutters, CAD and Inkscape read.
 
     Curves become polylines within `tolerance` (mm), which every reader takes. Tiles that the page
     cuts are cut. DXF has y up, and the page's lower left corner is the origin.
@@ -21,7 +22,8 @@ def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
     from ezdxf.filemanagement import new
 
     scene = flattened(scene, tolerance)
-    document: Any = new("R2010", units=units.MM)
+    unit = {} if dxf == "r12" else {"units": units.MM}  # which R12 does not have
+    document: Any = new(dxf.upper(), **unit)
     document.header["$MEASUREMENT"] = 1
     space = document.modelspace()
     extents = (0, 0, 0), (scene.width, scene.height, 0)
@@ -29,17 +31,21 @@ def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
     # ezdxf takes a corner at the origin for a missing one
     document.header["$EXTMIN"], document.header["$EXTMAX"] = extents
     space.reset_limits((0, 0), (scene.width, scene.height))
-    for note in filter(None, (scene.title, *scene.notes)):
+    for note in filter(None, (scene.title, *scene.notes)) if dxf != "r12" else ():
         document.header.custom_vars.append("orbiflow", note[:250])
     for layer in scene.layers:
         if layer.role == "paper":
             continue
-        entry = document.layers.add(layer.name, linetype="CONTINUOUS")
+        name = layer.name if dxf != "r12" else re.sub(r"\W", "_", layer.name.upper())[:31]
+        entry = document.layers.add(name, linetype="CONTINUOUS")
         colour = layer.style.stroke or layer.style.fill or "#000000"
-        entry.color, entry.rgb = ACI.get(colour, 7), RGB.from_hex(colour)
+        entry.color = ACI.get(colour, 7)
+        if dxf != "r12":
+            entry.rgb = RGB.from_hex(colour)
         for part in _parts(scene, layer, tolerance):
             points = [(x, scene.height - y) for x, y in part.flattened(tolerance).tolist()]
-            space.add_lwpolyline(points, close=part.closed, dxfattribs={"layer": layer.name})
+            line = space.add_polyline2d if dxf == "r12" else space.add_lwpolyline
+            line(points, close=part.closed, dxfattribs={"layer": name})
     text = io.StringIO()
     document.write(text)
     return text.getvalue()
