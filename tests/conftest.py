@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import torch
+from _pytest.doctest import DoctestModule
 from hypothesis import HealthCheck, register_random, settings
 
 from bent_tiles import bent_tile_fixture, equivariant_fixture  # noqa: F401
@@ -53,6 +54,13 @@ class TorchRandom:
 
 torch_random = TorchRandom()  # hypothesis keeps a weak reference
 register_random(torch_random)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file() -> Iterator[Any]:
+    """Look for examples in the docstrings of the package alone: tests have none."""
+    found = yield
+    return [own for own in found if not isinstance(own, DoctestModule)]
 
 
 def pytest_runtest_setup() -> None:
