@@ -136,7 +136,7 @@ def take_away(film: Film) -> None:
     page = film.page
     film.click(*centre(page, ".steps >> text=Take"))
     page.wait_for_selector(".form")
-    page.get_by_label("What is it for?").select_option("print")
+    page.get_by_role("radio", name="Mug").check()
     film.rest(400)
     film.click(*centre(page, "text=Make it"))
     page.wait_for_selector(".preview img", timeout=PATIENCE)

@@ -109,7 +109,7 @@ def take_away(page: Page, path: str) -> None:
     """What has been made of a tile."""
     page.goto(f"/#/{path}")
     page.wait_for_selector(".form")
-    page.get_by_label("What is it for?").select_option("laser")
+    page.get_by_role("radio", name="Pieces for a laser").check()
     page.get_by_text("Make it", exact=True).click()
     page.wait_for_selector(".preview img", timeout=PATIENCE)
     page.wait_for_timeout(700)

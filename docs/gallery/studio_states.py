@@ -219,7 +219,7 @@ def close_drawn(on: Visit) -> None:
 
 
 def take_running(on: Visit) -> None:
-    on.take("Animation")
+    on.take("Film")
     body = {"task": {**TASK, "operation": "animate", "state": "running", "what": "drawing"}}
     on.answer("**/tasks", body=body)
     on.page.get_by_role("button", name="Make it").click()
@@ -322,7 +322,7 @@ STATES: dict[str, Callable[[Visit], Any]] = {
     **{
         f"take-{name}": lambda on, kind=kind: on.make(kind)
         for name, kind in {
-            "print": "Print or cut", "picture": "Picture", "solid": "3D print", "film": "Animation"
+            "print": "Print or cut", "picture": "Picture", "solid": "3D print", "film": "Film"
         }.items()
     },
     "take-thin": take_thin,

@@ -116,6 +116,7 @@ def test_one_look_for_all_pages(page: Any, studio: RunningStudio, coloured: str,
     assert page.get_by_label("Colours", exact=True).input_value() == "lagoon"
     studio.until(lambda: page.wait_for_timeout(50) or shows_picture(page, ".card canvas"))
     page.goto(f"/#/p/{coloured}/take/{tile}")
+    page.get_by_role("radio", name="Print or cut").check()
     assert page.get_by_label("Colours", exact=True).input_value() == "lagoon"
     assert page.get_by_label("With your picture").is_checked()
     page.get_by_label("Colours", exact=True).select_option("earth")
@@ -128,6 +129,7 @@ def test_one_look_for_all_pages(page: Any, studio: RunningStudio, coloured: str,
 
 def test_a_preview_follows_each_setting(page: Any, coloured: str, tile: int) -> None:
     page.goto(f"/#/p/{coloured}/take/{tile}")
+    page.get_by_role("radio", name="Print or cut").check()
     image = page.locator(".live img")
     image.wait_for()
 
@@ -151,6 +153,6 @@ def test_a_preview_follows_each_setting(page: Any, coloured: str, tile: int) -> 
     assert page.get_by_label("How long is one tile?").evaluate(
         "box => box !== document.activeElement"
     )
-    changed(lambda: page.get_by_role("radio", name="Animation").check())
+    changed(lambda: page.get_by_role("radio", name="Film").check())
     page.get_by_text("One moment of the animation").wait_for()
     page.wrong[:] = [said for said in page.wrong if "422" not in said]

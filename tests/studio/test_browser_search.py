@@ -46,6 +46,7 @@ def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_
     page.wait_for_selector(DONE)
     reach(page, "Take away:")
     page.wait_for_selector(".form")
+    page.get_by_role("radio", name="Print or cut").press("Space")
     reach(page, "What is it for?", "Poster")
     reach(page, "Kind of file", "SVG")
     reach(page, "Make it")
@@ -185,11 +186,36 @@ def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio) -> No
     page.get_by_role("button", name="Search again").wait_for()
 
 
+def test_each_thing_has_three_fields_and_its_own_settings(page, studio, searched) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.goto(f"/#/p/{searched}/take/{tile}")
+    fields = page.locator(".form > .field:not([hidden])")
+    page.wait_for_selector(".form")
+    titles = {}
+    for thing in page.locator(".wishes .choice label").all_inner_texts()[:-3]:
+        page.get_by_role("radio", name=thing).check()
+        titles[thing] = fields.locator("label").all_inner_texts()
+        assert 1 <= len(titles[thing]) <= 3, thing
+    assert len(titles) == 12
+    page.get_by_role("radio", name="Pieces for a laser").check()
+    page.get_by_label("Width of the machine's cut").fill("0.2")
+    page.get_by_role("radio", name="Poster").check()
+    page.get_by_role("radio", name="Pieces for a laser").check()
+    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name="Make it").click()
+    page.get_by_text("not now").wait_for()
+    page.unroute("**/tasks")
+    wanted = {"tile": tile, "purpose": "laser", "cut": "pieces", "kerf": 0.2}
+    assert caught.value.post_data_json["settings"] == wanted
+
+
 def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched) -> None:
     tile = studio.project(searched)["tiles"][0]["id"]
     view = {"look": {"palette": "dusk"}}
     studio.client.patch(f"projects/{searched}", json={"view": view})
     page.goto(f"/#/p/{searched}/take/{tile}")
+    page.get_by_role("radio", name="Print or cut").check()
     page.get_by_text("Page and file").click()
     purpose, drawn = page.get_by_label("What is it for?"), page.get_by_label("What is drawn")
     filled, thin = page.get_by_label("Fill the page to its edge"), page.get_by_label("thinner than")
@@ -237,6 +263,7 @@ def test_the_true_size_is_of_the_file_and_follows_the_screen(page, studio, searc
     ring = np.array(card["polygon"])
     long, lying = longer_side(ring), np.ptp(ring, axis=0)
     page.goto(f"/#/p/{searched}/take/{card['id']}")
+    page.get_by_role("radio", name="Print or cut").check()
     wide = "parseFloat(document.querySelector('.true-tile').style.width) - 4"
     page.wait_for_selector(".true-tile[style*=width]")
     first = page.evaluate(wide)

@@ -358,6 +358,7 @@ def test_back_leads_to_the_place_and_to_what_was_chosen(page: Any, project: dict
     page.wait_for_selector(f'a[href="{place}"]:focus')
     assert page.evaluate("scrollY") == pytest.approx(top, abs=2)
     page.goto(f"/#/p/{project['id']}/take/{project['tiles'][0]['id']}")
+    page.get_by_role("radio", name="Print or cut").check()
     page.select_option("[name=purpose]", "stickers")
     page.locator("[name=tile_size]").fill("33")
     page.locator("[name=tile_size]").blur()

@@ -109,14 +109,18 @@ function control(name, schema, words, changed) {
 }
 
 /**
- * A form: the settings named in `first` on top, the rest folded away in their groups.
+ * A form: the settings named in `first` on top, the rest folded away in their groups; `fixed` ones are not shown.
  * `words`: titles and the like by setting; in them `some`: texts to choose from; `not`: values of others that rule it out;
  * `sets`: whether its choice begins all others anew, but those in `keeps`.
  * `hidden`: settings that the page sets itself. `start`: values to begin with.
  * `.values()`: what differs from the defaults and applies. `.refuse(name, text)`: show what is wrong beside the
  * setting that the text begins with; false if it names none.
  */
-export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = (_) => {}) {
+export function form(
+  schema,
+  { first, fixed = [], words = {}, hidden = [], start = {} },
+  changed = (_) => {},
+) {
   const controls = new Map();
   const presets = Object.entries(schema["x-presets"] ?? {});
   const names = Object.keys(schema.properties).filter((name) =>
@@ -168,12 +172,10 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     }
   }
   const now = (name) => controls.get(name).now();
+  const rest = names.filter((name) => !first.includes(name) && !fixed.includes(name));
   const groups = Map.groupBy
-    ? Map.groupBy(
-      names.filter((name) => !first.includes(name)),
-      (name) => schema.properties[name]["x-group"] || "More",
-    )
-    : new Map([["More", names.filter((name) => !first.includes(name))]]);
+    ? Map.groupBy(rest, (name) => schema.properties[name]["x-group"] || "More")
+    : new Map([["More", rest]]);
   const made = h(
     "div",
     { class: "stack form" },

@@ -12,6 +12,7 @@ import { COLOURLESS, colours, KINDS, lengthIn } from "./kinds.js";
 import { Making, picture } from "./made.js";
 import { Preview } from "./preview.js";
 import { share } from "./share.js";
+import { THINGS } from "./things.js";
 import { trueSize } from "./truesize.js";
 
 /** What each can be laid on. */
@@ -20,7 +21,7 @@ const ON = {
   picture: ["export", "art", "animate"],
 };
 const NEVER = "tile result out force picture drawing eyes second_eyes tint".split(" "); // what the page itself sets, or drawings hold
-/** What was chosen for tiles of each project: the kind, and the settings of each kind. */
+/** What was chosen for tiles of each project: the thing, and the settings of each. */
 const KEPT = {};
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
@@ -39,7 +40,7 @@ export async function show(root, page) {
     page.api.get(`${place}/cannot`),
   ]);
   own.build(root);
-  await own.choose(own.kept.kind);
+  await own.choose(own.kept.thing);
   return () => own.close();
 }
 
@@ -55,7 +56,7 @@ class TakeawayPage {
     this.navigate = navigate;
     this.card = card;
     this.place = `projects/${project.id}`;
-    this.kept = KEPT[project.id] ??= { kind: "export" };
+    this.kept = KEPT[project.id] ??= { thing: "poster" };
     this.about = about;
     this.look = lookOf(project, about);
     this.keepLook = keeper(api, project);
@@ -95,12 +96,12 @@ class TakeawayPage {
       skins: (tiling, scale) => this.skins(tiling, scale),
     }));
     /** @type {[string, string, any][]} */
-    const kindChoices = Object.entries(KINDS).map(([key, { title, image }]) => [key, title, image]);
-    const kinds = choice(
+    const choices = Object.entries(THINGS).map(([key, { title, image }]) => [key, title, image]);
+    const things = choice(
       "What shall it be?",
-      kindChoices,
-      this.kept.kind,
-      (kind) => trying(() => this.choose(kind)),
+      choices,
+      this.kept.thing,
+      (thing) => trying(() => this.choose(thing)),
     );
     put(
       root,
@@ -114,7 +115,7 @@ class TakeawayPage {
           h(
             "section",
             { class: "panel stack wishes" },
-            kinds,
+            things,
             this.wishes,
             h("div", { class: "go" }, this.making.make),
           ),
@@ -191,23 +192,36 @@ class TakeawayPage {
     return this.layers?.find((own) => own.name === name)?.box;
   }
 
-  /** Show the settings of another kind of thing. */
-  async choose(kind) {
-    this.kind = this.kept.kind = kind;
+  /** Show the settings of another thing. */
+  async choose(thing) {
+    const { first, fixed, makes: kind, start } = THINGS[thing];
+    this.thing = this.kept.thing = thing;
+    this.kind = kind;
     if (!this.schemas.has(kind)) {
       this.schemas.set(kind, await this.api.get(`operations/${kind}/schema`));
     }
-    if (this.kind !== kind) return;
+    if (this.thing !== thing) return;
     const schema = structuredClone(this.schemas.get(kind));
     const { palette } = schema.properties;
     const { options, value } = colours(this.look, this.about);
     if (palette) palette.enum = Object.keys(options);
-    const { first, words: names, start } = KINDS[kind];
+    const without = this.without(kind, schema);
+    const begin = Object.entries(start ?? {}).filter(([name, value]) => {
+      const property = schema.properties[name];
+      const allowed = [property, ...(property.anyOf ?? [])].flatMap((own) => own.enum ?? []);
+      return !allowed.length || allowed.includes(value);
+    });
+    const names = { ...KINDS[kind].words, ...THINGS[thing].words };
     this.form = form(schema, {
       first,
-      words: { ...names, palette: { ...names.palette, options }, ...this.without(kind, schema) },
+      fixed,
+      words: { ...names, palette: { ...names.palette, options }, ...without },
       hidden: NEVER,
-      start: { ...start, ...this.kept[kind], ...(palette && { palette: value }) },
+      start: {
+        ...Object.fromEntries(begin),
+        ...this.kept[thing],
+        ...(palette && { palette: value }),
+      },
     }, () => {
       this.keepLooks();
       this.changed();
@@ -225,7 +239,7 @@ class TakeawayPage {
 
   /** Take choices out of a schema that this tile does not have; returns words on why, by setting. */
   without(kind, schema) {
-    const { kept, project: { id } } = this;
+    const { kept, project: { id }, thing } = this;
     const [told, words] = [KINDS[kind].words, {}];
     for (const { setting, values, why, instead } of this.cannot[kind] ?? []) {
       const property = schema.properties[setting];
@@ -236,7 +250,7 @@ class TakeawayPage {
       const other = instead && h("a", {
         href: `#/p/${id}/take/${instead}`,
         onclick: () => {
-          kept[kind] = { [setting]: values[0] };
+          kept[thing] = { [setting]: values[0] };
         },
       }, "Take a tile that can.");
       const about = [...(words[setting]?.about ?? []), `Not ${names}: ${sentence(why)} `, other];
@@ -317,12 +331,13 @@ class TakeawayPage {
   /** Show the size at once; what was said or made before is past. */
   changed() {
     this.fitLayers();
-    this.kept[this.kind] = this.form.values();
+    this.kept[this.thing] = this.form.values();
     const size = lengthIn(this.form.now("tile_size"));
     this.real.hidden = !(size && KINDS[this.kind].solid);
     if (!this.real.hidden) this.size.show(size, this.form.now("warn_neck"));
-    const title = KINDS[this.kind].title.toLowerCase();
-    if (this.live.ask(this.kind, this.settings(), title)) this.noted.classList.add("past");
+    const title = THINGS[this.thing].title.toLowerCase();
+    const shown = { ...this.settings(), ...THINGS[this.thing].shown };
+    if (this.live.ask(this.kind, shown, title)) this.noted.classList.add("past");
     this.making.change();
   }
 
