@@ -239,6 +239,22 @@ def test_a_photo_is_taken(page, studio: RunningStudio) -> None:
     assert studio.project(own)["input"] == {"name": "photo.png", "type": "png"}
 
 
+def test_a_page_that_was_left_while_it_came_is_not_waited_for(page, studio: RunningStudio) -> None:
+    own, held = studio.with_picture(), list[Any]()
+    page.goto("/")
+    page.wait_for_selector(".drop")
+    page.route(f"**/api/projects/{own}", lambda route: held.append(route))
+    with page.expect_request(f"**/api/projects/{own}"):
+        page.evaluate(f"location.hash = '#/p/{own}/picture'")
+    page.evaluate("location.hash = '#/none'")
+    heading = page.get_by_role("heading", name="This page cannot be shown")
+    heading.wait_for()
+    page.evaluate("new Promise((done) => setTimeout(done, 350))")  # after the other's patience
+    assert heading.is_visible()
+    for route in held:
+        route.continue_()
+
+
 def test_pictures_are_dropped_and_pasted(page, drawing) -> None:
     for event, holder in (("drop", "dataTransfer"), ("paste", "clipboardData")):
         page.goto("/#/")

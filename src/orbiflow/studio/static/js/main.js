@@ -69,7 +69,7 @@ async function show() {
   await leave();
   const root = h("div", { class: "page" });
   const waiting = setTimeout(
-    () => put(page, h("p", { class: "lonely soft" }, "One moment …")),
+    () => mine === turn && put(page, h("p", { class: "lonely soft" }, "One moment …")),
     300,
   );
   try {
