@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import zipfile
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from orbiflow.errors import SettingError
 from orbiflow.runtime import ignore
 from orbiflow.studio.tile_files import put_tile, tile_number
 from orbiflow.tiles import ArtSettings, EscherTile, why_not_in
-from studio.served import Client, done, house_tile, new_project
+from studio.served import Client, done, house_tile, new_project, worked
 
 CLASSES = ["IH1", "IH2", "IH4", "IH6", "IH7", "IH21", "IH28"]
 
@@ -180,3 +181,17 @@ def test_what_cannot_be_made_is_refused_beside_its_setting(client: Client, addre
     assert preview(client, address, "search").status_code == 422
     missing = client.post(f"{address}7/preview", json={"operation": "export", "settings": {}})
     assert missing.status_code == 404
+
+
+def test_several_sheets_are_one_archive(client: Client) -> None:
+    tile = house_tile(client)
+    own, _, number = tile.partition("/tiles/")
+    sheets = {"purpose": "laser", "area": "300x200mm", "bed": "160x110mm"}
+    task = worked(client, own, "export", tile=int(number), format="svg", **sheets)
+    (file,) = task["result"]["files"]
+    content = client.get(
+        f"/api/takeaways/{task['result']['takeaway']}/files/{file['name']}"
+    ).content
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert len(archive.namelist()) == 5
+        assert all(archive.read(name).startswith(b"<?xml") for name in archive.namelist())
