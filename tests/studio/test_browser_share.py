@@ -181,13 +181,14 @@ def test_engraved_lines_are_on_the_page_and_can_be_hidden(alone: Any, tmp_path: 
     out = tmp_path / "tile.html"
     export(tile_of("IH4"), out, ExportSettings(engrave=True, outline=0))
     opened(alone, out)
-    canvas = "document.querySelector('#view').toDataURL()"
-    alone.wait_for_timeout(60)
-    engraved = picture_of(alone.evaluate(canvas))
+    shown = "document.querySelector('#view').toDataURL()"
     alone.uncheck("#skin")
-    alone.wait_for_timeout(60)
-    plain = picture_of(alone.evaluate(canvas))
-    assert 0.05 < (np.abs(engraved - plain).max(axis=-1) > 30).mean() < 0.8
+    alone.evaluate("new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(r)))")
+    plain = alone.evaluate(shown)
+    alone.check("#skin")
+    alone.wait_for_function(f"plain => {shown} !== plain", arg=plain)
+    engraved = picture_of(alone.evaluate(shown))
+    assert 0.05 < (np.abs(engraved - picture_of(plain)).max(axis=-1) > 30).mean() < 0.8
 
 
 def picture_of(address: str) -> np.ndarray:

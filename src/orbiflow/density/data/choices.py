@@ -209,13 +209,13 @@ class _Choice:
                 *named,
             }  # cells of the latter that are no numbers are wrong
             wanted = {k: None for k in self.free if k in numeric}
-            for name in self._names(self.table.texts.difference(wanted).intersection(self.free)):
+            left = [k for k in self.free if k not in wanted]
+            text = next((k for k in left if self.table.has_numbers_as_text(k)), None)
+            if text is not None:
+                name = self.table.names[text]
+                what = f"column {name!r} holds numbers as text: convert it (pandas.to_numeric)"
                 raise SettingError(
-                    literal(
-                        f"column {name!r} holds numbers as text: convert it (pandas.to_numeric)"
-                    )
-                    + ", or declare {columns} "
-                    + literal(f"{name}=ignore")
+                    literal(f"{what}, or declare ") + f"{{columns}} {literal(name)}=ignore"
                 )
             notes = self._left_out(wanted)
         self._check_count(list(wanted), None)

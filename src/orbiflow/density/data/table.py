@@ -93,7 +93,7 @@ class DataTable:
     - `is_array`: Whether it is an array, whose columns are angles in radians unless declared.
     - `numeric`: Which columns are of numbers, if that is known without their cells.
     - `codes`: What stands for missing values as well, numbers or words.
-    - `texts`: Which columns of a frame are numbers that are written as text.
+    - `categories`: Which columns of a frame hold categories, which are words even if they are numbers.
     - `text`: How it stands in a text file, None of others.
     """
 
@@ -105,7 +105,7 @@ class DataTable:
     is_array: bool = False
     numeric: frozenset[int] | None = None
     codes: tuple[str, ...] = ()
-    texts: frozenset[int] = frozenset()
+    categories: frozenset[int] = frozenset()
     text: TextForm | None = None
     _parsed: dict[int, Array] = field(default_factory=dict[int, Array], init=False, repr=False)
 
@@ -126,12 +126,8 @@ class DataTable:
         called = tuple(name for name, _ in columns)
         is_named = all(is_a(name, str) for name in called)
         called = called if is_named else tuple(numbered(len(called)))
-        texts = frozenset(
-            k
-            for k, (cells, (_, column)) in enumerate(zip(parts, columns, strict=True))
-            if cells.dtype.kind in "OUT" and not has_categories(column) and _are_texts(cells)
-        )
-        return cls(called, is_named, parts, texts=texts)
+        categories = frozenset(k for k, (_, own) in enumerate(columns) if has_categories(own))
+        return cls(called, is_named, parts, categories=categories)
 
     @property
     def is_file(self) -> bool:
@@ -151,6 +147,14 @@ class DataTable:
             return cells.dtype.kind in "fiu" or (cells.dtype.kind == "O" and _are_numbers(cells))
         known = ~self._missing(column)
         return 2 * int(np.isfinite(self._floats(column)[known]).sum()) > max(1, int(known.sum()))
+
+    def has_numbers_as_text(self, column: int) -> bool:
+        """Return whether most cells of a frame's column, from 0, are the text of a number."""
+        cells = self.columns[column]
+        if self.is_file or column in self.categories or cells.dtype.kind not in "OUT":
+            return False
+        texts = [c for c in cells.tolist() if is_a(c, str) and not is_missing_word(c)]
+        return 2 * sum(math.isfinite(number_of(text)) for text in texts) > max(len(texts), 1)
 
     def _floats(self, column: int) -> Array:
         """Return a column of words of text (N,) as numbers, NaN where they are none."""
@@ -211,12 +215,6 @@ class DataTable:
 def _are_numbers(cells: NDArray[Any]) -> bool:
     known = [cell for cell in cells if not is_missing(cell)]
     return bool(known) and all(is_a(c, Real) and not is_a(c, bool) for c in known)
-
-
-def _are_texts(cells: NDArray[Any]) -> bool:
-    """Return whether most cells are the text of a number."""
-    texts = [c for c in cells.tolist() if is_a(c, str) and not is_missing_word(c)]
-    return 2 * sum(math.isfinite(number_of(text)) for text in texts) > max(len(texts), 1)
 
 
 def numbered(count: int) -> list[str]:

@@ -22,7 +22,8 @@ def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE, dxf: DxfVersion = "
     from ezdxf.filemanagement import new
 
     scene = flattened(scene, tolerance)
-    unit = {} if dxf == "r12" else {"units": units.MM}  # which R12 does not have
+    is_old = dxf == "r12"
+    unit = {} if is_old else {"units": units.MM}  # which R12 does not have
     document: Any = new(dxf.upper(), **unit)
     document.header["$MEASUREMENT"] = 1
     space = document.modelspace()
@@ -31,20 +32,20 @@ def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE, dxf: DxfVersion = "
     # ezdxf takes a corner at the origin for a missing one
     document.header["$EXTMIN"], document.header["$EXTMAX"] = extents
     space.reset_limits((0, 0), (scene.width, scene.height))
-    for note in filter(None, (scene.title, *scene.notes)) if dxf != "r12" else ():
+    for note in filter(None, (scene.title, *scene.notes)) if not is_old else ():
         document.header.custom_vars.append("orbiflow", note[:250])
     for layer in scene.layers:
         if layer.role == "paper":
             continue
-        name = layer.name if dxf != "r12" else re.sub(r"\W", "_", layer.name.upper())[:31]
+        name = re.sub(r"\W", "_", layer.name.upper())[:31] if is_old else layer.name
         entry = document.layers.add(name, linetype="CONTINUOUS")
         colour = layer.style.stroke or layer.style.fill or "#000000"
         entry.color = ACI.get(colour, 7)
-        if dxf != "r12":
+        if not is_old:
             entry.rgb = RGB.from_hex(colour)
         for part in _parts(scene, layer, tolerance):
             points = [(x, scene.height - y) for x, y in part.flattened(tolerance).tolist()]
-            line = space.add_polyline2d if dxf == "r12" else space.add_lwpolyline
+            line = space.add_polyline2d if is_old else space.add_lwpolyline
             line(points, close=part.closed, dxfattribs={"layer": name})
     text = io.StringIO()
     document.write(text)

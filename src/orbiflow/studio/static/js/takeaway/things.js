@@ -16,29 +16,45 @@ import { KINDS } from "./kinds.js";
 
 /** @returns {Thing} */
 const printed = (title, image, start, first) => ({
-  ...{ title, image, start, first, makes: "export", fixed: ["purpose", "cut"] },
+  title,
+  image,
+  start,
+  first,
+  makes: "export",
+  fixed: ["purpose", "cut"],
 });
 /** @returns {Thing} */
 const solid = (title, image, kind, first) => ({
-  ...{ title, image, first, makes: "solid", start: { kind }, fixed: ["kind"] },
+  title,
+  image,
+  first,
+  makes: "solid",
+  start: { kind },
+  fixed: ["kind"],
 });
 
 /** @type {Record<string, Thing>} */
 export const THINGS = {
   laser: printed("Pieces for a laser", "laser", { purpose: "laser", cut: "pieces" }, [
-    ...["tile_size", "kerf", "area"],
+    "tile_size",
+    "kerf",
+    "area",
   ]),
   jigsaw: printed("Jigsaw", "jigsaw", { purpose: "laser", cut: "jigsaw" }, [
-    ...["area", "tile_size", "tray"],
+    "area",
+    "tile_size",
+    "tray",
   ]),
   poster: {
     ...printed("Poster", "poster", { purpose: "print", area: "A2", bed: "A4" }, [
-      ...["area", "bed", "tile_size"],
+      "area",
+      "bed",
+      "tile_size",
     ]),
     words: {
       area: { title: "How large is the poster?", about: "Such as A2, A3 or 600x400mm." },
       bed: {
-        title: "Which paper has your printer?",
+        title: "Which paper does your printer take?",
         about:
           "Such as A4 or letter. A larger poster is several sheets to put together, in one PDF.",
       },
@@ -46,20 +62,30 @@ export const THINGS = {
     shown: { bed: null }, // all of it, and not its first sheet
   },
   fabric: {
-    ...{ title: "Fabric that repeats", image: "fabric", makes: "art", start: { repeat: "basic" } },
+    title: "Fabric that repeats",
+    image: "fabric",
+    makes: "art",
+    start: { repeat: "basic" },
     first: ["repeat", "dpi", "palette"],
   },
   mug: printed("Mug", "mug", { purpose: "print", area: "mug" }, ["tile_size", "palette", "format"]),
   stickers: printed("Stickers", "sticker", { purpose: "stickers" }, [
-    ...["tile_size", "offset", "area"],
+    "tile_size",
+    "offset",
+    "area",
   ]),
   colouring: printed("Colouring page", "pencil", { purpose: "colouring" }, [
-    ...["tile_size", "outline", "area"],
+    "tile_size",
+    "outline",
+    "area",
   ]),
   stamp: solid("Stamp", "stamp", "stamp", ["tile_size", "height", "format"]),
   cutter: solid("Cookie cutter", "cutter", "cutter", ["tile_size", "blade", "format"]),
   ball: {
-    ...{ title: "Ball or lamp", image: "ball", makes: "solid", start: { kind: "ball" } },
+    title: "Ball or lamp",
+    image: "ball",
+    makes: "solid",
+    start: { kind: "ball" },
     first: ["kind", "diameter", "format"],
   },
   film: { ...KINDS.animate, makes: "animate", title: "Film", first: ["kind", "seconds", "format"] },
