@@ -53,7 +53,7 @@ class Made(Outcome):
         It holds the sheet, and in a format of pages those that come after it.
         """
         settings = self.settings
-        own = {"tolerance": TOLERANCE}
+        own: dict[str, Any] = {"tolerance": TOLERANCE}
         if isinstance(settings, ExportSettings):
             own = {"tolerance": settings.fine, "dxf": settings.dxf}
         form = format or settings.file_format

@@ -23,8 +23,8 @@ def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE, dxf: DxfVersion = "
 
     scene = flattened(scene, tolerance)
     is_old = dxf == "r12"
-    unit = {} if is_old else {"units": units.MM}  # which R12 does not have
-    document: Any = new(dxf.upper(), **unit)
+    # R12 has no units
+    document: Any = new("R12") if is_old else new("R2010", units=units.MM)
     document.header["$MEASUREMENT"] = 1
     space = document.modelspace()
     extents = (0, 0, 0), (scene.width, scene.height, 0)
