@@ -21,8 +21,7 @@ from orbiflow.tiles.silhouette.outlines import (
 )
 from orbiflow.tiles.silhouette.readers.image_files import image_kind
 from orbiflow.tiles.silhouette.readers.pictures import read_image
-from orbiflow.tiles.silhouette.readers.point_lists import read_points
-from orbiflow.tiles.silhouette.readers.polygon_json import read_json, read_wkt
+from orbiflow.tiles.silhouette.readers.polygons import read_json, read_points, read_wkt
 from orbiflow.tiles.silhouette.readers.reading import (
     FileContent,
     Reading,
