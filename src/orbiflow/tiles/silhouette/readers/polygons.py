@@ -243,8 +243,8 @@ def read_json(path: Source) -> Reading:
                 f"{path}: vertex {i} (counted from 0) is {quoted(json.dumps(pair))}, not a pair of "
                 "numbers [x, y]"
             )
-    notes += [UP] * (y_down is None)
-    return read_rings(path, [content], "json", y_down=bool(y_down), notes=notes)
+    reading = read_rings(path, [content], "json", y_down=bool(y_down), notes=notes)
+    return reading.with_notes(UP) if y_down is None else reading
 
 
 def read_wkt(path: Source) -> Reading:
