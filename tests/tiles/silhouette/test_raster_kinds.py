@@ -56,15 +56,11 @@ def test_a_transparent_level_of_grey_cuts_out_at_every_depth(case: tuple[int, in
 @given(
     st.sampled_from([8, 16]),
     st.lists(st.tuples(*[st.integers(0, 255)] * 3), min_size=2, max_size=2, unique=True),
-    st.booleans(),
 )
 def test_a_transparent_colour_cuts_out_at_every_depth(
-    depth: int, colours: list[tuple[int, int, int]], is_near: bool
+    depth: int, colours: list[tuple[int, int, int]]
 ) -> None:
     shape, ground = (np.array(c) * (257 if depth == 16 else 1) for c in colours)
-    if is_near:  # the least difference, which 8 bits of 16 do not show
-        shape = ground.copy()
-        shape[0] ^= 1
     key = struct.pack(">HHH", *ground)
     reading = read(png(of_inside(shape, ground), depth, COLOUR, transparent=key))
     assert reading.notes == (OPAQUE,)
@@ -89,7 +85,6 @@ DEEP = {
     "16 bits": of_inside(9000, 60_000).astype("u2"),
     "16 bits, big-endian": of_inside(9000, 60_000).astype(">u2"),
     "12 bits in 16": of_inside(4000, 100).astype("u2"),
-    "10 bits in 16": of_inside(0, 1000).astype("u2"),
     "32 bits": of_inside(200, 0).astype("i4"),
     "with a sign": of_inside(-3000, 9000).astype("i2"),
     "floats to 1": of_inside(0.0, 1.0).astype("f4"),
@@ -119,12 +114,11 @@ def test_tiffs_that_are_not_read_say_what_to_save() -> None:
 
 
 @pytest.mark.parametrize(("shape", "ground"), [(1, 0), (0, 1)])
-@pytest.mark.parametrize("dtype", ["u1", "u2", ">u2", "i4"])
-def test_masks_of_0_and_1_are_read_and_said(shape: int, ground: int, dtype: str) -> None:
-    reading = read(tiff(of_inside(shape, ground).astype(dtype)), "a.tif")
+def test_masks_of_0_and_1_are_read_and_said(shape: int, ground: int) -> None:
+    reading = read(tiff(of_inside(shape, ground).astype("u1")), "a.tif")
     assert "0 and 1" in reading.notes[0]
     assert iou(reading.outline, SHAPE) > 0.995
-    mask = of_inside(1, 0).astype(dtype)
+    mask = of_inside(1, 0).astype("u1")
     assert iou(Target.from_mask(mask).outline, reading.outline) > 0.999
 
 
@@ -142,34 +136,6 @@ def test_dark_pictures_are_read() -> None:
     ImageDraw.Draw(disc).ellipse((100, 100, 700, 700), fill=36)
     area = abs(signed_area(read(saved(disc.reduce(8))).outline))
     assert area == pytest.approx(np.pi * 37.5**2, rel=0.01)
-
-
-SHOWN = Image.fromarray(of_inside((0, 0, 0, 255), (0, 0, 0, 0)).astype(np.uint8))
-NOTHING = Image.new("RGBA", (100, 100))
-FILM = {"save_all": True, "duration": 100}
-ANIMATIONS = {
-    "APNG": (NOTHING, [SHOWN], "PNG"),
-    "APNG, third": (NOTHING, [NOTHING, SHOWN], "PNG"),
-    "GIF": (NOTHING, [SHOWN, NOTHING], "GIF"),
-    "WebP": (NOTHING, [SHOWN], "WEBP"),
-    "pages": (Image.new("L", (100, 100), 255), [SHOWN.getchannel("A")], "TIFF"),
-    "white first": (Image.new("L", (100, 100), 255), [SHOWN.getchannel("A")], "GIF"),
-}
-
-
-@pytest.mark.parametrize("case", ANIMATIONS)
-def test_the_first_frame_that_shows_anything_is_taken(case: str) -> None:
-    first, others, kind = ANIMATIONS[case]
-    lossless = {"lossless": True} if kind == "WEBP" else {}
-    own = FILM if kind != "TIFF" else {"save_all": True}
-    reading = read(saved(first, kind, append_images=others, **own, **lossless))
-    assert ", the first that shows anything, of " in reading.notes[0]
-    assert iou(reading.outline, SHAPE) > 0.99
-
-
-def test_an_animation_of_nothing_is_refused() -> None:
-    with refused("a.png", "transparent", kind=InputFileError):
-        read(saved(NOTHING, append_images=[Image.new("RGBA", (100, 100), (9, 0, 0, 0))], **FILM))
 
 
 def test_colours_behind_full_transparency_are_hinted_at() -> None:

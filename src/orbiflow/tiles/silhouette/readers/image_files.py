@@ -1,13 +1,13 @@
-"""Image files, decoded within bounds to what each pixel shows, whatever its depth and transparency."""
+"""Image files, decoded within bounds to what each pixel shows, as Pillow sees it."""
 
 import io
 import re
 import warnings
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import Image, ImageOps, UnidentifiedImageError
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source, check_file, read_bytes, read_head
@@ -15,9 +15,6 @@ from orbiflow.tiles.silhouette.readers.reading import Source, check_file, read_b
 MAX_BYTES = 64 * 2**20
 MAX_PIXELS = 40_000_000  # that are kept: of a larger image, several become one
 MAX_PIXELS_READ = 128_000_000  # before they are shrunk: telephones have 48 or 108 million
-MAX_FRAMES = 100  # of an animation, in which one that shows anything is sought
-FULL_SCALES = (1.0, 255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of masks, and of 8 to 16 bits
-STRIP_ROWS = 256  # rows of the shrunk image that are made at once
 MASK_NOTE = "took 1 for white: the levels are 0 and 1 alone"
 _STARTS = {
     **{b"\x89PNG\r\n\x1a\n": "PNG", b"\xff\xd8\xff": "JPEG", b"BM": "BMP"},
@@ -31,16 +28,6 @@ _DAMAGED = (
 )
 # by which Pillow scales these levels, but not the transparent one
 _PNG_SCALES = {"L;2": 85, "L;4": 17}
-# by EXIF orientation
-_TURNS = {
-    2: Image.Transpose.FLIP_LEFT_RIGHT,
-    3: Image.Transpose.ROTATE_180,
-    4: Image.Transpose.FLIP_TOP_BOTTOM,
-    5: Image.Transpose.TRANSPOSE,
-    6: Image.Transpose.ROTATE_270,
-    7: Image.Transpose.TRANSVERSE,
-    8: Image.Transpose.ROTATE_90,
-}
 
 
 def image_kind(head: bytes) -> str:
@@ -52,7 +39,7 @@ def image_kind(head: bytes) -> str:
 
 @dataclass(frozen=True)
 class DecodedImage:
-    """The first frame of an image file that shows anything, turned as its EXIF orientation asks.
+    """The first frame of an image file, turned as its EXIF orientation asks.
 
     - `image`: Of mode "L", "RGB", "RGBA" (not premultiplied), or "F" (0 to 1, of more than 8 bits).
     - `size`: The width and height of the image in the file, turned, in pixels.
@@ -84,7 +71,7 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
             # Pillow warns of damaged metadata and of sizes that are refused here anyway.
             warnings.simplefilter("ignore")
             with Image.open(_stream(path), formats=_FORMATS) as file:
-                return _first_shown(path, file, enough)
+                return _first_frame(path, file, enough)
     except InputFileError:
         raise
     except Image.DecompressionBombError as exc:
@@ -126,39 +113,13 @@ def _too_large(path: Source, size: str, most: int = MAX_PIXELS_READ) -> str:
     return f"{path}: {size}, at most {most // 10**6} megapixels are read; downscale the image"
 
 
-def _first_shown(path: Source, file: Any, enough: int | None) -> DecodedImage:
-    """Return the first frame that shows anything, or the first of all."""
-    n_frames = getattr(file, "n_frames", 1)
-    first: DecodedImage | None = None
-    pixels = 0
-    for number in range(min(n_frames, MAX_FRAMES)):
-        file.seek(number)
-        pixels += file.width * file.height
-        if first is not None and pixels > MAX_PIXELS_READ:
-            break
-        other = f"frame {number + 1}, the first that shows anything,"
-        which = other if number else "the first frame"
-        notes = [f"took {which} of {n_frames}"] * (n_frames > 1)
-        found = _frame(path, file, enough, notes)
-        if n_frames == 1 or _shows_anything(found.image):
-            return found
-        first = first or found
-    assert first is not None
-    return first
-
-
-def _shows_anything(image: Image.Image) -> bool:
-    extrema: Any = image.getextrema()
-    bands = [extrema] if len(image.getbands()) == 1 else extrema
-    transparent = image.mode == "RGBA" and bands[3][1] == 0
-    return not transparent and any(low != high for low, high in bands)
-
-
-def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> DecodedImage:
-    is_jpeg = file.format in ("JPEG", "MPO")
+def _first_frame(path: Source, file: Any, enough: int | None) -> DecodedImage:
+    frames = getattr(file, "n_frames", 1)
+    notes = [f"took the first frame of {frames}"] * (frames > 1)
     check_size(path, file.size)
     width, height = size = file.size
     stored = str(file.tile[0][3]) if file.format == "PNG" and file.tile else ""
+    is_jpeg = file.format in ("JPEG", "MPO")
     shrunk = 1  # of a JPEG, which is decoded to a half, quarter or eighth, a power of two
     while -(-width // shrunk) * -(-height // shrunk) > MAX_PIXELS:
         shrunk += shrunk if is_jpeg else 1
@@ -169,97 +130,49 @@ def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> Dec
         least = enough if enough is not None and shrunk == 1 else min(size) // shrunk
         file.draft("RGB", (least, least))
     orientation = file.getexif().get(0x0112, 1)
+    file.load()  # of a TIFF that is turned, Pillow turns pixels and size here, and the EXIF tag goes
+    key: Any = file.info.get("transparency")
+    if stored == "RGB;16B" and isinstance(key, tuple):  # the pixels have 8 bits by now
+        file.info["transparency"] = tuple((np.array(cast(Any, key)) >> 8).tolist())
+    elif stored in _PNG_SCALES and isinstance(key, int):
+        bits = int(stored.partition(";")[2])
+        file.info["transparency"] = (key & (2**bits - 1)) * _PNG_SCALES[stored]
+    image = ImageOps.exif_transpose(file)
     if orientation not in (0, 1):
         notes.append("turned the image as its EXIF orientation asks")
-        # Pillow itself turns TIFFs, their size included
-        size = (height, width) if orientation >= 5 and file.format != "TIFF" else size
-    raw = _loaded(path, file, stored)
-    turn = None if file.format == "TIFF" else _TURNS.get(orientation)
-    levels = _levels(path, raw.image, notes) if raw.image.mode.startswith(("I", "F")) else None
-    factor = max(1, round(shrunk * file.width / width))
-    image = raw.shown(levels) if factor == 1 else _shrunk(raw, factor, levels)
-    image = image if turn is None else image.transpose(turn)
+        size = size[::-1] if orientation >= 5 and file.format != "TIFF" else size
+    image = _shown(path, image).reduce(max(1, round(shrunk * file.width / width)))
     if image.mode == "L" and image.getextrema() == (0, 1):
         image = image.point([0, *[255] * 255])
         notes.append(MASK_NOTE)
     return DecodedImage(image, size, shrunk, tuple(notes))
 
 
-class _Raw(NamedTuple):
-    """What Pillow decodes, of any mode; and of a transparent level or colour where it is not, 255."""
+def _shown(path: Source, image: Image.Image) -> Image.Image:
+    """Return the image in one of the modes of `DecodedImage`.
 
-    image: Image.Image
-    opaque: Image.Image | None = None
-
-    def rows(self, top: int, bottom: int) -> "_Raw":
-        """Return some of the rows."""
-        box = (0, top, self.image.width, bottom)
-        return _Raw(self.image.crop(box), self.opaque and self.opaque.crop(box))
-
-    def shown(self, levels: tuple[float, float] | None) -> Image.Image:
-        """Return the image as `DecodedImage` has it, given the levels of its black and white."""
-        image = self.image
-        if levels is not None:
-            black, white = levels
-            values = np.asarray(image, dtype=np.float32) - np.float32(black)
-            image = Image.fromarray(values / np.float32(white - black))
-            if self.opaque is None:
-                return image
-            image = _eight_bits(image)
-        elif self.opaque is None:
-            if image.has_transparency_data:
-                return image.convert("RGBA")
-            return image.convert("L" if image.mode in ("1", "L") else "RGB")
-        image = image.convert("RGB")
-        image.putalpha(self.opaque)
-        return image
-
-
-def _loaded(path: Source, file: Any, stored: str) -> _Raw:
-    """Load the frame that an open file stands at; a PNG has pixels as `stored`, such as "L;2"."""
-    file.load()
-    key: Any = file.info.get("transparency")
-    values = np.asarray(file)
-    if file.mode == "RGB" and isinstance(key, tuple):
-        own = np.array(cast(Any, key), dtype=int)
-        if stored != "RGB;16B":
-            own &= 255
-        elif getattr(file, "n_frames", 1) > 1:
-            own >>= 8
-        else:
-            with Image.open(_stream(path), formats=_FORMATS) as again:
-                again.tile = [again.tile[0]._replace(args="RGB;16L")]  # the other byte of each
-                again.load()
-                values = values.astype(np.uint16) * 256 + np.asarray(again)
-        opaque = (values != own).any(axis=2)
-    elif file.mode in ("L", "I;16", "I;16B") and isinstance(key, int):
-        bits = 16 if file.mode != "L" else int(stored.partition(";")[2] or 8)
-        opaque = values != (key & (2**bits - 1)) * _PNG_SCALES.get(stored, 1)
-    else:
-        return _Raw(file)
-    return _Raw(file, Image.fromarray(np.where(opaque, 255, 0).astype(np.uint8)))
-
-
-def _levels(path: Source, image: Image.Image, notes: list[str]) -> tuple[float, float]:
-    """Return the levels of black and white in an image of more than 8 bits.
-
-    White is the least of `FULL_SCALES` for whole numbers, with a note if that is not of 16 bits. Of
-    other numbers none is known: the image's own range stands in for it.
+    White is 65,535 of levels of 16 bits; of other deep levels the image's own range stands in for it.
     """
-    values = np.asarray(image)
-    low, high = float(values.min()), float(values.max())
-    if not np.isfinite([low, high]).all():
-        raise InputFileError(f"{path}: holds pixels that are not finite numbers; export it as PNG")
-    if image.mode == "F" or low < 0 or high > FULL_SCALES[-1]:
-        return low, max(high, low + float(np.finfo(np.float32).tiny))
-    white = next(scale for scale in FULL_SCALES if high <= scale)
-    if high <= 1:
-        notes.append(MASK_NOTE)
-    elif high <= FULL_SCALES[-2]:
-        notes.append(
-            f"took {white:.0f} for white: the levels, of 16 bits or more, go up to {high:.0f}"
-        )
-    return 0.0, white
+    if image.mode.startswith(("I", "F")):
+        values = np.asarray(image, dtype=np.float32)
+        low, high = float(values.min()), float(values.max())
+        if not np.isfinite([low, high]).all():
+            raise InputFileError(
+                f"{path}: holds pixels that are not finite numbers; export it as PNG"
+            )
+        if image.mode.startswith("I;16"):
+            low, high = 0.0, 65535.0
+        shown = Image.fromarray((values - low) / max(high - low, np.finfo(np.float32).tiny))
+        key: Any = image.info.get("transparency")
+        if key is None:
+            return shown
+        image = _eight_bits(shown).convert("RGB")
+        image.putalpha(Image.fromarray(np.where(values == key, 0, 255).astype(np.uint8)))
+    elif image.has_transparency_data:
+        return image.convert("RGBA")
+    return (
+        image if image.mode == "RGBA" else image.convert("L" if image.mode in ("1", "L") else "RGB")
+    )
 
 
 def _eight_bits(image: Image.Image) -> Image.Image:
@@ -267,16 +180,3 @@ def _eight_bits(image: Image.Image) -> Image.Image:
     if image.mode != "F":
         return image
     return Image.fromarray((np.asarray(image) * 255 + 0.5).astype(np.uint8))
-
-
-def _shrunk(raw: _Raw, factor: int, levels: tuple[float, float] | None) -> Image.Image:
-    """Return the image with `factor` x `factor` pixels averaged into one, by strips: it is large."""
-    width, height = raw.image.size
-    strips: list[tuple[int, Image.Image]] = []
-    for top in range(0, height, STRIP_ROWS * factor):
-        strip = raw.rows(top, min(top + STRIP_ROWS * factor, height)).shown(levels)
-        strips.append((top // factor, strip.reduce(factor)))
-    whole = Image.new(strips[0][1].mode, (-(-width // factor), -(-height // factor)))
-    for top, strip in strips:
-        whole.paste(strip, (0, top))
-    return whole
