@@ -142,8 +142,8 @@ class Descent:
     def keep(self, chosen: Sequence[int], iou: Array) -> None:
         """Go on with the candidates `chosen` alone; `iou` (S,) is that of all, below 0 if unknown."""
         index = list(chosen)
-        known = torch.tensor(iou, dtype=torch.float32).clamp(0.5, 1.0)
-        self.threshold = (known / (1 + known))[index]
+        overlap = torch.tensor(iou, dtype=torch.float32).clamp(0.5, 1.0)
+        self.threshold = (overlap / (1 + overlap))[index]
         self._set_up(self.model.take(index))
         self.points, self.momentum = self.points[index], self.momentum[index]
         self.record = [parameters[index] for parameters in self.record]
@@ -370,11 +370,11 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
 def _starts(
     target: Target, kind: IsohedralClass, settings: OverlapSearch, cancel: Cancel
 ) -> Starts:
-    found: Starts | None = None
+    nearest: Starts | None = None
     if settings.starts == "outline":
-        found = outline_starts(target, kind, settings, cancel=cancel)
-        if len(found.prototiles) >= MIN_STARTS and found.iou.max() >= MIN_START_IOU:
-            return found
+        nearest = outline_starts(target, kind, settings, cancel=cancel)
+        if len(nearest.prototiles) >= MIN_STARTS and nearest.iou.max() >= MIN_START_IOU:
+            return nearest
     templates = template_starts(
         kind,
         turns=settings.turns,
@@ -384,7 +384,7 @@ def _starts(
     )
     # their overlap is not known: 0 says that any result is better
     plain = Starts(templates, np.zeros(len(templates)))
-    if found is None or not len(found.prototiles):
+    if nearest is None or not len(nearest.prototiles):
         return plain
-    joined = Prototiles.joined([found.prototiles, templates])
-    return Starts(joined, np.concatenate([found.iou, plain.iou]))
+    joined = Prototiles.joined([nearest.prototiles, templates])
+    return Starts(joined, np.concatenate([nearest.iou, plain.iou]))

@@ -115,12 +115,12 @@ class OverlapSearch(Settings, SearchMethod):
     ) -> ClassFinalists:
         """Let flows carry near tiles closer to the silhouette."""
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
-        own = replace(self, stages=stages)
+        search = replace(self, stages=stages)
         with one_thread():
-            found = fit_descent(
-                goal.target, kind, own, emphasis=goal.emphasis, progress=progress, cancel=cancel
+            finalists = fit_descent(
+                goal.target, kind, search, emphasis=goal.emphasis, progress=progress, cancel=cancel
             )
-        return found._replace(enough=1 if per_class == 1 else 2 * per_class)
+        return finalists._replace(enough=1 if per_class == 1 else 2 * per_class)
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> ClassFinalists:
         """Return the tiles nearest to the outline."""
@@ -128,10 +128,12 @@ class OverlapSearch(Settings, SearchMethod):
             return super().sketch(goal, kind, cancel)
         few: dict[str, Any] = {"candidates": 3, "projected": 1000, "measured": 40, "seed": 0}
         few |= {"resolutions": (PREVIEW_POINTS,), "boundary": PREVIEW_POINTS}
-        own = outline_starts(goal.target, kind, replace(self, **few), cancel=cancel).prototiles
-        if not len(own):
+        prototiles = outline_starts(
+            goal.target, kind, replace(self, **few), cancel=cancel
+        ).prototiles
+        if not len(prototiles):
             raise CertificationError("no tile near the outline is simple")
-        return ClassFinalists(StillTiles(kind, own), len(own), 0, 1)
+        return ClassFinalists(StillTiles(kind, prototiles), len(prototiles), 0, 1)
 
     def prepare(self, goal: Goal) -> None:
         """Draw the silhouette's soft edge."""
@@ -200,7 +202,7 @@ class OccupancySearch(Settings, SearchMethod):
         """Let flows carry templates onto the silhouette; each class has a seed of its own."""
         del per_class  # all survivors are given
         number = list(dict.fromkeys((*CLASSES, *ISOHEDRAL_TYPES))).index(kind.name)
-        own = replace(self, seed=(self.seed * 1009 + number) % 2**32)
+        seeded = replace(self, seed=(self.seed * 1009 + number) % 2**32)
         with one_thread():
-            model = fit_occupancy(goal.target, kind, own, progress, cancel=cancel)
+            model = fit_occupancy(goal.target, kind, seeded, progress, cancel=cancel)
         return ClassFinalists(model, len(initial_poses(kind, self.turns)[0]), 0, model.size)

@@ -90,15 +90,15 @@ def refine(
             cancel.check()
             if not descent.step():
                 break
-        found = next(t for t in map(space.tile, reversed(descent.path)) if certify(t).valid)
+        refined = next(t for t in map(space.tile, reversed(descent.path)) if certify(t).valid)
     return EscherTile(
-        found,
+        refined,
         name=start.name,
         y_down=start.y_down,
         silhouette=start.silhouette,
         no_map="its outline was changed by a loss of one's own",
         notes=(descent.note(),),
-        likeness=Likeness(thinnest=narrowest_neck(found.polygon)),
+        likeness=Likeness(thinnest=narrowest_neck(refined.polygon)),
     )
 
 
@@ -133,8 +133,8 @@ class _Descent:
 
     def evaluated(self, parameters: Array) -> tuple[float, Array]:
         """Return the loss of the tile for parameters (P,), and its gradient."""
-        first, own = self.space.first, torch.tensor(parameters, requires_grad=True)
-        polygon = (torch.tensor(self.space.matrix) @ own).reshape(-1, 2)
+        first, variables = self.space.first, torch.tensor(parameters, requires_grad=True)
+        polygon = (torch.tensor(self.space.matrix) @ variables).reshape(-1, 2)
         center, scale = torch.tensor(first.center), self.size / signed_area(polygon).abs().sqrt()
         polygon = center + scale * (polygon - center)
         value = self.loss(polygon)
@@ -143,7 +143,7 @@ class _Descent:
             raise OrbiflowError(f"the loss must give {how}, got {described(value)}")
         away = (polygon - torch.tensor(first.polygon)).square().sum(dim=1) / self.size**2
         total = value.reshape(()).double() + self.pull * (away @ torch.tensor(self.shares))
-        (gradient,) = torch.autograd.grad(total, own)
+        (gradient,) = torch.autograd.grad(total, variables)
         return float(total.detach()), gradient.numpy()
 
     def step(self) -> bool:

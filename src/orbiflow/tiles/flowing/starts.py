@@ -73,8 +73,8 @@ def outline_starts(
         for points in settings.resolutions:
             cancel.check()
             outline = resampled(ring, points, settings.phase) @ [1, 1j]
-            found = best_placements(kind, outline, settings.projected)
-            nearest = _simple_tiles(kind, goal, outline, found, settings.measured)
+            best = best_placements(kind, outline, settings.projected)
+            nearest = _simple_tiles(kind, goal, outline, best, settings.measured)
             for tiles, placements, score in nearest:
                 parts.append(Prototiles.of(kind, tiles, settings.boundary, mirrored=mirrored))
                 scores.append(score)
@@ -175,9 +175,9 @@ CHUNK_PLACEMENTS = 4000  # placements worked on at a time: bounds the memory at 
 
 def nearest_tiles(kind: IsohedralClass, outline: Complex, placements: Placements) -> NearestTiles:
     """Project an outline (n,), counter-clockwise, onto the tiles of a class for every placement."""
-    found: list[NearestTiles] = []
+    nearest: list[NearestTiles] = []
     pieces = max(1, -(-len(placements.starts) // CHUNK_PLACEMENTS))
     for index in np.array_split(np.arange(len(placements.starts)), pieces):
         space = TileSpace(kind, placements.take(index))
-        found.append(space.nearest(np.broadcast_to(outline, (space.count, len(outline)))))
-    return NearestTiles(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        nearest.append(space.nearest(np.broadcast_to(outline, (space.count, len(outline)))))
+    return NearestTiles(*(np.concatenate(parts) for parts in zip(*nearest, strict=True)))

@@ -128,8 +128,8 @@ class TileModel(nn.Module, ClassCandidates):
     def start_from(self, prototiles: Prototiles) -> None:
         """Take S start tiles with their poses, in place of those that there are."""
         kind = self.isohedral_class
-        own = prototiles.corners.shape[-1], prototiles.stretch.shape[-1]
-        if own != (len(kind.template()), kind.stretch_dim):
+        dimensions = prototiles.corners.shape[-1], prototiles.stretch.shape[-1]
+        if dimensions != (len(kind.template()), kind.stretch_dim):
             raise OrbiflowError(f"the prototiles are not of class {kind.name}")
         self.vertices = torch.tensor(prototiles.vertices, dtype=torch.float64)
         self.corners = torch.tensor(prototiles.corners)
@@ -246,8 +246,8 @@ class TileModel(nn.Module, ClassCandidates):
         if self.vertices is not None and self.corners is not None:
             model.vertices = self.vertices[chosen].clone()
             model.corners = self.corners[chosen].clone()
-        for own, parameters in zip(model.fourier_fields(), fields, strict=True):
-            own.parameters_.copy_(parameters)
+        for field, parameters in zip(model.fourier_fields(), fields, strict=True):
+            field.parameters_.copy_(parameters)
         return model
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
@@ -275,8 +275,10 @@ def trainable(candidates: ClassCandidates) -> TileModel:
         return candidates
     if not isinstance(candidates, StillTiles):
         raise OrbiflowError("expected the candidates of a fit; see fit_tile")
-    own = candidates.prototiles
-    return TileModel(candidates.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)
+    prototiles = candidates.prototiles
+    return TileModel(
+        candidates.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=prototiles
+    )
 
 
 def placed_field(model: TileModel) -> Callable[[Tensor], Tensor]:

@@ -38,8 +38,8 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
     >>> faithfulness(bar, [[5.0, 0.0], [5.0, 8.0], [3.0, 8.0], [3.0, 0.0]]).score > 0.99
     True
     """
-    own, other = _ring(silhouette, "the silhouette"), _ring(shape, "the shape")
-    body, overlap = _body(own.tobytes())
+    original, other = _ring(silhouette, "the silhouette"), _ring(shape, "the shape")
+    body, overlap = _body(original.tobytes())
     z = complex_points(other)
     turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS).tolist()
     rough = [
@@ -48,12 +48,12 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
         for turn in turns
     ]
     rough.sort(key=lambda overlay: -overlay[0])
-    found: list[tuple[float, Complex]] = []
+    candidates: list[tuple[float, Complex]] = []
     for _, turn, ring in rough[:REFINED_TURNS]:
         factor, middle, _ = best_overlay(ring, overlap, turn)
         z = bent_onto(body, plane_points(factor * ring + middle))[:, None]
-        found.append((float(body.cost(z)[0]), z[: body.size, 0]))
-    cost, outline = min(found, key=lambda one: one[0])
+        candidates.append((float(body.cost(z)[0]), z[: body.size, 0]))
+    cost, outline = min(candidates, key=lambda candidate: candidate[0])
     return fidelity(body.rest[: body.size], outline, cost)
 
 

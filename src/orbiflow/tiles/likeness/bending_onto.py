@@ -46,8 +46,8 @@ def corresponding(
     steps = _best_of(cost, _first_places(cost[0]), stretch)
     at = np.append(steps, steps[0] + places) / places * arc_lengths(other)[-1]
     # the k-th matched point lies at (first + k) / count of the own length
-    known = (first + np.arange(count + 1)) / count * along[-1]
-    knots = np.concatenate([known[:-1] - along[-1], known])
+    matched = (first + np.arange(count + 1)) / count * along[-1]
+    knots = np.concatenate([matched[:-1] - along[-1], matched])
     values = np.concatenate([at[:-1] - arc_lengths(other)[-1], at])
     return np.interp(along[:-1], knots, values)
 
@@ -55,10 +55,10 @@ def corresponding(
 def _differences(points: Array, places: Array, near: float) -> Array:
     """Return the costs (n, m) of matching a point with a place."""
     x, y = complex_points(points), complex_points(places)
-    own, other = (np.roll(z, -k) - np.roll(z, k) for z, k in ((x, 1), (y, PLACES_PER_POINT)))
-    own, other = (step / np.maximum(abs(step), 1e-12) for step in (own, other))
+    tangents, other = (np.roll(z, -k) - np.roll(z, k) for z, k in ((x, 1), (y, PLACES_PER_POINT)))
+    tangents, other = (step / np.maximum(abs(step), 1e-12) for step in (tangents, other))
     apart = abs(x[:, None] - y[None]) ** 2 / near**2
-    return apart + 1 - (np.conj(own)[:, None] * other[None]).real
+    return apart + 1 - (np.conj(tangents)[:, None] * other[None]).real
 
 
 def _first_places(cost: Array) -> list[int]:
@@ -161,17 +161,17 @@ def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
     pull = condensed.forces(forces)[:, 0]
     matrix, low = condensed.outline, condensed.low
     product = matrix @ p.real + 1j * (matrix @ p.imag)
-    own = np.empty((len(p) + 1, len(p) + 1))
-    own[:-1, :-1] = matrix * (np.conj(along)[:, None] * along[None]).real
-    own[:-1, -1] = own[-1, :-1] = (np.conj(along) * product).real
-    own[-1, -1] = np.vdot(p, product).real
+    hessian = np.empty((len(p) + 1, len(p) + 1))
+    hessian[:-1, :-1] = matrix * (np.conj(along)[:, None] * along[None]).real
+    hessian[:-1, -1] = hessian[-1, :-1] = (np.conj(along) * product).real
+    hessian[-1, -1] = np.vdot(p, product).real
     less = low.conj().T @ np.concatenate([np.diag(along), p[:, None]], axis=1)
-    own -= (less.conj().T @ less).real
+    hessian -= (less.conj().T @ less).real
     product -= low @ (low.conj().T @ p)
     gap = pull - product
     right = np.append((np.conj(along) * gap).real, np.vdot(p, gap).real)
-    own[np.diag_indices_from(own)] += 1e-8 * np.trace(own) / len(own)
-    way = scipy.linalg.solve(own, right, assume_a="pos", check_finite=False)
+    hessian[np.diag_indices_from(hessian)] += 1e-8 * np.trace(hessian) / len(hessian)
+    way = scipy.linalg.solve(hessian, right, assume_a="pos", check_finite=False)
     size = arc_lengths(slide.ring)[-1]
     reach = MAX_SLIDE * size / len(p)
     stay = condensed.whole(p[:, None], forces)

@@ -285,9 +285,9 @@ class Elastic(ElasticBody):
     @cached_property
     def _mates(self) -> Integers:
         """The same pair from its other end, for each pair."""
-        own = self._i * len(self) + self._j
-        order = np.argsort(own)
-        return order[np.searchsorted(own[order], self._j * len(self) + self._i)]
+        keys = self._i * len(self) + self._j
+        order = np.argsort(keys)
+        return order[np.searchsorted(keys[order], self._j * len(self) + self._i)]
 
     @cached_property
     def _gather(self) -> scipy.sparse.csr_matrix:
@@ -340,11 +340,11 @@ class Elastic(ElasticBody):
         cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
         areas = _symmetric(i, j, np.tile(factors, 3) * cotangent / 2, count)
         areas.data = np.clip(areas.data, *COTANGENT_BOUNDS)
-        own = np.arange(n)
-        after = (own + 1) % n
+        index = np.arange(n)
+        after = (index + 1) % n
         # each side counts twice, with either end's rotation
-        sides = self.stiffness.stretch / np.maximum(abs(self.rest[after] - self.rest[own]), 1e-6)
-        total = (areas + _symmetric(own, after, sides, count)).tocoo()
+        sides = self.stiffness.stretch / np.maximum(abs(self.rest[after] - self.rest[index]), 1e-6)
+        total = (areas + _symmetric(index, after, sides, count)).tocoo()
         if stiff is not None:
             factors = self._everywhere(stiff)
             total.data = total.data * np.sqrt(factors[total.row] * factors[total.col])
@@ -359,12 +359,12 @@ class Elastic(ElasticBody):
     def _bending(self, stiff: Array | None) -> tuple[scipy.sparse.csr_matrix, Array]:
         """Return the differences of unit steps along the outline (n, n), and their costs (n,)."""
         n, rest = self.size, self.rest[: self.size]
-        own, after = np.arange(n), (np.arange(n) + 1) % n
+        index, after = np.arange(n), (np.arange(n) + 1) % n
         length = np.maximum(abs(rest[after] - rest), 1e-6)
         before = np.roll(length, 1)
         values = np.concatenate([1 / length, -1 / length - 1 / before, 1 / before])
-        columns = np.concatenate([after, own, (own - 1) % n])
-        matrix = scipy.sparse.csr_matrix((values, (np.tile(own, 3), columns)), shape=(n, n))
+        columns = np.concatenate([after, index, (index - 1) % n])
+        matrix = scipy.sparse.csr_matrix((values, (np.tile(index, 3), columns)), shape=(n, n))
         cost = 2 * self.stiffness.bend / (length + before)
         return matrix, cost if stiff is None else cost * self._everywhere(stiff)[:n]
 

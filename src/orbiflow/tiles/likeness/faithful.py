@@ -154,10 +154,10 @@ def fidelity_to_original(
     gaps = np.asarray(shapely.distance(line, dots))
     # from the point that moved least, once around
     first, length = int(np.argmin(gaps)), float(line.length)
-    found = np.flatnonzero(np.roll(gaps, -first) <= near)
-    along = (np.roll(places, -first)[found] - places[first]) % length
+    close = np.flatnonzero(np.roll(gaps, -first) <= near)
+    along = (np.roll(places, -first)[close] - places[first]) % length
     kept = _longest_increasing(along)
-    knots, values = np.append(found[kept], len(points)), np.append(along[kept], length)
+    knots, values = np.append(close[kept], len(points)), np.append(along[kept], length)
     at: Array = np.interp(np.arange(len(points)), knots, values) + places[first]
     share: Array = np.interp(at % length, arc_lengths(rest), np.arange(len(rest) + 1))
     closed = complex_points(np.vstack([bent, bent[:1]]))

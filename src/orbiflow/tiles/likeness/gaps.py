@@ -30,14 +30,14 @@ class Gaps:
         self.width, n = width, len(ring)
         steps = np.roll(ring, -1) - ring
         beyond = _is_beyond(ring)
-        own, other, share = _nearest_others(ring, steps, beyond, REACH * width)
-        towards = ring[other] + share * steps[other] - ring[own]
-        sign = np.where(beyond[own], -1.0, 1.0)
+        index, other, share = _nearest_others(ring, steps, beyond, REACH * width)
+        towards = ring[other] + share * steps[other] - ring[index]
+        sign = np.where(beyond[index], -1.0, 1.0)
         self._way = sign * towards / np.maximum(abs(towards), 1e-12)
-        rows = np.tile(np.arange(len(own)), 3)
-        columns = np.concatenate([own, other, (other + 1) % n])
-        parts = np.concatenate([np.full(len(own), -1.0), 1 - share, share])
-        self._differences = scipy.sparse.csr_array((parts, (rows, columns)), shape=(len(own), n))
+        rows = np.tile(np.arange(len(index)), 3)
+        columns = np.concatenate([index, other, (other + 1) % n])
+        parts = np.concatenate([np.full(len(index), -1.0), 1 - share, share])
+        self._differences = scipy.sparse.csr_array((parts, (rows, columns)), shape=(len(index), n))
 
     def missing(self, ring: Complex) -> tuple[float, Complex]:
         """Return what is missing on a ring (n,), and its gradient (n,) in the points.
@@ -58,11 +58,11 @@ def _is_beyond(ring: Complex) -> Array:
     tried = ring + OFFSET * outward / np.maximum(abs(outward), 1e-300)
     low, high = ring, np.roll(ring, -1)
     passed = (low.imag <= tried.imag[:, None]) != (high.imag <= tried.imag[:, None])
-    own, side = np.nonzero(passed)
+    index, side = np.nonzero(passed)
     rise = high.imag[side] - low.imag[side]
-    share = (tried.imag[own] - low.imag[side]) / np.where(rise == 0, 1.0, rise)
-    right = low.real[side] + share * (high.real[side] - low.real[side]) > tried.real[own]
-    return np.bincount(own[right], minlength=len(ring)) % 2 == 1
+    share = (tried.imag[index] - low.imag[side]) / np.where(rise == 0, 1.0, rise)
+    right = low.real[side] + share * (high.real[side] - low.real[side]) > tried.real[index]
+    return np.bincount(index[right], minlength=len(ring)) % 2 == 1
 
 
 def _nearest_others(
@@ -76,18 +76,18 @@ def _nearest_others(
     lengths = np.maximum(abs(steps), 1e-12)
     knots = np.concatenate([[0.0], np.cumsum(lengths)])
     near = abs(ring[:, None] - ring) < width + lengths
-    own, other = np.nonzero(near | beyond[:, None])
-    way = abs(knots[own] - knots[other])
+    index, other = np.nonzero(near | beyond[:, None])
+    way = abs(knots[index] - knots[other])
     # the side ends one step on: what counts is its nearer end
-    after = abs(knots[own] - knots[other + 1])
+    after = abs(knots[index] - knots[other + 1])
     total = knots[n]
     way = np.minimum(np.minimum(way, total - way), np.minimum(after, total - after))
     far = way >= MIN_OUTLINE
-    own, other = own[far], other[far]
-    share = (np.conj(steps[other]) * (ring[own] - ring[other])).real / lengths[other] ** 2
+    index, other = index[far], other[far]
+    share = (np.conj(steps[other]) * (ring[index] - ring[other])).real / lengths[other] ** 2
     share = np.clip(share, 0.0, 1.0)
-    apart = abs(ring[other] + share * steps[other] - ring[own])
-    order = np.lexsort((apart, own))
-    first = np.unique(own[order], return_index=True)[1]
+    apart = abs(ring[other] + share * steps[other] - ring[index])
+    order = np.lexsort((apart, index))
+    first = np.unique(index[order], return_index=True)[1]
     best = order[first]
-    return own[best], other[best], share[best]
+    return index[best], other[best], share[best]

@@ -59,12 +59,12 @@ class Measures:
         """Return the seven values of an outline, and their gradients (7, n)."""
         size, z = _normal(bent)
         pieces, of_pieces = self._pieces.misfits(z, self._share)
-        found = self._measured(z)
-        along = np.vstack([of_pieces(), *(gradient() for _, gradient in found)])
+        measured = self._measured(z)
+        along = np.vstack([of_pieces(), *(gradient() for _, gradient in measured)])
         # a larger outline is made smaller again
         grows = (np.conj(along) @ z).real
         along = (along - grows[:, None] * _area_gradient(z) / 2) / size
-        return np.array([*pieces, *(value for value, _ in found)]), along
+        return np.array([*pieces, *(value for value, _ in measured)]), along
 
     def wrinkles(self, ring: Complex, places: Array) -> tuple[float, Complex, Array]:
         """Return by how many radians a ring turns elsewhere than the outline at rest.
@@ -144,12 +144,12 @@ class Measures:
         return float(np.maximum(less, 0).sum() / self._step), gradient
 
     def _moved(self, z: Complex) -> Measured:
-        own, goal, n = z - z.sum() / len(z), self._centered, len(z)
-        factor = _product(own, goal) / _product(own, own).real
-        missed = factor * own - goal
+        centered, goal, n = z - z.sum() / len(z), self._centered, len(z)
+        factor = _product(centered, goal) / _product(centered, centered).real
+        missed = factor * centered - goal
 
         def gradient() -> Complex:
-            return 2 / n * (abs(factor) ** 2 * own - np.conj(factor) * goal)
+            return 2 / n * (abs(factor) ** 2 * centered - np.conj(factor) * goal)
 
         return _product(missed, missed).real / n, gradient
 
@@ -177,10 +177,10 @@ class _Discs(NamedTuple):
         apart = z[ends] - z
         steep = share * self.radius * towards  # of the depth
         pulled = share * apart - steep
-        found = np.bincount(ends, pulled.real, n) + 1j * np.bincount(ends, pulled.imag, n)
+        at_ends = np.bincount(ends, pulled.real, n) + 1j * np.bincount(ends, pulled.imag, n)
         # the vectors turn with the outline
         tilt = steep * (np.conj(apart) * -1j * self.side * towards).real / sides
-        return found - pulled + _shifted(tilt, 1) - _shifted(tilt, -1)
+        return at_ends - pulled + _shifted(tilt, 1) - _shifted(tilt, -1)
 
 
 class _Pieces:
@@ -197,12 +197,12 @@ class _Pieces:
         n, most = values.shape[-1], max(self.halves)
         padded = [values[..., -most - 1 :], values, values[..., :most]]
         total = np.cumsum(np.concatenate(padded, axis=-1), axis=-1)
-        found = np.empty((len(values), 2, n), dtype=complex)
+        sums = np.empty((len(values), 2, n), dtype=complex)
         for k, half in enumerate(self.halves):
-            own, middle = total[:, k % total.shape[1]], most + 1
-            high, low = own[:, middle + half :], own[:, middle - half - 1 :]
-            np.subtract(high[:, :n], low[:, :n], out=found[:, k])
-        return found
+            cumulated, middle = total[:, k % total.shape[1]], most + 1
+            high, low = cumulated[:, middle + half :], cumulated[:, middle - half - 1 :]
+            np.subtract(high[:, :n], low[:, :n], out=sums[:, k])
+        return sums
 
     def misfits(self, z: Complex, share: Array) -> tuple[Array, Callable[[], Complex]]:
         """Return means (2,), with weights (n,), of roots of misfits after the best motions.
@@ -210,11 +210,11 @@ class _Pieces:
         And what computes their gradients (2, n).
         """
         rest, count = self.rest, self.count
-        own, square, common = self.windows(
+        sums, square, common = self.windows(
             np.stack([z, z * np.conj(z), np.conj(rest) * z])[:, None]
         )
-        common -= np.conj(self.sum) * own / count
-        sizes = self.square + square.real - (own.real**2 + own.imag**2) / count
+        common -= np.conj(self.sum) * sums / count
+        sizes = self.square + square.real - (sums.real**2 + sums.imag**2) / count
         size = abs(common)
         misfit = np.maximum(1 - 2 * size / sizes, 0.0)
         root = np.sqrt(misfit + SMALL_MISFIT)
@@ -223,7 +223,7 @@ class _Pieces:
             slope = share * (misfit + 2 * SMALL_MISFIT) / root**3  # of half the misfit
             turned = -slope / sizes * common / np.maximum(size, 1e-300)
             larger = slope * size / sizes**2
-            parts = self.windows(np.stack([turned, turned * self.sum, larger, larger * own]))
+            parts = self.windows(np.stack([turned, turned * self.sum, larger, larger * sums]))
             along = rest * parts[0] - parts[1] / count
             return along + 2 * (z * parts[2] - parts[3] / count)
 
@@ -268,8 +268,10 @@ def _turns(chords: Complex, step: int) -> Array:
 
 def _turned(chords: Complex, step: int, along: Array) -> Complex:
     """Return the gradient in the points of what has a gradient (n,) in `_turns` of chords."""
-    own = (along - _shifted(along, -step)) * 1j * chords / np.maximum(abs(chords) ** 2, 1e-300)
-    return _stepped(own, step)
+    of_chords = (
+        (along - _shifted(along, -step)) * 1j * chords / np.maximum(abs(chords) ** 2, 1e-300)
+    )
+    return _stepped(of_chords, step)
 
 
 def _discs(z: Complex) -> tuple[_Discs, _Discs]:
@@ -278,21 +280,21 @@ def _discs(z: Complex) -> tuple[_Discs, _Discs]:
     They are found as by Ma, Bae and Choi (3D medial axis point approximation, 2012).
     """
     n = len(z)
-    own = np.arange(n)
+    index = np.arange(n)
     inward = 1j * (_shifted(z, -1) - _shifted(z, 1))
     inward /= np.maximum(abs(inward), 1e-300)
-    x, y, one, far = z.real, z.imag, np.ones(n), (z * z.conj()).real
+    x, y, ones, far = z.real, z.imag, np.ones(n), (z * z.conj()).real
     # by products of matrices: sums of outer ones take four times as long
     level = (np.conj(inward) * z).real
-    depth = np.column_stack([inward.real, inward.imag, -level]) @ np.stack([x, y, one])
-    square = np.column_stack([-2 * x, -2 * y, far, one]) @ np.stack([x, y, one, far])
+    depth = np.column_stack([inward.real, inward.imag, -level]) @ np.stack([x, y, ones])
+    square = np.column_stack([-2 * x, -2 * y, far, ones]) @ np.stack([x, y, ones, far])
     np.maximum(square, 1e-300, out=square)  # points may coincide
     curvature = np.divide(depth, square, out=square)  # half of that of the disc
     curvature.ravel()[_near(n)] = 0
 
     def largest(ends: Integers, side: int) -> _Discs:
-        least = np.maximum(side * curvature[own, ends], 0.5 / LARGEST_WIDTH)
-        return _Discs(ends, side * inward, side * depth[own, ends], 0.5 / least, side)
+        least = np.maximum(side * curvature[index, ends], 0.5 / LARGEST_WIDTH)
+        return _Discs(ends, side * inward, side * depth[index, ends], 0.5 / least, side)
 
     return largest(curvature.argmax(axis=1), 1), largest(curvature.argmin(axis=1), -1)
 
@@ -300,8 +302,8 @@ def _discs(z: Complex) -> tuple[_Discs, _Discs]:
 @lru_cache(maxsize=16)
 def _near(n: int) -> Integers:
     """Return where in a flat (n, n) matrix pairs of points are that are two steps apart at most."""
-    own = np.arange(n)[:, None]
-    return (own * n + (own + np.arange(-2, 3)) % n).ravel()
+    index = np.arange(n)[:, None]
+    return (index * n + (index + np.arange(-2, 3)) % n).ravel()
 
 
 def _smooth(values: Array) -> Array:

@@ -123,19 +123,19 @@ def best_overlay(
     """
 
     def loss(x: Array) -> tuple[float, Array]:
-        own = factor * complex(np.exp(x[0] + 1j * x[1])) * ring
-        place = own + middle + x[2] + 1j * x[3]
+        scaled = factor * complex(np.exp(x[0] + 1j * x[1])) * ring
+        place = scaled + middle + x[2] + 1j * x[3]
         value, slope = overlap.iou(plane_points(place))
         pull = complex_points(slope)
-        turned = np.conj(own) * pull
+        turned = np.conj(scaled) * pull
         gradient = [turned.real.sum(), turned.imag.sum(), pull.real.sum(), pull.imag.sum()]
         return -value, -np.array(gradient)
 
-    found = scipy.optimize.minimize(
+    optimum = scipy.optimize.minimize(
         loss, np.zeros(4), jac=True, method="L-BFGS-B", options={"maxiter": 40}
     )
-    best = complex(factor * np.exp(found.x[0] + 1j * found.x[1]))
-    return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)
+    best = complex(factor * np.exp(optimum.x[0] + 1j * optimum.x[1]))
+    return best, complex(middle + optimum.x[2] + 1j * optimum.x[3]), -float(optimum.fun)
 
 
 # the accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves
@@ -216,9 +216,9 @@ def iou(a: Shape, b: Shape) -> float:
     >>> iou([[0, 0], [2, 0], [2, 2], [0, 2]], [[1, 0], [3, 0], [3, 2], [1, 2]])
     0.3333333333333333
     """
-    one, other = as_region(a, "a"), as_region(b, "b")
-    shared = one.intersection(other).area
-    return share(shared / (one.area + other.area - shared))
+    first, other = as_region(a, "a"), as_region(b, "b")
+    shared = first.intersection(other).area
+    return share(shared / (first.area + other.area - shared))
 
 
 def dice(a: Shape, b: Shape) -> float:
@@ -229,8 +229,8 @@ def dice(a: Shape, b: Shape) -> float:
     >>> dice([[0, 0], [2, 0], [2, 2], [0, 2]], [[1, 0], [3, 0], [3, 2], [1, 2]])
     0.5
     """
-    one, other = as_region(a, "a"), as_region(b, "b")
-    return share(2 * one.intersection(other).area / (one.area + other.area))
+    first, other = as_region(a, "a"), as_region(b, "b")
+    return share(2 * first.intersection(other).area / (first.area + other.area))
 
 
 def pixel_accuracy(a: Shape, b: Shape) -> float:
@@ -245,9 +245,9 @@ def pixel_accuracy(a: Shape, b: Shape) -> float:
     >>> round(pixel_accuracy([[0, 0], [5, 0], [5, 2], [0, 2]], square), 6)  # 15 of 36 differ
     0.583333
     """
-    one, target = as_region(a, "a"), as_region(b, "b")
+    region, target = as_region(a, "a"), as_region(b, "b")
     view = default_window(target)
-    return share(1 - one.symmetric_difference(target).intersection(view).area / view.area)
+    return share(1 - region.symmetric_difference(target).intersection(view).area / view.area)
 
 
 def default_window(target: Shape) -> Polygon:
@@ -273,10 +273,10 @@ def hausdorff(a: Shape, b: Shape) -> float:
     >>> hausdorff([[0, 0], [4, 0], [4, 4], [0, 4]], [[0, 0], [4, 0], [4, 1], [0, 1]])
     3.0
     """
-    one, other = as_region(a, "a"), as_region(b, "b")
-    xmin, ymin, xmax, ymax = shapely.total_bounds([one, other])
+    first, other = as_region(a, "a"), as_region(b, "b")
+    xmin, ymin, xmax, ymax = shapely.total_bounds([first, other])
     tolerance = HAUSDORFF_TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
-    a_edges, b_edges = _edges(one), _edges(other)
+    a_edges, b_edges = _edges(first), _edges(other)
     forth = _directed(a_edges, b_edges, tolerance)
     return max(forth, _directed(b_edges, a_edges, tolerance, at_least=forth))
 
@@ -291,13 +291,13 @@ def compare(tile: Shape, target: Shape) -> ShapeMetrics:
     >>> compare([[0, 0], [4, 0], [4, 1], [0, 1]], square).hausdorff
     0.75
     """
-    own, goal = as_region(tile, "tile"), as_region(target, "target")
+    region, goal = as_region(tile, "tile"), as_region(target, "target")
     return ShapeMetrics(
-        iou=iou(own, goal),
-        dice=dice(own, goal),
-        pixel_accuracy=pixel_accuracy(own, goal),
+        iou=iou(region, goal),
+        dice=dice(region, goal),
+        pixel_accuracy=pixel_accuracy(region, goal),
         window=default_window(goal).bounds,
-        hausdorff=hausdorff(own, goal) / float(np.sqrt(goal.area)),
+        hausdorff=hausdorff(region, goal) / float(np.sqrt(goal.area)),
     )
 
 

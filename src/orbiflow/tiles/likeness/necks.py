@@ -103,9 +103,9 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
     points, polygon = _checked(ring)
     size = math.sqrt(polygon.area)
     shapely.prepare(polygon)
-    found = _facing(orient(points), size, _inside(polygon))
-    if found is not None:
-        return found
+    neck = _facing(orient(points), size, _inside(polygon))
+    if neck is not None:
+        return neck
     radius = shapely.maximum_inscribed_circle(polygon, tolerance=1e-4 * size)
     center, touch = shapely.get_coordinates(radius)
     width = float(2 * np.linalg.norm(touch - center))
@@ -124,8 +124,8 @@ def neck_up_to(ring: ArrayLike, share: float) -> float:
     points, polygon = _checked(ring)
     size = math.sqrt(polygon.area)
     shapely.prepare(polygon)
-    found = _facing(orient(points), size, _inside(polygon), share * size)
-    return share if found is None else found.share
+    neck = _facing(orient(points), size, _inside(polygon), share * size)
+    return share if neck is None else neck.share
 
 
 def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
@@ -185,10 +185,10 @@ def _facing(
     widest = min(widest, ring_length(ring) / 2 / OUTLINE_PER_WIDTH, MAX_NECK_WIDTH * size)
     reach = min(2 * POINT_SPACING * size, widest)
     while True:
-        found = _nearest_within(points, tree, reach, MIN_OUTLINE * size, runs_well)
-        if found is not None:
-            width = float(np.linalg.norm(found[1] - found[0]))
-            return Thinnest(width, float(width / size), found)
+        ends = _nearest_within(points, tree, reach, MIN_OUTLINE * size, runs_well)
+        if ends is not None:
+            width = float(np.linalg.norm(ends[1] - ends[0]))
+            return Thinnest(width, float(width / size), ends)
         if reach == widest:
             return None
         reach = min(2 * reach, widest)

@@ -73,9 +73,9 @@ def _score(body: Elastic, images: Integers, *, mirrored: bool) -> float:
 def _symmetric(outlines: Complex, images: Integers, *, mirrored: bool) -> Complex:
     """Return the symmetric outlines (C, n) that are nearest to these."""
     middle = outlines.mean(axis=1, keepdims=True)
-    own = outlines - middle
-    other = np.take_along_axis(own, images, axis=1)
+    centered = outlines - middle
+    other = np.take_along_axis(centered, images, axis=1)
     if not mirrored:
-        return middle + (own - other) / 2
-    axis = np.exp(1j * np.angle((own * other).sum(axis=1, keepdims=True)))
-    return middle + (own + axis * np.conj(other)) / 2
+        return middle + (centered - other) / 2
+    axis = np.exp(1j * np.angle((centered * other).sum(axis=1, keepdims=True)))
+    return middle + (centered + axis * np.conj(other)) / 2

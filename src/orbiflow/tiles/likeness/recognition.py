@@ -92,16 +92,16 @@ class Recogniser:
 
     def __call__(self, tile: Shape) -> Recognisability:
         """Compare `tile`, in the target's frame, with the target."""
-        own = _features(self._rings(as_region(tile, "tile")), self._spacing, self._start)
-        agreement = _agreement(self._target, own)
+        features = _features(self._rings(as_region(tile, "tile")), self._spacing, self._start)
+        agreement = _agreement(self._target, features)
         goal_points, own_points = scipy.optimize.linear_sum_assignment(agreement, maximize=True)
-        found = agreement[goal_points, own_points]
-        total = float(found.sum())
+        matched = agreement[goal_points, own_points]
+        total = float(matched.sum())
         return Recognisability(
             score=share(2 * total / sum(agreement.shape)),
             kept=share(total / agreement.shape[0]),
             clean=share(total / agreement.shape[1]),
-            limbs=share(float(self._limb_weights[goal_points] @ found)),
+            limbs=share(float(self._limb_weights[goal_points] @ matched)),
         )
 
     def _rings(self, region: Region) -> list[Array]:

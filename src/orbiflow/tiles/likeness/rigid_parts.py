@@ -84,15 +84,15 @@ class Pinned(Elastic):
         This is the root mean square distance after the best similarity, over that from the part's
         middle (Procrustes); None if no part has three points of the outline.
         """
-        found: list[float] = []
+        misfits: list[float] = []
         for part in self.parts:
             index = part.index[part.index < self.size]
             if len(index) >= MIN_PART_POINTS:
                 rest: Complex = self.rest[index] - self.rest[index].mean()
                 bent: Complex = outline[index] - outline[index].mean()
                 sizes = np.vdot(rest, rest).real * np.vdot(bent, bent).real
-                found.append(np.sqrt(max(0.0, 1 - abs(np.vdot(rest, bent)) ** 2 / sizes)))
-        return float(max(found)) if found else None
+                misfits.append(np.sqrt(max(0.0, 1 - abs(np.vdot(rest, bent)) ** 2 / sizes)))
+        return float(max(misfits)) if misfits else None
 
     def forces(self, z: Complex) -> Complex:
         """Return the forces of `Elastic` and the parts' pull to their sizes or angles."""
@@ -125,8 +125,8 @@ class Pinned(Elastic):
         spread = _complex(plain.inverse @ low[n:])
         coupling = _complex(low[:n] + plain.follow.T @ low[n:])
         solve = _complex(np.linalg.inv(_one_less(low[n:], spread)))
-        own = plain.outline, plain.follow, plain.inverse
-        return PinnedCondensed(*own, coupling, spread, solve)
+        matrices = plain.outline, plain.follow, plain.inverse
+        return PinnedCondensed(*matrices, coupling, spread, solve)
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
         """Let the outline be pulled towards other points, as `Elastic.pulled` does."""
@@ -196,9 +196,9 @@ class _Part:
 
     def cost(self, z: Complex, goal: Complex) -> Array:
         """Return the cost (C,) of the part in shapes (N, C)."""
-        own = z[self.index] - z[self.index].mean(axis=0)
+        centered = z[self.index] - z[self.index].mean(axis=0)
         a = self.factor(z)
-        apart = (abs(own - self.rest[:, None] * a) ** 2).sum(axis=0)
+        apart = (abs(centered - self.rest[:, None] * a) ** 2).sum(axis=0)
         return self.weight * apart + self.stays * abs(a - goal) ** 2
 
 

@@ -233,12 +233,14 @@ def _shifted(
 
 def _best_marked(lots: Sequence[_Lot], count: int) -> list[_Lot]:
     """Return so many of the best marks, of all lots together."""
-    every = [(mark, lot, k) for lot, own in enumerate(lots) for k, mark in enumerate(own.marks)]
-    every.sort(key=lambda one: -one[0])
+    every = [
+        (mark, lot, k) for lot, shapes in enumerate(lots) for k, mark in enumerate(shapes.marks)
+    ]
+    every.sort(key=lambda entry: -entry[0])
     kept: dict[int, list[int]] = {}
     for _, lot, k in every[:count]:
         kept.setdefault(lot, []).append(k)
-    return [lots[lot].take(np.array(own)) for lot, own in sorted(kept.items())]
+    return [lots[lot].take(np.array(chosen)) for lot, chosen in sorted(kept.items())]
 
 
 def _best_coarse(
@@ -284,10 +286,12 @@ def _detailed(lot: _Lot, kind: IsohedralClass, settings: LikenessSearch) -> Bent
     """Work out the one shape of a lot, with all points; None if nothing is left of it."""
     body, space = lot.body, TileSpace(kind, lot.placements)
     tiles = held_on_tiles(body, space, lot.points, settings.rounds)
-    ring, own = tiles.points[: body.size, 0], tiles.placements
-    corners = (np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0]) % body.size
+    ring, placements = tiles.points[: body.size, 0], tiles.placements
+    corners = (
+        np.cumsum(placements.lengths[0]) - placements.lengths[0] + placements.starts[0]
+    ) % body.size
     as_bent = Carved(ring, np.arange(body.size), corners, tiles.linear[0], tiles.offset[0])
-    return _bent(lot.side, body, as_bent, tiles.points, own, settings.min_neck)
+    return _bent(lot.side, body, as_bent, tiles.points, placements, settings.min_neck)
 
 
 def _carved(kind: IsohedralClass, bent: Bent, min_neck: float, race: Race) -> Bent:

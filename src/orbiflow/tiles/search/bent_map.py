@@ -143,9 +143,9 @@ def shares(mesh: SilhouetteMesh) -> Array:
 
 def _unknown(mesh: SilhouetteMesh, at: Array) -> Array:
     """Return the places (m,) on the outline, in vertices from the first, that are no points of it."""
-    found = np.sort(at % mesh.size)
-    found = found[_snapped(found, np.append(np.sort(shares(mesh)), mesh.size), 1.0)[1]]
-    return found[np.diff(found, prepend=-1.0) > SAME_PLACE]
+    places = np.sort(at % mesh.size)
+    places = places[_snapped(places, np.append(np.sort(shares(mesh)), mesh.size), 1.0)[1]]
+    return places[np.diff(places, prepend=-1.0) > SAME_PLACE]
 
 
 def divided(mesh: SilhouetteMesh, at: Array, images: Array) -> tuple[SilhouetteMesh, Array]:
@@ -168,11 +168,11 @@ def divided(mesh: SilhouetteMesh, at: Array, images: Array) -> tuple[SilhouetteM
         a, b = int(order[slot - 1]), int(order[slot % outline])
         i, k = owner[a, b]
         apex = rows[i][k - 2]
-        own = np.flatnonzero(slots == slot)
-        fresh = (outline + own[np.argsort(at[own])]).tolist()
-        second = [*range(count + len(behind), count + len(behind) + len(own))]
-        behind += [(point, apex) for point in fresh] if len(own) > 1 else []
-        chain, inner = [a, *fresh, b], [a, *(second if len(own) > 1 else fresh), b]
+        within = np.flatnonzero(slots == slot)
+        fresh = (outline + within[np.argsort(at[within])]).tolist()
+        second = [*range(count + len(behind), count + len(behind) + len(within))]
+        behind += [(point, apex) for point in fresh] if len(within) > 1 else []
+        chain, inner = [a, *fresh, b], [a, *(second if len(within) > 1 else fresh), b]
         rows[i] = []
         for (u, v), (p, q) in zip(pairwise(chain), pairwise(inner), strict=True):
             rows += [t for t in ([u, v, q], [u, q, p], [p, q, apex]) if len({*t}) == 3]

@@ -144,7 +144,7 @@ def carved(
     best = climbed(best, [places for places, _ in laid])
     vertices, group = hill.tile(best)
     rings = (vertices[places] for places in hill.places)
-    return [Carved(ring, *own, *group) for ring, own in zip(rings, laid, strict=True)]
+    return [Carved(ring, *layout, *group) for ring, layout in zip(rings, laid, strict=True)]
 
 
 class _Hill:
@@ -325,17 +325,17 @@ def cornered(places: Array, corners: Integers) -> tuple[Array, Integers]:
     first = corners - corners[0]
     away = (places - corners[0] - first[:, None] % n + n / 2) % n - n / 2
     points = abs(away).argmin(axis=1)
-    own = (points - points[0]) % n
-    for k in range(1, len(own)):  # no two at one point
-        own[k] = max(own[k], own[k - 1] + 1)
-    moved = -away[np.arange(len(own)), (own + points[0]) % n]
-    fixed = dict(zip(own.tolist(), moved.tolist(), strict=True))
-    for at in own.tolist():
+    nearest = (points - points[0]) % n
+    for k in range(1, len(nearest)):  # no two at one point
+        nearest[k] = max(nearest[k], nearest[k - 1] + 1)
+    moved = -away[np.arange(len(nearest)), (nearest + points[0]) % n]
+    fixed = dict(zip(nearest.tolist(), moved.tolist(), strict=True))
+    for at in nearest.tolist():
         for beyond in (at - CORNER_REACH - 1, at + CORNER_REACH + 1):
-            if all(abs((beyond - k + n / 2) % n - n / 2) > CORNER_REACH for k in own.tolist()):
+            if all(abs((beyond - k + n / 2) % n - n / 2) > CORNER_REACH for k in nearest.tolist()):
                 fixed[beyond % n] = 0.0
     anchors = np.array(sorted(fixed))
     shift = np.interp(
         np.arange(n), anchors, np.array([fixed[k] for k in anchors.tolist()]), period=n
     )
-    return places + np.roll(shift, points[0]), (own + points[0]) % n
+    return places + np.roll(shift, points[0]), (nearest + points[0]) % n

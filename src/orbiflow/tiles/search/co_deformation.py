@@ -329,10 +329,10 @@ def _moves(kind: IsohedralClass, step: int) -> tuple[NDArray[np.int64], NDArray[
     """
     still = np.zeros(len(kind.template()), dtype=np.int64)
     lengths, starts = [still, still], [step, -step]
-    for one, other in permutations((own.edges for own in kind.edge_classes), 2):
-        change, common = still.copy(), gcd(len(one), len(other))
-        change[one] += step * len(other) // common
-        change[other] -= step * len(one) // common
+    for growing, other in permutations((edge_class.edges for edge_class in kind.edge_classes), 2):
+        change, common = still.copy(), gcd(len(growing), len(other))
+        change[growing] += step * len(other) // common
+        change[other] -= step * len(growing) // common
         corners = np.cumsum(change) - change
         low, high = int(corners.min()), int(corners.max())
         for start in sorted({0, -low, -high, -(low + high) // 2}):

@@ -52,29 +52,34 @@ class GluedBody(ElasticBody):
 
     def __init__(self, parts: tuple[Elastic, Elastic], glue: Glue) -> None:
         super().__init__()
-        one, two = parts
+        left, right = parts
         self.glue, self._figures = glue, parts
         first, second, length = glue
-        free = one.size - length  # the steps of the first figure that are not on the path
-        self.size = free + two.size - length
+        free = left.size - length  # the steps of the first figure that are not on the path
+        self.size = free + right.size - length
         self.outer = count = self.size + length - 1
         within = np.arange(1, length)
-        own, other = np.empty(len(one), dtype=np.int64), np.empty(len(two), dtype=np.int64)
-        own[(first + length + np.arange(free)) % one.size] = np.arange(free)
-        rest = np.arange(two.size - length)
-        other[(second + length + rest) % two.size] = free + rest
-        own[first % one.size], other[second % two.size] = free, 0
+        left_places, right_places = (
+            np.empty(len(left), dtype=np.int64),
+            np.empty(len(right), dtype=np.int64),
+        )
+        left_places[(first + length + np.arange(free)) % left.size] = np.arange(free)
+        rest = np.arange(right.size - length)
+        right_places[(second + length + rest) % right.size] = free + rest
+        left_places[first % left.size], right_places[second % right.size] = free, 0
         on_path = self.size + within - 1
-        own[(first + within) % one.size] = on_path
-        other[(second + length - within) % two.size] = on_path
-        own[one.size :] = count + np.arange(len(one) - one.size)
-        other[two.size :] = count + len(one) - one.size + np.arange(len(two) - two.size)
-        self._places: tuple[Integers, Integers] = (own, other)
-        self._count = count + len(one) - one.size + len(two) - two.size
-        paths = self.path(one.rest, two.rest)
+        left_places[(first + within) % left.size] = on_path
+        right_places[(second + length - within) % right.size] = on_path
+        left_places[left.size :] = count + np.arange(len(left) - left.size)
+        right_places[right.size :] = (
+            count + len(left) - left.size + np.arange(len(right) - right.size)
+        )
+        self._places: tuple[Integers, Integers] = (left_places, right_places)
+        self._count = count + len(left) - left.size + len(right) - right.size
+        paths = self.path(left.rest, right.rest)
         turn = np.vdot(np.diff(paths[1]), np.diff(paths[0]))
-        moved = turn / abs(turn) * (two.rest - paths[1].mean()) + paths[0].mean()
-        self.rest = self.joined((one.rest[:, None], moved[:, None]))[:, 0]
+        moved = turn / abs(turn) * (right.rest - paths[1].mean()) + paths[0].mean()
+        self.rest = self.joined((left.rest[:, None], moved[:, None]))[:, 0]
 
     @property
     def figures(self) -> tuple[Elastic, Elastic]:

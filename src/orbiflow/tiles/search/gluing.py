@@ -262,4 +262,4 @@ def placements(
             lengths = _complete(kind, tables, row, start)[None]
             corners = Placements(lengths, np.array([start]), np.array([turn]))
             options.append(Placement(residual, glued.glue, kind, corners))
-    return sorted(options, key=lambda own: own.residual)[:count]
+    return sorted(options, key=lambda placed: placed.residual)[:count]

@@ -127,13 +127,13 @@ class LikenessSearch(Settings, SearchMethod):
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> ClassFinalists:
         """Let the silhouette bend in haste."""
-        own = replace(goal, has_rounder=False)  # of few shapes, most may cross
-        return replace(self, passed=0, **SKETCH).fit(own, kind, 1, silent, cancel)
+        plain_goal = replace(goal, has_rounder=False)  # of few shapes, most may cross
+        return replace(self, passed=0, **SKETCH).fit(plain_goal, kind, 1, silent, cancel)
 
     def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
         """Return the silhouette and, without emphasis and pins, it with thin parts rounded off."""
         goals = [(share, rounded) for share, (rounded,) in rounded_goals([goal])]
-        return [(share, replace(own, has_rounder=True)) for share, own in goals[:-1]] + goals[-1:]
+        return [(share, replace(goal, has_rounder=True)) for share, goal in goals[:-1]] + goals[-1:]
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image, as the first phase has them."""
@@ -166,12 +166,14 @@ class LikenessSearch(Settings, SearchMethod):
         >>> LikenessSearch(starts=8).of_class(symmetric=True).starts
         4
         """
-        own = self
+        search = self
         if symmetric:
-            own = replace(own, **{name: -(-getattr(own, name) // 2) for name in HALVED_SETTINGS})
-        if own.finalists < wanted:
-            own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))
-        return replace(own, carved=max(own.carved, wanted)) if own.carved else own
+            search = replace(
+                search, **{name: -(-getattr(search, name) // 2) for name in HALVED_SETTINGS}
+            )
+        if search.finalists < wanted:
+            search = replace(search, finalists=wanted, starts=max(search.starts, 2 * wanted))
+        return replace(search, carved=max(search.carved, wanted)) if search.carved else search
 
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
         """Return the phases of each level of effort that this one holds."""
@@ -186,5 +188,5 @@ class LikenessSearch(Settings, SearchMethod):
 
     def is_promising(self, tile: EscherTile, best: EscherTile) -> bool:
         """Return whether the tile is at most `PROMISING` marks behind the best one."""
-        own, other = tile.likeness.fidelity, best.likeness.fidelity
-        return own is None or other is None or own.mark >= other.mark - PROMISING
+        fidelity, other = tile.likeness.fidelity, best.likeness.fidelity
+        return fidelity is None or other is None or fidelity.mark >= other.mark - PROMISING

@@ -113,7 +113,7 @@ class PairSearch(Settings):
 
     def couples(self, goals: Sequence[Goal]) -> list[Couple]:
         """Return both silhouettes at all sizes, the second one as it is and mirrored."""
-        one, two = (np.asarray(goal.target.normal) for goal in goals)
+        left, right = (np.asarray(goal.target.normal) for goal in goals)
         first = float(np.random.default_rng(self.seed).random()) if self.seed else 0.0
         shared = {
             "stiff": tuple(map(_stiff, goals)),
@@ -127,7 +127,7 @@ class PairSearch(Settings):
         for more in MORE_POINTS:
             count = round(more * self.points)
             couples = [
-                Couple.of(one, two, ratio=float(ratio), mirrored=hand, count=count, **shared)
+                Couple.of(left, right, ratio=float(ratio), mirrored=hand, count=count, **shared)
                 for ratio, hand in product(ratios, hands)
             ]
             with contextlib.suppress(OrbiflowError):
@@ -257,4 +257,4 @@ def _detailed(pair: BentPair) -> BentPair:
 
 def _ranked(pairs: Sequence[BentPair]) -> list[BentPair]:
     """Return pairs by the worse of their scores, then by the better."""
-    return sorted(pairs, key=lambda own: own.scores, reverse=True)
+    return sorted(pairs, key=lambda pair: pair.scores, reverse=True)

@@ -182,7 +182,7 @@ def bent(couple: Couple, placements: Sequence[Placement], count: int) -> list[Be
             (cost, BentPair(couple, 0, glue, kind, turned.take(np.array([k])), z[:, k]))
             for k, cost in enumerate(together(costs).tolist())
         ]
-    rough.sort(key=lambda one: one[0])
+    rough.sort(key=lambda scored: scored[0])
     return [held(pair, HELD_ROUNDS) for _, pair in rough[:count]]
 
 
@@ -257,7 +257,7 @@ def carved_pair(pair: BentPair, steps: int) -> BentPair:
     if along.factor == 1:
         return along
     try:
-        return max(along, _carved(pair, steps, ROOM), key=lambda one: one.scores)
+        return max(along, _carved(pair, steps, ROOM), key=lambda pair: pair.scores)
     except BehindError:
         return along
 

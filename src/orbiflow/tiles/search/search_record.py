@@ -147,10 +147,10 @@ class Record:
             is_tile = isinstance(first, EscherTile)
             self.outcome(first if is_tile else ClassFailure(name, INTERRUPTED), 0.0)
         outcomes = self.outcomes.values()
-        best = [found for found in outcomes if isinstance(found, EscherTile)]
+        best = [outcome for outcome in outcomes if isinstance(outcome, EscherTile)]
         tiles = [tile for first in best for tile in first.family()]
         tiles.sort(key=lambda tile: (-tile.score, names.index(tile.name)))
-        failures = [found for found in outcomes if isinstance(found, ClassFailure)]
+        failures = [outcome for outcome in outcomes if isinstance(outcome, ClassFailure)]
         return Found(tiles, failures, frozenset(left))
 
 

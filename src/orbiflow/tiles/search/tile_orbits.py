@@ -114,9 +114,9 @@ class Orbits:
         self.mirror = np.zeros((count, n), dtype=complex)
         self.foot = np.zeros((count, n), dtype=complex)
         vertices = kind.template() @ [1, 1j]
-        for own in kind.edge_classes:
-            ends = vertices[own.edge], vertices[(own.edge + 1) % len(vertices)]
-            self._edges(own, lengths[:, [own.edge]], sum(ends) / 2)
+        for edge_class in kind.edge_classes:
+            ends = vertices[edge_class.edge], vertices[(edge_class.edge + 1) % len(vertices)]
+            self._edges(edge_class, lengths[:, [edge_class.edge]], sum(ends) / 2)
         for k, (first, element, fixed, mirror) in enumerate(_corners(kind)):
             if fixed:
                 self._fix(np.arange(count), self.corners[:, k], element.shift)

@@ -94,11 +94,11 @@ class TileVariations:
 
     def tile(self, parameters: Array, *, same_area: bool = True) -> Tile:
         """Return the tile for parameters (P,), by default scaled to the first tile's area."""
-        own, polygon = self.first, self.polygon(parameters)
+        first, polygon = self.first, self.polygon(parameters)
         linear = np.tensordot(parameters[-2 - len(self.maps) : -2], self.maps, 1)
-        group = own.group.conjugate(linear, parameters[-2:])
-        tile = Tile(polygon, group, own.isohedral_class, own.corners)
+        group = first.group.conjugate(linear, parameters[-2:])
+        tile = Tile(polygon, group, first.isohedral_class, first.corners)
         if not same_area:
             return tile
-        scale = np.sqrt(own.signed_area / signed_area(polygon))
-        return tile.transformed(scale * np.eye(2), (1 - scale) * own.center)
+        scale = np.sqrt(first.signed_area / signed_area(polygon))
+        return tile.transformed(scale * np.eye(2), (1 - scale) * first.center)

@@ -117,10 +117,10 @@ class _PiecewiseAffine:
         flat = points.reshape(-1, 2)
         result = np.full_like(flat, np.nan)
         finite = np.isfinite(flat).all(axis=1)
-        own = flat[finite]
-        triangle, nearest = self._located(own)
+        places = flat[finite]
+        triangle, nearest = self._located(places)
         inside = np.einsum("pij,pj->pi", self.linear[triangle], nearest - self.origin[triangle])
-        result[finite] = self.image[triangle] + inside + (own - nearest) @ self.similarity.T
+        result[finite] = self.image[triangle] + inside + (places - nearest) @ self.similarity.T
         result = result.reshape(points.shape)
         if not is_tensor(given):
             return result
@@ -131,16 +131,16 @@ class _PiecewiseAffine:
 
     def _located(self, points: Array) -> tuple[NDArray[np.int64], Array]:
         """Return the triangle (P,) in or nearest to which points (P, 2) lie, and its nearest points."""
-        found, where = np.full(len(points), -1), np.asarray(shapely.points(points))
+        located, where = np.full(len(points), -1), np.asarray(shapely.points(points))
         index, triangle = self.tree.query(where, predicate="intersects")
-        found[index] = triangle
+        located[index] = triangle
         nearest = points.copy()
-        outside = np.flatnonzero(found < 0)
+        outside = np.flatnonzero(located < 0)
         if len(outside):
-            found[outside] = self.tree.nearest(where[outside])
-            lines = shapely.shortest_line(self.tree.geometries[found[outside]], where[outside])
+            located[outside] = self.tree.nearest(where[outside])
+            lines = shapely.shortest_line(self.tree.geometries[located[outside]], where[outside])
             nearest[outside] = shapely.get_coordinates(lines)[::2]
-        return found, nearest
+        return located, nearest
 
 
 def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
@@ -175,9 +175,9 @@ def unfolded(mesh: SilhouetteMesh, points: Array, sharpenings: int | None = None
     outline = points[: mesh.size + len(mesh.sides)]
     # the second is a start for tangled points
     for start in (points, harmonic(mesh, outline))[: None if sharpenings is None else 1]:
-        found = _untangled(_Distortion(mesh, start), sharpenings or MAX_SHARPENINGS)
-        if found is not None:
-            return found
+        untangled = _untangled(_Distortion(mesh, start), sharpenings or MAX_SHARPENINGS)
+        if untangled is not None:
+            return untangled
     raise OrbiflowError(
         "the silhouette cannot be carried to this tile without folds: parts of it are too thin"
     )
@@ -188,10 +188,10 @@ def _untangled(work: _Distortion, sharpenings: int) -> Array | None:
 
     x = work.start
     for _ in range(sharpenings):
-        found = scipy.optimize.minimize(
+        optimum = scipy.optimize.minimize(
             work.value, x, jac=True, method="L-BFGS-B", options={"maxiter": 30, "maxcor": 20}
         )
-        x = found.x
+        x = optimum.x
         smallest = work.smallest(x)
         if smallest > 0:
             return work.points(x)
@@ -261,6 +261,6 @@ def _slopes(mesh: SilhouetteMesh, inverse: Array) -> Any:
     weights = np.stack([-inverse.sum(axis=1), inverse[:, 0], inverse[:, 1]])
     rows = np.broadcast_to(np.arange(2 * count).reshape(2, -1), (3, 2, count))
     columns = np.broadcast_to(mesh.triangles.T[:, None], (3, 2, count))
-    own = weights.swapaxes(1, 2).ravel(), (rows.ravel(), columns.ravel())
+    entries = weights.swapaxes(1, 2).ravel(), (rows.ravel(), columns.ravel())
     made: Any = scipy.sparse.csr_matrix
-    return made(own, shape=(2 * count, len(mesh.points)))
+    return made(entries, shape=(2 * count, len(mesh.points)))

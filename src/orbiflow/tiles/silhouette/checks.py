@@ -64,41 +64,41 @@ def doubts(target: Target) -> list[Advice]:
 
 
 def _lost_parts(target: Target) -> list[str]:
-    found: list[str] = []
+    warnings: list[str] = []
     lost, holes, is_image = parts_left_out(target), holes_filled(target), target.kind == "image"
     share = left_out_share(target)
     level = ", or try another {threshold}, or a plain ground of another colour for a photograph"
     if share > MAX_LEFT_OUT_SHARE:
         parts = "a part" if len(lost) == 1 else f"{len(lost)} parts"
-        found.append(
+        warnings.append(
             f"{percent(share)} of what was seen is left out, in {parts} apart from the rest: join "
             f"them to it in the drawing, or by a larger {{smooth}}{level * is_image}"
         )
     share = sum(hole.area for hole in holes) / target.area
     is_cut_out = _is_card(target, holes)
     if is_cut_out:
-        found.append(
+        warnings.append(
             f"the silhouette is a card, of whose area a hole takes {percent(share)}: if the hole is "
             "the shape, change {invert}"
         )
     elif MIN_HOLE_SHARE < share < MAX_HOLE_SHARE:
         level = " or try another {threshold} or another {invert}" if is_image else ""
-        found.append(
+        warnings.append(
             "large holes were filled, because a tile has none: if one is background, open it to the "
             f"outside in the drawing{level}"
         )
     share = _share_inside(target, holes)
     if share > MAX_INSIDE_SHARE:
-        found.append(
+        warnings.append(
             f"another shape, of {percent(share)} of the silhouette, lies inside the hole that was "
             "filled: if it is the one meant, remove the frame or lines around it"
         )
     elif not is_cut_out and _fills_page(target):
-        found.append(
+        warnings.append(
             "the silhouette is a rectangle almost as large as the page: if it is the card that the "
             "shape lies on, remove it from the picture"
         )
-    return found
+    return warnings
 
 
 def _share_inside(target: Target, holes: list[Polygon]) -> float:
@@ -112,7 +112,7 @@ def _share_inside(target: Target, holes: list[Polygon]) -> float:
 
 def _is_card(target: Target, holes: list[Polygon]) -> bool:
     """Return whether a silhouette is a plain shape, of which another shape has been cut out."""
-    hole = max(holes, key=lambda own: own.area, default=Polygon())
+    hole = max(holes, key=lambda part: part.area, default=Polygon())
     share = hole.area / target.area
     is_cut_out = MIN_HOLE_SHARE < share < MAX_CUT_OUT_SHARE and not _is_convex(hole)
     return is_cut_out and _is_convex(Polygon(target.outline))
@@ -139,33 +139,33 @@ def is_mere_line(target: Target) -> bool:
 
 def _thin_parts(target: Target) -> list[str]:
     """Return why no tile will look like a silhouette."""
-    shape, found = Polygon(target.outline), list[str]()
+    shape, warnings = Polygon(target.outline), list[str]()
     length = float(np.ptp(target.outline, axis=0).max())
     if is_mere_line(target):
-        found.append(
+        warnings.append(
             f"the silhouette is a line or thread, nowhere wider than {MAX_THREAD_WIDTH:.0%} of its "
             "length: no tile will look like it; let it grow ({thicken}) by 0.1, draw it wider, or "
             "close its outline"
         )
     elif (share := _thin_share(shape, LEG_WIDTH_SHARE * length)) > MAX_LEG_SHARE:
-        found.append(
+        warnings.append(
             f"legs or other parts thinner than {LEG_WIDTH_SHARE:.1%} of the silhouette's length have "
             f"{share:.0%} of its outline, and tiles may lose them: let them grow ({{thicken}}) by "
             "0.04, or draw them wider"
         )
     if target.kind != "image":
-        return found
+        return warnings
     if length < MIN_LENGTH_PIXELS:
-        found.append(
+        warnings.append(
             f"the silhouette is only {length:.0f} pixels long, so its outline is of stairs: give a "
             f"larger picture, at least {MIN_LENGTH_PIXELS} pixels and better 400"
         )
     if _thin_share(shape, THIN_PIXELS) > MAX_THIN_SHARE:
-        found.append(
+        warnings.append(
             f"most of the silhouette is less than {THIN_PIXELS:.0f} pixels wide, which is too thin to "
             "be followed: give a larger picture, or draw it wider"
         )
-    return found
+    return warnings
 
 
 def _thin_share(shape: Polygon, width: float) -> float:

@@ -87,9 +87,9 @@ class Emphasis:
         picture = read_mask(path)
         covered = target.covered
         covered.require_aspect(path, "mask", picture.size)
-        own, (wide, high) = picture.size, covered.high - covered.low
-        laid = f"mask ({own[0]} x {own[1]} pixels) over {covered.name} ({wide:.6g} x {high:.6g})"
-        placed = [f"laid the {laid}"] * (target.size is None or own != (wide, high))
+        size, (wide, high) = picture.size, covered.high - covered.low
+        laid = f"mask ({size[0]} x {size[1]} pixels) over {covered.name} ({wide:.6g} x {high:.6g})"
+        placed = [f"laid the {laid}"] * (target.size is None or size != (wide, high))
         levels = picture.channel
         # the last row and column of an averaged mask may extend beyond the picture
         overhang = np.array(levels.shape[::-1]) * picture.reduced / picture.size

@@ -56,20 +56,20 @@ class SilhouetteMesh:
         centers = Voronoi(subdivided(ring, PIECES_PER_SIDE)).vertices
         centers = centers[shapely.contains_xy(shapely.Polygon(ring), centers[:, 0], centers[:, 1])]
         middle = self.points[self.triangles].mean(axis=1)
-        found = radii(middle)
+        thickness = radii(middle)
         if not len(centers):
-            return found
+            return thickness
         radius = radii(centers)
         largest = np.argsort(-radius)
         centers, radius = centers[largest], radius[largest]
         square = (DISC_OVERREACH * radius) ** 2 - (centers**2).sum(axis=1)
         for part in np.array_split(np.arange(len(middle)), len(middle) // 512 + 1):  # bounds memory
-            own = middle[part]
-            covers = (own**2).sum(axis=1)[:, None] - 2 * own @ centers.T <= square
+            middles = middle[part]
+            covers = (middles**2).sum(axis=1)[:, None] - 2 * middles @ centers.T <= square
             first = covers.argmax(axis=1)
             covering = np.where(covers[np.arange(len(part)), first], radius[first], 0.0)
-            found[part] = np.maximum(found[part], covering)
-        return found
+            thickness[part] = np.maximum(thickness[part], covering)
+        return thickness
 
 
 def triangulate(ring: Array, spacing: float | None = None) -> SilhouetteMesh:
@@ -121,7 +121,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> SilhouetteMesh:
 def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
     """Return points inside on triangular grids, wider farther from the outline."""
     xmin, ymin, xmax, ymax = polygon.bounds
-    found: list[Array] = []
+    layers: list[Array] = []
     for level, (least, most) in enumerate(((0.6, 1.7), (1.7, 4.5), (4.5, np.inf))):
         step = spacing * 2**level
         x = np.arange(xmin, xmax + step, step)
@@ -131,17 +131,17 @@ def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
         points = grid.reshape(-1, 2)
         points = points[shapely.contains_xy(polygon, points[:, 0], points[:, 1])]
         depth = shapely.distance(shapely.points(points), polygon.exterior) / spacing
-        found.append(points[(depth >= least) & (depth < most)])
-    return np.concatenate(found)
+        layers.append(points[(depth >= least) & (depth < most)])
+    return np.concatenate(layers)
 
 
 def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bool_]:
     pairs = np.sort(
         np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     )
-    known = np.unique(pairs[:, 0] * count + pairs[:, 1])
+    keys = np.unique(pairs[:, 0] * count + pairs[:, 1])
     wanted = np.sort(ends, axis=1)
-    return np.isin(wanted[:, 0] * count + wanted[:, 1], known)
+    return np.isin(wanted[:, 0] * count + wanted[:, 1], keys)
 
 
 def _kept(mesh: SilhouetteMesh, polygon: shapely.Polygon) -> SilhouetteMesh:
@@ -161,8 +161,8 @@ def _kept(mesh: SilhouetteMesh, polygon: shapely.Polygon) -> SilhouetteMesh:
 
 def _without_flat(triangles: Integers, flat: Integers) -> Integers:
     """Divide the neighbour of each flat triangle whose middle vertex is in no other triangle."""
-    known = set(triangles.ravel().tolist())
-    lost = [(row, k) for row in flat.tolist() for k in range(3) if row[k] not in known]
+    vertices = set(triangles.ravel().tolist())
+    lost = [(row, k) for row in flat.tolist() for k in range(3) if row[k] not in vertices]
     for row, k in lost:
         b, ends = row[k], {row[k - 1], row[k - 2]}
         for t, triangle in enumerate(triangles.tolist()):

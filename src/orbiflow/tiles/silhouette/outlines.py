@@ -213,10 +213,10 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     solid = _solids(geometry)
     shape = filled(max(solid, key=lambda part: part.area))
     solid = [part for part in solid if part.area >= MIN_PART_SHARE * shape.area]
-    own = shapely.intersection(geometry, shape)
-    holes = sum(len(part.interiors) for part in polygons_in(own))
+    visible = shapely.intersection(geometry, shape)
+    holes = sum(len(part.interiors) for part in polygons_in(visible))
     kept = shape.area / sum(part.area for part in solid)
-    return shape, left_out(len(solid), kept, holes, 1 - own.area / shape.area)
+    return shape, left_out(len(solid), kept, holes, 1 - visible.area / shape.area)
 
 
 def _solids(geometry: BaseGeometry) -> list[Polygon]:

@@ -79,7 +79,7 @@ class Pins:
             InputFileError: for masks that cannot be read or do not touch the silhouette.
             OrbiflowError: as for `at`.
         """
-        words = [str(one) for one in given]
+        words = [str(pin) for pin in given]
         spots = [word for word in words if _SPOT.fullmatch(word)]
         files = [word for word in words if not _SPOT.fullmatch(word)]
         for file in files:
@@ -171,9 +171,9 @@ def _warnings(pins: Pins, target: Target) -> list[str]:
 def _strongest(mask: Emphasis) -> Array:
     """Return the strongest point (K, 2) of each piece that is painted on a mask."""
     pieces, count = cast(Any, scipy.ndimage.label(mask.mask > PAINTED_LEVEL))
-    found = scipy.ndimage.maximum_position(mask.mask, pieces, range(1, count + 1))
+    positions = scipy.ndimage.maximum_position(mask.mask, pieces, range(1, count + 1))
     xmin, ymin, xmax, ymax = mask.box
-    shares = (np.reshape(found, (-1, 2))[:, ::-1] + 0.5) / mask.mask.shape[::-1]
+    shares = (np.reshape(positions, (-1, 2))[:, ::-1] + 0.5) / mask.mask.shape[::-1]
     return np.array([xmin, ymax]) + shares * (xmax - xmin, ymin - ymax)
 
 

@@ -55,15 +55,15 @@ class Covered(NamedTuple):
 
     def shares(self, points: Array) -> Array:
         """Return points (..., 2) in widths and heights of the picture, from its upper left corner."""
-        found = (points - self.low) / (self.high - self.low)
+        shares = (points - self.low) / (self.high - self.low)
         if not self.y_down:
-            found[..., 1] = 1 - found[..., 1]
-        return found
+            shares[..., 1] = 1 - shares[..., 1]
+        return shares
 
     def at(self, shares: Array) -> Array:
         """Return the points (..., 2) that have these `shares`."""
-        own = shares if self.y_down else (shares - (0, 1)) * (1, -1)
-        return own * (self.high - self.low) + self.low
+        upright = shares if self.y_down else (shares - (0, 1)) * (1, -1)
+        return upright * (self.high - self.low) + self.low
 
     def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
         """Refuse a picture, drawing or mask of this width and height unless its aspect is the same."""
@@ -327,8 +327,8 @@ class Target(Reading):
             return self
         length = float(np.ptp(self.outline, axis=0).max())
         whole = Polygon(self.outline)  # which may be more than what was seen: what lines enclose
-        own = whole if self.seen is None else shapely.union_all([whole, self.seen.buffer(0)])
-        shape = rounded(whole, own, share * length)
+        seen = whole if self.seen is None else shapely.union_all([whole, self.seen.buffer(0)])
+        shape = rounded(whole, seen, share * length)
         if shape.is_empty:
             raise OrbiflowError(
                 Advice(
@@ -348,7 +348,7 @@ class Target(Reading):
         notes = self.notes
         if self.seen is not None and any(other.startswith(LEFT_OUT) for other in notes):
             notes = (other for other in notes if not other.startswith(LEFT_OUT))
-            notes = (*notes, *still_left_out(shape, own))
+            notes = (*notes, *still_left_out(shape, seen))
         return replace(self, outline=outer_ring(shape), notes=(*notes, note))
 
     def thickened(self, share: float) -> Self:
@@ -363,11 +363,11 @@ class Target(Reading):
         """
         if share == 0:
             return self
-        own = Polygon(self.outline)
-        shape = thickened(own, share * float(np.ptp(self.outline, axis=0).max()))
-        more = percent(shape.area / own.area - 1)
+        before = Polygon(self.outline)
+        shape = thickened(before, share * float(np.ptp(self.outline, axis=0).max()))
+        more = percent(shape.area / before.area - 1)
         note = f"grew parts thinner than {percent(share)} of the length, by {more} of the area"
-        seen = None if self.seen is None else self.seen.buffer(0).union(shape.difference(own))
+        seen = None if self.seen is None else self.seen.buffer(0).union(shape.difference(before))
         return replace(self, outline=outer_ring(shape), notes=(*self.notes, note), seen=seen)
 
     @property

@@ -61,8 +61,8 @@ def thickened(shape: Polygon, width: float) -> Polygon:
     grown = _about(parts.lines, width / 2).difference(_about(gaps.lines, GAP_SHARE * width / 2))
     whole = polygons_in(shapely.union(shape, grown))
     solid = filled(max(whole, key=lambda part: part.area))
-    found = simplified(solid, width / 100)
-    return found if found.is_valid and found.area >= shape.area else solid
+    simpler = simplified(solid, width / 100)
+    return simpler if simpler.is_valid and simpler.area >= shape.area else solid
 
 
 def _thin_parts(shape: Polygon, width: float) -> list[Polygon]:
@@ -106,8 +106,8 @@ def _ridges(shape: Polygon, width: float) -> _Ridges:
     way = abs(along[places[:, 0]] - along[places[:, 1]])
     outline = np.minimum(way, along[-1] - way) / gap
     lines, middles = cast(Any, (shapely.linestrings(ends), shapely.points(ends.mean(axis=1))))
-    found = _Ridges(lines, middles, radii, gap / radii, outline)
-    return found.take(radii < 0.75 * width)
+    ridges = _Ridges(lines, middles, radii, gap / radii, outline)
+    return ridges.take(radii < 0.75 * width)
 
 
 def _are_tufts(ridges: _Ridges, width: float) -> Any:

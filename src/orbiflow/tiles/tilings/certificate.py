@@ -142,28 +142,30 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
     area = float(shares @ [p.signed_area for p in tiling.prototiles] / shares.sum())
     size, nan = tiling.tile_area, math.nan
     off = abs(abs(area) - size) / size
-    found = Certificate(False, area, size, off, nan, "none", nan, nan, nan, 0, tolerance, ())
+    certificate = Certificate(False, area, size, off, nan, "none", nan, nan, nan, 0, tolerance, ())
     numbers = range(len(tiling.prototiles))
     try:
         around = [surroundings(tiling, k, _MARGIN) for k in numbers]
     except OrbiflowError as error:
-        return replace(found, reasons=(str(error),))
+        return replace(certificate, reasons=(str(error),))
     mismatch, matching = _edge_mismatch(tiling, around, tolerance)
-    found = replace(found, edge_mismatch=mismatch, edge_matching=matching)
+    certificate = replace(certificate, edge_mismatch=mismatch, edge_matching=matching)
     for k in numbers:
         crossing = _self_crossing(tiling, k, around[k].ring)
         if crossing:
-            return replace(found, reasons=(crossing,))
+            return replace(certificate, reasons=(crossing,))
     areas = np.array([_areas(a) for a in around])
     overlap, total, bare = (float(x) for x in areas[:, :3].max(axis=0))
     count = max(int(touching(a, max(1e-7, tolerance))[1].sum()) for a in around)
-    found = replace(found, simple=True, overlap=overlap, total_overlap=total, uncovered=bare)
-    return replace(found, neighbours=count, reasons=_reasons(found, areas, tiling))
+    certificate = replace(
+        certificate, simple=True, overlap=overlap, total_overlap=total, uncovered=bare
+    )
+    return replace(certificate, neighbours=count, reasons=_reasons(certificate, areas, tiling))
 
 
-def _reasons(found: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...]:
+def _reasons(certificate: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...]:
     """Return what fails, given what `_areas` gives for each prototile, (K, 5)."""
-    several, bound = len(tiling.prototiles) > 1, found.tolerance
+    several, bound = len(tiling.prototiles) > 1, certificate.tolerance
     _, overlaps, bare, lengths, widths = areas.T
     reasons: list[str] = []
     if several and widths.min() < _LEAST_WIDTH * bound:
@@ -171,16 +173,18 @@ def _reasons(found: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...
             f"prototile {widths.argmin()} is only {widths.min():.1e} of a tile's size wide: within "
             f"the tolerance of {bound:.0e} it is hardly more than a line, leave it out"
         )
-    if not found.area_error <= bound:
+    if not certificate.area_error <= bound:
         symmetry = max(s.order for s in tiling.stabilisers)
-        own = f" for a tile with a symmetry of order {symmetry}" if symmetry > 1 else ""
+        of_order = f" for a tile with a symmetry of order {symmetry}" if symmetry > 1 else ""
         reasons.append(
             f"{'the mean area of its tiles' if several else 'its area'} "
-            f"{abs(found.signed_area):.9g} is not the group's {found.expected_area:.9g}"
-            f"{'' if several else own} (relative error {found.area_error:.1e})"
+            f"{abs(certificate.signed_area):.9g} is not the group's {certificate.expected_area:.9g}"
+            f"{'' if several else of_order} (relative error {certificate.area_error:.1e})"
         )
-    if not found.edge_mismatch <= bound:
-        reasons.append(f"its edges miss their partners by {found.edge_mismatch:.1e} of its size")
+    if not certificate.edge_mismatch <= bound:
+        reasons.append(
+            f"its edges miss their partners by {certificate.edge_mismatch:.1e} of its size"
+        )
     if np.isnan(overlaps).any():
         needles = "a tile has needles or gaps thinner than 1e-12 of its size: smooth its outline"
         return (*reasons, f"overlaps cannot be computed, as {needles}")
@@ -188,12 +192,14 @@ def _reasons(found: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...
     excess = overlaps / np.minimum(lengths, 1.0)
     if not excess.max() <= bound:
         who = f"prototile {excess.argmax()}" if several else "it"
-        own = "a tile's" if several else "its"
+        whose = "a tile's" if several else "its"
         much = overlaps[excess.argmax()]
-        reasons.append(f"{who} overlaps its neighbours by {much:.1e} of {own} area")
-    if not found.uncovered <= bound:
+        reasons.append(f"{who} overlaps its neighbours by {much:.1e} of {whose} area")
+    if not certificate.uncovered <= bound:
         who = f"prototile {bare.argmax()}" if several else "it"
-        reasons.append(f"its images leave {found.uncovered:.1e} of its area uncovered around {who}")
+        reasons.append(
+            f"its images leave {certificate.uncovered:.1e} of its area uncovered around {who}"
+        )
     return tuple(reasons)
 
 
@@ -204,18 +210,22 @@ def _self_crossing(tiling: Tiling, prototile: int, ring: Array) -> str:
         return ""
     what = f"prototile {prototile}" if len(tiling.prototiles) > 1 else "the polygon"
     reason = str(shapely.is_valid_reason(polygon))
-    found = re.fullmatch(r"(.*)\[(\S+) (\S+)\]", reason)
-    if not found:
+    match = re.fullmatch(r"(.*)\[(\S+) (\S+)\]", reason)
+    if not match:
         return f"{what} is not simple: {reason}"
-    own: Prototile = tiling.prototiles[prototile]
-    x, y = np.array([float(found[2]), float(found[3])]) * math.sqrt(tiling.tile_area) + own.center
-    return f"{what} is not simple: {found[1].lower()} near ({x:.6g}, {y:.6g})"
+    figure: Prototile = tiling.prototiles[prototile]
+    x, y = (
+        np.array([float(match[2]), float(match[3])]) * math.sqrt(tiling.tile_area) + figure.center
+    )
+    return f"{what} is not simple: {match[1].lower()} near ({x:.6g}, {y:.6g})"
 
 
 def _edge_mismatch(
     tiling: Tiling, around: list[Surroundings], tolerance: float
 ) -> tuple[float, EdgeMatching]:
-    asymmetry = max(own.error for own in tiling.stabilisers) / math.sqrt(tiling.tile_area)
+    asymmetry = max(stabiliser.error for stabiliser in tiling.stabilisers) / math.sqrt(
+        tiling.tile_area
+    )
     matches: list[SegmentMatch] = [match_segments(a, tolerance) for a in around]
     mismatch = max(float(match.distance.max()) for match in matches)
     if mismatch <= tolerance and boundaries_cancel(tiling, around, matches):

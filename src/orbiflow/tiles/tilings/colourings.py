@@ -82,8 +82,8 @@ class Colouring:
 
         Raises `OrbiflowError` for an isometry that is not in the tile's group.
         """
-        own = self.tiling
-        aspect, cell, _ = own.aspects.find(own.group, element, prototile_of(element))
+        tiling = self.tiling
+        aspect, cell, _ = tiling.aspects.find(tiling.group, element, prototile_of(element))
         first, second = reduce_cell(cell, self.sublattice)
         return int(self.table[aspect, first, second])
 
@@ -113,40 +113,42 @@ def colouring(tile: Tiles) -> Colouring:
     links, table = _links(tiling), tiling.aspects
     kinds = [np.flatnonzero(table.prototiles == k) for k in range(len(tiling.prototiles))]
     among = [_among(links, kind.tolist()) for kind in kinds]
-    least = [_least_colours(own) for own in among]
+    least = [_least_colours(links) for links in among]
     coloured = cache(partial(_coloured, among))  # few are needed
 
     def fewest(sublattice: Sublattice, most: int) -> list[list[int]]:
         """Return each prototile's colours, if together they are at most so many; else nothing."""
-        found: list[list[int]] = []
+        chosen: list[list[int]] = []
         for k in range(len(kinds)):
-            room = most - sum(max(own) + 1 for own in found) - sum(least[k + 1 :])
+            room = most - sum(max(used) + 1 for used in chosen) - sum(least[k + 1 :])
             options = (coloured(k, sublattice, count) for count in range(least[k], room + 1))
-            own = next((own for own in options if own is not None), None)
-            if own is None:
+            option = next((option for option in options if option is not None), None)
+            if option is None:
                 return []
-            found.append(own)
-        return found
+            chosen.append(option)
+        return chosen
 
     def is_loop_free(sublattice: Sublattice) -> bool:
-        quotients = (_quotient(own, sublattice) for own in among)
+        quotients = (_quotient(links, sublattice) for links in among)
         return all(node not in near for graph in quotients for node, near in enumerate(graph))
 
     sublattices, size = [h for index in _INDICES for h in _sublattices(index)], max(_INDICES)
-    while not (free := [own for own in sublattices if is_loop_free(own)]):
+    while not (free := [sublattice for sublattice in sublattices if is_loop_free(sublattice)]):
         size *= 2
         sublattices = [(size, 0, size)]
     sublattice, colours = next(
-        (sublattice, found)
+        (sublattice, proper)
         for count in itertools.count(sum(least))  # one more than neighbours is enough
         for sublattice in free
-        if (found := fewest(sublattice, count))
+        if (proper := fewest(sublattice, count))
     )
     a, _, c = sublattice
     numbers, shares = np.zeros((len(table), a, c), dtype=np.int64), list[int]()
-    for kind, own in zip(kinds, colours, strict=True):
-        order = np.argsort(-np.bincount(own), kind="stable")  # the most frequent colour first
-        numbers[kind] = sum(shares) + np.argsort(order)[np.array(own)].reshape(len(kind), a, c)
+    for kind, numbering in zip(kinds, colours, strict=True):
+        order = np.argsort(-np.bincount(numbering), kind="stable")  # the most frequent colour first
+        numbers[kind] = sum(shares) + np.argsort(order)[np.array(numbering)].reshape(
+            len(kind), a, c
+        )
         shares.append(len(order))
     return Colouring(tiling, sum(shares), sublattice, numbers, tuple(shares))
 
@@ -168,15 +170,15 @@ def _links(tiling: Tiling) -> _Links:
     links: _Links = []
     for k, coset in zip(table.prototiles, table.cosets, strict=True):
         g = group.cosets[int(coset)]
-        found = [table.find(group, g @ near, near.prototile) for near in shared[int(k)]]
-        links.append([(aspect, cell) for aspect, cell, _ in found])
+        places = [table.find(group, g @ near, near.prototile) for near in shared[int(k)]]
+        links.append([(aspect, cell) for aspect, cell, _ in places])
     return links
 
 
 def _among(links: _Links, aspects: list[int]) -> _Links:
     """Return the links among some aspects, which are numbered anew."""
     number = {aspect: k for k, aspect in enumerate(aspects)}
-    return [[(number[k], cell) for k, cell in links[own] if k in number] for own in aspects]
+    return [[(number[k], cell) for k, cell in links[aspect] if k in number] for aspect in aspects]
 
 
 def _coloured(
@@ -188,11 +190,11 @@ def _coloured(
 
 def _least_colours(links: _Links) -> int:
     """Return 1 without neighbours, 3 where three tiles are neighbours of each other, else 2."""
-    near = [set(own) for own in links]
+    near = [set(linked) for linked in links]
     triangle = any(
-        (other, (u - a, v - b)) in near[one]
-        for own in links
-        for (one, (a, b)), (other, (u, v)) in itertools.combinations(own, 2)
+        (other, (u - a, v - b)) in near[aspect]
+        for linked in links
+        for (aspect, (a, b)), (other, (u, v)) in itertools.combinations(linked, 2)
     )
     return 3 if triangle else 2 if any(links) else 1
 

@@ -50,9 +50,9 @@ class IncidenceSymbol:
         edges, neighbours = symbol.split()
         self.labels = [(name, _SIGNS[sign]) for name, sign in re.findall(r"([a-z])([+-]?)", edges)]
         letters = dict.fromkeys(name for name, _ in self.labels)
-        found = re.findall(r"([a-z])([+-]?)", neighbours)
+        partners = re.findall(r"([a-z])([+-]?)", neighbours)
         self.adjacent = {
-            k: (name, _SIGNS[sign]) for k, (name, sign) in zip(letters, found, strict=True)
+            k: (name, _SIGNS[sign]) for k, (name, sign) in zip(letters, partners, strict=True)
         }
         self._tile = laves_tile(tuple(int(valence) for valence in valences.split(".")))
 
@@ -76,14 +76,14 @@ class IncidenceSymbol:
     def group(self, name: str) -> CrystallographicGroup:
         """Return the group that the steps to the neighbours and the tile's own symmetries generate."""
         generators = [*self._across(self.template), *self.stabiliser[1:]]
-        known, shifts = [identity(2)], list[Array]()
-        for element in known:  # grows while it is walked
+        elements, shifts = [identity(2)], list[Array]()
+        for element in elements:  # grows while it is walked
             for generator in generators:
                 product = generator @ element
-                same = [g for g in known if np.allclose(g.linear, product.linear, atol=1e-6)]
-                known += [] if same else [product]
+                same = [g for g in elements if np.allclose(g.linear, product.linear, atol=1e-6)]
+                elements += [] if same else [product]
                 shifts += [(g.inverse() @ product).translation for g in same]
-        volume = _AREA * len(known) / len(self.stabiliser)
+        volume = _AREA * len(elements) / len(self.stabiliser)
         bases = (np.stack(pair, axis=1) for pair in combinations(shifts, 2))
         lattice = next(b for b in bases if abs(abs(np.linalg.det(b)) - volume) < 1e-6)
         return CrystallographicGroup.generate(lattice, generators, name=name)
@@ -91,27 +91,27 @@ class IncidenceSymbol:
     def _stabiliser(self, corners: Array) -> tuple[Isometry, ...]:
         """Return the symmetries of the corners that keep the labels."""
         edges, count = self.labels, len(self.labels)
-        found: list[Isometry] = []
+        symmetries: list[Isometry] = []
         for sign in (1, -1):
             turned = [(name, sign * direction) for name, direction in edges]
             for first in range(count):
                 order = (first + sign * np.arange(count)) % count
                 if [edges[k] for k in order] == turned:
                     image = (first + (sign < 0) + sign * np.arange(2)) % count
-                    found.append(_carried(corners[:2], corners[image], sign))
-        return tuple(found)
+                    symmetries.append(_carried(corners[:2], corners[image], sign))
+        return tuple(symmetries)
 
     def _across(self, corners: Array) -> tuple[Isometry, ...]:
         """Return for each edge an element that takes the tile to its other side."""
-        found: list[Isometry] = []
+        steps: list[Isometry] = []
         for k, (name, direction) in enumerate(self.labels):
             partner, relation = self.adjacent[name]
             j = next(j for j, label in enumerate(self.labels) if label[0] == partner)
             sign = relation * direction * self.labels[j][1] or 1
             there = corners[[k, (k + 1) % len(corners)]]
-            own = corners[[j, (j + 1) % len(corners)]]
-            found.append(_carried(own, there[::-1] if sign > 0 else there, sign))
-        return tuple(found)
+            here = corners[[j, (j + 1) % len(corners)]]
+            steps.append(_carried(here, there[::-1] if sign > 0 else there, sign))
+        return tuple(steps)
 
 
 def _carried(own: Array, there: Array, sign: int) -> Isometry:

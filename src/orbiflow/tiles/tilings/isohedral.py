@@ -133,8 +133,8 @@ def commutant(linear_parts: Array) -> Array:
     basis: list[Array] = []
     for a, b in turned[:, 0]:
         rest = np.array([a, b])
-        for known in basis:
-            rest = rest - (rest @ known) * known
+        for vector in basis:
+            rest = rest - (rest @ vector) * vector
         if np.linalg.norm(rest) > _ROUNDING_ERROR:
             rest = rest / np.linalg.norm(rest)
             # exact for a group in the frame of its axes
@@ -170,16 +170,18 @@ _cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
 
 def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
     """Return cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
-    own = array_functions(square)
-    hyperbolic_cosh, hyperbolic_sinh = (own.cosh, own.sinh) if is_tensor(square) else (_cosh, _sinh)
+    functions = array_functions(square)
+    hyperbolic_cosh, hyperbolic_sinh = (
+        (functions.cosh, functions.sinh) if is_tensor(square) else (_cosh, _sinh)
+    )
     small = square < 1e-2
-    root = own.sqrt(own.where(small, own.ones_like(square), square))
-    s = own.where(small, square, own.zeros_like(square))
+    root = functions.sqrt(functions.where(small, functions.ones_like(square), square))
+    s = functions.where(small, square, functions.zeros_like(square))
     cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
     sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
     return (
-        own.where(small, cosh, hyperbolic_cosh(root)),
-        own.where(small, sinhc, hyperbolic_sinh(root) / root),
+        functions.where(small, cosh, hyperbolic_cosh(root)),
+        functions.where(small, sinhc, hyperbolic_sinh(root) / root),
     )
 
 
@@ -257,7 +259,7 @@ class IsohedralClass:
     @property
     def divisor(self) -> int:
         """A divisor of the number of steps round a tile whose edges of one class have as many each."""
-        return math.gcd(*(len(own.edges) for own in self.edge_classes))
+        return math.gcd(*(len(edge_class.edges) for edge_class in self.edge_classes))
 
     @property
     def shape_dim(self) -> int:
@@ -290,8 +292,8 @@ class IsohedralClass:
         Parameters are (..., stretch_dim), NumPy or torch (then differentiable). Raises `OrbiflowError`
         if their last axis has another length.
         """
-        own = self._parameters(parameters, self.stretch_dim, "stretch")
-        return stretch_matrix(self._freedom, own)
+        checked = self._parameters(parameters, self.stretch_dim, "stretch")
+        return stretch_matrix(self._freedom, checked)
 
     def group(self) -> CrystallographicGroup:
         """Return the group of the template; the same for all shape parameters."""
@@ -381,9 +383,11 @@ class PaperClass(IsohedralClass):
         """The template's edges, those that are images of each other together."""
         return tuple(
             EdgeClass(
-                own.edge, tuple(map(self._exact, own.folds)), tuple(map(self._exact, own.images))
+                edge_class.edge,
+                tuple(map(self._exact, edge_class.folds)),
+                tuple(map(self._exact, edge_class.images)),
             )
-            for own in super().edge_classes
+            for edge_class in super().edge_classes
         )
 
     def _exact(self, pair: EdgePair) -> EdgePair:

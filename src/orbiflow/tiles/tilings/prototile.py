@@ -121,22 +121,22 @@ def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
     size = math.sqrt(group.cell_volume / group.order)
     candidates = _near_center(group, ring, SYMMETRY_TOLERANCE * size) if len(ring) > 2 else []
     still = np.arange(len(ring))
-    found: list[tuple[Isometry, Integers | None, float]] = []
+    symmetries: list[tuple[Isometry, Integers | None, float]] = []
     for element in candidates:
         order, error = _image_order(element, ring)
         if error <= SYMMETRY_TOLERANCE * size:
-            found.append((element, order, error))
+            symmetries.append((element, order, error))
     # a polygon may be symmetric only within the tolerance: drop the worst until they form a group
-    while not _closed([element for element, _, _ in found]):
-        worst = max(error for _, _, error in found)
-        found = [item for item in found if item[2] < worst]
-    elements = (Isometry(np.eye(2), np.zeros(2)), *(element for element, _, _ in found))
-    orders = (still, *(order for _, order, _ in found))
-    return Stabiliser(elements, orders, max((error for _, _, error in found), default=0.0))
+    while not _closed([element for element, _, _ in symmetries]):
+        worst = max(error for _, _, error in symmetries)
+        symmetries = [item for item in symmetries if item[2] < worst]
+    elements = (Isometry(np.eye(2), np.zeros(2)), *(element for element, _, _ in symmetries))
+    orders = (still, *(order for _, order, _ in symmetries))
+    return Stabiliser(elements, orders, max((error for _, _, error in symmetries), default=0.0))
 
 
 def free_subgroup(
-    group: CrystallographicGroup, own: Sequence[Isometry]
+    group: CrystallographicGroup, symmetries: Sequence[Isometry]
 ) -> CrystallographicGroup | None:
     """Return a subgroup that takes a tile with these symmetries to each other one in one way only.
 
@@ -147,12 +147,12 @@ def free_subgroup(
     >>> free_subgroup(wallpaper_group("p4m"), [identity(2), mirror]).order
     4
     """
-    order = group.order // len(own)
-    held = [g @ s @ g.inverse() for g in group.cosets for s in own[1:]]
+    order = group.order // len(symmetries)
+    held = [g @ s @ g.inverse() for g in group.cosets for s in symmetries[1:]]
     for generators in combinations_with_replacement(group.cosets, 2):
-        found = CrystallographicGroup.generate(group.lattice, generators)
-        if found.order == order and not any(found.contains(element) for element in held):
-            return found
+        subgroup = CrystallographicGroup.generate(group.lattice, generators)
+        if subgroup.order == order and not any(subgroup.contains(element) for element in held):
+            return subgroup
     return None
 
 

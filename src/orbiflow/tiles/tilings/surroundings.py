@@ -82,27 +82,27 @@ class Surroundings:
 def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     """Return the tiles whose box is within `margin`, in tile sizes, of a prototile's, nearest first."""
     scale = math.sqrt(tiling.tile_area)
-    own = tiling.prototiles[prototile]
-    count = expected_near(tiling, *(own.box[1] - own.box[0] + 2 * margin * scale))
+    tile = tiling.prototiles[prototile]
+    count = expected_near(tiling, *(tile.box[1] - tile.box[0] + 2 * margin * scale))
     if count > MAX_AROUND:
         raise OrbiflowError(
-            f"the tile's radius is {own.radius / scale:.0f} times the size that its group allows for, "
+            f"the tile's radius is {tile.radius / scale:.0f} times the size that its group allows for, "
             f"and about {count:.0f} tiles would lie around it: check that polygon and group belong "
             "together and have the same units"
         )
     if any(len(p.ring) < 3 for p in tiling.prototiles):
         raise OrbiflowError("the tile's polygon has fewer than three distinct vertices")
-    (left, bottom), (right, top) = own.box + margin * scale * np.array([[-1.0], [1.0]])
+    (left, bottom), (right, top) = tile.box + margin * scale * np.array([[-1.0], [1.0]])
     near = copies_near(tiling, (left, bottom, right, top), whole=False)
     itself = (near.aspects == tiling.aspects.table[prototile, 0]) & ~near.cells.any(axis=1)
-    away = np.linalg.norm(near.centers() - own.center, axis=1)
+    away = np.linalg.norm(near.centers() - tile.center, axis=1)
     away[itself] = np.inf
     order = np.argsort(away, kind="stable")[: len(near) - int(itself.sum())]
     near = near.select(order)
     rings = near.rings([p.ring for p in tiling.prototiles])
     counts = np.array([len(ring) for ring in rings], dtype=np.int64)
     points = np.concatenate([*rings, np.empty((0, 2))])
-    local = ((part - own.center) / scale for part in (own.ring, points))
+    local = ((part - tile.center) / scale for part in (tile.ring, points))
     # squares of coordinates such as 1e-200 underflow in GEOS and give areas that are plainly wrong
     ring, points = (np.where(np.abs(part) < 1e-15, 0.0, part) for part in local)
     mirrored = (np.linalg.det(tiling.group.linear_parts) < 0)[near.cosets]
@@ -135,8 +135,8 @@ def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
         return SegmentMatch(np.full(count, np.inf), nowhere, nowhere)
     segments = np.concatenate([ring, np.roll(ring, -1, axis=0)], axis=1)
     distance, index = KDTree(reverse[inside]).query(segments)
-    found = inside[index]
-    return SegmentMatch(np.asarray(distance), around.owner[found], around.place[found])
+    nearest = inside[index]
+    return SegmentMatch(np.asarray(distance), around.owner[nearest], around.place[nearest])
 
 
 def boundaries_cancel(
@@ -152,23 +152,23 @@ def boundaries_cancel(
     """
     sizes = np.array([len(a.ring) for a in around])
     first: Integers = np.cumsum(sizes) - sizes
-    weights = np.repeat([1.0 / own.order for own in tiling.stabilisers], sizes)
+    weights = np.repeat([1.0 / stabiliser.order for stabiliser in tiling.stabilisers], sizes)
     pairs = zip(around, matches, strict=True)
     partners = np.concatenate([first[a.copies.prototiles[m.tile]] + m.partner for a, m in pairs])
     labels = _orbits(tiling, first)
     if labels is None:
         return False
-    own = np.bincount(labels, weights, minlength=len(labels))
+    totals = np.bincount(labels, weights, minlength=len(labels))
     named = np.bincount(labels[partners], weights, minlength=len(labels))
-    return bool(np.abs(own - named).max() < 1e-9)
+    return bool(np.abs(totals - named).max() < 1e-9)
 
 
 def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
     """Return the first segment that has each as an image in its tile; None if vertices have none."""
     labels: list[Integers] = []
-    for start, own in zip(first, tiling.stabilisers, strict=True):
+    for start, stabiliser in zip(first, tiling.stabilisers, strict=True):
         images: list[Integers] = []
-        for element, order in zip(own.elements, own.orders, strict=True):
+        for element, order in zip(stabiliser.elements, stabiliser.orders, strict=True):
             if order is None:
                 return None
             # segment i from vertex i on; read backwards its image begins where its end is taken
@@ -261,14 +261,14 @@ def _shared_lengths(around: Surroundings, tolerance: float) -> Array:
     ring, ahead = around.ring, np.roll(around.ring, -1, axis=0)
     low, high = np.minimum(ring, ahead) - tolerance, np.maximum(ring, ahead) + tolerance
     boxes = cast(NDArray[np.object_], shapely.box(*low.T, *high.T))
-    own, other = segment_tree(around).query(boxes)
+    side, other = segment_tree(around).query(boxes)
     lengths = np.linalg.norm(ahead - ring, axis=1)
-    along = ((ahead - ring) / lengths[:, None])[own]
-    ends = np.stack([around.points[other], around.ahead[other]], axis=1) - ring[own, None]
+    along = ((ahead - ring) / lengths[:, None])[side]
+    ends = np.stack([around.points[other], around.ahead[other]], axis=1) - ring[side, None]
     place = np.einsum("pei,pi->pe", ends, along)
     height = ends[..., 1] * along[:, None, 0] - ends[..., 0] * along[:, None, 1]
     # from where to where along the prototile's side the other lies, and how far it is there
-    part = np.sort(np.clip(place, 0.0, lengths[own, None]), axis=1)
+    part = np.sort(np.clip(place, 0.0, lengths[side, None]), axis=1)
     run = place[:, 1] - place[:, 0]
     slope = np.divide(height[:, 1] - height[:, 0], run, out=np.zeros(len(run)), where=run != 0)
     apart = np.abs(height[:, :1] + slope[:, None] * (part - place[:, :1])).max(axis=1)
@@ -284,11 +284,11 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
     >>> len(patch(Tile(ih1.template(), ih1.group()), (-0.1, -0.1, 0.1, 0.1)))
     1
     """
-    found = copies_meeting(tile, window)
+    copies = copies_meeting(tile, window)
     xmin, ymin, xmax, ymax = checked_window(window)
     middle = np.array([xmin + xmax, ymin + ymax]) / 2
-    away = np.linalg.norm(found.centers() - middle, axis=1)
-    return list(found.select(np.argsort(away, kind="stable")).elements())
+    away = np.linalg.norm(copies.centers() - middle, axis=1)
+    return list(copies.select(np.argsort(away, kind="stable")).elements())
 
 
 def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
@@ -320,13 +320,13 @@ def arrangement(tile: Tiles) -> str:
 
 
 def _words(tiling: Tiling) -> str:
-    own, cosets = tiling.stabilisers[0].elements, tiling.group.cosets
-    flips = any(g.determinant < 0 for g in cosets) and all(s.determinant > 0 for s in own)
-    turns = sum(g.determinant > 0 for g in cosets) // sum(s.determinant > 0 for s in own)
+    symmetries, cosets = tiling.stabilisers[0].elements, tiling.group.cosets
+    flips = any(g.determinant < 0 for g in cosets) and all(s.determinant > 0 for s in symmetries)
+    turns = sum(g.determinant > 0 for g in cosets) // sum(s.determinant > 0 for s in symmetries)
     if turns > 2:
         return _around(tiling) + (", with their mirror images" if flips else "")
     half = ", half turned over" if flips else ""
-    if turns == 2 and any(np.allclose(s.linear, -np.eye(2)) for s in own):
+    if turns == 2 and any(np.allclose(s.linear, -np.eye(2)) for s in symmetries):
         return f"every other one turned a quarter{half}"
     near = [g for g in neighbours(tiling).edge if g.prototile == 0]
     rows = [g.translation for g in near if np.allclose(g.linear, np.eye(2))]

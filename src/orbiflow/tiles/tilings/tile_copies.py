@@ -119,17 +119,19 @@ class Copies:
 
     def rings(self, of: Sequence[Array] | None = None) -> list[Array]:
         """Return each copy's polygon, or the image of what is given for its prototile."""
-        found: list[Array] = [np.empty((0, 2))] * len(self)
+        rings: list[Array] = [np.empty((0, 2))] * len(self)
         for k, points in enumerate(of or [p.polygon for p in self.tiling.prototiles]):
-            own = np.flatnonzero(self.prototiles == k)
-            for index, ring in zip(own, self.select(own).images(points), strict=True):
-                found[index] = ring
-        return found
+            members = np.flatnonzero(self.prototiles == k)
+            for index, ring in zip(members, self.select(members).images(points), strict=True):
+                rings[index] = ring
+        return rings
 
     def centers(self) -> Array:
         """Return (M, 2) where the centre of each copy's prototile comes to lie."""
-        own = np.stack([p.center for p in self.tiling.prototiles])
-        turned = np.einsum("mij,mj->mi", self.group.linear_parts[self.cosets], own[self.prototiles])
+        centers = np.stack([p.center for p in self.tiling.prototiles])
+        turned = np.einsum(
+            "mij,mj->mi", self.group.linear_parts[self.cosets], centers[self.prototiles]
+        )
         return turned + self.translations
 
     def boxes(self) -> tuple[Array, Array]:
@@ -156,13 +158,13 @@ class Copies:
         for number, element in enumerate(elements):
             source = 0 if of is None else of[number]
             mine = np.flatnonzero(self.prototiles == source)
-            own = np.flatnonzero(table.prototiles == source)
-            found = [
+            source_aspects = np.flatnonzero(table.prototiles == source)
+            links = [
                 table.find(self.group, self.group.cosets[int(c)] @ element, prototile_of(element))
-                for c in table.cosets[own]
+                for c in table.cosets[source_aspects]
             ]
-            place = np.searchsorted(own, self.aspects[mine])
-            aspects, steps, by = (np.array(part)[place] for part in zip(*found, strict=True))
+            place = np.searchsorted(source_aspects, self.aspects[mine])
+            aspects, steps, by = (np.array(part)[place] for part in zip(*links, strict=True))
             keys = zip(aspects.tolist(), *(self.cells[mine] + steps).T.tolist(), strict=True)
             copy[mine, number] = [self._numbers.get(key, -1) for key in keys]
             turn[mine, number] = by
@@ -199,19 +201,19 @@ def copies_meeting(tile: Tiles, window: Sequence[float]) -> Copies:
     """
     tiling, box = as_tiling(tile), checked_window(window)
     _refuse_too_many(tiling, box)
-    found = copies_near(tiling, box, whole=False)
-    low, high = found.boxes()
+    near = copies_near(tiling, box, whole=False)
+    low, high = near.boxes()
     meets = np.asarray(((low >= box[:2]) & (high <= box[2:])).all(axis=1))
     page = shapely.box(*box)
     shapely.prepare(page)
     middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
     for k, prototile in enumerate(tiling.prototiles):
-        unsure = np.flatnonzero(~meets & (found.prototiles == k))
-        rings = found.select(unsure).images(prototile.polygon)
+        unsure = np.flatnonzero(~meets & (near.prototiles == k))
+        rings = near.select(unsure).images(prototile.polygon)
         # rings, not polygons: a tile that crosses itself can still be drawn
         touched = shapely.intersects(page, shapely.linearrings(rings))
         meets[unsure] = touched | shapely.contains_xy(shapely.polygons(rings), *middle)
-    return _by_rows(found.select(meets))
+    return _by_rows(near.select(meets))
 
 
 def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
@@ -233,9 +235,9 @@ def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
     table, group = tiling.aspects, tiling.group
     low, high = np.empty((len(table), 2)), np.empty((len(table), 2))
     for k, prototile in enumerate(tiling.prototiles):
-        own = table.prototiles == k
-        images = group.images(prototile.polygon)[table.cosets[own]]
-        low[own], high[own] = images.min(axis=1), images.max(axis=1)
+        members = table.prototiles == k
+        images = group.images(prototile.polygon)[table.cosets[members]]
+        low[members], high[members] = images.min(axis=1), images.max(axis=1)
     return low, high
 
 
@@ -250,9 +252,9 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
     for axis, (step, across) in enumerate(lattice.tolist()):
         if abs(step) < 1e-12 * abs(inverse).max() * abs(np.linalg.det(lattice)):
             continue
-        one, other = ((ends[box, axis] - across * second) / step for ends in (least, most))
-        low = np.maximum(low, np.minimum(one, other))
-        high = np.minimum(high, np.maximum(one, other))
+        start, other = ((ends[box, axis] - across * second) / step for ends in (least, most))
+        low = np.maximum(low, np.minimum(start, other))
+        high = np.minimum(high, np.maximum(start, other))
     row, first = _ranges(low, high)
     cells = np.stack([first, second[row]], axis=1)
     box = box[row]
@@ -265,8 +267,10 @@ def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
     """Return all whole numbers in some intervals, and one more at either end for rounding."""
     first = np.ceil(low - 1e-9)
     counts = np.maximum(np.floor(high + 1e-9) + 1 - first, 0).astype(np.int64)
-    own = np.repeat(np.arange(len(counts)), counts)
-    return own, first[own] + np.arange(len(own)) - (np.cumsum(counts) - counts)[own]
+    interval = np.repeat(np.arange(len(counts)), counts)
+    return interval, first[interval] + np.arange(len(interval)) - (np.cumsum(counts) - counts)[
+        interval
+    ]
 
 
 def _by_rows(copies: Copies) -> Copies:

@@ -156,15 +156,15 @@ def edges(tile: Tiles) -> Edges:
     _require_match(tiling, matches)
     begins = [_begins(tiling, a, match) for a, match in zip(around, matches, strict=True)]
     first = np.cumsum([0] + [len(b) for b in begins])
-    found: list[tuple[int, int, Placed, int]] = []
+    runs: list[tuple[int, int, Placed, int]] = []
     for k in numbers:
         match, near = matches[k], around[k].copies
         for segment in begins[k]:
             beyond = near.isometry(int(match.tile[segment]))
             partner = _edge_of(begins[beyond.prototile], int(match.partner[segment]))
             start = int(tiling.prototiles[k].kept[segment])
-            found.append((k, start, beyond, int(first[beyond.prototile]) + partner))
-    owners, starts, across, partners = zip(*found, strict=True)
+            runs.append((k, start, beyond, int(first[beyond.prototile]) + partner))
+    owners, starts, across, partners = zip(*runs, strict=True)
     turned = tuple(_turned(tiling, k, begins[k], first) for k in numbers)
     # make partners mutual where possible, with isometries that are inverses of each other
     return _mutual(Edges(tiling, owners, starts, across, partners, turned))
@@ -172,7 +172,9 @@ def edges(tile: Tiles) -> Edges:
 
 def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
     missing = sum(int((match.distance > VERTEX_TOLERANCE).sum()) for match in matches)
-    if missing or any(order is None for own in tiling.stabilisers for order in own.orders):
+    if missing or any(
+        order is None for stabiliser in tiling.stabilisers for order in stabiliser.orders
+    ):
         count = sum(len(match.distance) for match in matches)
         what = f"{missing} of the tile's {count} sides are not sides of a neighbour"
         if not missing:
@@ -202,9 +204,9 @@ def _edge_of(begins: Integers, segment: int) -> int:
 
 
 def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Integers:
-    own = tiling.stabilisers[k]
-    turned = np.tile(np.arange(int(first[-1])), (own.order, 1))
-    for row, element, order in zip(turned, own.elements, own.orders, strict=True):
+    stabiliser = tiling.stabilisers[k]
+    turned = np.tile(np.arange(int(first[-1])), (stabiliser.order, 1))
+    for row, element, order in zip(turned, stabiliser.elements, stabiliser.orders, strict=True):
         assert order is not None
         # a segment read backwards begins where its end is taken
         image = order if element.determinant > 0 else np.roll(order, -1)
@@ -291,9 +293,14 @@ def mixing(tile: Tiles) -> float:
     >>> round(mixing(dirichlet_tiling(wallpaper_group("p4m"), [(0, 0), (0.5, 0.5)])), 9)
     1.0
     """
-    own = edges(edge_to_edge(tile))
-    lengths = np.array([np.hypot(*np.diff(own.points(k), axis=0).T).sum() for k in range(len(own))])
-    differ = [there.prototile != here for there, here in zip(own.across, own.owners, strict=True)]
+    tile_edges = edges(edge_to_edge(tile))
+    lengths = np.array(
+        [np.hypot(*np.diff(tile_edges.points(k), axis=0).T).sum() for k in range(len(tile_edges))]
+    )
+    differ = [
+        there.prototile != here
+        for there, here in zip(tile_edges.across, tile_edges.owners, strict=True)
+    ]
     return float(lengths[differ].sum() / lengths.sum())
 
 
@@ -307,12 +314,12 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
     [(3, True)]
     """
     links = _links(own)
-    found: dict[int, EdgeImage] = {}
+    images: dict[int, EdgeImage] = {}
     classes: list[EdgeClass] = []
     for edge in range(len(own)):
-        if edge in found:
+        if edge in images:
             continue
-        found[edge] = EdgeImage(edge, identity(2), reversed=False)
+        images[edge] = EdgeImage(edge, identity(2), reversed=False)
         folds: dict[tuple[int, bool], EdgeImage] = {}
         members: list[EdgeImage] = []
         waiting = deque([edge])
@@ -321,23 +328,23 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
             for link in links[here]:
                 image = EdgeImage(
                     link.edge,
-                    link.isometry @ found[here].isometry,
-                    found[here].reversed != link.reversed,
+                    link.isometry @ images[here].isometry,
+                    images[here].reversed != link.reversed,
                 )
-                known = found.get(link.edge)
-                if known is None:
-                    found[link.edge] = image
+                reached = images.get(link.edge)
+                if reached is None:
+                    images[link.edge] = image
                     members.append(image)
                     waiting.append(link.edge)
                     continue
-                loop = known.isometry.inverse() @ image.isometry
-                fold = EdgeImage(edge, loop, known.reversed != image.reversed)
+                loop = reached.isometry.inverse() @ image.isometry
+                fold = EdgeImage(edge, loop, reached.reversed != image.reversed)
                 folds.setdefault((loop.determinant, fold.reversed), fold)
         folds.pop((1, False), None)  # the identity
         if len(folds) == 2:  # the third follows from both
-            one, other = folds.values()
-            product = one.isometry @ other.isometry
-            third = EdgeImage(edge, product, one.reversed != other.reversed)
+            first, other = folds.values()
+            product = first.isometry @ other.isometry
+            third = EdgeImage(edge, product, first.reversed != other.reversed)
             folds[product.determinant, third.reversed] = third
         classes.append(EdgeClass(edge, tuple(folds.values()), tuple(members)))
     return tuple(classes)
@@ -376,9 +383,9 @@ def edge_to_edge(tile: Tiles) -> Tiling:
 
 
 def _with_vertices(tiling: Tiling, k: int) -> Prototile:
-    own, around = tiling.prototiles[k], surroundings(tiling, k, VERTEX_TOLERANCE)
-    ring = own.ring
-    nearby = around.points * np.sqrt(tiling.tile_area) + own.center
+    prototile, around = tiling.prototiles[k], surroundings(tiling, k, VERTEX_TOLERANCE)
+    ring = prototile.ring
+    nearby = around.points * np.sqrt(tiling.tile_area) + prototile.center
     points = np.concatenate([nearby, *(s(ring) for s in tiling.stabilisers[k].elements[1:])])
     reach = VERTEX_TOLERANCE * float(np.sqrt(tiling.tile_area))
     line = shapely.LinearRing(ring)
@@ -386,14 +393,14 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
     near = np.linalg.norm(points[:, None] - ring, axis=2).min(axis=1, initial=np.inf)
     points = points[near > 2 * reach]
     if not len(points):
-        return own
+        return prototile
     along: Array = np.asarray(shapely.line_locate_point(line, shapely.points(points)))
     order = np.argsort(along)
     fresh = np.diff(along[order], prepend=-np.inf) > 2 * reach
     points, along = points[order][fresh], along[order][fresh]
     steps = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
     at = np.searchsorted(np.cumsum(steps) - steps, along, side="right")
-    corners = np.searchsorted(own.kept, own.corners, side="left")
+    corners = np.searchsorted(prototile.kept, prototile.corners, side="left")
     moved = corners + np.searchsorted(at, corners, side="right")
     return Prototile(np.insert(ring, at, points, axis=0), tuple(int(c) for c in moved))
 

@@ -50,10 +50,10 @@ class Aspects:
         turns = np.zeros((count, order), dtype=np.int64)
         prototiles: list[int] = []
         cosets: list[int] = []
-        for k, own in enumerate(stabilisers):
+        for k, symmetry in enumerate(stabilisers):
             first = np.arange(order)
-            if own.order > 1:
-                first, steps[k], turns[k] = _first_cosets(group, own)
+            if symmetry.order > 1:
+                first, steps[k], turns[k] = _first_cosets(group, symmetry)
             kept, number = np.unique(first, return_inverse=True)
             table[k] = len(cosets) + number
             prototiles += [k] * len(kept)
@@ -134,24 +134,26 @@ class Tiling:
         if group.dim != 2:
             raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
         try:
-            given = list(prototiles)
+            sequence = list(prototiles)
         except TypeError:
-            given = []
-        if given and not isinstance(given[0], Prototile | str) and np.ndim(given[0]) == 1:
-            given = []  # a single polygon instead of a sequence
-        own = tuple(p if isinstance(p, Prototile) else Prototile(np.asarray(p)) for p in given)
-        if not own:
+            sequence = []
+        if sequence and not isinstance(sequence[0], Prototile | str) and np.ndim(sequence[0]) == 1:
+            sequence = []  # a single polygon instead of a sequence
+        figures = tuple(
+            p if isinstance(p, Prototile) else Prototile(np.asarray(p)) for p in sequence
+        )
+        if not figures:
             raise OrbiflowError(
                 "a tiling needs a sequence of at least one prototile: Tiling(group, [polygon])"
             )
-        for number, prototile in enumerate(own):
-            if prototile.signed_area * own[0].signed_area < 0:
+        for number, prototile in enumerate(figures):
+            if prototile.signed_area * figures[0].signed_area < 0:
                 raise OrbiflowError(
                     f"prototile {number} and prototile 0 have opposite orientations: reverse the "
                     "vertices of one"
                 )
         object.__setattr__(self, "group", group)
-        object.__setattr__(self, "prototiles", own)
+        object.__setattr__(self, "prototiles", figures)
 
     @cached_property
     def stabilisers(self) -> tuple[Stabiliser, ...]:
@@ -191,7 +193,7 @@ class Tiling:
         return Tiling(self.group.conjugate(by, to), moved)
 
     def __repr__(self) -> str:
-        orders = ", ".join(str(own.order) for own in self.stabilisers)
+        orders = ", ".join(str(symmetry.order) for symmetry in self.stabilisers)
         name = self.group.name or f"order {self.group.order}"
         return f"Tiling({name}, prototiles with stabilisers of order {orders})"
 
@@ -305,12 +307,12 @@ def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) 
     as_instance(group, CrystallographicGroup, "the group", "wallpaper_group(name) makes one")
     if group.dim != 2:
         raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
-    given = as_array(points, "the points of Dirichlet cells", ("K", 2))
-    if not len(given):
+    sites = as_array(points, "the points of Dirichlet cells", ("K", 2))
+    if not len(sites):
         raise OrbiflowError("a Dirichlet tiling needs at least one point")
     same = _SAME_DISTANCE * float(np.sqrt(group.cell_volume))
-    given = np.array([_settled(group, point, same) for point in given])
-    return Tiling(group, [_cell(group, given, k, same) for k in range(len(given))])
+    sites = np.array([_settled(group, point, same) for point in sites])
+    return Tiling(group, [_cell(group, sites, k, same) for k in range(len(sites))])
 
 
 def _settled(group: CrystallographicGroup, point: Array, same: float) -> Array:
@@ -333,12 +335,12 @@ def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> A
     reach = 1.01 * float(np.linalg.norm(reduced_basis(group.lattice), axis=0).sum())
     images: list[Array] = []
     for number, point in enumerate(points):
-        found = [g(point) - site for g in group.elements_near(site, reach, source=point)]
-        if number != k and found and float(np.linalg.norm(found[0])) < same:
+        offsets = [g(point) - site for g in group.elements_near(site, reach, source=point)]
+        if number != k and offsets and float(np.linalg.norm(offsets[0])) < same:
             raise OrbiflowError(
                 f"points {k} and {number} of a Dirichlet tiling have the same images"
             )
-        images += found
+        images += offsets
     others = np.array(images)
     others = others[np.linalg.norm(others, axis=1) > same]
     pairs = KDTree(others).query_pairs(same, output_type="ndarray")

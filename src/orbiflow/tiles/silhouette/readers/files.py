@@ -90,8 +90,8 @@ def read_outline(
     kind = _kind(path, read_head(path, _HEAD_BYTES))
     if kind == "image":
         return _bridged(read_image(path, threshold=threshold, invert=invert))
-    given = {"threshold": threshold, "invert": None if kind == "svg" else invert}
-    for name in (name for name, value in given.items() if value is not None):
+    options = {"threshold": threshold, "invert": None if kind == "svg" else invert}
+    for name in (name for name, value in options.items() if value is not None):
         what = "images" if name == "threshold" else "images and drawings"
         is_one = "a drawing" if kind == "svg" else "a polygon"
         raise OrbiflowError(f"{name} applies to {what} only and {path} is {is_one}; leave it out")

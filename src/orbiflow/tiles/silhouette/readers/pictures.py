@@ -54,8 +54,8 @@ def read_image(
     parts them; with `invert` the shape is the light (or transparent) part; with either, a photograph
     is read like a drawing. Coordinates are those of the image turned as its EXIF orientation asks.
     """
-    found = decoded_image(path)
-    image, notes = found.image, [*found.notes]
+    decoded = decoded_image(path)
+    image, notes = decoded.image, [*decoded.notes]
     if _is_hardly_cut_out(image):
         image, notes = _on_white(image), [*notes, "took the few transparent pixels for white"]
     band, name, band_notes = _channel(path, image)
@@ -64,7 +64,7 @@ def read_image(
         colours = band if band_notes or band.mode == "F" else image.convert("RGB")
         picture = _photograph(path, colours, (*notes, *band_notes))
     picture = picture or _drawing(band, name, notes, band_notes)
-    picture = replace(picture, size=found.size, reduced=picture.reduced * found.shrunk)
+    picture = replace(picture, size=decoded.size, reduced=picture.reduced * decoded.shrunk)
     return _traced(path, picture, threshold, invert)
 
 
@@ -161,7 +161,7 @@ def choose_shape(
             "another one"
         )
     cut = _cut(path, picture) if threshold is None else threshold
-    given = "" if threshold is None else ", as given"
+    suffix = "" if threshold is None else ", as given"
     above = channel > cut
     if above.all() or not above.any():
         side = "above" if above.any() else "below"
@@ -180,9 +180,9 @@ def choose_shape(
     elif picture.name in _PARTS:
         take_high = not invert
         part = _PARTS[picture.name][not take_high]
-        notes = [f"the shape is {part} (edge at {cut:.2f}{given})"]
+        notes = [f"the shape is {part} (edge at {cut:.2f}{suffix})"]
     else:
-        take_high, notes = _polarity(above, invert, f"edge at {cut:.2f}{given}")
+        take_high, notes = _polarity(above, invert, f"edge at {cut:.2f}{suffix}")
     if take_high:
         return Level(channel, cut, float(high)), notes
     return Level(1 - channel, 1 - cut, 1 - float(low)), notes
@@ -292,8 +292,8 @@ _PAINT = "paint what must survive white and the rest black"
 
 def read_mask(path: Source) -> ImageChannel:
     """Read a mask from an image: its opacity where some is more transparent, else its luminance."""
-    found = decoded_image(path)
-    image, notes = found.image, [*found.notes]
+    decoded = decoded_image(path)
+    image, notes = decoded.image, [*decoded.notes]
     band = image if image.mode == "F" else image.convert("RGB").convert("L")
     if image.mode == "RGBA":
         alpha = image.getchannel("A")
@@ -315,4 +315,4 @@ def read_mask(path: Source) -> ImageChannel:
             f"{path}: the mask is uniform, its levels are {low:.2f} to {high:.2f} of white, and "
             f"emphasises nothing above the rest; {_PAINT}"
         )
-    return ImageChannel(levels, "mask", found.size, reduced * found.shrunk, tuple(notes))
+    return ImageChannel(levels, "mask", decoded.size, reduced * decoded.shrunk, tuple(notes))

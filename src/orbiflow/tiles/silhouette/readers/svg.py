@@ -178,23 +178,23 @@ def _bounds(drawing: Drawing, root: Element | None = None) -> Window | None:
     """Return bounds of all that is seen, on the page if there is one; None if nothing is."""
     if drawing.window is not None:
         return _seen_in(drawing, drawing.window, root)
-    reach, found = FIRST_REACH, None
-    while found is None or max(np.abs(found)) >= reach * (1 - 2 / SMALL_PIXELS):
+    reach, bounds = FIRST_REACH, None
+    while bounds is None or max(np.abs(bounds)) >= reach * (1 - 2 / SMALL_PIXELS):
         if reach > MAX_COORDINATE:
-            if found is None:
+            if bounds is None:
                 return None
             raise InputFileError(
                 f"{drawing.path}: a path reaches beyond {MAX_COORDINATE:g} user units; rescale the "
                 "drawing"
             )
-        found = _seen_in(drawing, (-reach, -reach, reach, reach), root)
-        reach *= 10 if found is not None or reach < 1e6 else 1000
+        bounds = _seen_in(drawing, (-reach, -reach, reach, reach), root)
+        reach *= 10 if bounds is not None or reach < 1e6 else 1000
     for _ in range(20):  # to a drawing that is small beside its distance from the origin
-        before = found
-        found = _seen_in(drawing, before, root) or before
-        if _size_of(found) > _size_of(before) / 2:
+        before = bounds
+        bounds = _seen_in(drawing, before, root) or before
+        if _size_of(bounds) > _size_of(before) / 2:
             break
-    return found
+    return bounds
 
 
 def _size_of(window: Window) -> float:
@@ -412,7 +412,7 @@ def _share_beyond(drawing: Drawing, root: Element | None) -> float:
     page = drawing.window
     assert page is not None
     low, high = np.array(page[:2]), np.array(page[2:])
-    found = 0.0
+    largest = 0.0
     for beyond in BEYOND:
         sides = beyond * (high - low)
         (left, top), (right, bottom) = (low - sides).tolist(), (high + sides).tolist()
@@ -424,5 +424,5 @@ def _share_beyond(drawing: Drawing, root: Element | None) -> float:
         )
         total = float(shown.sum())
         outside = total - float(shown[rows][:, columns].sum())
-        found = max(found, outside / total if total else 0.0)
-    return found
+        largest = max(largest, outside / total if total else 0.0)
+    return largest

@@ -111,9 +111,11 @@ class Document:
             if "url" in text.lower():
                 element.set(key, self._within(text))
             elif (
-                key in LENGTHS and (found := _LENGTH.fullmatch(text)) and found[2].lower() in _RARE
+                key in LENGTHS
+                and (length := _LENGTH.fullmatch(text))
+                and length[2].lower() in _RARE
             ):
-                element.set(key, f"{float(found[1]) * _PIXELS[found[2].lower()]:.9g}")
+                element.set(key, f"{float(length[1]) * _PIXELS[length[2].lower()]:.9g}")
         if "pathLength" in element.attrib:
             self._scale_dashes(element)
         if link is not None and element.tag != "a":
@@ -144,12 +146,12 @@ class Document:
 
     def _is_data(self, link: str) -> bool:
         """Return whether a link holds the data of a picture within bounds."""
-        found = _DATA.match(link)
-        if found is None:
+        match = _DATA.match(link)
+        if match is None:
             return False
         try:
-            text = link[found.end() :]
-            encoded = "base64" in (found[2] or "").lower()
+            text = link[match.end() :]
+            encoded = "base64" in (match[2] or "").lower()
             data = base64.b64decode(text) if encoded else unquote_to_bytes(text)
             decoded_image(FileContent(data, f"{self.path}: a picture in it"))
         except (binascii.Error, ValueError):
@@ -180,9 +182,9 @@ class Document:
         for item in self.root.iter():
             by_id.setdefault(item.get("id", ""), item)
         by_id.pop("", None)
-        known: dict[Element, tuple[int, int]] = {}
-        self._work(self.root, by_id, known, set())
-        elements, filters = known[self.root]
+        counts: dict[Element, tuple[int, int]] = {}
+        self._work(self.root, by_id, counts, set())
+        elements, filters = counts[self.root]
         if elements > MAX_DRAWN:
             raise InputFileError(
                 f"{self.path}: draws more than {MAX_DRAWN} elements; keep only the silhouette"
@@ -230,10 +232,10 @@ class Document:
         if (link := element.get("href", "")).startswith("#") and element.tag != "a":
             yield link[1:], 1
         for key, text in element.items():
-            for found in _URL.finditer(text) if "url" in text.lower() else ():
+            for reference in _URL.finditer(text) if "url" in text.lower() else ():
                 is_marker = "marker" in key or (key == "style" and "marker" in text)
                 points = element.get("d", element.get("points", ""))
-                yield found["target"].strip()[1:], 1 + is_marker * len(_POINTS.findall(points))
+                yield reference["target"].strip()[1:], 1 + is_marker * len(_POINTS.findall(points))
 
     def _page(self) -> tuple[Window | None, Window | None]:
         """Return the page in user units, and the part of the plane that shows."""
@@ -270,7 +272,7 @@ class Document:
         ]
         left, top = x + shares[0] * (wide - sides[0]), y + shares[1] * (high - sides[1])
         window = left, top, left + sides[0], top + sides[1]
-        gap = max(abs(one - other) for one, other in zip(page, window, strict=True))
+        gap = max(abs(side - other) for side, other in zip(page, window, strict=True))
         return page, page if gap <= PAGE_TOLERANCE * max(wide, high) else window
 
     def _thin_strokes(self, element: Element, matrix: svgelements.Matrix) -> None:
@@ -292,10 +294,10 @@ class Document:
         text = (text or "").strip()
         if not text or text.endswith("%") or text == "auto":
             return None
-        found = _LENGTH.fullmatch(text)
-        if found is None or found[2].lower() not in _PIXELS:
+        length = _LENGTH.fullmatch(text)
+        if length is None or length[2].lower() not in _PIXELS:
             raise InputFileError(f"{self.path}: <svg>: {key} {quoted(text)} is not a length")
-        value = float(found[1]) * _PIXELS[found[2].lower()]
+        value = float(length[1]) * _PIXELS[length[2].lower()]
         return value if 0 < value < math.inf else None
 
 
@@ -326,8 +328,8 @@ def text_of(style: dict[str, str]) -> str:
 
 def _number(text: str) -> float:
     """Return the number that a text begins with; 0 without one."""
-    found = _LENGTH.match(text)
-    return float(found[1]) if found else 0.0
+    length = _LENGTH.match(text)
+    return float(length[1]) if length else 0.0
 
 
 _ALIGN = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}

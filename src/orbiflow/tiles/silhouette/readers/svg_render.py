@@ -97,13 +97,13 @@ class Drawing:
         """Notes of fonts that are not on this machine, in place of which another was used."""
         if not self.document.has_text:
             return []
-        asked = {
+        fonts = {
             name
             for item in self.document.root.iter()
             for text in _families(item)
             if (name := text.split(",")[0].strip(" '\"")) and name.lower() not in _GENERIC
         }
-        missing = sorted(name for name in asked if not self._has_font(name))
+        missing = sorted(name for name in fonts if not self._has_font(name))
         return [
             f"the font {name[:40]!r} is not on this machine, {STAND_IN} stood in for it: convert the "
             "text to paths"

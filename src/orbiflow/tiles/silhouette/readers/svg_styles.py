@@ -118,17 +118,20 @@ def _write(
     node.local_name = element.tag if element.tag[:1] != "{" else node.local_name
     node.namespace_url = SVG
     ruled = [
-        declared for *_, pseudo, own in matcher.match(node) if pseudo is None for declared in own
+        declared
+        for *_, pseudo, declarations in matcher.match(node)
+        if pseudo is None
+        for declared in declarations
     ]
     text = element.get("style", "")
     ruled += [] if _is_too_nested(text) else _declarations(text)
     style = {name: value for name, value, important in ruled if not important}
     style |= {name: value for name, value, important in ruled if important}
-    known = around | {name: value for name, value in style.items() if name.startswith("--")}
+    variables = around | {name: value for name, value in style.items() if name.startswith("--")}
     kept: list[str] = []
     for name, value in style.items():
         if "var(" in value.lower():
-            filled = _with_variables(value, known)
+            filled = _with_variables(value, variables)
             if filled is None:
                 notes.add(f"{name} {quoted(value)} is not understood and left out")
                 continue
@@ -143,7 +146,7 @@ def _write(
         element.attrib.pop("style", None)
     for name in set(_PAINTS) & element.attrib.keys():
         element.set(name, _plain_colour(element.attrib[name]))
-    return known
+    return variables
 
 
 def _set_as_attribute(element: Element, name: str, value: str, notes: Notes) -> bool:
@@ -155,8 +158,8 @@ def _set_as_attribute(element: Element, name: str, value: str, notes: Notes) -> 
     if name.startswith("background"):
         return True  # of the page, which is no shape
     if name == "d":
-        found = _PATH.fullmatch(value)
-        element.set("d", found[2] if found else "")
+        path = _PATH.fullmatch(value)
+        element.set("d", path[2] if path else "")
         return True
     if name == "transform":
         plain = "" if value == "none" else _plain_transform(value)
@@ -213,10 +216,10 @@ def _plain_transform(text: str) -> str | None:
     for name, arguments in _CALL.findall(text):
         words = arguments.replace(",", " ").split()
         numbers = [_NUMBER.fullmatch(word) for word in words]
-        if not numbers or not all(found and found[2].lower() in _UNITS for found in numbers):
+        if not numbers or not all(number and number[2].lower() in _UNITS for number in numbers):
             return None
         values = [
-            f"{float(found[1]) * _UNITS[found[2].lower()]:.10g}" for found in numbers if found
+            f"{float(number[1]) * _UNITS[number[2].lower()]:.10g}" for number in numbers if number
         ]
         if len(values) > 1 and name.lower() in ("rotate", "rotatez"):
             return None
@@ -277,14 +280,14 @@ def _add(
 
 
 def _declarations(source: str | list[Node]) -> list[Declared]:
-    found: list[Declared] = []
+    declarations: list[Declared] = []
     for item in tinycss2.parse_blocks_contents(source, skip_comments=True, skip_whitespace=True):
         if isinstance(item, Declaration):
             value = "".join(" " if t.type == "comment" else t.serialize() for t in item.value)
             name = item.name if item.name.startswith("--") else item.lower_name
             if name not in _PAINTS or _is_paint(value.strip()):
-                found.append((name.removeprefix("-webkit-"), value.strip(), item.important))
-    return found
+                declarations.append((name.removeprefix("-webkit-"), value.strip(), item.important))
+    return declarations
 
 
 def _is_paint(text: str) -> bool:

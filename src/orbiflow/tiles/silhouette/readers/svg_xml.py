@@ -100,11 +100,11 @@ class _BoundedTree:
         if self.count == 1:
             self._check_root(tag)
         # attributes without a prefix have no namespace
-        own = {self._named(k) if ":" in k else k: text for k, text in attributes.items()}
+        named = {self._named(k) if ":" in k else k: text for k, text in attributes.items()}
         if self.count == 1 and self.sheets:
-            own["{}xml-stylesheet"] = self.sheets
+            named["{}xml-stylesheet"] = self.sheets
         self.names.append(self._named(tag, self.own))
-        self.builder.start(self.names[-1], own)
+        self.builder.start(self.names[-1], named)
 
     def end(self, _: str) -> None:
         self.scopes.pop()

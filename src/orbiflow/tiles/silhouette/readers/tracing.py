@@ -88,8 +88,8 @@ def trace(
         )
     tolerance = SIMPLIFY_TOLERANCE
     if stepped:
-        own = min(STEP_TOLERANCE, STEP_TOLERANCE_OF_SIZE * float(np.sqrt(polygon.area)))
-        tolerance = max(tolerance, own)
+        step = min(STEP_TOLERANCE, STEP_TOLERANCE_OF_SIZE * float(np.sqrt(polygon.area)))
+        tolerance = max(tolerance, step)
     polygon, moved = thinned(polygon, tolerance, MAX_OUTLINE_VERTICES)
     if moved > STEP_TOLERANCE:
         notes.append(f"simplified the outline to within {moved:.2f} traced pixels")
@@ -267,8 +267,8 @@ def _from_middle(line: _Mask, inside: _Mask, borders: tuple[Array, Array], width
         limbs = scipy.ndimage.binary_dilation(
             limbs, _ACROSS_CORNERS, round(LIMB_DISTANCE_WIDTHS * width) + 2
         )
-        own = np.where(line, to_outer, -to_outer)
-        values = np.where(limbs & near & ~inside, np.maximum(values, own), values)
+        outer = np.where(line, to_outer, -to_outer)
+        values = np.where(limbs & near & ~inside, np.maximum(values, outer), values)
     return np.clip(values, -width, width)
 
 
