@@ -58,26 +58,26 @@ def batch(
         match: Only files whose names fit a pattern, such as "*.svg".
         figures: Also write figures for print.
     """
-    given = {**settings.to_json(), "figures": figures}
+    shared = {**settings.to_json(), "figures": figures}
     if pairs is None and settings.ratio is not None:
         raise SettingError("{ratio} is for pairs; give {pairs} all, or leave it out")
 
     def call_of(name: str, results: str) -> Call:
         first, _, second = name.partition(PAIRED) if pairs else (name, "", "")
-        names = [own for own in (first, second) if own]
-        is_outline = all(PurePath(own).suffix.lower() in OUTLINES for own in names)
-        own = {"smooth": reading.smooth} if is_outline else reading.to_json()
+        names = [file for file in (first, second) if file]
+        is_outline = all(PurePath(file).suffix.lower() in OUTLINES for file in names)
+        options = {"smooth": reading.smooth} if is_outline else reading.to_json()
         # each call has one process: many at a time make better use of the cores
         fixed = {"image": first, "out": "out", "workers": 1}
         words = {"called": first, "shown_out": str(out / results)}
         more = {"second": second, "second_called": second} if second else {}
-        return find("escherize").call({**given, **own, **fixed, **words, **more})
+        return find("escherize").call({**shared, **options, **fixed, **words, **more})
 
     title = f"{'Pairs' if pairs else 'Tiles'} of {folder.name or 'a folder'}"
     kind = TILES if pairs is None else PAIRS
     sheet, reads = (None, "") if pairs is None else (PairSheet(kind, title), "second")
-    own = match, work, on_event, cancel
-    return run_files(folder, out, kind, title, call_of, *own, sheet=sheet, second=reads)
+    running = match, work, on_event, cancel
+    return run_files(folder, out, kind, title, call_of, *running, sheet=sheet, second=reads)
 
 
 def _best(summary: Summary) -> dict[str, Any]:
@@ -130,10 +130,10 @@ class PairSheet(ContactSheet):
 
     def matrix(self, entries: Sequence[Entry]) -> Matrix:
         """Return a table of the stars of the worse figure of each pair."""
-        found = {tuple(entry.file.split(PAIRED)): entry for entry in entries}
-        names = sorted({name for pair in found for name in pair})
+        by_pair = {tuple(entry.file.split(PAIRED)): entry for entry in entries}
+        names = sorted({name for pair in by_pair for name in pair})
         cells = [
-            [_cell(found.get((column, row))) for column in names[:number]]
+            [_cell(by_pair.get((column, row))) for column in names[:number]]
             for number, row in enumerate(names)
         ]
         shown = [PurePath(name).stem for name in names]

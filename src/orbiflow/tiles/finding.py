@@ -78,11 +78,11 @@ def escherize(
     silhouettes = [(target, image)]
     if other is not None and second is not None:
         silhouettes.append((other, second))
-    pictures = functools.cache(lambda: [run_folder.read_png(*own) for own in silhouettes])
+    pictures = functools.cache(lambda: [run_folder.read_png(*source) for source in silhouettes])
 
     def show() -> None:
-        for number, (own, picture) in enumerate(zip(silhouettes, pictures(), strict=True)):
-            run_folder.show_reading(own[0], picture, out, on_event, number=number)
+        for number, (source, picture) in enumerate(zip(silhouettes, pictures(), strict=True)):
+            run_folder.show_reading(source[0], picture, out, on_event, number=number)
 
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
     result = search.escherize(
@@ -114,7 +114,7 @@ def _tables(tiles: Sequence[EscherTile]) -> list[Table]:
     """Return a table of the tiles, in words and in figures; empty if there are none."""
     if not tiles:
         return []
-    rows = [_figures(tile, own) for tile in tiles for own in tile.likenesses]
+    rows = [_figures(tile, figure) for tile in tiles for figure in tile.likenesses]
     figures = _table("Figures", rows)
     return [_table("Tiles, best first", [_words(tile) for tile in tiles]), figures]
 
@@ -126,7 +126,7 @@ def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
 
 def _words(tile: EscherTile) -> dict[str, str]:
     """Return a line about a tile, in 80 characters."""
-    lies, ratings = tile.arrangement, [own.rating for own in tile.likenesses]
+    lies, ratings = tile.arrangement, [figure.rating for figure in tile.likenesses]
     words = dict.fromkeys(rating.word for rating in ratings if rating)
     return {
         "class": f"{tile.name} ({tile.group_name})",
@@ -159,8 +159,8 @@ def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> 
 
     explains = not result.tiles or any(map(is_mere_line, result.targets))
     # beside the stars, which are of what was read
-    told = result.targets if explains else filter(left_out_share, result.targets)
-    again = [Note(text, warning=True) for target in told for text in doubts(target)]
+    doubtful = result.targets if explains else filter(left_out_share, result.targets)
+    again = [Note(text, warning=True) for target in doubtful for text in doubts(target)]
     if poor := why_poor(result.tiles[0]) if result.tiles else "":
         again = [Note(poor), *again]
     if rounded := rounded_for(result.tiles):
@@ -181,19 +181,19 @@ def _remarks(result: SearchResult) -> list[str]:
 
 
 def _measures(tile: EscherTile) -> dict[str, Any]:
-    mismatch, own = tile.certificate.edge_mismatch, tile.worst.likeness
+    mismatch, likeness = tile.certificate.edge_mismatch, tile.worst.likeness
     return {
         "class": tile.isohedral_class,
         "group": tile.group_name,
         "objective": tile.search.objective,
-        "deformation": own.deformation,
+        "deformation": likeness.deformation,
         "arrangement": tile.arrangement,
         "stars": tile.rating and tile.rating.stars,
         "word": tile.rating and tile.rating.word,
         "score": tile.score,
-        "iou": own.metrics.iou,
-        "dice": own.metrics.dice,
-        "recognised": own.recognisability.score,
+        "iou": likeness.metrics.iou,
+        "dice": likeness.metrics.dice,
+        "recognised": likeness.recognisability.score,
         "certified": tile.certificate.valid,
         "edge_mismatch": mismatch if mismatch < float("inf") else None,
         "seconds": tile.search.seconds,

@@ -135,8 +135,8 @@ def best_similarity(points: Complex, images: Complex) -> Complex:
     >>> complex(best_similarity(triangle, 2j * triangle + 5))
     2j
     """
-    own = points - points.mean(axis=0)
-    return np.conj(own) @ (images - images.mean(axis=0)) / (abs(own) ** 2).sum()
+    centered = points - points.mean(axis=0)
+    return np.conj(centered) @ (images - images.mean(axis=0)) / (abs(centered) ** 2).sum()
 
 
 def apart(points: Complex, images: Complex) -> float:

@@ -59,14 +59,14 @@ def _taken(
     """
     from orbiflow.tiles.result_file import as_tile, read_tiles
 
-    given = None
+    taken = None
     if best is not None and tile is None and isinstance(result, str | Path):
-        given = best(read_tiles(result))
-    given = given or as_tile(result, tile)
-    out = out or Path(name.format(given.name))
+        taken = best(read_tiles(result))
+    taken = taken or as_tile(result, tile)
+    out = out or Path(name.format(taken.name))
     read = (result,) if isinstance(result, str | Path) else ()
     check_output_file(out, *map(Path, read), *pictures)
-    return given, out
+    return taken, out
 
 
 @operation("export")
@@ -105,9 +105,9 @@ def export(
     from orbiflow.tiles import make
 
     pictures = picture, second_picture
-    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)
+    taken, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)
     on_event(Progress(0.0, "laying out"))
-    made = make.exported(given, settings, pictures, force=force)
+    made = make.exported(taken, settings, pictures, force=force)
     return _finished(made, out, on_event, cancel)
 
 
@@ -170,24 +170,24 @@ def art(
         best = partial(worlds.best_in_world, orders=settings.order, sign=CURVED[settings.world])
     elif begins:
         best = partial(worlds.best_to_become, begins=begins)
-    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures, best=best)
-    given.require_certified(
+    taken, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures, best=best)
+    taken.require_certified(
         force=force, otherwise="so it is not drawn; {force} draws it all the same"
     )
     on_event(Progress(0.0, "laying out"))
-    given = motifs.with_map(given)
-    alike = (own for own in begins if own.isohedral_class == given.isohedral_class)
+    taken = motifs.with_map(taken)
+    alike = (begin for begin in begins if begin.isohedral_class == taken.isohedral_class)
     first = next(alike, begins[0] if begins else None)
     if first is None:
-        motifs.require_figures(given, settings, 1 + (second_picture is not None))
-        overs = motifs.read_overs(pictures, given)
+        motifs.require_figures(taken, settings, 1 + (second_picture is not None))
+        overs = motifs.read_overs(pictures, taken)
     else:
-        both = zip(pictures, (given, first), strict=True)
-        overs = [own for over, figure in both for own in motifs.read_overs((over,), figure)]
+        both = zip(pictures, (taken, first), strict=True)
+        overs = [carried for over, figure in both for carried in motifs.read_overs((over,), figure)]
     if settings.world or settings.metamorphosis:
-        made = worlds.world_artwork(given, settings, *overs, begin=first, cancel=cancel)
+        made = worlds.world_artwork(taken, settings, *overs, begin=first, cancel=cancel)
     else:
-        made = make.artwork(given, settings, *overs)
+        made = make.artwork(taken, settings, *overs)
     return _finished(made, out, on_event, cancel)
 
 
@@ -234,9 +234,9 @@ def solid(
     best = None
     if settings.kind in BALLS:
         best = partial(worlds.best_in_world, orders=settings.order, sign=1)
-    given, out = _taken(result, tile, out, name, *pictures, best=best)
-    own = {"picture": picture, "second_picture": second_picture}
-    made = make_solid(given, settings, **own, force=force)
+    taken, out = _taken(result, tile, out, name, *pictures, best=best)
+    carried = {"picture": picture, "second_picture": second_picture}
+    made = make_solid(taken, settings, **carried, force=force)
     cancel.check()
     contents = solid_files(made, settings.file_format)
     cancel.check()
@@ -294,26 +294,26 @@ def animate(
     from orbiflow.tiles.tilings import colouring
 
     pictures = picture, second_picture
-    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", *pictures)
-    given, overs = motion.dressed(given, settings, pictures)
-    known = colouring(given.tiling)
-    carried = [part.figure for part in given.figures] if overs else []
-    said = [note for own in (*carried, *overs) for note in own.notes]
-    for note in (*said, *shades(palette(settings.palette), known).shortage(known.count)):
+    taken, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", *pictures)
+    taken, overs = motion.dressed(taken, settings, pictures)
+    colours = colouring(taken.tiling)
+    carried = [part.figure for part in taken.figures] if overs else []
+    said = [note for source in (*carried, *overs) for note in source.notes]
+    for note in (*said, *shades(palette(settings.palette), colours).shortage(colours.count)):
         on_event(Note(note))
 
     def told(share: float) -> None:
         cancel.check()
         on_event(Progress(share, "drawing"))
 
-    content = motion.animation(given, settings, *overs, force=force, told=told)
+    content = motion.animation(taken, settings, *overs, force=force, told=told)
     cancel.check()
     write_atomic(out, content)
     width, height = (round(side * settings.pixels) for side in settings.page)
     note = (
-        f"written {out}: {settings.kind} of {given.isohedral_class}, {settings.seconds:g} s, "
+        f"written {out}: {settings.kind} of {taken.isohedral_class}, {settings.seconds:g} s, "
         f"{width} x {height} pixels, {len(content) / 1000:.0f} kB"
     )
     _tell(on_event, (note,), out)
-    facts = {"bytes": len(content), "class": given.isohedral_class, "kind": settings.kind}
+    facts = {"bytes": len(content), "class": taken.isohedral_class, "kind": settings.kind}
     return Outcome({"file": str(out), **facts})

@@ -71,17 +71,17 @@ def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
     try:
         tile = _tile(entry)
         # folders are named after classes: an unknown name leads nowhere
-        own = file.parent / folder_names(names)[index] if tile.isohedral_class else None
-        found = _measured(tile, entry, f"{source}-{names[index]}", silhouette, own)
-        found = found.changed(
+        tile_folder = file.parent / folder_names(names)[index] if tile.isohedral_class else None
+        read = _measured(tile, entry, f"{source}-{names[index]}", silhouette, tile_folder)
+        read = read.changed(
             rank=index + 1,
             search=SearchFacts(**{name: entry[name] for name in _SEARCH if name in entry}),
         )
         if parts := entry.get("parts", []):
-            found = _divided(found, parts, own)
+            read = _divided(read, parts, tile_folder)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise InputFileError(f"{file}: tile {index + 1} cannot be read: {error}") from error
-    return found
+    return read
 
 
 def read_tiles(path: str | Path) -> list[EscherTile]:
@@ -119,15 +119,15 @@ def _measured(
 
 def _divided(whole: EscherTile, entries: list[dict[str, Any]], folder: Path | None) -> EscherTile:
     """Return a tile that figures divide."""
-    parts = tuple(_part(whole, own, folder, k) for k, own in enumerate(entries))
-    found = whole.changed(division=parts, map_source=None, no_map=NO_MAP)
+    parts = tuple(_part(whole, entry, folder, k) for k, entry in enumerate(entries))
+    divided = whole.changed(division=parts, map_source=None, no_map=NO_MAP)
     area, whole_area = (
-        sum(own.signed_area for own in found.tiling.prototiles),
-        found.tile.signed_area,
+        sum(prototile.signed_area for prototile in divided.tiling.prototiles),
+        divided.tile.signed_area,
     )
     if not abs(area - whole_area) <= SAME_AREA * abs(whole_area):
         raise OrbiflowError("its parts do not fill its polygon")
-    return found
+    return divided
 
 
 def _part(whole: EscherTile, entry: dict[str, Any], folder: Path | None, number: int) -> Part:
@@ -199,10 +199,10 @@ def folder_names(classes: Iterable[str]) -> list[str]:
 
 def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
     """Return the result.json at a path, in a run's folder or above a tile's, and what it holds."""
-    given = as_path(path, "the result")
-    file = _result_in(given) if given.is_dir() else given
+    source = as_path(path, "the result")
+    file = _result_in(source) if source.is_dir() else source
     if not file.exists():
-        what = f"{given}: no such file or folder; give what orbiflow escherize wrote"
+        what = f"{source}: no such file or folder; give what orbiflow escherize wrote"
         raise InputFileError(what)
     first = f"find its tiles first: orbiflow escherize {file}"
     if file.suffix.lower() in PICTURES:
@@ -226,17 +226,19 @@ def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
 
 def _result_in(folder: Path) -> Path:
     """Return the result.json of a run's folder, or of the run that a tile's folder belongs to."""
-    own, above = folder / RESULT, folder.resolve().parent / RESULT
-    runs = [] if own.exists() else sorted(file.parent.name for file in folder.glob(f"*/{RESULT}"))
+    inside, above = folder / RESULT, folder.resolve().parent / RESULT
+    runs = (
+        [] if inside.exists() else sorted(file.parent.name for file in folder.glob(f"*/{RESULT}"))
+    )
     if runs:
         some = ", ".join(runs[:MOST_NAMED]) + ", ..." * (len(runs) > MOST_NAMED)
         raise InputFileError(
             f"{folder} holds the runs {some}: give one, such as {folder / runs[0]}"
         )
-    if not own.exists() and not above.exists():
+    if not inside.exists() and not above.exists():
         what = f"{folder} holds no {RESULT}; give the folder that orbiflow escherize wrote"
         raise InputFileError(what)
-    return own if own.exists() else above
+    return inside if inside.exists() else above
 
 
 def _index(names: list[str], which: str | int, file: Path) -> int:
@@ -267,7 +269,7 @@ def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
     """
     if not tiles:
         raise OrbiflowError("there is no tile to save")
-    own = ResultFolder(as_path(folder, "the folder to write into"), _saved_files)
+    run = ResultFolder(as_path(folder, "the folder to write into"), _saved_files)
     names = folder_names(tile.isohedral_class or "tile" for tile in tiles)
     silhouette = tiles[0].silhouette or {"source": tiles[0].name, "y_down": tiles[0].y_down}
     document = {
@@ -275,14 +277,14 @@ def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
         "input": silhouette,
         "tiles": [tile_json(tile) for tile in tiles],
     }
-    with own.replaced() as staged:
+    with run.replaced() as staged:
         for tile, name in zip(tiles, names, strict=True):
             for number, part in enumerate(tile.figures):
                 if part.figure.map is not None:
                     file = make_folder(staged / name) / part_file(TILE_MODEL, number)
                     write_atomic(file, part.figure.map.to_bytes())
         write_json(staged / RESULT, document)
-    return own.path
+    return run.path
 
 
 def _saved_files(folder: Path) -> set[str]:
@@ -317,7 +319,7 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
     """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
     search = tile.search
     # what is measured of a tile that figures divide is theirs
-    own = (
+    measures = (
         {"parts": [_part_json(part) for part in tile.figures]}
         if len(tile.figures) > 1
         else _measures_json(tile)
@@ -327,7 +329,7 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
         "arrangement": tile.arrangement,
         "objective": search.objective,
         **_rating_json(tile),
-        **own,
+        **measures,
         "certificate": tile.certificate.as_dict(),
         "group": group_json(tile.tile.group),
         "starts": search.starts,
@@ -349,18 +351,18 @@ def _rating_json(tile: EscherTile) -> dict[str, Any]:
 
 def _measures_json(tile: EscherTile) -> dict[str, Any]:
     """Return what is measured of a tile, or one of its figures, in its own coordinates."""
-    own, thin = tile.likeness, tile.likeness.thinnest
+    likeness, thin = tile.likeness, tile.likeness.thinnest
     return {
-        "smoothed": own.smoothed,
+        "smoothed": likeness.smoothed,
         "metrics": {
-            **_or_none(own.metrics.as_dict()),
-            "deformation": own.deformation,
-            "bent_iou": own.bent_iou,
-            "pinned": own.pinned,
-            "fidelity": None if own.fidelity is None else asdict(own.fidelity),
+            **_or_none(likeness.metrics.as_dict()),
+            "deformation": likeness.deformation,
+            "bent_iou": likeness.bent_iou,
+            "pinned": likeness.pinned,
+            "fidelity": None if likeness.fidelity is None else asdict(likeness.fidelity),
         },
-        "recognisability": _or_none(own.recognisability.as_dict()),
-        "bent": None if own.bent is None else _closed(own.bent),
+        "recognisability": _or_none(likeness.recognisability.as_dict()),
+        "bent": None if likeness.bent is None else _closed(likeness.bent),
         "thinnest": thin if thin is None else {**thin._asdict(), "ends": thin.ends.tolist()},
     }
 
@@ -368,9 +370,9 @@ def _measures_json(tile: EscherTile) -> dict[str, Any]:
 def _part_json(part: Part) -> dict[str, Any]:
     """Return what is known of one of the figures that divide a tile."""
     place = {"linear": part.place.linear.tolist(), "offset": part.place.offset.tolist()}
-    known = {"name": part.figure.name, "input": part.figure.silhouette, "place": place}
+    facts = {"name": part.figure.name, "input": part.figure.silhouette, "place": place}
     measured = {} if part.is_background else _measures_json(part.figure)
-    return {**known, **_rating_json(part.figure), **measured}
+    return {**facts, **_rating_json(part.figure), **measured}
 
 
 def _or_none(value: Any) -> Any:
@@ -389,23 +391,23 @@ def _closed(ring: Array) -> list[list[float]]:
 def _likeness(entry: dict[str, Any]) -> Likeness:
     """Return the measures that an entry states; those that it lacks are left out."""
     metrics = dict(entry.get("metrics") or {})
-    own = ("deformation", "bent_iou", "pinned")
-    found: dict[str, Any] = {name: metrics.pop(name, None) for name in own}
+    plain = ("deformation", "bent_iou", "pinned")
+    measures: dict[str, Any] = {name: metrics.pop(name, None) for name in plain}
     fidelity = metrics.pop("fidelity", None)
     if fidelity is not None:
-        found["fidelity"] = Fidelity(**{**fidelity, "pieces": tuple(fidelity["pieces"])})
+        measures["fidelity"] = Fidelity(**{**fidelity, "pieces": tuple(fidelity["pieces"])})
     if metrics.get("iou") is not None:
-        found["metrics"] = ShapeMetrics(**{**metrics, "window": tuple(metrics["window"])})
+        measures["metrics"] = ShapeMetrics(**{**metrics, "window": tuple(metrics["window"])})
     recognised = entry.get("recognisability")
     if recognised and recognised["score"] is not None:
-        found["recognisability"] = Recognisability(**recognised)
+        measures["recognisability"] = Recognisability(**recognised)
     thinnest, bent = entry.get("thinnest"), entry.get("bent")
     if thinnest is not None:
         ends = np.array(thinnest["ends"], dtype=np.float64)
-        found["thinnest"] = Thinnest(thinnest["width"], thinnest["share"], ends)
+        measures["thinnest"] = Thinnest(thinnest["width"], thinnest["share"], ends)
     if bent is not None:
-        found["bent"] = np.array(bent, dtype=np.float64)[:-1]
-    return Likeness(known_score=entry.get("score"), smoothed=entry.get("smoothed", 0.0), **found)
+        measures["bent"] = np.array(bent, dtype=np.float64)[:-1]
+    return Likeness(known_score=entry.get("score"), smoothed=entry.get("smoothed", 0.0), **measures)
 
 
 _SEARCH = ("objective", "starts", "dropped", "seconds")  # fields of `SearchFacts` in an entry

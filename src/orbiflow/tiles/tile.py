@@ -215,7 +215,7 @@ class EscherTile:
     @property
     def worst(self) -> EscherTile:
         """The one of the `figures` that is least like its silhouette."""
-        return min(self.likenesses, key=lambda own: own.likeness.score)
+        return min(self.likenesses, key=lambda figure: figure.likeness.score)
 
     @property
     def likenesses(self) -> list[EscherTile]:

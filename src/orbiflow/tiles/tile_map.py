@@ -59,8 +59,8 @@ class TileMap:
         """Return the contents of a `model.safetensors` file."""
         frame = {} if self.frame is None else {FRAME: self.frame.as_dict()}
         header = dict(sorted({**self.settings, **frame}.items()))
-        own = self.bending
-        parts = () if own is None else (own.rest, own.images, own.triangles)
+        bending = self.bending
+        parts = () if bending is None else (bending.rest, bending.images, bending.triangles)
         stored = {**self.arrays, **dict(zip(BENDING, parts, strict=False))}
         arrays = {name: np.array(a, order="C") for name, a in stored.items()}  # keeps 0-d
         return array_bytes(header, arrays, "a tile model", key=FORMAT)
@@ -94,13 +94,13 @@ class TileMap:
 
 def _bending_in(arrays: dict[str, Array]) -> Bending | None:
     """Take the map from the silhouette out of a file's arrays."""
-    found = {name: arrays.pop(name) for name in BENDING if name in arrays}
-    if not found:
+    parts = {name: arrays.pop(name) for name in BENDING if name in arrays}
+    if not parts:
         return None
-    missing = [name for name in BENDING if name not in found]
+    missing = [name for name in BENDING if name not in parts]
     if missing:
         raise OrbiflowError(f"the model's {', '.join(missing)} is missing")
-    return Bending(*(found[name] for name in BENDING))
+    return Bending(*(parts[name] for name in BENDING))
 
 
 @contextlib.contextmanager

@@ -109,7 +109,7 @@ def read_parts(drawing: Drawing, carry: Carry) -> list[PathPart] | None:
         painted = _painted(drawing, carry)
         if painted is None or not _is_all(drawing, painted):
             return None
-        return [part for one in painted if (part := _part(one, carry)).curves]
+        return [part for paint in painted if (part := _part(paint, carry)).curves]
     except (TooManyPoints, TooTangled, GEOSException) as error:
         raise InputFileError(
             f"{drawing.path}: the drawing is too intricate to be carried, or much too long; simplify it"
@@ -148,9 +148,9 @@ def _painted(drawing: Drawing, carry: Carry) -> list[_Painted] | None:
     try:
         text = tostring(root, encoding="unicode")
         tree = svgelements.SVG.parse(io.StringIO(text), reify=True, ppi=96, color=_CURRENT)
-        shapes = [one for one in tree.elements() if isinstance(one, svgelements.Shape)]
+        shapes = [element for element in tree.elements() if isinstance(element, svgelements.Shape)]
         offset, count = np.array([left, top]), 0
-        found: list[_Painted] = []
+        painted: list[_Painted] = []
         for shape in shapes:
             lines = _lines(shape, offset, carry.tolerance)
             reach = np.concatenate([line.points for line in lines] or [np.zeros((1, 2))])
@@ -161,8 +161,8 @@ def _painted(drawing: Drawing, carry: Carry) -> list[_Painted] | None:
             count += len(reach)
             if count > MOST_POINTS:
                 raise TooManyPoints
-            found += _paints(shape, lines, carry)
-        return found
+            painted += _paints(shape, lines, carry)
+        return painted
     except _DAMAGED:
         return None
     finally:
@@ -174,13 +174,13 @@ def _paints(shape: svgelements.Shape, lines: list[_Line], carry: Carry) -> list[
     values = shape.values
     if values.get("visibility", "visible") != "visible" or values.get("display") == "none":
         return []
-    found: list[_Painted] = []
+    painted: list[_Painted] = []
     colour = svgelements.Color("black") if values.get("fill") is None else shape.fill
     if colour is not None and colour.value is not None:
         inside = _Painted(colour, 0.0, [])
         rings = [line.points for line in lines if len(line.points) > 2]
         inside.region = fill(rings, values.get("fill-rule", "nonzero"))
-        found.append(inside)
+        painted.append(inside)
     width = float(shape.stroke_width or 0.0)
     if shape.stroke is not None and shape.stroke.value is not None and width > 0:
         pen = _Painted(shape.stroke, width, [line for line in lines if len(line.points) > 1])
@@ -199,30 +199,30 @@ def _paints(shape: svgelements.Shape, lines: list[_Line], carry: Carry) -> list[
                 )
             )
             pen.lines = []
-        found.append(pen)
+        painted.append(pen)
     opacity = float(values.get("opacity", 1.0))
-    for one in found:
-        one.opacity *= opacity
-    return [one for one in found if one.opacity > 0]
+    for paint in painted:
+        paint.opacity *= opacity
+    return [paint for paint in painted if paint.opacity > 0]
 
 
 def _lines(shape: svgelements.Shape, offset: Array, tolerance: float) -> list[_Line]:
     """Return the sub-paths of a shape within a tolerance of their curves."""
-    found: list[tuple[list[Array], bool]] = []
+    runs: list[tuple[list[Array], bool]] = []
     for segment in svgelements.Path(shape):
         if isinstance(segment, svgelements.Move):
-            found.append(([_points([segment.end])], False))
+            runs.append(([_points([segment.end])], False))
             continue
-        if not found or found[-1][1]:  # after a close without a move, from where the last one began
-            found.append(([found[-1][0][0][:1] if found else _points([segment.start])], False))
-        parts = found[-1][0]
+        if not runs or runs[-1][1]:  # after a close without a move, from where the last one began
+            runs.append(([runs[-1][0][0][:1] if runs else _points([segment.start])], False))
+        parts = runs[-1][0]
         if isinstance(segment, svgelements.Close):
-            found[-1] = parts, True
+            runs[-1] = parts, True
             continue
         controls = _control(segment)
         for piece in [controls[k : k + 3] for k in range(0, len(controls), 3)]:
             parts.append(_flattened(np.vstack([parts[-1][-1:], _points(piece)]), tolerance))
-    lines = [(np.concatenate(parts) + offset, closed) for parts, closed in found if len(parts) > 1]
+    lines = [(np.concatenate(parts) + offset, closed) for parts, closed in runs if len(parts) > 1]
     ended = [closed and len(points) > 2 and bool((points[0] == points[-1]).all())
              for points, closed in lines]  # fmt: skip
     return [
@@ -273,8 +273,8 @@ def _is_all(drawing: Drawing, painted: list[_Painted]) -> bool:
     text = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1">{body}</svg>'
     alone = Drawing(FileContent(text.encode(), str(drawing.path)))
     alone.box = None  # so that it is drawn in the units of the other
-    one, other = (_on_gray(each.pixels(window, size)) for each in (drawing, alone))
-    apart = np.abs(one - other).max(axis=-1) > MAX_CHANNEL_DIFFERENCE
+    drawn, other = (_on_gray(each.pixels(window, size)) for each in (drawing, alone))
+    apart = np.abs(drawn - other).max(axis=-1) > MAX_CHANNEL_DIFFERENCE
     whole = drawing.pixels(window, size)[..., 3] > 0
     return bool(apart.sum() <= MAX_DIFFERING_SHARE * max(whole.sum(), 1) + 2)
 

@@ -52,7 +52,7 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
         return tile.with_figures(with_map)
     if tile.no_map or (tile.bending is not None and tile.frame is not None):
         return tile
-    frame, bending, known = tile.frame, None, tile.map or TileMap()
+    frame, bending, stored = tile.frame, None, tile.map or TileMap()
     said: dict[str, Any] = {}
     try:
         if tile.rank is not None and tile.silhouette is not None:  # out of a file
@@ -70,7 +70,7 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
     if frame is None:
         size = np.sqrt(abs(tile.tile.signed_area))
         frame = Frame.upright(size, y_down=tile.y_down)
-    return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending), **said)
+    return tile.changed(map_source=TileMap(stored.settings, stored.arrays, frame, bending), **said)
 
 
 def _silhouette(own: dict[str, Any]) -> Target:
@@ -263,7 +263,7 @@ def require_figures(tile: EscherTile, settings: MotifSettings, pictures: int) ->
         SettingError: If something is for a second figure, and there is none.
     """
     extra = {"second_picture": pictures > 1, "second_eyes": bool(settings.second_eyes)}
-    for name in (name for name, given in extra.items() if given and len(tile.figures) == 1):
+    for name in (name for name, present in extra.items() if present and len(tile.figures) == 1):
         raise SettingError(f"{{{name}}} applies only to a tile of two figures; leave it out")
 
 
@@ -293,7 +293,7 @@ def drawn_motif(
     if drawing is not None or settings.eyes:
         tile.require_map()
     parts = () if drawing is None else drawing.parts
-    around = [eye(tile, given, palette) for given in settings.eyes]
+    around = [eye(tile, spot, palette) for spot in settings.eyes]
     if settings.strokes is not None:
         parts += engraved(tile, settings.strokes, around, hairlines=hairlines)
-    return Motif(parts + tuple(part for one in around for part in one.parts))
+    return Motif(parts + tuple(part for motif in around for part in motif.parts))

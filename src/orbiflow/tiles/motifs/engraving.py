@@ -85,10 +85,10 @@ class TileDepths:
     def _at(self, values: Array, points: Array) -> Array:
         place = self._grid.texels(points) - 0.5
         flat = place.reshape(-1, 2)
-        found = scipy.ndimage.map_coordinates(
+        sampled = scipy.ndimage.map_coordinates(
             values, [flat[:, 1], flat[:, 0]], order=1, mode="nearest"
         )
-        return found.reshape(points.shape[:-1])
+        return sampled.reshape(points.shape[:-1])
 
 
 def shade(normals: Array) -> Array:
@@ -184,10 +184,10 @@ def _hatch(body: TileDepths, reach: float = 0.32, spacing: float = 0.017) -> lis
     inward = np.stack([-step[:, 1], step[:, 0]], axis=1) * np.sign(signed_area(body.ring))
     inward = scipy.ndimage.gaussian_filter(inward, (2, 0), mode="wrap")
     n = inward / np.maximum(np.linalg.norm(inward, axis=1), 1e-12)[:, None]
-    own = body.half_thickness(points, n)
+    thickness = body.half_thickness(points, n)
     dark = shade(n)
-    half = scipy.ndimage.median_filter(own, 9, mode="wrap")  # no single spikes out of notches
-    length = np.minimum(half, 1.15 * own) * (0.22 + 0.62 * dark)
+    half = scipy.ndimage.median_filter(thickness, 9, mode="wrap")  # no single spikes out of notches
+    length = np.minimum(half, 1.15 * thickness) * (0.22 + 0.62 * dark)
     # around a point of a neighbour they fan out: short, or they make a star
     bend = np.roll(n, -1, axis=0) - np.roll(n, 1, axis=0)
     length /= 1 + 0.05 * np.hypot(*bend.T) / (2 * spacing)
@@ -196,7 +196,7 @@ def _hatch(body: TileDepths, reach: float = 0.32, spacing: float = 0.017) -> lis
     cos, sin = np.cos(lean), np.sin(lean)
     way = np.stack([cos * n[:, 0] - sin * n[:, 1], sin * n[:, 0] + cos * n[:, 1]], axis=1)
     share = np.linspace(0, 1, 9)
-    found = []
+    ticks = []
     for k in range(count):
         if length[k] < 0.016:
             continue
@@ -207,21 +207,21 @@ def _hatch(body: TileDepths, reach: float = 0.32, spacing: float = 0.017) -> lis
         if body.depth(path[2:]).min() <= 0.002:
             continue
         width = (0.0045 + 0.0065 * dark[k]) * (1 - share) ** 0.8 + 0.0006
-        found.append(stroke(path, width))
-    return found
+        ticks.append(stroke(path, width))
+    return ticks
 
 
 def _echoes(body: TileDepths) -> list[Array]:
     """Return the outline repeated inwards, thick in the shade and fading in the light."""
-    found: list[Array] = []
+    lines: list[Array] = []
     shape = shapely.Polygon(body.ring)
     depth, gap = 0.018, 0.017
     while depth < 0.92 * body.thickest:
         inner = shape.buffer(-depth, join_style="round", quad_segs=6)
         for part in shapely.get_parts(inner):
-            found += _echo(body, part, depth)
+            lines += _echo(body, part, depth)
         depth, gap = depth + gap, gap * 1.13
-    return found
+    return lines
 
 
 def _echo(body: TileDepths, part: shapely.Polygon, depth: float) -> list[Array]:
@@ -237,13 +237,13 @@ def _echo(body: TileDepths, part: shapely.Polygon, depth: float) -> list[Array]:
     width = 0.0085 * fade**0.7 * np.clip(1.25 * dark + 1.1 * fade - 0.85, 0, 1)
     width = scipy.ndimage.convolve1d(width, SMOOTHING / SMOOTHING.sum(), mode="wrap")
     # shorter ones look like strays
-    arcs = [own for own in _arcs(width > 0.0012) if len(own) >= min(ECHO_LEAST_STEPS, count)]
-    return [stroke(points[own], width[own]) for own in arcs]
+    arcs = [arc for arc in _arcs(width > 0.0012) if len(arc) >= min(ECHO_LEAST_STEPS, count)]
+    return [stroke(points[arc], width[arc]) for arc in arcs]
 
 
 def _feathers(body: TileDepths) -> list[Array]:
     """Return rows of scallops that follow the body from one end to the other."""
-    found = []
+    scallops = []
     axis = body.axis
     across = np.array([-axis[1], axis[0]])
     place = body.ring @ np.stack([axis, across], axis=1)
@@ -252,8 +252,8 @@ def _feathers(body: TileDepths) -> list[Array]:
     for i, u in enumerate(np.arange(low[0], high[0], row)):
         for v in np.arange(low[1] + (i % 2) * column / 2, high[1], column):
             point = u * axis + v * across
-            found += _scallop(body, point, column)
-    return found + _hatch(body, reach=0.035, spacing=0.022)
+            scallops += _scallop(body, point, column)
+    return scallops + _hatch(body, reach=0.035, spacing=0.022)
 
 
 def _scallop(body: TileDepths, point: Array, size: float) -> list[Array]:

@@ -55,16 +55,16 @@ def motifs_on(
             lies outside it.
     """
     figures = [part.figure for part in tile.figures]
-    known = [over or Over() for over, _ in zip_longest(overs, figures)]
+    all_overs = [over or Over() for over, _ in zip_longest(overs, figures)]
     motifs = list[Motif]()
-    for number, (over, part) in enumerate(zip(known, tile.figures, strict=True)):
-        own, rasters = settings.of_figure(number), ()
-        drawn = drawn_motif(part.figure, own, palette, over.drawing)
+    for number, (over, part) in enumerate(zip(all_overs, tile.figures, strict=True)):
+        motif_settings, rasters = settings.of_figure(number), ()
+        drawn = drawn_motif(part.figure, motif_settings, palette, over.drawing)
         if over.picture is not None:
             rasters = (carried_picture(over.picture, part.figure, density * part.place.scale),)
         motifs.append(Motif(drawn.parts, rasters))
     return FigureMotifs(
         tuple(motifs),
-        tint * any(over.picture or over.drawing for over in known),
-        tuple(note for own in (*figures, *known) for note in own.notes),
+        tint * any(over.picture or over.drawing for over in all_overs),
+        tuple(note for source in (*figures, *all_overs) for note in source.notes),
     )

@@ -64,7 +64,7 @@ class MotifSettings(Settings):
     def check(self) -> None:
         eyes = {"eyes": self.eyes, "second_eyes": self.second_eyes}
         for name, number, place in (
-            (key, k, own) for key, given in eyes.items() for k, own in enumerate(given, 1)
+            (key, k, place) for key, places in eyes.items() for k, place in enumerate(places, 1)
         ):
             if len(place) not in (2, 3) or min(place[2:], default=0) < 0:
                 raise SettingError(

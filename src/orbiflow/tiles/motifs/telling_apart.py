@@ -38,7 +38,7 @@ def notes_on_dark_pictures(
     tile: EscherTile, overs: Sequence[Over | None], chosen: Palette
 ) -> tuple[str, ...]:
     """Return what to say of pictures whose copies cannot be told apart."""
-    found: list[str] = []
+    notes: list[str] = []
     for part, over in zip(tile.figures, overs, strict=False):
         if over is None or not (over.picture or over.drawing):
             continue
@@ -53,9 +53,9 @@ def notes_on_dark_pictures(
         colours = opacity * seen.pixels[..., :3] / 255 + (1 - opacity) * ground
         inside = inside_ring((polygon - seen.offset) / seen.linear[0, 0], *colours.shape[:2])
         if not are_told_apart(colours, inside, chosen.outline):
-            found.append(
+            notes.append(
                 "the picture is as dark as the lines around tiles, and its copies can hardly be told "
                 "apart: leave it out, or choose lines of another colour, such as {palette} "
-                f"{','.join(own.lstrip('#') for own in chosen.colours[:3])},outline=ffffff"
+                f"{','.join(colour.lstrip('#') for colour in chosen.colours[:3])},outline=ffffff"
             )
-    return tuple(map(Advice, dict.fromkeys(found)))
+    return tuple(map(Advice, dict.fromkeys(notes)))

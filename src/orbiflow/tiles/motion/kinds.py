@@ -130,8 +130,8 @@ def _page(given: EscherTile, settings: AnimationSettings) -> Page:
 def _window(page: Page, linear: Array) -> Window:
     """Return the part of a plane that is seen if `linear` maps it to the page about its middle."""
     corners = np.array(page.size) / 2 * np.array([[1, 1], [-1, -1], [1, -1], [-1, 1]])
-    own = corners @ np.linalg.inv(linear).T
-    return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
+    mapped = corners @ np.linalg.inv(linear).T
+    return (*mapped.min(axis=0).tolist(), *mapped.max(axis=0).tolist())
 
 
 def morph(
@@ -153,7 +153,7 @@ def morph(
         return every(progress)[: len(parts)] if parts else [way.at(progress).points]
 
     end = way.end
-    group, own = end.kind.group(), Tiling(end.kind.group(), rings(1.0))
+    group, tiling = end.kind.group(), Tiling(end.kind.group(), rings(1.0))
     center = np.linalg.solve(end.linear, given.tiling.center - end.offset)
 
     def linear(progress: float) -> Array:
@@ -170,16 +170,16 @@ def morph(
         return [(ring - center) @ linear(progress).T for ring in rings(progress)]
 
     def moved_bodies(progress: float) -> list[Array]:
-        return [(own - center) @ linear(progress).T for own in every(progress)[len(parts) :]]
+        return [(points - center) @ linear(progress).T for points in every(progress)[len(parts) :]]
 
-    copies = _seen(own, center, linear, outlines, places, page)
+    copies = _seen(tiling, center, linear, outlines, places, page)
     still = places(1.0, copies)
     return Motion(
         page,
         outlines,
         (lambda _: still) if steady else (lambda progress: places(progress, copies)),
         copies.prototiles,
-        page.colours_of(copies, own),
+        page.colours_of(copies, tiling),
         np.tile(ALWAYS, (len(copies), 1)),
         (0.0, 1.0) if way.weights is None and steady else tuple(np.linspace(0, 1, 17).tolist()),
         f"A tiling with straight edges becomes the tiling of {tile.isohedral_class}",
@@ -189,10 +189,12 @@ def morph(
 
 def grow(given: EscherTile, page: Page, bodies: Sequence[BendingFigure] = ()) -> Motion:
     """Return one tile, with all of its figures, and the tiling growing around it, nearest first."""
-    outlines = [own.polygon - own.center for own in page.tiling.prototiles]
+    outlines = [prototile.polygon - prototile.center for prototile in page.tiling.prototiles]
     still = [
-        page.place.after(part.place)(body.points) - own.center
-        for own, part, body in zip(page.tiling.prototiles, given.figures, bodies, strict=False)
+        page.place.after(part.place)(body.points) - prototile.center
+        for prototile, part, body in zip(
+            page.tiling.prototiles, given.figures, bodies, strict=False
+        )
     ]
     places, kinds, colours = _still_places(page)
     return Motion(
@@ -230,7 +232,9 @@ def bend(given: EscherTile, page: Page) -> Motion:
 
     return Motion(
         page,
-        lambda progress: [own[ring] for own, ring in zip(bodies(progress), borders, strict=True)],
+        lambda progress: [
+            points[ring] for points, ring in zip(bodies(progress), borders, strict=True)
+        ],
         lambda _: places,
         kinds,
         colours,
@@ -253,19 +257,21 @@ def _still_places(page: Page) -> tuple[Places, Integers, Integers]:
     count = len(page.tiling.prototiles)
     uses, kinds = [page.uses(k) for k in range(count)], np.arange(count)
     mine = [np.flatnonzero(page.copies.prototiles == k) for k in range(count)]
-    linear = np.concatenate([own.linear[own.which] for own in uses])
-    offsets = np.concatenate([own.offsets for own in uses])
-    numbers = np.repeat(kinds, [len(own) for own in uses])
+    linear = np.concatenate([used.linear[used.which] for used in uses])
+    offsets = np.concatenate([used.offsets for used in uses])
+    numbers = np.repeat(kinds, [len(used) for used in uses])
     colours = page.colours[np.concatenate(mine)]
     far = np.linalg.norm(offsets - np.array(page.size) / 2, axis=1)
-    itself = [np.linalg.norm(offsets - own.center, axis=1) for own in page.tiling.prototiles]
+    itself = [
+        np.linalg.norm(offsets - prototile.center, axis=1) for prototile in page.tiling.prototiles
+    ]
     first = [int(np.argmin(np.where(numbers == k, away, np.inf))) for k, away in enumerate(itself)]
     far[first] = -1.0
     order = np.argsort(far, kind="stable")
     places, numbers, colours = Places(linear[order], offsets[order]), numbers[order], colours[order]
     if count == 1:  # the tile that is alone at first has the palette's second colour
-        one = colours[0]
-        colours = np.where(colours == one, 1, np.where(colours == 1, one, colours))
+        alone = colours[0]
+        colours = np.where(colours == alone, 1, np.where(colours == 1, alone, colours))
     return places, numbers, colours
 
 

@@ -43,10 +43,10 @@ class VertexOrbits:
     fixed: NDArray[np.bool_]  # whether (N,) the vertex lies on a centre of rotation and cannot move
 
     @classmethod
-    def of(cls, own: OwnFrame) -> VertexOrbits:
+    def of(cls, frame: OwnFrame) -> VertexOrbits:
         """Return the orbits of a polygon's vertices."""
-        links = _links(own)
-        count = len(own.points)
+        links = _links(frame)
+        count = len(frame.points)
         elements: list[Isometry | None] = [None] * count
         source, fixed = np.arange(count), np.zeros(count, dtype=bool)
         for root in range(count):
@@ -57,16 +57,16 @@ class VertexOrbits:
             for i in orbit:  # grows while it is walked
                 for j, link in links[i]:
                     reached = link @ (elements[i] or identity(2))
-                    known = elements[j]
-                    if known is None:
+                    earlier = elements[j]
+                    if earlier is None:
                         elements[j], source[j] = reached, root
                         orbit.append(j)
-                    elif not known.is_close(reached, 1e-6):
+                    elif not earlier.is_close(reached, 1e-6):
                         fixed[root] = True  # two ways there: an element leaves it where it is
             fixed[orbit] = fixed[root]
-        found = [element or identity(2) for element in elements]
-        linear = np.stack([element.linear for element in found])
-        shift = np.stack([element.translation for element in found])
+        isometries = [element or identity(2) for element in elements]
+        linear = np.stack([element.linear for element in isometries])
+        shift = np.stack([element.translation for element in isometries])
         return cls(source, linear, shift, fixed)
 
     def with_inner(self, count: int) -> VertexOrbits:
@@ -124,24 +124,24 @@ class Morph:
     triangles along; where there are parts, nothing moves along straight lines.
     """
 
-    def __init__(self, own: OwnFrame, parts: Sequence[Array] = ()) -> None:
-        self.end, self.start = own, own.straight()
+    def __init__(self, frame: OwnFrame, parts: Sequence[Array] = ()) -> None:
+        self.end, self.start = frame, frame.straight()
         self.weights: _Weights | None = None  # None if every vertex moves along a straight line
         shares = np.linspace(0, 1, CHECKED + 1)
         straight = (shapely.Polygon(self._straight_way(float(s))).is_valid for s in shares)
         self._parts: list[_Within] = []
         if parts or not all(straight):
-            self.weights = _Weights.of(own)
+            self.weights = _Weights.of(frame)
             self.end = self.weights.own
             self.start = replace(self.end.straight(), points=self.weights.points(0.0))
             # how far the outline has moved, 0 to 1, at even shares of the weights' way
-            found = [self.weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
-            steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
+            outlines = [self.weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
+            steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(outlines)]
             far = np.concatenate([[0], np.cumsum(steps)])
             self._even = far / far[-1]
-            inverse = np.linalg.inv(own.linear).T
+            inverse = np.linalg.inv(frame.linear).T
             self._parts = [
-                _Within.of(self.weights, (ring - own.offset) @ inverse) for ring in parts
+                _Within.of(self.weights, (ring - frame.offset) @ inverse) for ring in parts
             ]
 
     def at(self, share: float) -> OwnFrame:
@@ -206,31 +206,31 @@ class _Weights:
     triangles: NDArray[np.int64]  # (M, 3) of these
 
     @classmethod
-    def of(cls, own: OwnFrame) -> _Weights:
-        if own.group.order * signed_area(own.kind.template()) > 1.5 * own.group.cell_volume:
-            name = own.kind.name
+    def of(cls, frame: OwnFrame) -> _Weights:
+        if frame.group.order * signed_area(frame.kind.template()) > 1.5 * frame.group.cell_volume:
+            name = frame.kind.name
             raise OrbiflowError(
                 f"the straight way to this tile crosses itself, and tiles of {name} know no other: "
                 "animate it with another kind, bend or grow"
             )
         for _ in range(ROUNDS):
-            mesh = triangulate(own.points)
+            mesh = triangulate(frame.points)
             if not len(mesh.sides):
                 break
-            own = own.refined(set(mesh.sides.tolist()))
+            frame = frame.refined(set(mesh.sides.tolist()))
         else:
             raise OrbiflowError("the tile is too thin somewhere to be animated")
-        orbits = VertexOrbits.of(own).with_inner(len(mesh.points) - mesh.size)
+        orbits = VertexOrbits.of(frame).with_inner(len(mesh.points) - mesh.size)
         pairs = [(a, b) for a in range(3) for b in range(3) if a != b]
         sides = np.unique(np.concatenate([mesh.triangles[:, pair] for pair in pairs]), axis=0)
         first, last = (
             weights / _sums(weights, sides, orbits)
             for weights in (
-                _stiff_edges(own, sides),
+                _stiff_edges(frame, sides),
                 _mean_values(mesh.points, mesh.triangles, sides),
             )
         )
-        return cls(own, orbits, sides, first, last, mesh.points, mesh.triangles)
+        return cls(frame, orbits, sides, first, last, mesh.points, mesh.triangles)
 
     def points(self, share: float) -> Array:
         """Return the outline (n, 2) at a share of the way."""
@@ -321,8 +321,8 @@ def _open_ways(own: OwnFrame) -> Array:
 
 def _sums(weights: Array, sides: NDArray[np.int64], orbits: VertexOrbits) -> Array:
     """Return for each side (E,) the sum of the weights over all sides at the same orbit."""
-    own = orbits.source[sides[:, 0]]
-    return np.bincount(own, weights, minlength=len(orbits.source))[own]
+    orbit = orbits.source[sides[:, 0]]
+    return np.bincount(orbit, weights, minlength=len(orbits.source))[orbit]
 
 
 def _stiff_edges(own: OwnFrame, sides: NDArray[np.int64]) -> Array:
@@ -342,11 +342,11 @@ def _mean_values(points: Array, triangles: NDArray[np.int64], sides: NDArray[np.
     total = np.zeros(len(sides))
     codes = sides[:, 0] * len(points) + sides[:, 1]
     for k in range(3):
-        at, one, other = (triangles[:, (k + m) % 3] for m in range(3))
-        u, v = points[one] - points[at], points[other] - points[at]
+        at, left, other = (triangles[:, (k + m) % 3] for m in range(3))
+        u, v = points[left] - points[at], points[other] - points[at]
         lengths = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
         cross, dot = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1)
         half = (lengths[0] * lengths[1] - dot) / cross  # tan of half the angle
-        for end, length in zip((one, other), lengths, strict=True):
+        for end, length in zip((left, other), lengths, strict=True):
             np.add.at(total, np.searchsorted(codes, at * len(points) + end), half / length)
     return total

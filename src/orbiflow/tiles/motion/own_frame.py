@@ -62,13 +62,13 @@ class OwnFrame:
         linear = tile.group.lattice @ kind.group().inverse_lattice
         offset = _offset(kind, placed, starts, linear)
         points = (placed - offset) @ np.linalg.inv(linear).T
-        group, found = kind.group(), kind.edge_classes
+        group, classes = kind.group(), kind.edge_classes
         if len(kind.stabiliser) > 1:
             group = free_subgroup(group, kind.stabiliser) or group
-            found = edge_classes(edges(Tile(kind.template(), group)))
-        own = cls(kind, group, found, points, starts, linear, offset)
-        own.check()
-        return own
+            classes = edge_classes(edges(Tile(kind.template(), group)))
+        frame = cls(kind, group, classes, points, starts, linear, offset)
+        frame.check()
+        return frame
 
     def check(self) -> None:
         """Check that identified edges are images of each other, vertex by vertex."""
@@ -106,16 +106,17 @@ class OwnFrame:
         marks = np.zeros(len(self.points), dtype=bool)
         marks[list(sides)] = True
         parts = [marks[bounds[k] : bounds[k + 1]] for k in range(len(self.starts))]
-        for own in self.edge_classes:
+        for edge_class in self.edge_classes:
             steps = [
-                (image.edge, -1 if image.reversed else 1) for image in (*own.folds, *own.images)
+                (image.edge, -1 if image.reversed else 1)
+                for image in (*edge_class.folds, *edge_class.images)
             ]
-            every = parts[own.edge]
+            every = parts[edge_class.edge]
             for edge, step in steps:
                 every = every | parts[edge][::step]
-            if own.turn:
+            if edge_class.turn:
                 every = every | every[::-1]
-            for edge, step in ((own.edge, 1), *steps):
+            for edge, step in ((edge_class.edge, 1), *steps):
                 parts[edge] = every[::step]
         chosen = np.concatenate(parts)
         index = np.flatnonzero(chosen)
@@ -129,26 +130,28 @@ class OwnFrame:
         """Return for each edge the shares of its length, 0 to 1, at which this tile has vertices, and
         those of another of its class that are not near to them; the same for edges that are identified.
         """
-        found = [_along(self.edge(k)) for k in range(len(self.starts))]
-        for own in self.edge_classes:
-            kept = found[own.edge]
-            for share in _along(other.edge(own.edge)).tolist():
-                pair = [share] if own.turn is None else [share, 1 - share]
+        shares = [_along(self.edge(k)) for k in range(len(self.starts))]
+        for edge_class in self.edge_classes:
+            kept = shares[edge_class.edge]
+            for share in _along(other.edge(edge_class.edge)).tolist():
+                pair = [share] if edge_class.turn is None else [share, 1 - share]
                 near = np.abs(np.subtract.outer(kept, pair)).min()
                 if near > NEAR_SHARE and (len(pair) == 1 or abs(1 - 2 * share) > NEAR_SHARE):
                     kept = np.sort(np.append(kept, pair))
-            for image in own.images:
-                found[image.edge] = 1 - kept[::-1] if image.reversed else kept
-            found[own.edge] = kept
-        return found
+            for image in edge_class.images:
+                shares[image.edge] = 1 - kept[::-1] if image.reversed else kept
+            shares[edge_class.edge] = kept
+        return shares
 
     def at_shares(self, shares: Sequence[Array]) -> OwnFrame:
         """Return the tile with its vertices at these shares of its edges, both ends among them."""
         parts = list[Array]()
-        for k, own in enumerate(shares):
+        for k, wanted in enumerate(shares):
             edge = self.edge(k)
-            known = _along(edge)
-            parts.append(np.column_stack([np.interp(own[:-1], known, edge[:, j]) for j in (0, 1)]))
+            along = _along(edge)
+            parts.append(
+                np.column_stack([np.interp(wanted[:-1], along, edge[:, j]) for j in (0, 1)])
+            )
         ends = np.cumsum([0, *map(len, parts)])[:-1]
         return replace(self, points=np.concatenate(parts), starts=tuple(ends.tolist()))
 
@@ -187,6 +190,6 @@ def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear
 
 def relations(classes: Iterable[EdgeClass]) -> Iterator[tuple[int, EdgeImage]]:
     """Yield each edge that others, or itself, are images of, with the image."""
-    for own in classes:
-        for image in (*own.folds, *own.images):
-            yield own.edge, image
+    for edge_class in classes:
+        for image in (*edge_class.folds, *edge_class.images):
+            yield edge_class.edge, image

@@ -79,7 +79,7 @@ class Dress:
                 for k in range(count)
             ]
             texels = (body.points - painted[0].offset) / painted[0].linear[0, 0]
-            skins.append(Skin(tuple(own.pixels for own in painted), texels, body.triangles))
+            skins.append(Skin(tuple(picture.pixels for picture in painted), texels, body.triangles))
             bodies.append(body)
         return cls(tuple(bodies), tuple(skins))
 

@@ -55,13 +55,13 @@ def animation(
 
     `overs` are what lies over the silhouette of each of the tile's figures, as `read_over` returns it.
     """
-    settings, given = (settings or AnimationSettings()).for_file(None), as_tile(tile)
+    settings, resolved = (settings or AnimationSettings()).for_file(None), as_tile(tile)
     if settings.format == "mp4":
         require_ffmpeg()  # before the work
-    given.require_certified(force=force, otherwise="so it is not animated; {force} animates it")
-    made = motion(given, settings, *overs)
+    resolved.require_certified(force=force, otherwise="so it is not animated; {force} animates it")
+    made = motion(resolved, settings, *overs)
     told(0.0)
-    named = replace(made, what=f"{given.name}: {made.what}")
+    named = replace(made, what=f"{resolved.name}: {made.what}")
     return WRITERS[settings.file_format](named, settings, told)
 
 
@@ -72,11 +72,11 @@ def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
     symbols = {symbol_of(k): Curve.polyline(ring, closed=True) for k, ring in enumerate(rings)}
     layers = [Layer("paper", "paper", Style(chosen.paper), (rectangle(page.box),))]
     motifs: dict[str, Motif] = {}
-    growing = [[own] for own in seen if not own.whole]
-    for copies in (*growing, [own for own in seen if own.whole]):
-        kinds = sorted({(own.kind, own.colour) for own in copies})
+    growing = [[copy] for copy in seen if not copy.whole]
+    for copies in (*growing, [copy for copy in seen if copy.whole]):
+        kinds = sorted({(copy.kind, copy.colour) for copy in copies})
         for kind, colour in kinds:
-            mine = [own for own in copies if (own.kind, own.colour) == (kind, colour)]
+            mine = [copy for copy in copies if (copy.kind, copy.colour) == (kind, colour)]
             uses = _uses(symbol_of(kind), mine)
             layers.append(Layer("tiles", "tiles", Style(chosen.fill(colour)), (uses,)))
             if motion.dress is not None:
@@ -86,7 +86,7 @@ def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
                 layers.append(Layer("drawing", "drawing", Style(), (on,)))
         if motion.line.width:
             lines = [
-                _uses(symbol_of(k), [own for own in copies if own.kind == k])
+                _uses(symbol_of(k), [copy for copy in copies if copy.kind == k])
                 for k in range(len(rings))
             ]
             layers.append(Layer("outlines", "tiles", motion.line, tuple(filter(len, lines))))
@@ -95,11 +95,11 @@ def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
 
 def _uses(symbol: str, copies: Sequence[SeenCopy]) -> Uses:
     """Return copies of a symbol, those that lie alike as of one aspect."""
-    linear = np.array([own.linear for own in copies]).reshape(-1, 2, 2)
+    linear = np.array([copy.linear for copy in copies]).reshape(-1, 2, 2)
     _, first, which = np.unique(
         np.round(linear.reshape(-1, 4), 9), axis=0, return_index=True, return_inverse=True
     )
-    offsets = np.array([own.offset for own in copies]).reshape(-1, 2)
+    offsets = np.array([copy.offset for copy in copies]).reshape(-1, 2)
     return Uses(symbol, linear[first], which.ravel(), offsets)
 
 
@@ -116,8 +116,8 @@ def still(
     pictures: Sequence[Path | None] = (),
 ) -> bytes:
     """Return one frame of an animation as a PNG, its longer side at most so many pixels."""
-    given, overs = dressed(as_tile(tile), settings, pictures)
-    made = motion(given, settings.for_file(None), *overs)
+    resolved, overs = dressed(as_tile(tile), settings, pictures)
+    made = motion(resolved, settings.for_file(None), *overs)
     image = frame_image(made, made.palette(settings), progress)
     image.thumbnail((side, side))
     return png_bytes(image)
@@ -154,13 +154,13 @@ def _limiting(motion: Motion, chosen: Palette) -> Callable[[Image.Image], Image.
 
 def require_ffmpeg() -> str:
     """Return the path of ffmpeg, which must be installed."""
-    found = shutil.which("ffmpeg")
-    if found is None:
+    path = shutil.which("ffmpeg")
+    if path is None:
         raise OrbiflowError(
             "an MP4 needs ffmpeg, which is not installed (or not on the PATH); install it, or choose "
             "a .gif or .svg"
         )
-    return found
+    return path
 
 
 def write_mp4(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
@@ -194,13 +194,13 @@ def _shown(
     made: Callable[[Image.Image], Image.Image],
 ) -> Iterator[Image.Image]:
     """Yield the pictures of a loop, each of which is drawn once."""
-    known: dict[float, Image.Image] = {}
+    pictures: dict[float, Image.Image] = {}
     count = len(dict(loop))
     for progress, _ in loop:
-        if progress not in known:
-            known[progress] = made(frame_image(motion, chosen, progress))
-            told(len(known) / count)
-        yield known[progress]
+        if progress not in pictures:
+            pictures[progress] = made(frame_image(motion, chosen, progress))
+            told(len(pictures) / count)
+        yield pictures[progress]
 
 
 _EASE, _EVEN = "0.42 0 0.58 1", "0 0 1 1"

@@ -44,7 +44,7 @@ def tiling_json(tiling: Tiling, known: Colouring, *, y_down: bool) -> dict[str, 
             "shares": list(known.shares),
         },
     }
-    rings = [polygon_json(own.polygon) for own in tiling.prototiles]
+    rings = [polygon_json(prototile.polygon) for prototile in tiling.prototiles]
     if len(rings) == 1:
         return {**shown, "polygon": rings[0]}
     shown["group"]["figures"] = aspects.prototiles.tolist()
@@ -85,20 +85,20 @@ class Endless:
 
     def as_json(self) -> dict[str, Any]:
         """Return what `tiling_json` says of it, in its colours."""
-        found = tiling_json(self.tiling, colouring(self.tiling), y_down=True)
+        document = tiling_json(self.tiling, colouring(self.tiling), y_down=True)
         if self.colour != "neighbour":
             cosets = self.tiling.aspects.cosets
             numbers = cosets if self.colour == "aspect" else np.zeros_like(cosets)
             table = numbers[:, None, None].tolist()
-            found["colours"] = {"sublattice": [1, 0, 1], "table": table, "shares": [1]}
-        return found
+            document["colours"] = {"sublattice": [1, 0, 1], "table": table, "shares": [1]}
+        return document
 
     def palettes(self) -> dict[str, Palette]:
         """Return all palettes for its figures, the one that was chosen first."""
-        known = colouring(self.tiling)
-        own = {name: every for name, every in PALETTES.items() if every != self.palette}
+        colours = colouring(self.tiling)
+        others = {name: every for name, every in PALETTES.items() if every != self.palette}
         named = {every: name for name, every in PALETTES.items()}
-        found = {named.get(self.palette, "as it was"): self.palette, **own}
+        chosen = {named.get(self.palette, "as it was"): self.palette, **others}
         if self.colour != "neighbour":
-            return found
-        return {name: shades(every, known) for name, every in found.items()}
+            return chosen
+        return {name: shades(every, colours) for name, every in chosen.items()}

@@ -33,12 +33,12 @@ def flattened(scene: Scene, tolerance: float) -> Scene:
 
     Where the symbol or the page cuts a motif off, curves become polygons within `tolerance`.
     """
-    own = {name: _within(motif, scene, tolerance) for name, motif in scene.motifs.items()}
+    flat = {name: _within(motif, scene, tolerance) for name, motif in scene.motifs.items()}
     layers = tuple(
-        replace(layer, items=tuple(_items(layer, own, shapely.box(*scene.clip))))
+        replace(layer, items=tuple(_items(layer, flat, shapely.box(*scene.clip))))
         for layer in scene.layers
     )
-    return replace(scene, layers=layers, motifs={}) if own else scene
+    return replace(scene, layers=layers, motifs={}) if flat else scene
 
 
 def expanded(scene: Scene) -> Scene:

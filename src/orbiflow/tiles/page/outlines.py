@@ -39,10 +39,10 @@ def fitted(points: Array, tolerance: float) -> Curve:
 def _fitted(shape: tuple[int, ...], content: bytes, tolerance: float) -> Curve:
     points = np.frombuffer(content).reshape(shape)
     corners = [0, *(np.flatnonzero(_is_corner(turning(points))) + 1), len(points) - 1]
-    found: list[tuple[Array, bool]] = []
+    pieces: list[tuple[Array, bool]] = []
     for first, last in pairwise(corners):
-        found += _run(points[first : last + 1], tolerance)
-    return Curve(np.stack([piece for piece, _ in found]), np.array([flat for _, flat in found]))
+        pieces += _run(points[first : last + 1], tolerance)
+    return Curve(np.stack([piece for piece, _ in pieces]), np.array([flat for _, flat in pieces]))
 
 
 def _is_corner(turn: Array) -> Booleans:
@@ -123,9 +123,9 @@ def _samples(part: Array) -> Array:
     """Return the vertices, and points on long sides: a fit to vertices alone sways between them."""
     lengths = np.linalg.norm(np.diff(part, axis=0), axis=1)
     count = np.maximum(1, np.ceil(lengths / max(lengths.sum() / _SAMPLES, 1e-300))).astype(int)
-    own = np.repeat(np.arange(len(count)), count)
-    share = (np.arange(count.sum()) - (np.cumsum(count) - count)[own]) / count[own]
-    points = part[own] + share[:, None] * (part[own + 1] - part[own])
+    side = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(count.sum()) - (np.cumsum(count) - count)[side]) / count[side]
+    points = part[side] + share[:, None] * (part[side + 1] - part[side])
     return np.concatenate([points, part[-1:]])
 
 
@@ -203,33 +203,35 @@ def outline(tile: Tiles, tolerance: float) -> Outline:
     images. Where curves would touch, they are fitted more closely, at worst along the polygon.
     """
     try:
-        own = edges(tile)
+        tile_edges = edges(tile)
     except OrbiflowError as error:
         plain = (Curve.polyline(p.polygon, closed=True) for p in as_tiling(tile).prototiles)
         return Outline(None, tuple(plain), f"the outline is left as it is: {error}")
     for share in _SHARES:
-        found = Outline(own, _curves(own, share * tolerance))
-        rings = (curve.flattened(tolerance / 20) for curve in found.closed)
+        candidate = Outline(tile_edges, _curves(tile_edges, share * tolerance))
+        rings = (curve.flattened(tolerance / 20) for curve in candidate.closed)
         if all(shapely.Polygon(ring).is_valid for ring in rings):
-            return found
-    return Outline(own, tuple(Curve.polyline(own.points(k)) for k in range(len(own))))
+            return candidate
+    return Outline(
+        tile_edges, tuple(Curve.polyline(tile_edges.points(k)) for k in range(len(tile_edges)))
+    )
 
 
-def _curves(own: Edges, tolerance: float) -> tuple[Curve, ...]:
-    found: dict[int, Curve] = {}
-    for kind in edge_classes(own):
-        points = own.points(kind.edge)
+def _curves(tile_edges: Edges, tolerance: float) -> tuple[Curve, ...]:
+    curves: dict[int, Curve] = {}
+    for kind in edge_classes(tile_edges):
+        points = tile_edges.points(kind.edge)
         if kind.straight:
             curve = Curve.polyline(points)
         elif kind.folds:
             curve = _folded(points, kind.folds[0], tolerance)
         else:
             curve = fitted(points, tolerance)
-        found[kind.edge] = curve
+        curves[kind.edge] = curve
         for image in kind.images:
             moved = curve.moved(image.isometry.linear, image.isometry.translation)
-            found[image.edge] = moved.reversed() if image.reversed else moved
-    return tuple(found[k] for k in range(len(own)))
+            curves[image.edge] = moved.reversed() if image.reversed else moved
+    return tuple(curves[k] for k in range(len(tile_edges)))
 
 
 def _folded(points: Array, fold: EdgeImage, tolerance: float) -> Curve:

@@ -138,7 +138,9 @@ class Page:
     @property
     def polygons(self) -> list[Curve]:
         """The polygon of each prototile, in its place, as a curve."""
-        return [Curve.polyline(own.polygon, closed=True) for own in self.tiling.prototiles]
+        return [
+            Curve.polyline(prototile.polygon, closed=True) for prototile in self.tiling.prototiles
+        ]
 
     @property
     def tile_size(self) -> float:
@@ -149,12 +151,12 @@ class Page:
     def copies(self) -> Copies:
         """The copies that the page shows."""
         if self.whole is not None:
-            found = copies_inside(self.tiling, inset(self.box, self.whole))
-            return found.select(np.arange(len(found))[: self.most])
+            inside = copies_inside(self.tiling, inset(self.box, self.whole))
+            return inside.select(np.arange(len(inside))[: self.most])
         left, top, right, bottom = self.box
         corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
-        own = corners @ np.linalg.inv(self.stretch).T
-        return copies_meeting(self.tiling, (*own.min(axis=0), *own.max(axis=0)))
+        mapped = corners @ np.linalg.inv(self.stretch).T
+        return copies_meeting(self.tiling, (*mapped.min(axis=0), *mapped.max(axis=0)))
 
     @cached_property
     def _colouring(self) -> Colouring:
@@ -196,15 +198,15 @@ class Page:
         """
         tiling, (linear, offset) = self._colouring.tiling, self.place
         table, back = tiling.aspects, np.linalg.inv(linear)
-        found = []
+        places = []
         for coset, prototile in zip(
             self.tiling.aspects.cosets, self.tiling.aspects.prototiles, strict=True
         ):
             element = self.tiling.group.cosets[int(coset)]
             shift = element.linear @ offset + element.translation - offset
             moved = Isometry(back @ element.linear @ linear, back @ shift)
-            found.append(table.find(tiling.group, moved, int(prototile))[:2])
-        aspects, cells = (np.array(part) for part in zip(*found, strict=True))
+            places.append(table.find(tiling.group, moved, int(prototile))[:2])
+        aspects, cells = (np.array(part) for part in zip(*places, strict=True))
         return Copies(tiling, aspects[copies.aspects], copies.cells + cells[copies.aspects])
 
     def rings(self) -> list[Array]:
@@ -252,8 +254,8 @@ class Page:
             tint: How much a copy's colour tints what lies on it, from 0 to 1.
             more: Further fields of the scene.
         """
-        given = enumerate(self.polygons if outlines is None else outlines)
-        symbols = {symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in given}
+        numbered = enumerate(self.polygons if outlines is None else outlines)
+        symbols = {symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in numbered}
         drawn = {
             k: replace(motif.moved(*self.about_middle(k)), within=symbol_of(k))
             for k, motif in enumerate(motifs)
@@ -282,7 +284,7 @@ class Page:
         if clipped and self.whole is None:
             return (rectangle(self.box),)
         rings = [curve.flattened(GROUND_INSET / 2) for curve in outlines]
-        copies = (own for kind, ring in enumerate(rings) for own in self.uses(kind).images(ring))
+        copies = (copy for kind, ring in enumerate(rings) for copy in self.uses(kind).images(ring))
         parts = polygons_in(ground_of(copies))
         return tuple(curve for part in parts for curve in boundary(shapely.Polygon(part.exterior)))
 
@@ -306,15 +308,17 @@ class Page:
             return [Layer("tiles", "tiles", line, tuple(every), clipped)]
         layers = list[Layer]()
         for colour in sorted(set(self.colours.tolist())):
-            own = [
+            coloured = [
                 uses.select(self.colours[mine] == colour)
                 for uses, mine in zip(every, numbers, strict=True)
             ]
             fill, name = chosen.fill(colour), f"colour {colour + 1}"
             style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
-            layers.append(Layer(name, "tiles", style, tuple(filter(len, own)), clipped))
+            layers.append(Layer(name, "tiles", style, tuple(filter(len, coloured)), clipped))
             what = tinted_name(colour) if tint else MOTIF
-            on = tuple(replace(own[k], symbol=symbol_of(k, what)) for k in drawn if len(own[k]))
+            on = tuple(
+                replace(coloured[k], symbol=symbol_of(k, what)) for k in drawn if len(coloured[k])
+            )
             if on:
                 ink = chosen.ink(colour)
                 layers.append(Layer(f"drawing on {name}", "drawing", Style(), on, clipped, ink))
@@ -393,7 +397,7 @@ def _shift_to_most_whole(tiling: Tiling, box: Box) -> Array:
 
 def tiling_size(tiling: Tiling) -> float:
     """Return the longer side of the smallest rectangle around the largest prototile."""
-    return max(longer_side(own.polygon) for own in tiling.prototiles)
+    return max(longer_side(prototile.polygon) for prototile in tiling.prototiles)
 
 
 def longer_side(ring: Array) -> float:

@@ -108,10 +108,10 @@ def region_sides(points: Array, triangles: Integers) -> Sides:
     keys = np.sort(pairs, axis=1) @ np.array([len(points), 1])
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     border = pairs[first[count == 1]]
-    own = np.tile(np.arange(len(triangles)), 3)[first[count == 1]]
+    owner = np.tile(np.arange(len(triangles)), 3)[first[count == 1]]
     start, end = points[border[:, 0]], points[border[:, 1]]
     sense = np.sign(doubled_areas(points, triangles))
-    leaving = (end - start)[:, 1] * sense[own] > 0
+    leaving = (end - start)[:, 1] * sense[owner] > 0
     return Sides(
         np.concatenate([inner.start, start[leaving]]),
         np.concatenate([inner.end, end[leaving]]),
@@ -136,16 +136,16 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
     first = np.clip(np.ceil(low - middle).astype(np.int64), top, top + rows)
     last = np.clip(np.ceil(high - middle).astype(np.int64), top, top + rows)
     count = last - first
-    own = np.repeat(np.arange(len(count)), count)
-    row = np.arange(len(own)) - np.repeat(np.cumsum(count) - count, count) + first[own]
-    start, end = sides.start[own], sides.end[own]
+    side = np.repeat(np.arange(len(count)), count)
+    row = np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count) + first[side]
+    start, end = sides.start[side], sides.end[side]
     share = (row + middle - start[:, 1]) / (end[:, 1] - start[:, 1])
     x = start[:, 0] + share * (end[:, 0] - start[:, 0])
     row -= top
     # every row begins nowhere
     row = np.concatenate([np.arange(rows), row])
     x = np.concatenate([np.full(rows, -np.inf), x])
-    label = np.concatenate([np.full(rows, NOWHERE), sides.label[own]])
+    label = np.concatenate([np.full(rows, NOWHERE), sides.label[side]])
     order = np.lexsort((x, row))
     row, x, label = row[order], x[order], label[order]
     begin = np.ceil(np.clip(x, 0, width + 1) - 0.5).clip(0, width).astype(np.int64)
@@ -156,8 +156,8 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
 
 def inside_ring(ring: Array, rows: int, width: int) -> NDArray[np.bool_]:
     """Return which samples (rows, width) lie in a ring (N, 2), in samples."""
-    found = runs(polygon_sides(ring), 0, rows, width)
-    return found.spread(found.label >= 0).reshape(rows, width)
+    ring_runs = runs(polygon_sides(ring), 0, rows, width)
+    return ring_runs.spread(ring_runs.label >= 0).reshape(rows, width)
 
 
 MARGIN = 3  # width in texels of the margin around what a grid is over
@@ -197,18 +197,18 @@ def bleed(pixels: Pixels, inside: NDArray[np.bool_], area: NDArray[np.bool_]) ->
 
     What is outside the area becomes transparent.
     """
-    known, left = np.pad(inside & area, 1), np.argwhere(area & ~inside)
+    has_colour, left = np.pad(inside & area, 1), np.argwhere(area & ~inside)
     pixels[~(area | inside)] = 0
     while len(left):
         rows, columns = left.T
         filled = np.zeros(len(left), dtype=bool)
         for down, right in _AROUND:
-            near = known[rows + 1 + down, columns + 1 + right] & ~filled
+            near = has_colour[rows + 1 + down, columns + 1 + right] & ~filled
             pixels[rows[near], columns[near]] = pixels[rows[near] + down, columns[near] + right]
             filled |= near
         if not filled.any():
             return
-        known[rows[filled] + 1, columns[filled] + 1] = True
+        has_colour[rows[filled] + 1, columns[filled] + 1] = True
         left = left[~filled]
 
 
@@ -246,13 +246,13 @@ def carried(
     triangles = triangles[areas * np.sign(np.median(areas)) > FLATTEST]
     if not len(triangles):
         return shown, np.zeros((height, width), dtype=bool)
-    found = runs(region_sides(places, triangles), 0, height, width)
+    mesh_runs = runs(region_sides(places, triangles), 0, height, width)
     linear = triangle_sides(texels, triangles) @ np.linalg.inv(triangle_sides(places, triangles))
     first = triangles[:, 0]
     offset = texels[first] - np.einsum("tij,tj->ti", linear, places[first])
-    held = found.label >= 0
-    label, row, start = found.label[held], found.row[held], found.start[held]
-    length = found.length[held]
+    held = mesh_runs.label >= 0
+    label, row, start = mesh_runs.label[held], mesh_runs.row[held], mesh_runs.start[held]
+    length = mesh_runs.length[held]
     # along a run only x changes
     here = offset[label] + linear[label, :, 1] * (row + 0.5)[:, None]
     here += linear[label, :, 0] * (start + 0.5)[:, None]

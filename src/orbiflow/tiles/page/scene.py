@@ -86,10 +86,10 @@ class Curve:
         bend = 6 * np.linalg.norm(second, axis=2).max(axis=1)
         count = np.maximum(1, np.ceil(np.sqrt(bend / 8 / tolerance)).astype(int))
         count[self.straight] = 1
-        own = np.repeat(np.arange(len(count)), count)
+        piece = np.repeat(np.arange(len(count)), count)
         first = np.cumsum(count) - count
-        share = (np.arange(count.sum()) - first[own]) / count[own]
-        points = bezier(self.pieces[own], share)
+        share = (np.arange(count.sum()) - first[piece]) / count[piece]
+        points = bezier(self.pieces[piece], share)
         return points if self.closed else np.concatenate([points, self.end[None]])
 
     def bounds(self) -> Array:
@@ -200,7 +200,8 @@ class Warped(NamedTuple):
     def raster(self) -> Raster:
         """Return it as it is seen, with as many pixels as it has, and a little beyond its edge."""
         areas = (
-            np.abs(doubled_areas(own, self.triangles)).sum() for own in (self.texels, self.points)
+            np.abs(doubled_areas(points, self.triangles)).sum()
+            for points in (self.texels, self.points)
         )
         grid = Grid.over(self.points, float(np.sqrt(next(areas) / next(areas))))
         size = grid.width, grid.height
@@ -332,8 +333,8 @@ class Scene:
         """Return points (n, 2) whose box holds a symbol or a motif."""
         motif = self.motifs.get(name)
         if motif is None or motif.within is not None:
-            own = name if motif is None or motif.within is None else motif.within
-            return self.symbols[own].pieces.reshape(-1, 2)
+            symbol = name if motif is None or motif.within is None else motif.within
+            return self.symbols[symbol].pieces.reshape(-1, 2)
         curves = [curve.pieces.reshape(-1, 2) for part in motif.parts for curve in part.curves]
         return np.concatenate([*curves, *(raster.corners for raster in motif.rasters)])
 

@@ -31,12 +31,12 @@ def tinted(motif: Motif, through: Array) -> Motif:
             return colour
         return "#" + "".join(f"{round(v):02x}" for v in np.array(rgb(colour)) * through)
 
-    def part(own: PathPart) -> PathPart:
-        style = own.style._replace(fill=seen(own.style.fill), stroke=seen(own.style.stroke))
-        return own._replace(style=style)
+    def part(path: PathPart) -> PathPart:
+        style = path.style._replace(fill=seen(path.style.fill), stroke=seen(path.style.stroke))
+        return path._replace(style=style)
 
     parts = tuple(map(part, motif.parts))
-    rasters = tuple(tinted_picture(own, through) for own in motif.rasters)
+    rasters = tuple(tinted_picture(raster, through) for raster in motif.rasters)
     return replace(motif, parts=parts, rasters=rasters)
 
 

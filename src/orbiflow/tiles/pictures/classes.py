@@ -55,7 +55,7 @@ def classes_png(
         row, column = divmod(number, columns)
         corner = column / columns, 1 - panel * (row + 1) / height
         _class_panel(figure, kind, corner, (1 / columns, panel / height))
-    mirrors = any(own.straight for kind in kinds for own in kind.edge_classes)
+    mirrors = any(edge_class.straight for kind in kinds for edge_class in kind.edge_classes)
     mirrors |= any(len(kind.stabiliser) > 1 and kind.has_reflections for kind in kinds)
     draw_key(figure, _KEY_HEIGHT / height, mirrors=mirrors)
     return sheet.file(figure)
@@ -95,19 +95,19 @@ def draw_template(axes: Axes, kind: IsohedralClass) -> None:
     """Draw a class's template: identified edges in one colour, with the arrows that are identified."""
     vertices = kind.template()
     fill_rings(axes, [vertices], ASPECT_FILLS[0], "none", 0)
-    for own, colour in zip(kind.edge_classes, EDGE_COLOURS, strict=False):
-        marks = [] if own.straight else [_arrow(kind, own)]
-        if own.turn and not own.straight and own.turn.isometry.determinant > 0:
-            marks.append(own.turn.isometry(marks[0]))
-        for edge in own.edges:
+    for edge_class, colour in zip(kind.edge_classes, EDGE_COLOURS, strict=False):
+        marks = [] if edge_class.straight else [_arrow(kind, edge_class)]
+        if edge_class.turn and not edge_class.straight and edge_class.turn.isometry.determinant > 0:
+            marks.append(edge_class.turn.isometry(marks[0]))
+        for edge in edge_class.edges:
             ends = vertices[[edge, (edge + 1) % len(vertices)]]
             axes.plot(*ends.T, color=colour, linewidth=2.2, solid_capstyle="round")
-            if own.straight:
+            if edge_class.straight:
                 axes.plot(*ends.T, color="#ffffff", linewidth=0.8, zorder=3)
             elif len(marks) > 1:
                 sign = ends.mean(axis=0) + center_sign(2, 0.09)
                 axes.fill(*sign.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.8, zorder=4)
-        for element in (identity(2), *(image.isometry for image in own.images)):
+        for element in (identity(2), *(image.isometry for image in edge_class.images)):
             for ring in map(element, marks):
                 axes.fill(*ring.T, facecolor=colour, edgecolor=colour, linewidth=0.5, zorder=3)
     axes.plot(*vertices.T, "o", color="#1a1a1a", markersize=3, zorder=5)

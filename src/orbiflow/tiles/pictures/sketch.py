@@ -140,8 +140,8 @@ class Sketch:
         on_page: bool = False,
     ) -> None:
         """Draw a line with round ends along points (N, 2) of the plane, or of the page."""
-        own = points if on_page else self.on_page(points)
-        self._stroke([Curve.polyline(own, closed=closed)], colour, width)
+        placed = points if on_page else self.on_page(points)
+        self._stroke([Curve.polyline(placed, closed=closed)], colour, width)
 
     def dashed(self, points: Array, colour: str, width: float, unit: float) -> None:
         """Draw a dashed line along points (N, 2) of the page, with dashes in proportion to a unit."""
@@ -203,8 +203,8 @@ def dashes(points: Array, on: float, off: float) -> list[Array]:
     starts = np.arange(0.0, at[-1], on + off)
     ends = np.minimum(starts + on, at[-1])
     first, last = (
-        np.stack([np.interp(own, at, points[:, k]) for k in (0, 1)], axis=1)
-        for own in (starts, ends)
+        np.stack([np.interp(places, at, points[:, k]) for k in (0, 1)], axis=1)
+        for places in (starts, ends)
     )
     within = zip(np.searchsorted(at, starts, "right"), np.searchsorted(at, ends), strict=True)
     return [

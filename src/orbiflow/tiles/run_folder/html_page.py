@@ -49,16 +49,16 @@ def index_page(
     names = [PurePath(target.source).name for target in targets]
     name = " and ".join(names)
     extra = figures or [()] * len(results)
-    known = colours or [colouring(tile.tiling) for tile in results]
+    colourings = colours or [colouring(tile.tiling) for tile in results]
     tiles = [
         {
             "found": tile,
             "folder": folder,
             "files": files_of(TILE_FILES + more, len(targets)),
-            "patch": _patch(tile, own),
+            "patch": _patch(tile, coloured),
             "words": f" a tile like {name}" if len(targets) == 1 else f" {name}",
         }
-        for tile, folder, more, own in zip(results, folders, extra, known, strict=True)
+        for tile, folder, more, coloured in zip(results, folders, extra, colourings, strict=True)
     ]
     return rendered(
         "orbiflow.tiles.run_folder",
@@ -66,7 +66,7 @@ def index_page(
         title=f"Tiles that look like {name}",
         names=names,
         name=name,
-        stem="-".join(PurePath(own).stem for own in names),
+        stem="-".join(PurePath(name).stem for name in names),
         out=shlex.quote(f"./{out}" if out.startswith("-") else out),
         quote=shlex.quote,
         reads=[part_file(READ, number) for number in range(len(targets))] if read else [],
@@ -94,10 +94,10 @@ def _patch(tile: EscherTile, colours: Colouring) -> dict[str, Any]:
     (width, height), paths = page.size, list[str]()
     copies: list[list[tuple[int, str]]] = [[] for _ in range(page.count)]
     for kind, prototile in enumerate(page.tiling.prototiles):
-        uses, own = page.uses(kind), page.colours[page.copies.prototiles == kind]
+        uses, shades = page.uses(kind), page.colours[page.copies.prototiles == kind]
         columns = uses.linear[uses.which].transpose(0, 2, 1).reshape(-1, 4)
         numbers = np.concatenate([columns, uses.offsets], axis=1)
-        for colour, row in zip(own.tolist(), numbers, strict=True):
+        for colour, row in zip(shades.tolist(), numbers, strict=True):
             copies[colour].append((kind, " ".join(f"{x:.4g}" for x in row)))
         ring = shapely.LinearRing(prototile.polygon - prototile.center).simplify(0.2)
         paths.append(_path(shapely.get_coordinates(ring)[:-1]))

@@ -134,13 +134,13 @@ def overview_png(
         left, top = _MARGIN + column * (cell + _GAP), _HEADER + row * (height + _GAP)
         below = top + round(cell / 1.5) + 14
         _write_words(pen, result, left + thumbs, below, k + 1)
-        own = colours[k] if colours else None
+        coloured = colours[k] if colours else None
         tiling = tiling_picture(
-            result.tiling, colours=own, outline=1.4 / cell, y_down=result.y_down
+            result.tiling, colours=coloured, outline=1.4 / cell, y_down=result.y_down
         )
         sheet.paste(tiling.image(cell), (left, top))
-        for number, (own, target) in enumerate(zip(result.likenesses, targets, strict=True)):
-            thumb = _small(own, target)
+        for number, (figure, target) in enumerate(zip(result.likenesses, targets, strict=True)):
+            thumb = _small(figure, target)
             thumb.thumbnail((_THUMB, _THUMB))
             middle = left + number * (_THUMB + 22) + (_THUMB - thumb.width) // 2
             sheet.paste(thumb, (middle, below))

@@ -96,12 +96,12 @@ def write_tile_folder(
         "field.png": lambda: field(Sheet.screen(1200)),
         "field.pdf": lambda: field(Sheet.column()),
     }
-    for number, (own, target) in enumerate(zip(result.likenesses, targets, strict=True)):
-        label = own.name if len(result.figures) > 1 else label
+    for number, (figure, target) in enumerate(zip(result.likenesses, targets, strict=True)):
+        label = figure.name if len(result.figures) > 1 else label
         more: dict[str, Callable[[], str | bytes]] = {
-            "overlay.png": partial(_overlay, own, target, label),
-            "overlay.pdf": partial(_overlay, own, target, label, printed),
-            "model.safetensors": (own.map or TileMap()).to_bytes,
+            "overlay.png": partial(_overlay, figure, target, label),
+            "overlay.pdf": partial(_overlay, figure, target, label, printed),
+            "model.safetensors": (figure.map or TileMap()).to_bytes,
         }
         contents |= {part_file(name, number): content for name, content in more.items()}
     names = files_of((*TILE_FILES, *(figure_files(result) if figures else ())), len(targets))

@@ -36,21 +36,21 @@ def ball_of(
     """
     if len(tile.figures) > 1:
         raise OrbiflowError("a ball is made of a tile of one figure")
-    found, seen = in_world(tile, settings.order, 1)
-    motions = copies(found, lambda own: np.ones(len(own), dtype=bool), 500)
+    unfolding, seen = in_world(tile, settings.order, 1)
+    motions = copies(unfolding, lambda moved: np.ones(len(moved), dtype=bool), 500)
     radius = settings.diameter / 2
     # mm in a unit of the plane, in the mean
-    scale = radius * float(np.sqrt(4 * np.pi / len(motions) / found.tiling.tile_area))
+    scale = radius * float(np.sqrt(4 * np.pi / len(motions) / unfolding.tiling.tile_area))
     if settings.kind == "ball":
-        bodies = {"ball": ClosedBody(_relief(found, motions, radius, scale, settings.relief))}
+        bodies = {"ball": ClosedBody(_relief(unfolding, motions, radius, scale, settings.relief))}
         return bodies, seen
     if settings.kind == "lamp":
-        return {"lamp": ClosedBody(_openwork(found, motions, radius, scale, settings))}, seen
-    piece = _piece(found, radius, scale, settings)
+        return {"lamp": ClosedBody(_openwork(unfolding, motions, radius, scale, settings))}, seen
+    piece = _piece(unfolding, radius, scale, settings)
     note = f"a ball of {settings.diameter:g} mm has {len(motions)} of these pieces, all alike"
     notes = [note, *seen]
     if settings.magnet is not None:
-        count = len(joints(found.tiling, found.ring))
+        count = len(joints(unfolding.tiling, unfolding.ring))
         notes.append(
             f"{2 * count} holes for magnets of {settings.magnet:g} x {settings.magnet_depth:g} mm in "
             "each piece; where two holes meet, the magnets' poles must be unlike, in all pieces alike"
@@ -69,9 +69,9 @@ def _divided(ring: Array, step: float) -> Array:
     """Return a ring with points on sides longer than a step; sides of one length have as many."""
     ends = np.roll(ring, -1, axis=0)
     count = np.maximum(1, np.ceil(np.linalg.norm(ends - ring, axis=1) / step - 1e-6)).astype(int)
-    own = np.repeat(np.arange(len(ring)), count)
-    share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / count[own]
-    return ring[own] + share[:, None] * (ends - ring)[own]
+    side = np.repeat(np.arange(len(ring)), count)
+    share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / count[side]
+    return ring[side] + share[:, None] * (ends - ring)[side]
 
 
 def _welded(parts: list[Array], triangles: Integers) -> tuple[Array, Integers]:
@@ -118,8 +118,8 @@ def _ringed(tile: shapely.Polygon, scale: float) -> tuple[Array, Integers]:
     corners, regions = list[Array](), [tile]
     for off in np.linspace(0, GROOVE, ROWS + 1)[1:]:
         inner = [
-            orient(shapely.get_coordinates(own.exterior)[:-1], counter_clockwise=True)
-            for own in polygons_in(tile.buffer(-off / scale))
+            orient(shapely.get_coordinates(part.exterior)[:-1], counter_clockwise=True)
+            for part in polygons_in(tile.buffer(-off / scale))
         ]
         rings = [_divided(ring, FINE / scale) for ring in inner]
         if off == GROOVE:
@@ -128,7 +128,11 @@ def _ringed(tile: shapely.Polygon, scale: float) -> tuple[Array, Integers]:
             corners += [mesh.points[mesh.triangles] for mesh in meshes]
         fresh = [shapely.Polygon(ring) for ring in rings]
         for outer in regions:
-            holes = [own.exterior for own in fresh if outer.contains(own.representative_point())]
+            holes = [
+                polygon.exterior
+                for polygon in fresh
+                if outer.contains(polygon.representative_point())
+            ]
             corners.append(_between(shapely.Polygon(outer.exterior, holes)))
         regions = fresh
     points, index = np.unique(np.concatenate(corners).reshape(-1, 2), axis=0, return_inverse=True)
@@ -138,7 +142,7 @@ def _ringed(tile: shapely.Polygon, scale: float) -> tuple[Array, Integers]:
 def _between(region: shapely.Polygon) -> Array:
     """Return triangles (T, 3, 2), counter-clockwise, between the points of a region's rings."""
     pieces: Any = shapely.get_parts(shapely.constrained_delaunay_triangles(region))
-    corners = np.stack([shapely.get_coordinates(own)[:3] for own in pieces])
+    corners = np.stack([shapely.get_coordinates(triangle)[:3] for triangle in pieces])
     sides = corners[:, 1:] - corners[:, :1]
     back = sides[:, 0, 0] * sides[:, 1, 1] < sides[:, 0, 1] * sides[:, 1, 0]
     corners[back] = corners[back][:, ::-1]
@@ -146,17 +150,17 @@ def _between(region: shapely.Polygon) -> Array:
 
 
 def _openwork(
-    found: Unfolding, motions: Array, radius: float, scale: float, settings: SolidSettings
+    unfolding: Unfolding, motions: Array, radius: float, scale: float, settings: SolidSettings
 ) -> Manifold:
     """Return a shell that has a band along the edges of its tiles alone."""
-    tile = shapely.Polygon(_divided(found.ring, STEP / scale))
+    tile = shapely.Polygon(_divided(unfolding.ring, STEP / scale))
     inner = tile.buffer(-settings.wall / 2 / scale)
     holes = [
         _divided(
-            orient(shapely.get_coordinates(own.exterior)[:-1], counter_clockwise=False),
+            orient(shapely.get_coordinates(part.exterior)[:-1], counter_clockwise=False),
             STEP / scale,
         )
-        for own in polygons_in(inner)
+        for part in polygons_in(inner)
     ]
     if not holes:
         raise OrbiflowError(
@@ -166,7 +170,7 @@ def _openwork(
     band = shapely.Polygon(outer, holes)
     points = np.concatenate([outer, *holes])
     triangles: Integers = np.asarray(KDTree(points).query(_between(band))[1])
-    count, vectors = len(points), found.vectors(points)
+    count, vectors = len(points), unfolding.vectors(points)
     walls, first = list[Array](), len(outer)
     for hole in holes:
         ahead = np.arange(len(hole))
@@ -180,42 +184,42 @@ def _openwork(
     )
 
 
-def _piece(found: Unfolding, radius: float, scale: float, settings: SolidSettings) -> Manifold:
+def _piece(unfolding: Unfolding, radius: float, scale: float, settings: SolidSettings) -> Manifold:
     """Return one tile of a shell, its middle upwards, smaller by half of the clearance all around."""
-    region = shapely.Polygon(found.ring).buffer(-settings.clearance / 2 / scale)
-    rings = sorted(polygons_in(region), key=lambda own: own.area)
+    region = shapely.Polygon(unfolding.ring).buffer(-settings.clearance / 2 / scale)
+    rings = sorted(polygons_in(region), key=lambda part: part.area)
     if not rings:
         raise OrbiflowError("nothing is left of a piece; choose a larger {diameter}")
     ring = orient(shapely.get_coordinates(rings[-1].exterior)[:-1], counter_clockwise=True)
     mesh = triangulate(_divided(ring, STEP / scale), max(STEP / scale, ring_length(ring) / 400))
-    vectors, edge, count = found.vectors(mesh.points), border(mesh.triangles), len(mesh.points)
+    vectors, edge, count = unfolding.vectors(mesh.points), border(mesh.triangles), len(mesh.points)
     ahead = np.roll(edge, -1)
     walls = [
         np.column_stack([edge, edge + count, ahead]),
         np.column_stack([ahead, edge + count, ahead + count]),
     ]
     triangles = np.concatenate([mesh.triangles, mesh.triangles[:, ::-1] + count, *walls])
-    turned = vectors @ facing(found.middle).T
+    turned = vectors @ facing(unfolding.middle).T
     made = _closed(np.concatenate([radius * turned, (radius - settings.wall) * turned]), triangles)
     if settings.magnet is not None:
-        holes = _holes(found, radius, scale, settings)
+        holes = _holes(unfolding, radius, scale, settings)
         made = _with_holes(made, holes)
     return made.translate((0, 0, -made.bounding_box()[2]))
 
 
 def _holes(
-    found: Unfolding, radius: float, scale: float, settings: SolidSettings
+    unfolding: Unfolding, radius: float, scale: float, settings: SolidSettings
 ) -> list[Manifold]:
     """Return the holes for magnets in the sides of a piece: those of two neighbours meet."""
-    frame, holes = facing(found.middle), list[Manifold]()
+    frame, holes = facing(unfolding.middle), list[Manifold]()
     deep = settings.magnet_depth + settings.clearance / 2
     shape = Manifold.cylinder(deep + STEP, (settings.magnet or 0.0) / 2, circular_segments=48)
-    polygon = shapely.Polygon(found.ring)
-    for point in (own for pair in joints(found.tiling, found.ring) for own in pair):
+    polygon = shapely.Polygon(unfolding.ring)
+    for point in (joint for pair in joints(unfolding.tiling, unfolding.ring) for joint in pair):
         near = 1e-3 / scale
         inner: Any = polygon.buffer(-near).exterior
         inside = shapely.get_coordinates(inner.interpolate(inner.project(shapely.Point(*point))))
-        here, there = found.vectors(np.stack([point, inside[0]])) @ frame.T
+        here, there = unfolding.vectors(np.stack([point, inside[0]])) @ frame.T
         inwards = there - here - ((there - here) @ here) * here
         inwards /= np.linalg.norm(inwards)
         # from STEP beyond the edge inwards, about the middle of the wall

@@ -51,7 +51,7 @@ class Solid(Outcome):
     @property
     def parts(self) -> dict[str, Manifold]:
         """The closed bodies of all plates by name."""
-        return {name: own.solid for plate in self.plates for name, own in plate.items()}
+        return {name: body.solid for plate in self.plates for name, body in plate.items()}
 
     @property
     def volume(self) -> float:
@@ -91,18 +91,18 @@ def solid_files(solid: Solid, format: str) -> list[bytes]:
     A 3MF has what fills a drawing as a part in a second colour; in an STL the drawing is sunk.
     """
     if as_choice(format, FORMATS, "the format") == "stl":
-        plates = [{name: own.solid for name, own in plate.items()} for plate in solid.plates]
+        plates = [{name: body.solid for name, body in plate.items()} for plate in solid.plates]
         return [write_stl(bodies, solid.title) for bodies in plates]
     return [_coloured(plate, solid.title) for plate in solid.plates]
 
 
 def _coloured(plate: Plate, title: str) -> bytes:
     bodies, groups, colours = dict[str, Manifold](), dict[str, list[str]](), dict[str, str]()
-    for name, own in plate.items():
-        bodies[name] = own.solid
-        if own.inlay is not None:
+    for name, body in plate.items():
+        bodies[name] = body.solid
+        if body.inlay is not None:
             drawing = f"{name}, drawing"
-            bodies[drawing], groups[name] = own.inlay, [name, drawing]
+            bodies[drawing], groups[name] = body.inlay, [name, drawing]
             colours[name], colours[drawing] = GROUND, DRAWN
     return write_3mf(bodies, title, colours=colours, groups=groups)
 
@@ -129,23 +129,23 @@ def make_solid(
         OrbiflowError: If the settings cannot be met.
         InputFileError: If the drawing cannot be read, or is a picture of pixels.
     """
-    settings, given = settings or SolidSettings(), as_tile(tile)
+    settings, resolved = settings or SolidSettings(), as_tile(tile)
     settings.check_picture(picture or second_picture)
-    certificate = given.require_certified(
+    certificate = resolved.require_certified(
         force=force, otherwise="so no solid is made of it; {force} makes one, marked so"
     )
-    title = f"{settings.kind} of {given.name} in mm, made with orbiflow {__version__}"
+    title = f"{settings.kind} of {resolved.name} in mm, made with orbiflow {__version__}"
     if not certificate.valid:
         title = f"NOT CERTIFIED: {title}"
     if settings.kind in BALLS:
         from orbiflow.tiles.solids.ball import ball_of  # other worlds, which flat solids do without
 
-        bodies, notes = ball_of(given, settings)
-        own = {"kind": settings.kind, "tile": given, "title": title, "notes": notes}
-        return Solid(plates=(bodies,), **own)
+        bodies, notes = ball_of(resolved, settings)
+        facts = {"kind": settings.kind, "tile": resolved, "title": title, "notes": notes}
+        return Solid(plates=(bodies,), **facts)
     pictures = picture, second_picture
-    placed, notes = laid_out(given, _page(settings), pictures)
-    drawings = placed.motifs or (Motif(),) * len(given.figures)
+    placed, notes = laid_out(resolved, _page(settings), pictures)
+    drawings = placed.motifs or (Motif(),) * len(resolved.figures)
     for file, drawing in zip(pictures, drawings, strict=False):
         if drawing.rasters:
             raise InputFileError(f"{file}: a {settings.kind} needs lines: draw it as SVG")
@@ -157,7 +157,7 @@ def make_solid(
     if settings.fit_test:
         notes = (*notes, fit_words(settings.clearance))
     plates = plates_of(plans)
-    return Solid(kind=settings.kind, tile=given, plates=plates, title=title, notes=notes)
+    return Solid(kind=settings.kind, tile=resolved, plates=plates, title=title, notes=notes)
 
 
 def _page(settings: SolidSettings) -> ExportSettings:

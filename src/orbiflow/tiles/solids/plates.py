@@ -33,20 +33,23 @@ def plates_of(plans: Sequence[Plan]) -> tuple[Plate, ...]:
     settings = plans[0].settings
     across = 1.0
     if settings.fit_test:
-        found = _fit_test(plans)
+        plates = _fit_test(plans)
     elif settings.kind == "puzzle":
-        found = _puzzle(plans)
+        plates = _puzzle(plans)
     else:
         across = 1.0 if settings.kind == "tile" else -1.0
-        found = [_side_by_side(plans, across)]
-    return tuple(_on_the_bed(plate, across) for plate in found)
+        plates = [_side_by_side(plans, across)]
+    return tuple(_on_the_bed(plate, across) for plate in plates)
 
 
 def _on_the_bed(plate: Plate, across: float) -> Plate:
     """Return a plate with y up that begins at the bed's corner."""
-    turned = [body.changed(lambda own: own.scale((across, -1.0, 1.0))) for body in plate.values()]
+    turned = [
+        body.changed(lambda manifold: manifold.scale((across, -1.0, 1.0)))
+        for body in plate.values()
+    ]
     x, y = np.min([body.solid.bounding_box()[:2] for body in turned], axis=0)
-    moved = [body.changed(lambda own: own.translate((-x, -y, 0.0))) for body in turned]
+    moved = [body.changed(lambda manifold: manifold.translate((-x, -y, 0.0))) for body in turned]
     return dict(zip(plate, moved, strict=True))
 
 
@@ -57,8 +60,8 @@ def _side_by_side(plans: Sequence[Plan], across: float) -> Plate:
         body = SHAPES[kind](plan)
         low, _, _, high, *_ = body.solid.bounding_box()
         left = low if across > 0 else -high
-        own = plan.layout.tile.figures[plan.number].figure.name
-        name = kind if len(plans) == 1 else f"{kind} {number}, {own}"
+        figure = plan.layout.tile.figures[plan.number].figure.name
+        name = kind if len(plans) == 1 else f"{kind} {number}, {figure}"
         placed[name] = _moved(body, (across * (right - left), 0.0))
         right += high - low + APART
     return placed
@@ -66,7 +69,7 @@ def _side_by_side(plans: Sequence[Plan], across: float) -> Plate:
 
 def _moved(body: ClosedBody, shift: Sequence[float]) -> ClosedBody:
     x, y = shift
-    return body.changed(lambda own: own.translate((x, y, 0.0)))
+    return body.changed(lambda manifold: manifold.translate((x, y, 0.0)))
 
 
 def _puzzle(plans: Sequence[Plan]) -> list[Plate]:
@@ -83,9 +86,9 @@ def _puzzle(plans: Sequence[Plan]) -> list[Plate]:
     centers = copies.centers()
     far = np.linalg.norm(centers - centers.mean(axis=0), axis=1)
     copies = copies.select(np.sort(np.argsort(far, kind="stable")[:wanted]))
-    tray = ClosedBody(_tray(plan, copies.rings([own.ring for own in plans])))
+    tray = ClosedBody(_tray(plan, copies.rings([figure_plan.ring for figure_plan in plans])))
     z = settings.floor if settings.assembled else 0.0
-    pieces = _copied([tile_body(own) for own in plans], copies, z)
+    pieces = _copied([tile_body(figure_plan) for figure_plan in plans], copies, z)
     named = {f"piece {k}": body for k, body in enumerate(pieces, 1)}
     if settings.assembled:
         return [{"tray": tray, **named}]
@@ -99,7 +102,7 @@ def _copied(kinds: Sequence[ClosedBody], copies: Copies, z: float) -> list[Close
     moves[:, :2, 3], moves[:, 2, 2], moves[:, 2, 3] = copies.translations, 1.0, z
     numbers = copies.prototiles.tolist()
     return [
-        kinds[k].changed(lambda own, move=move: own.transform(move))
+        kinds[k].changed(lambda manifold, move=move: manifold.transform(move))
         for k, move in zip(numbers, moves, strict=True)
     ]
 
@@ -124,7 +127,7 @@ def _tray(plan: Plan, rings: Sequence[Array]) -> Manifold:
 
 def _in_rows(bodies: Mapping[str, ClosedBody], area: tuple[float, float]) -> Iterator[Plate]:
     """Yield plates no larger than an area with bodies apart in rows, as few as their boxes allow."""
-    boxes = np.array([own.solid.bounding_box() for own in bodies.values()])
+    boxes = np.array([body.solid.bounding_box() for body in bodies.values()])
     boxes = boxes.reshape(-1, 2, 3)[:, :, :2]
     step = np.ptp(boxes, axis=1).max(axis=0) + APART
     columns, rows = np.maximum((np.array(area) + APART) // step, 1).astype(int).tolist()
@@ -144,14 +147,14 @@ def _in_rows(bodies: Mapping[str, ClosedBody], area: tuple[float, float]) -> Ite
 def _fit_test(plans: Sequence[Plan]) -> list[Plate]:
     """Return two neighbours at each of several clearances, with the number of each in dots."""
     settings, pair = plans[0].settings, two_neighbours(plans[0].layout.page.tiling)
-    found = Plate()
+    plate = Plate()
     for number, clearance in enumerate(fit_clearances(settings.clearance), 1):
-        own = settings.replace(clearance=clearance)
+        adjusted = settings.replace(clearance=clearance)
         kinds = list[ClosedBody]()
         for plan in plans:
             face = plan.piece.buffer(-settings.chamfer - settings.nozzle)
-            marked = plan._replace(settings=own, drawing=dice(face, number))
+            marked = plan._replace(settings=adjusted, drawing=dice(face, number))
             kinds.append(tile_body(marked))
         for side, body in zip("ab", _copied(kinds, pair, 0.0), strict=True):
-            found[f"pair {number}{side}, {clearance:.3g} mm"] = body
-    return list(_in_rows(found, settings.area))
+            plate[f"pair {number}{side}, {clearance:.3g} mm"] = body
+    return list(_in_rows(plate, settings.area))

@@ -60,9 +60,9 @@ def _between(below: CrossSection, above: CrossSection) -> Iterator[Array]:
 
 def _rings(level: CrossSection) -> dict[bytes, Array]:
     """Return the rings (n, 3) of a level, its region on their left, by their bytes in the plane."""
-    found = dict[bytes, Array]()
+    rings = dict[bytes, Array]()
     for polygon in polygons_in(shapely.normalize(level.region)):
         for k, line in enumerate([polygon.exterior, *polygon.interiors]):
             ring = orient(shapely.get_coordinates(line)[:-1], counter_clockwise=k == 0)
-            found[ring.tobytes()] = np.column_stack([ring, np.full(len(ring), level.z)])
-    return found
+            rings[ring.tobytes()] = np.column_stack([ring, np.full(len(ring), level.z)])
+    return rings

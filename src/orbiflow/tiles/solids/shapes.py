@@ -53,12 +53,12 @@ class Plan(NamedTuple):
 
 def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
     """Return a region grown by a distance, or shrunk, unless nothing is left."""
-    found = region.buffer(distance, quad_segs=12) if distance else region
-    if found.is_empty:
+    grown = region.buffer(distance, quad_segs=12) if distance else region
+    if grown.is_empty:
         raise OrbiflowError(
             f"nothing is left of the tile {-distance:.3g} mm inside its edge; choose a larger tile size"
         )
-    return found
+    return grown
 
 
 def tile_body(plan: Plan) -> ClosedBody:

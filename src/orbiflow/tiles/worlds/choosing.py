@@ -85,9 +85,9 @@ def in_world(
     if len(tile.figures) > 1 or tile.bending is None:
         return _unfolded(tile, orders, sign, distortion), ()
     seen = WorldLikeness(tile)
-    found = _unfolded(tile, orders, sign, lambda own: -seen.mark(own))
-    here, there = (Rating.of_mark(mark) for mark in (seen.plane, seen.mark(found)))
-    return found, (f"likeness {there} there, {here} in the plane",)
+    world = _unfolded(tile, orders, sign, lambda unfolding: -seen.mark(unfolding))
+    here, there = (Rating.of_mark(mark) for mark in (seen.plane, seen.mark(world)))
+    return world, (f"likeness {there} there, {here} in the plane",)
 
 
 def _unfolded(
@@ -113,11 +113,13 @@ def best_in_world(
         if seen.plane + BETTER < highest:
             break
         try:
-            found = _unfolded(tile, orders, sign, lambda own, seen=seen: -seen.mark(own))
+            world = _unfolded(
+                tile, orders, sign, lambda unfolding, seen=seen: -seen.mark(unfolding)
+            )
         except OrbiflowError:  # it stays in the plane
             if spare is None and orders and order_count(tile.tiling.group) == len(orders):
                 spare = tile
             continue
-        if (mark := seen.mark(found)) > highest:
+        if (mark := seen.mark(world)) > highest:
             best, highest = tile, mark
     return best or spare

@@ -24,7 +24,7 @@ def curvature(orders: Sequence[int]) -> int:
     >>> curvature((2, 3, 5)), curvature((2, 3, 7)), curvature((4, 4, 2)), curvature((2, 2, 2, 3))
     (1, -1, 0, -1)
     """
-    excess = 2 - sum(1 - Fraction(1, own) for own in orders)
+    excess = 2 - sum(1 - Fraction(1, order) for order in orders)
     return (excess > 0) - (excess < 0)
 
 

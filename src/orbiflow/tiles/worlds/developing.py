@@ -51,11 +51,11 @@ class Way:
         """Return solutions about the end (1,), and what takes them to those about the start (2, 2)."""
         points, rows = self.around.points, np.arange(len(self.around.points))
         every, halves = potential.about_points(self.around), (points[1:] + points[:-1]) / 2
-        one, two = (every.take(own).wronskians(halves) for own in (rows[:-1], rows[1:]))
-        found = np.eye(2, dtype=np.complex128)
-        for step in one @ np.linalg.inv(two):
-            found = found @ step
-        return every.take(rows[-1:]), found
+        before, after = (every.take(chosen).wronskians(halves) for chosen in (rows[:-1], rows[1:]))
+        matrix = np.eye(2, dtype=np.complex128)
+        for step in before @ np.linalg.inv(after):
+            matrix = matrix @ step
+        return every.take(rows[-1:]), matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,20 +127,20 @@ def _ways(pattern: Pattern) -> tuple[Way, ...]:
     """Return the ways from the middle to where the corners' own series begin."""
     corners, middle = pattern.corners, pattern.middle
     away = middle - corners
-    own = pattern.around_centres.reach[np.abs(pattern.to_centres(corners)).argmin(axis=1)]
-    before = corners + ROUND * np.minimum(own, np.abs(away)) * away / np.abs(away)
+    reach = pattern.around_centres.reach[np.abs(pattern.to_centres(corners)).argmin(axis=1)]
+    before = corners + ROUND * np.minimum(reach, np.abs(away)) * away / np.abs(away)
     return tuple(Way.of(pattern, middle, complex(end)) for end in before)
 
 
 def _at_corners(potential: Potential, ways: tuple[Way, ...]) -> Complex:
     """Return matrices (k, 2, 2) from the solutions about the corners to those about the middle."""
-    found = list[Complex]()
+    matrices = list[Complex]()
     for way in ways:
         end = way.around.points[-1:]
         series, matrix = way.along(potential)
         corner = potential.about_centres(end).wronskians(end)[0]
-        found.append(matrix @ series.wronskians(end)[0] @ np.linalg.inv(corner))
-    return np.stack(found)
+        matrices.append(matrix @ series.wronskians(end)[0] @ np.linalg.inv(corner))
+    return np.stack(matrices)
 
 
 def _turns(frames: Complex, orders: tuple[int, ...]) -> Complex:
@@ -159,8 +159,8 @@ def _with_form(potential: Potential, ways: tuple[Way, ...]) -> Potential:
     """
 
     def traces(free: complex) -> Complex:
-        own = replace(potential, free=free)
-        a, b, c, _ = _turns(_at_corners(own, ways), own.orders)
+        tried = replace(potential, free=free)
+        a, b, c, _ = _turns(_at_corners(tried, ways), tried.orders)
         return np.array([np.trace(a @ b), np.trace(b @ c), np.trace(a @ c)])
 
     unit, free = 1 / potential.pattern.elliptic.area, 0j
@@ -198,8 +198,8 @@ def _kept_form(matrices: Complex) -> tuple[Complex, int]:
 def _placed(ends: Complex, sign: int) -> Complex:
     """Return the motion of spinors that takes the first of two to 0, the second to a positive one."""
     (p, q), scale = ends[0], np.sqrt(norms(ends[0], sign))
-    found = np.array([[q, -p], [sign * np.conj(p), np.conj(q)]]) / scale
-    one, two = found @ ends[1]
-    half = np.exp(0.5j * np.angle(one / two))
+    motion = np.array([[q, -p], [sign * np.conj(p), np.conj(q)]]) / scale
+    first, second = motion @ ends[1]
+    half = np.exp(0.5j * np.angle(first / second))
     turn: Any = np.diag([1 / half, half])
-    return turn @ found
+    return turn @ motion

@@ -153,11 +153,11 @@ def metamorphosis(
     if settings.tile_size is not None:
         scale = settings.tile_size / tiling_size(tile.tiling)
     for smaller in (1.0, *SMALLER) if settings.tile_size is None else (1.0,):
-        found = _on_page(ends, settings, smaller * scale)
-        if found.is_sound:
-            return found, [f"{len(found.motions)} tiles on their way from {origin}", *notes]
+        laid = _on_page(ends, settings, smaller * scale)
+        if laid.is_sound:
+            return laid, [f"{len(laid.motions)} tiles on their way from {origin}", *notes]
     crossed = "tiles change so fast on this sheet that edges cross; choose smaller ones"
-    return found, [*notes, crossed]
+    return laid, [*notes, crossed]
 
 
 class Changing(NamedTuple):
@@ -194,21 +194,21 @@ def _both(tile: EscherTile, begin: EscherTile) -> tuple[list[Changing], float]:
     """Return a tile and the one that becomes it, on a lattice between theirs, and by how much both are
     stretched for it; vertices are at the same shares of their edges.
     """
-    last, first = (OwnFrame.of(own.tile) for own in (tile, begin))
+    last, first = (OwnFrame.of(figure.tile) for figure in (tile, begin))
     if first.kind is not last.kind:
         raise OrbiflowError(
             f"{begin.name} is of {first.kind.name} and {tile.name} of {last.kind.name}: a tile can "
             "become another one of its own class"
         )
     shares, (half, stretch) = last.shares(first), _middle(last, first)
-    frames = [replace(own, linear=half) for own in (last, first)]
+    frames = [replace(frame, linear=half) for frame in (last, first)]
     whole = zip((tile, begin), frames, strict=True)
-    tiles = [own.changed(tile=frame.at_shares(shares).tile()) for own, frame in whole]
-    meshes = [triangulate(own.tile.polygon) for own in tiles]
+    tiles = [figure.changed(tile=frame.at_shares(shares).tile()) for figure, frame in whole]
+    meshes = [triangulate(figure.tile.polygon) for figure in tiles]
     # a tile's own vertices move; those of the other one lie between them
     ways = [_way(frame, mesh.points) for frame, mesh in zip(frames, meshes, strict=True)]
-    found = list[Changing]()
-    for k, (own, mine) in enumerate(zip((tile, begin), (last, first), strict=True)):
+    changes = list[Changing]()
+    for k, (figure, mine) in enumerate(zip((tile, begin), (last, first), strict=True)):
         there, back = ways[k], ways[1 - k] - frames[1 - k].offset + frames[k].offset
         count, way = len(tiles[k].tile.polygon), np.repeat(there[:1], STEPS + 1, axis=0)
         for n, share in enumerate(np.linspace(0, 1, STEPS + 1)):
@@ -223,8 +223,8 @@ def _both(tile: EscherTile, begin: EscherTile) -> tuple[list[Changing], float]:
         linear = half @ np.linalg.inv(mine.linear)
         end = there[-1] if k == 0 else harmonic(meshes[1], back[-1, :count])
         shift = mine.offset - linear @ mine.offset
-        found.append(Changing(own, tiles[k], linear, shift, meshes[k], way, end, SHOWN_LATE))
-    return found, stretch
+        changes.append(Changing(figure, tiles[k], linear, shift, meshes[k], way, end, SHOWN_LATE))
+    return changes, stretch
 
 
 def _middle(last: OwnFrame, first: OwnFrame) -> tuple[Array, float]:
@@ -241,14 +241,15 @@ def best_to_become(tiles: Sequence[EscherTile], begins: Sequence[EscherTile]) ->
     hardly stretched to lie on one lattice; None if no class is in both."""
 
     def worth(pair: tuple[EscherTile, EscherTile]) -> float:
-        stars = min(own.rating.stars if own.rating else 1.0 for own in pair)
-        return stars - STARS_OF_STRETCH * _middle(*(OwnFrame.of(own.tile) for own in pair))[1]
+        stars = min(figure.rating.stars if figure.rating else 1.0 for figure in pair)
+        return stars - STARS_OF_STRETCH * _middle(*(OwnFrame.of(figure.tile) for figure in pair))[1]
 
     pairs = [
-        (one, two)
-        for one in tiles
-        for two in begins
-        if one.isohedral_class == two.isohedral_class and len(one.figures) == len(two.figures) == 1
+        (tile, begin)
+        for tile in tiles
+        for begin in begins
+        if tile.isohedral_class == begin.isohedral_class
+        and len(tile.figures) == len(begin.figures) == 1
     ]
     return max(pairs, key=worth)[0] if pairs else None
 
@@ -270,29 +271,29 @@ def _on_page(ends: Sequence[Changing], settings: ArtSettings, scale: float) -> M
     copies = wider.copies
     motions = motions_of(copies.group.linear_parts[copies.cosets], copies.translations)
     made = list[Metamorphosis]()
-    for k, own in enumerate(ends):
+    for k, end in enumerate(ends):
         made.append(
             Metamorphosis(
-                own.tile.tiling,
-                _placer(page, own),
+                end.tile.tiling,
+                _placer(page, end),
                 motions,
                 wider.colours,
                 WorldView("sheet", page.size, np.eye(3)),
                 page=wider,
-                way=np.stack([page.place(way) for way in own.way]),
-                last=page.place(own.last),
-                triangles=own.mesh.triangles,
-                vertices=len(own.placed.tile.polygon),
+                way=np.stack([page.place(way) for way in end.way]),
+                last=page.place(end.last),
+                triangles=end.mesh.triangles,
+                vertices=len(end.placed.tile.polygon),
                 goes=settings.metamorphosis or "right",
                 stages=settings.stages,
-                shown=own.shown,
+                shown=end.shown,
                 backwards=k > 0,
                 still=STILL if len(ends) == 1 else BRIEF,
             )
         )
     rings = made[0].moved(np.arange(len(motions)))[:, : made[0].vertices]
     seen = made[0].view.meets(rings)
-    near = [replace(own, motions=motions[seen], colours=own.colours[seen]) for own in made]
+    near = [replace(part, motions=motions[seen], colours=part.colours[seen]) for part in made]
     return near[0] if len(near) == 1 else replace(near[0], before=near[1])
 
 

@@ -21,7 +21,7 @@ ON_EDGE = 0.37  # of a straight piece of the edge, where no centre is
 
 def ring_of(tiling: Tiling) -> Array:
     """Return a tile's outline (N, 2), counter-clockwise; of several figures, their union."""
-    polygons = [shapely.Polygon(own.polygon) for own in tiling.prototiles]
+    polygons = [shapely.Polygon(prototile.polygon) for prototile in tiling.prototiles]
     if len(polygons) == 1:
         return orient(tiling.prototiles[0].polygon, counter_clockwise=True)
     union: Any = shapely.union_all(polygons, grid_size=1e-9 * float(np.sqrt(tiling.tile_area)))
@@ -47,16 +47,16 @@ def with_points(ring: Array, points: Array, near: float) -> Array:
     ring = ring.copy()
     for j in np.flatnonzero(away.min(axis=0) < near):
         ring[away[:, j].argmin()] = points[j]
-    line, found = shapely.LinearRing(ring), list[tuple[float, Array]]()
+    line, added = shapely.LinearRing(ring), list[tuple[float, Array]]()
     for point in points:
-        others = np.array([*ring, *(own for _, own in found)])
+        others = np.array([*ring, *(vertex for _, vertex in added)])
         apart = float(np.linalg.norm(others - point, axis=1).min())
         if line.distance(shapely.Point(*point)) < near < apart:
-            found.append((line.project(shapely.Point(*point)), point))
-    found.sort(key=lambda own: own[0])
+            added.append((line.project(shapely.Point(*point)), point))
+    added.sort(key=lambda entry: entry[0])
     lengths = np.cumsum(np.append(0.0, np.linalg.norm(np.diff(ring, axis=0), axis=1)))
-    places = np.searchsorted(lengths, [length for length, _ in found])
-    return np.insert(ring, places, np.reshape([own for _, own in found], (-1, 2)), axis=0)
+    places = np.searchsorted(lengths, [length for length, _ in added])
+    return np.insert(ring, places, np.reshape([vertex for _, vertex in added], (-1, 2)), axis=0)
 
 
 def _sides(tiling: Tiling, ring: Array) -> tuple[list[Any], Integers, Array]:
@@ -69,11 +69,11 @@ def _sides(tiling: Tiling, ring: Array) -> tuple[list[Any], Integers, Array]:
     beyond = edge + BEYOND * size * normals
     low, high = ring.min(axis=0) - size, ring.max(axis=0) + size
     copies = copies_meeting(tiling, (*low.tolist(), *high.tolist()))
-    polygon, found = shapely.Polygon(ring), np.full(len(ring), -1)
+    polygon, sides = shapely.Polygon(ring), np.full(len(ring), -1)
     isometries = [copies.isometry(int(k)) for k in np.flatnonzero(copies.prototiles == 0)]
     for number, isometry in enumerate(isometries):
-        found[shapely.contains_xy(polygon, *isometry.inverse()(beyond).T)] = number
-    return isometries, found, edge
+        sides[shapely.contains_xy(polygon, *isometry.inverse()(beyond).T)] = number
+    return isometries, sides, edge
 
 
 def contacts(tiling: Tiling, ring: Array) -> list[tuple[Any, Array]]:
@@ -93,9 +93,9 @@ def joints(tiling: Tiling, ring: Array) -> list[tuple[Array, Array]]:
     starts = np.flatnonzero(sides != np.roll(sides, 1))
     runs = [np.arange(a, b) % len(ring) for a, b in pairwise([*starts, starts[0] + len(ring)])]
     longest = dict[int, Integers]()
-    for run in sorted(runs, key=lambda own: weights[own].sum()):
+    for run in sorted(runs, key=lambda pieces: weights[pieces].sum()):
         longest[int(sides[run[0]])] = run
-    found, size = list[tuple[Array, Array]](), float(np.sqrt(tiling.tile_area))
+    pairs, size = list[tuple[Array, Array]](), float(np.sqrt(tiling.tile_area))
     for k, run in longest.items():
         if k < 0:
             continue
@@ -104,10 +104,10 @@ def joints(tiling: Tiling, ring: Array) -> list[tuple[Array, Array]]:
         along = np.cumsum(weights[run]) / weights[run].sum()
         point = edge[run[int(np.searchsorted(along, 0.25 if itself else 0.5))]]
         line = shapely.LineString(ring[np.append(run, run[-1] + 1) % len(ring)])
-        known = (line.distance(shapely.Point(*own)) for pair in found for own in pair)
-        if min(known, default=np.inf) > NEAR * size:  # an edge's image has its points already
-            found.append((point, back(point)))
-    return found
+        distances = (line.distance(shapely.Point(*joint)) for pair in pairs for joint in pair)
+        if min(distances, default=np.inf) > NEAR * size:  # an edge's image has its points already
+            pairs.append((point, back(point)))
+    return pairs
 
 
 def cone_points(tiling: Tiling, ring: Array) -> tuple[Array, list[complex]]:
@@ -119,8 +119,8 @@ def cone_points(tiling: Tiling, ring: Array) -> tuple[Array, list[complex]]:
     group = tiling.group
     if group.name == "p1":
         _, sides, _ = _sides(tiling, ring)
-        known = np.flatnonzero(sides >= 0)
-        ends = known[np.flatnonzero(np.diff(sides[known], append=sides[known[0]]))]
+        shared = np.flatnonzero(sides >= 0)
+        ends = shared[np.flatnonzero(np.diff(sides[shared], append=sides[shared[0]]))]
         lattice, points = group.lattice, ring[(ends + 1) % len(ring)]
     else:
         reach = float(np.linalg.norm(ring - tiling.center, axis=1).max())
@@ -128,12 +128,12 @@ def cone_points(tiling: Tiling, ring: Array) -> tuple[Array, list[complex]]:
         step = lines[0].shift * lines[0].line.direction
         lattice = np.column_stack([step, (-step[1], step[0])])
         lattice = lattice * [1.0, group.cell_volume / (2 * step @ step)]
-        found = list[Array]()
-        for own in lines:
-            ends = own.line.point + 2 * reach * np.outer((-1, 1), own.line.direction)
+        crossings = list[Array]()
+        for mirror in lines:
+            ends = mirror.line.point + 2 * reach * np.outer((-1, 1), mirror.line.direction)
             crossed: Any = shapely.LineString(ends).intersection(shapely.LinearRing(ring))
-            found.append(shapely.get_coordinates(crossed))
-        points = np.concatenate(found)
+            crossings.append(shapely.get_coordinates(crossed))
+        points = np.concatenate(crossings)
     kept = list[Array]()
     back = np.linalg.inv(lattice)
     for point in points:

@@ -63,9 +63,9 @@ class Weierstrass:
         """Return differences z by the shortest vectors that the lattice leaves."""
         basis = np.array([[self.first.real, self.second.real], [self.first.imag, self.second.imag]])
         shares = np.linalg.solve(basis, np.stack([z.real, z.imag]).reshape(2, -1))
-        own = z - (np.array([self.first, self.second]) @ np.round(shares)).reshape(np.shape(z))
+        reduced = z - (np.array([self.first, self.second]) @ np.round(shares)).reshape(np.shape(z))
         around = [a * self.first + b * self.second for a in (-1, 0, 1) for b in (-1, 0, 1)]
-        every = np.stack([own + shift for shift in around])
+        every = np.stack([reduced + shift for shift in around])
         return np.take_along_axis(every, np.abs(every).argmin(axis=0)[None], axis=0)[0]
 
     def series(self, z: Complex, scale: Array) -> Complex:
@@ -76,14 +76,14 @@ class Weierstrass:
         other = self._nome ** np.abs(n) * np.where(n < 0, 1 / u, u)
         sums = (other / (1 - other) ** 2).sum(axis=0)
         odd = (np.where(n < 0, -1, 1) * other * (1 + other) / (1 - other) ** 3).sum(axis=0)
-        found = np.zeros((*np.shape(z), TERMS), dtype=np.complex128)
-        found[..., 0] = scale**2 * unit**2 * (1 / 12 + sums - 2 * self._eisenstein(1))
-        found[..., 1] = scale**3 * unit**3 * odd
+        terms = np.zeros((*np.shape(z), TERMS), dtype=np.complex128)
+        terms[..., 0] = scale**2 * unit**2 * (1 / 12 + sums - 2 * self._eisenstein(1))
+        terms[..., 1] = scale**3 * unit**3 * odd
         last = self.invariants[0] * scale**4 / 2
         for k in range(TERMS - 2):
-            square = (found[..., : k + 1] * found[..., k::-1][..., : k + 1]).sum(axis=-1)
-            found[..., k + 2] = (6 * square - (last if k == 0 else 0)) / ((k + 2) * (k + 1))
-        return found
+            square = (terms[..., : k + 1] * terms[..., k::-1][..., : k + 1]).sum(axis=-1)
+            terms[..., k + 2] = (6 * square - (last if k == 0 else 0)) / ((k + 2) * (k + 1))
+        return terms
 
     def series_at_pole(self, scale: float) -> Complex:
         """Return the coefficients (TERMS,) of (s x)^2 P(s x)."""
@@ -92,9 +92,9 @@ class Weierstrass:
         c[0], c[2], c[3] = 1.0, second / 20, third / 28
         for n in range(4, len(c)):
             c[n] = 3 * (c[2 : n - 1] @ c[n - 2 : 1 : -1]) / ((2 * n + 1) * (n - 3))
-        found = np.zeros(TERMS, dtype=np.complex128)
-        found[::2] = c * scale ** (2 * np.arange(len(c)))
-        return found
+        terms = np.zeros(TERMS, dtype=np.complex128)
+        terms[::2] = c * scale ** (2 * np.arange(len(c)))
+        return terms
 
 
 class Around(NamedTuple):
@@ -130,21 +130,21 @@ class Pattern:
         """Return that of a group of `FLAT`, with a polygon near a point (2,)."""
         flat, goal = FLAT[group.name], complex(*point)
         size = float(np.sqrt(group.cell_volume))
-        found = symmetry_elements(group, point, 1.5 * size).centers
+        centers = symmetry_elements(group, point, 1.5 * size).centers
         places = {
-            order: [complex(*c.point) for c in found if c.order == order] for order in set(flat)
+            order: [complex(*c.point) for c in centers if c.order == order] for order in set(flat)
         }
         every = (
             _parallelograms(group, places[2]) if len(flat) == 4 else _triangles(flat, places, size)
         )
-        corners = min(every, key=lambda own: abs(own.mean() - goal))
+        corners = min(every, key=lambda polygon: abs(polygon.mean() - goal))
         elliptic = Weierstrass(
-            *(complex(*own) for own in _positive(reduced_basis(group.lattice)).T)
+            *(complex(*vector) for vector in _positive(reduced_basis(group.lattice)).T)
         )
         centres, corner_of, kinds = list[complex](), list[int](), list[int]()
         for k, corner in enumerate(corners):
             images = group.images(np.array([corner.real, corner.imag])) @ (1, 1j)
-            known = len(centres)
+            before = len(centres)
             for place in images:
                 away = (
                     elliptic.nearest(place - np.array(centres)) if centres else np.array([np.inf])
@@ -155,7 +155,7 @@ class Pattern:
                 elif (first := corner_of[int(np.abs(away).argmin())]) < k:
                     kinds.append(kinds[first])
                     break
-            if len(centres) > known:
+            if len(centres) > before:
                 kinds.append(max(kinds, default=-1) + 1)
         return cls(
             elliptic, corners, tuple(kinds), np.array(centres), np.array(corner_of), np.array(flat)
@@ -166,11 +166,13 @@ class Pattern:
         """Return that of a lattice (2, 2) and half-turns about a point, the first corner."""
         about = np.array([point.real, point.imag])
         turn = Isometry(-np.eye(2), 2 * about)
-        found = cls.near(CrystallographicGroup.generate(lattice, [turn], name="p2"), about)
-        first = int(np.abs(found.corners - point).argmin())
+        pattern = cls.near(CrystallographicGroup.generate(lattice, [turn], name="p2"), about)
+        first = int(np.abs(pattern.corners - point).argmin())
         # of half-turns each corner is a kind of its own, all alike
         return replace(
-            found, corners=np.roll(found.corners, -first), corner_of=(found.corner_of - first) % 4
+            pattern,
+            corners=np.roll(pattern.corners, -first),
+            corner_of=(pattern.corner_of - first) % 4,
         )
 
     @property
@@ -214,27 +216,29 @@ def _triangles(
 ) -> list[Complex]:
     """Return triangles of centres with the angles pi / order."""
     ends = [np.exp(1j * np.pi / order) for order in flat]
-    found = list[Complex]()
+    triangles = list[Complex]()
     for first in places[flat[0]]:
-        others = [own for own in places[flat[1]] if abs(own - first) > NEAR * size]
+        others = [place for place in places[flat[1]] if abs(place - first) > NEAR * size]
         if not others:
             continue
-        least = min(abs(own - first) for own in others)
-        for second in (own for own in others if abs(own - first) < (1 + NEAR) * least):
+        least = min(abs(place - first) for place in others)
+        for second in (place for place in others if abs(place - first) < (1 + NEAR) * least):
             # the third is where the sides from both meet
             side = second - first
-            one, two = side * ends[0], -side * np.conj(ends[1])
-            t = (side * np.conj(two)).imag / (one * np.conj(two)).imag
-            third = first + t * one
-            if any(abs(own - third) < NEAR * size for own in places[flat[2]]):
-                found.append(np.array([first, second, third]))
-    return found
+            left, right = side * ends[0], -side * np.conj(ends[1])
+            t = (side * np.conj(right)).imag / (left * np.conj(right)).imag
+            third = first + t * left
+            if any(abs(place - third) < NEAR * size for place in places[flat[2]]):
+                triangles.append(np.array([first, second, third]))
+    return triangles
 
 
 def _parallelograms(group: CrystallographicGroup, places: list[complex]) -> list[Complex]:
     """Return the parallelograms of centres of half-turns, halves of the shortest lattice vectors."""
-    one, two = (complex(*own) / 2 for own in _positive(reduced_basis(group.lattice)).T)
-    return [np.array([own, own + one, own + one + two, own + two]) for own in places]
+    first, second = (complex(*vector) / 2 for vector in _positive(reduced_basis(group.lattice)).T)
+    return [
+        np.array([place, place + first, place + first + second, place + second]) for place in places
+    ]
 
 
 def _positive(basis: Array) -> Array:

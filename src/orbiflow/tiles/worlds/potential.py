@@ -69,10 +69,10 @@ class Series(NamedTuple):
 
 
 def _horner(terms: Complex, x: Complex) -> Complex:
-    found = terms[..., -1]
+    total = terms[..., -1]
     for k in range(terms.shape[-1] - 2, -1, -1):
-        found = found * x + terms[..., k]
-    return found
+        total = total * x + terms[..., k]
+    return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,8 @@ class Potential:
     @cached_property
     def _orders(self) -> Array:
         """The orders (J,) of a cell's centres, in the plane over those in the other world."""
-        own = self.pattern.corner_of
-        return self.pattern.flat[own] / np.array(self.orders)[own]
+        corner = self.pattern.corner_of
+        return self.pattern.flat[corner] / np.array(self.orders)[corner]
 
     @cached_property
     def _strengths(self) -> Array:
@@ -99,11 +99,14 @@ class Potential:
 
     def about(self, around: Around) -> Series:
         """Return solutions about points (N,), or about the nearest centre where it is near."""
-        found, centres = self.about_points(around), self.about_centres(around.points)
+        at_points, centres = self.about_points(around), self.about_centres(around.points)
         near = np.abs(around.points - centres.origin) < ROUND * centres.reach
-        parts = zip(centres, found, strict=True)
+        parts = zip(centres, at_points, strict=True)
         return Series(
-            *(np.where(near.reshape(-1, *(1,) * (one.ndim - 1)), one, two) for one, two in parts)
+            *(
+                np.where(near.reshape(-1, *(1,) * (at_centre.ndim - 1)), at_centre, at_point)
+                for at_centre, at_point in parts
+            )
         )
 
     def about_points(self, around: Around) -> Series:
@@ -114,8 +117,8 @@ class Potential:
         terms = np.zeros((len(points), 2, TERMS), dtype=np.complex128)
         terms[:, 0, 0] = terms[:, 1, 1] = 1.0
         for k in range(TERMS - 2):
-            known = (potential[:, None, : k + 1] * terms[..., k::-1][..., : k + 1]).sum(axis=-1)
-            terms[..., k + 2] = -known / ((k + 2) * (k + 1))
+            sums = (potential[:, None, : k + 1] * terms[..., k::-1][..., : k + 1]).sum(axis=-1)
+            terms[..., k + 2] = -sums / ((k + 2) * (k + 1))
         ones = np.ones(len(points), dtype=np.complex128)
         return Series(
             points, reach, np.ones(len(points), int), np.zeros((len(points), 2)), terms, ones
@@ -126,13 +129,13 @@ class Potential:
         away = self.pattern.to_centres(points)
         near = np.abs(away).argmin(axis=1)
         exponents, terms = self._about_centres
-        own = away[np.arange(len(points)), near]
+        offset = away[np.arange(len(points)), near]
         power, reach = (
             self.pattern.flat[self.pattern.corner_of[near]],
             self.pattern.around_centres.reach,
         )
-        ahead: Complex = own / np.abs(own)
-        return Series(points - own, reach[near], power, exponents[near], terms[near], ahead)
+        ahead: Complex = offset / np.abs(offset)
+        return Series(points - offset, reach[near], power, exponents[near], terms[near], ahead)
 
     @cached_property
     def _about_centres(self) -> tuple[Array, Complex]:
@@ -150,6 +153,6 @@ class Potential:
             potential = potential[::order]  # the others are 0, as the centre's rotation keeps it
             for n in range(1, len(potential)):
                 e = exponents[j] + order * n
-                known = terms[j, :, n - 1 :: -1][:, :n] @ potential[1 : n + 1]
-                terms[j, :, n] = -known / (e * (e - 1) + potential[0])
+                sums = terms[j, :, n - 1 :: -1][:, :n] @ potential[1 : n + 1]
+                terms[j, :, n] = -sums / (e * (e - 1) + potential[0])
         return exponents, terms

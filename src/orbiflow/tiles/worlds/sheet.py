@@ -60,9 +60,9 @@ WIDEST_LINE = 0.4  # mm
 
 def motions_of(linear: Array, shift: Array) -> Array:
     """Return maps p -> linear p + shift, (M, 2, 2) and (M, 2), as motions (M, 3, 3) of (x, y, 1)."""
-    found = np.tile(np.eye(3), (len(linear), 1, 1))
-    found[:, :2, :2], found[:, :2, 2] = linear, shift
-    return found
+    motions = np.tile(np.eye(3), (len(linear), 1, 1))
+    motions[:, :2, :2], motions[:, :2, 2] = linear, shift
+    return motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +119,8 @@ class World:
     def _rings(self) -> list[Array]:
         """The polygon's vectors of each prototile, few of them."""
         return [
-            self.vectors(own.polygon[:: max(1, len(own.polygon) // 60)])
-            for own in self.tiling.prototiles
+            self.vectors(prototile.polygon[:: max(1, len(prototile.polygon) // 60)])
+            for prototile in self.tiling.prototiles
         ]
 
     @cached_property
@@ -166,15 +166,15 @@ class World:
             scale = float(self.sizes[copies].max()) / self.size
             step, least = self.size / DETAIL_STEPS[level], LEAST_SHOWN / scale
             for part in within:
-                lines = [stepped(own, step) for own in part.curves if _reach(own) > least]
+                lines = [stepped(curve, step) for curve in part.curves if _reach(curve) > least]
                 if not lines:
                     continue
-                closed = [own.closed for own in part.curves if _reach(own) > least]
+                closed = [curve.closed for curve in part.curves if _reach(curve) > least]
                 ends = np.cumsum([len(line) for line in lines])[:-1]
                 every = self.places(self.vectors(np.concatenate(lines)), copies)
                 for k, places in zip(copies.tolist(), every, strict=True):
                     pieces = zip(np.split(places, ends), closed, strict=True)
-                    curves = tuple(Curve.polyline(own, closed=shut) for own, shut in pieces)
+                    curves = tuple(Curve.polyline(points, closed=shut) for points, shut in pieces)
                     width = part.style.width * float(self.sizes[k]) / self.size
                     style = part.style._replace(width=width)
                     seen_as = part.opacity * float(self.fade[k])
@@ -191,8 +191,8 @@ def stepped(curve: Curve, step: float) -> Array:
     points = curve.flattened(step / 20)
     line = shapely.LinearRing(points) if curve.closed else shapely.LineString(points)
     simple = shapely.segmentize(shapely.simplify(line, step / 20), step)
-    found = shapely.get_coordinates(simple)
-    return found[:-1] if curve.closed else found
+    divided = shapely.get_coordinates(simple)
+    return divided[:-1] if curve.closed else divided
 
 
 def _between(pieces: Array, start: float, end: float) -> Array:
@@ -206,7 +206,7 @@ def _divided(curve: Curve, longest: float, cones: Array, near: float) -> Array:
 
     Those are points within the length `near` of the curve, where its image has a corner.
     """
-    found, shares = list[Array](), np.linspace(0, 1, SAMPLES)
+    divided, shares = list[Array](), np.linspace(0, 1, SAMPLES)
     for piece in curve.pieces:
         length = float(np.linalg.norm(np.diff(piece, axis=0), axis=1).sum())
         cuts = set(np.linspace(0, 1, max(1, int(np.ceil(length / longest))) + 1).tolist())
@@ -214,12 +214,12 @@ def _divided(curve: Curve, longest: float, cones: Array, near: float) -> Array:
             away = np.linalg.norm(bezier(np.tile(piece, (SAMPLES, 1, 1)), shares) - cone, axis=1)
             if away.min() < near + length / SAMPLES:
                 share = _nearest(piece, cone, float(shares[away.argmin()]))
-                cuts = {own for own in cuts if abs(own - share) > 1 / SAMPLES or own in (0, 1)} | {
+                cuts = {cut for cut in cuts if abs(cut - share) > 1 / SAMPLES or cut in (0, 1)} | {
                     share
                 }
         parts = (_between(piece[None], a, b) for a, b in pairwise(sorted(cuts)))
-        found += [_through(part).pieces[0] for part in parts]
-    every = np.stack(found)
+        divided += [_through(part).pieces[0] for part in parts]
+    every = np.stack(divided)
     for cone in cones:
         for end in (0, 3):
             every[np.linalg.norm(every[:, end] - cone, axis=1) < near, end] = cone
@@ -240,8 +240,8 @@ def _nearest(piece: Array, point: Array, share: float) -> float:
 def _through(points: Array) -> Curve:
     """Return the closed curve of cubics through points (n, 4, 2) at the shares 0, 1/3, 2/3 and 1."""
     a, b, c, d = (points[:, k] for k in range(4))
-    one, two = (-5 * a + 18 * b - 9 * c + 2 * d) / 6, (2 * a - 9 * b + 18 * c - 5 * d) / 6
-    return Curve(np.stack([a, one, two, d], axis=1), np.zeros(len(a), dtype=bool), closed=True)
+    second, third = (-5 * a + 18 * b - 9 * c + 2 * d) / 6, (2 * a - 9 * b + 18 * c - 5 * d) / 6
+    return Curve(np.stack([a, second, third, d], axis=1), np.zeros(len(a), dtype=bool), closed=True)
 
 
 class CopyMotifs(NamedTuple):
@@ -260,11 +260,11 @@ class CopyMotifs(NamedTuple):
         """Yield the picture on each copy that is seen."""
         world = self.world
         levels = np.digitize(world.sizes, DETAIL_SIZES)
-        for own, pictures in zip(world.tiling.prototiles, self.pictures, strict=True):
+        for prototile, pictures in zip(world.tiling.prototiles, self.pictures, strict=True):
             for level in np.unique(levels[world.faces]).tolist():
                 cancel.check()
                 step = 3 * world.size / DETAIL_STEPS[level]
-                rough = shapely.simplify(shapely.Polygon(own.polygon), step / 10)
+                rough = shapely.simplify(shapely.Polygon(prototile.polygon), step / 10)
                 ring = orient(shapely.get_coordinates(rough)[:-1], counter_clockwise=True)
                 mesh = triangulate(with_points(ring, world.cones, step / 5), step)
                 first = pictures[0]
@@ -301,31 +301,33 @@ def world_scene(
     layers = [Layer("paper", "paper", Style(chosen.paper), (page,))]
     fills = {world.colour(k, kind) for kind in kinds for k in outlines[kind]}
     ground = Style(chosen.mean(fills))
-    rings = (curve.flattened(TOLERANCE) for own in outlines for curve in own.values())
+    rings = (curve.flattened(TOLERANCE) for by_copy in outlines for curve in by_copy.values())
     under = PathPart(boundary(ground_of(rings)), ground)
     layers.append(Layer("ground", "paper", ground, (under,), clipped=True))
-    plain = not any(own.pictures or any(motif.parts for motif in own.motifs) for own in worn)
-    widths = {k: _width(world, k, line) for own in outlines for k in own}
-    for kind, own in enumerate(outlines):
-        for colour in sorted(set(world.colours[list(own)].tolist())):
-            mine = [k for k in own if world.colours[k] == colour]
+    plain = not any(dress.pictures or any(motif.parts for motif in dress.motifs) for dress in worn)
+    widths = {k: _width(world, k, line) for by_copy in outlines for k in by_copy}
+    for kind, by_copy in enumerate(outlines):
+        for colour in sorted(set(world.colours[list(by_copy)].tolist())):
+            mine = [k for k in by_copy if world.colours[k] == colour]
             number = kind * world.count + colour
             fill, name = chosen.fill(number), f"colour {number + 1}"
             for width in sorted({widths[k] for k in mine}) if plain and line != 0 else [0.0]:
                 style = Style(fill, chosen.outline, width) if width else Style(fill, fill, SEAM)
-                curves = tuple(own[k] for k in mine if not width or widths[k] == width)
+                curves = tuple(by_copy[k] for k in mine if not width or widths[k] == width)
                 layers.append(Layer(name, "tiles", style, curves, clipped=True))
-    for own in worn:
-        if own.pictures:
-            layers.append(Layer("pictures", "drawing", Style(), tuple(own.warped(cancel))))
-        for kind, motif in enumerate(own.motifs):
-            drawn = sorted(own.world.drawn(motif, kind), key=lambda one: one[0])
-            parts = tuple(_inked(part, chosen, own.world.colour(k, kind)) for k, part in drawn)
+    for dress in worn:
+        if dress.pictures:
+            layers.append(Layer("pictures", "drawing", Style(), tuple(dress.warped(cancel))))
+        for kind, motif in enumerate(dress.motifs):
+            drawn = sorted(dress.world.drawn(motif, kind), key=lambda entry: entry[0])
+            parts = tuple(_inked(part, chosen, dress.world.colour(k, kind)) for k, part in drawn)
             if parts:
                 layers.append(Layer("drawing", "drawing", Style(), parts, clipped=True))
     for width in sorted(set(widths.values())) if line != 0 and not plain else []:
         style = Style(None, chosen.outline, width)
-        curves = tuple(curve for own in outlines for k, curve in own.items() if widths[k] == width)
+        curves = tuple(
+            curve for by_copy in outlines for k, curve in by_copy.items() if widths[k] == width
+        )
         layers.append(Layer("outlines", "tiles", style, curves, clipped=True))
     if world.view.border is not None:
         style = Style(None, chosen.outline, line or WIDEST_LINE)
@@ -335,10 +337,10 @@ def world_scene(
 
 def _width(world: World, copy: int, line: float | None) -> float:
     """Return the width in mm of a copy's outline, one of a few."""
-    given = min(WIDEST_LINE, LINE * float(world.sizes[copy])) if line is None else line
-    return max(0.01, float(f"{given:.1g}"))
+    width = min(WIDEST_LINE, LINE * float(world.sizes[copy])) if line is None else line
+    return max(0.01, float(f"{width:.1g}"))
 
 
 def _inked(part: PathPart, chosen: Palette, colour: int) -> PathPart:
-    fill, stroke = (chosen.ink(colour) if own == INK else own for own in part.style[:2])
+    fill, stroke = (chosen.ink(colour) if paint == INK else paint for paint in part.style[:2])
     return part._replace(style=part.style._replace(fill=fill, stroke=stroke))

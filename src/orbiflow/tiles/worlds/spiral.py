@@ -44,7 +44,7 @@ def spiral(
     def vectors(points: Array) -> Array:
         return np.column_stack([points @ flip, np.ones(len(points))])
 
-    rings = [vectors(own.polygon) for own in given.prototiles]
+    rings = [vectors(prototile.polygon) for prototile in given.prototiles]
     near = view.meets(view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings))))
     motions = motions[near]
     numbers = _around(motions, rings, period, size)
@@ -74,7 +74,7 @@ def cylinder(
     def vectors(points: Array) -> Array:
         return np.column_stack([points @ flip, np.ones(len(points))])
 
-    rings = [vectors(own.polygon) for own in given.prototiles]
+    rings = [vectors(prototile.polygon) for prototile in given.prototiles]
     numbers = _around(once, rings, period, size)
     steps = np.array([period.real, period.imag]) * np.array([[-1.0], [0.0], [1.0]])
     motions = np.concatenate([motions_of(once[:, :2, :2], once[:, :2, 2] + step) for step in steps])
@@ -121,19 +121,19 @@ def _around(motions: Array, rings: list[Array], period: complex, size: float) ->
     step, count, small = np.array([period.real, period.imag]), len(motions), TOUCHING * size
     placed = [np.einsum("mij,nj->mni", motions, ring)[..., :2] for ring in rings]
     near: list[set[int]] = [set() for _ in range(count)]
-    wide: list[Any] = [shapely.buffer(shapely.polygons(own), small) for own in placed]
+    wide: list[Any] = [shapely.buffer(shapely.polygons(polygons), small) for polygons in placed]
     every: Any = np.concatenate(
         [
-            shapely.buffer(shapely.polygons(own + turn * step), small)
-            for own in placed
+            shapely.buffer(shapely.polygons(polygons + turn * step), small)
+            for polygons in placed
             for turn in (-1, 0, 1)
         ]
     )
     tree = shapely.STRtree(every)
-    for own in wide:
-        one, two = tree.query(own, predicate="intersects")
-        shared = shapely.area(shapely.intersection(own[one], every[two]))
-        for i, j in zip(one[shared > 50 * small**2], two[shared > 50 * small**2], strict=True):
+    for grown in wide:
+        index, nearby = tree.query(grown, predicate="intersects")
+        shared = shapely.area(shapely.intersection(grown[index], every[nearby]))
+        for i, j in zip(index[shared > 50 * small**2], nearby[shared > 50 * small**2], strict=True):
             if j % count != i:
                 near[i].add(int(j % count))
                 near[j % count].add(int(i))

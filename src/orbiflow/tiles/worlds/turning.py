@@ -25,30 +25,30 @@ AROUND = 10  # points of the outline by which a copy's size is seen
 
 def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: str) -> str:
     """Return the page, with outlines and drawings as vectors, and what neighbours' motions do."""
-    found = world.unfolding
-    assert found is not None
-    moves = colour_moves(found)
+    unfolding = world.unfolding
+    assert unfolding is not None
+    moves = colour_moves(unfolding)
     count = world.count + SPARE if moves is None else len(moves[0])
     fills = len(world.tiling.prototiles) * count
     rings = [
-        with_points(own.polygon, world.cones, CONE_NEAR * world.size)
-        for own in world.tiling.prototiles
+        with_points(prototile.polygon, world.cones, CONE_NEAR * world.size)
+        for prototile in world.tiling.prototiles
     ]
     parts = list[dict[str, Any]]()
     for kind, motif in enumerate(motifs):
         for part in cut_off(motif, shapely.Polygon(rings[kind])).parts:
-            lines = [(stepped(own, world.size / STEPS), own.closed) for own in part.curves]
+            lines = [(stepped(curve, world.size / STEPS), curve.closed) for curve in part.curves]
             curves = [[_listed(world.vectors(line)), closed] for line, closed in lines]
             style, width = part.style, part.style.width / world.size
-            own = {"kind": kind, "fill": style.fill, "stroke": style.stroke, "width": width}
-            parts.append({**own, "opacity": part.opacity, "curves": curves})
+            facts = {"kind": kind, "fill": style.fill, "stroke": style.stroke, "width": width}
+            parts.append({**facts, "opacity": part.opacity, "curves": curves})
     first = world.vectors(rings[0])
     data = {
         "name": re.sub(r"[^A-Za-z0-9]+", "-", title).strip("-").lower() or "world",
-        "sign": found.sign,
+        "sign": unfolding.sign,
         "view": (world.view.motion @ world.motions[0]).ravel().tolist(),
-        "middle": found.middle.tolist(),
-        "near": found.neighbours.reshape(-1, 9).tolist(),
+        "middle": unfolding.middle.tolist(),
+        "near": unfolding.neighbours.reshape(-1, 9).tolist(),
         "moves": moves and [move.tolist() for move in moves],  # else the page chooses colours
         "rings": [_listed(world.vectors(ring)) for ring in rings],
         "around": _listed(first[:: max(1, len(first) // AROUND)]),

@@ -149,8 +149,8 @@ class Unfolding:
         """Points (K, 2) of the outline about which angles are others in the world than in the plane."""
         potential = self.development.potential
         away = potential.pattern.to_centres(complex_points(self.ring))
-        own = potential.pattern.corner_of
-        bent = potential.pattern.flat[own] != np.array(potential.orders)[own]
+        corner = potential.pattern.corner_of
+        bent = potential.pattern.flat[corner] != np.array(potential.orders)[corner]
         size = float(np.sqrt(self.tiling.tile_area))
         return self.ring[(np.abs(away[:, bent]) < NEAR * size).any(axis=1)]
 
@@ -163,19 +163,19 @@ class Unfolding:
     def _matrices(self) -> Complex:
         """What takes the solutions near each triangle to those of the development (N, 2, 2)."""
         tile, series = self.tile, self._series
-        one, two = (
-            series.take(own).wronskians(tile.halves)
-            for own in (tile.parents[tile.order], tile.order)
+        before, after = (
+            series.take(rows).wronskians(tile.halves)
+            for rows in (tile.parents[tile.order], tile.order)
         )
-        steps = one @ np.linalg.inv(two)
+        steps = before @ np.linalg.inv(after)
         root = tile.parents[tile.order[:1]]
         middle = tile.around.points[root]
         here = self.development.reached(complex(middle[0]))
-        found = np.zeros((len(tile.parents), 2, 2), dtype=np.complex128)
-        found[root] = here @ np.linalg.inv(series.take(root).wronskians(middle))
+        matrices = np.zeros((len(tile.parents), 2, 2), dtype=np.complex128)
+        matrices[root] = here @ np.linalg.inv(series.take(root).wronskians(middle))
         for k, step in zip(tile.order.tolist(), steps, strict=True):
-            found[k] = found[tile.parents[k]] @ step
-        return found
+            matrices[k] = matrices[tile.parents[k]] @ step
+        return matrices
 
     def vectors(self, points: Array) -> Array:
         """Return where points (N, 2) of the tile are in the world, vectors (N, 3)."""
@@ -197,15 +197,15 @@ class Unfolding:
     @cached_property
     def neighbours(self) -> Array:
         """The motions (E, 3, 3) that take the tile to those along its edge."""
-        found = list[Array]()
+        across = list[Array]()
         for isometry, points in contacts(self.tiling, self.ring):
             here, there = self._wronskians(points), self._wronskians(isometry.inverse()(points))
             turn = complex(*isometry.linear[:, 0])
             here = here * np.array([turn**-0.5, turn**0.5])
             if mirrored := isometry.determinant < 0:
                 there = np.conj(there)
-            found.append(motions_of_spinors(here @ np.linalg.inv(there), self.sign, mirrored))
-        motions = np.concatenate(found)
+            across.append(motions_of_spinors(here @ np.linalg.inv(there), self.sign, mirrored))
+        motions = np.concatenate(across)
         _, first = np.unique(np.round(motions @ self.middle, 6), axis=0, return_index=True)
         return motions[np.sort(first)]
 
@@ -267,7 +267,7 @@ def _check_group(group: CrystallographicGroup, sign: int) -> None:
     if not order_count(group):
         raise OrbiflowError(
             f"tiles of {group.name or 'this group'} stay in the plane, or go around a spiral: other "
-            f"worlds take tiles of the groups {', '.join(name for name, own in USUAL if own < 0)}"
+            f"worlds take tiles of the groups {', '.join(name for name, curved in USUAL if curved < 0)}"
         )
     if sign > 0 and (group.name, 1) not in USUAL:
         raise OrbiflowError(
@@ -315,9 +315,9 @@ def unfolded(
         every = [(Pattern.about(lattice, point), [(2 * orders[0], 2, 2, 2)]) for point in points]
     else:
         pattern, chosen = Pattern.near(group, tiling.center), sorted(set(permutations(orders)))
-        every = [(pattern, [tuple(own[k] for k in pattern.kinds) for own in chosen])]
-    found = 0 if min(orders) < 2 else curvature(every[0][1][0])
-    if not found or sign not in (0, found):
+        every = [(pattern, [tuple(assigned[k] for k in pattern.kinds) for assigned in chosen])]
+    curved = 0 if min(orders) < 2 else curvature(every[0][1][0])
+    if not curved or sign not in (0, curved):
         where = {0: "a sphere or a disc", 1: "the sphere", -1: "the hyperbolic plane"}[sign]
         raise OrbiflowError(
             f"the orders {', '.join(map(str, orders))} are not of {where}: the sphere has 2,3,3, "
@@ -326,8 +326,11 @@ def unfolded(
     worlds = list[Unfolding]()
     for pattern, assignments in every:
         tile = TileMesh.of(tiling, ring, pattern)
-        worlds += [Unfolding(tiling, Development.of(pattern, own), tile) for own in assignments]
-    return min(worlds, key=lambda own: round(cost(own), 9))
+        worlds += [
+            Unfolding(tiling, Development.of(pattern, assignment), tile)
+            for assignment in assignments
+        ]
+    return min(worlds, key=lambda world: round(cost(world), 9))
 
 
 def _check_inside(tiling: Tiling, ring: Array) -> None:
@@ -335,7 +338,7 @@ def _check_inside(tiling: Tiling, ring: Array) -> None:
     polygon = shapely.Polygon(ring).buffer(-INSIDE * size)
     reach = float(np.linalg.norm(ring - tiling.center, axis=1).max())
     centres = symmetry_elements(tiling.group, tiling.center, reach).centers
-    if any(polygon.contains(shapely.Point(*own.point)) for own in centres):
+    if any(polygon.contains(shapely.Point(*centre.point)) for centre in centres):
         raise OrbiflowError(
             "the tile has a centre of rotation inside, where another world would have a cone's tip: "
             "it stays in the plane, or goes around a spiral"

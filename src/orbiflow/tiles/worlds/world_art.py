@@ -54,9 +54,9 @@ def world_artwork(
         chosen = chosen.shaded((world.count,) * len(tile.figures))
     own_overs = overs if begin is None else overs[:1]
     require_figures(tile, settings, len(own_overs))
-    worn = [_worn(tile, world, settings, chosen, own_overs, notes)]
+    dresses = [_worn(tile, world, settings, chosen, own_overs, notes)]
     if isinstance(world, Metamorphosis) and world.before and begin:
-        worn.append(_worn(with_map(begin), world.before, settings, chosen, overs[1:], notes))
+        dresses.append(_worn(with_map(begin), world.before, settings, chosen, overs[1:], notes))
     notes += chosen.shortage(count)
     more = {
         "title": tile.name,
@@ -65,10 +65,10 @@ def world_artwork(
         ),
     }
     if settings.format == "html":
-        page = partial(turning_page, world, chosen, worn[0].motifs, tile.name)
+        page = partial(turning_page, world, chosen, dresses[0].motifs, tile.name)
         scene = Scene(*settings.page, (), web_page=page, **more)
     else:
-        scene = world_scene(world, chosen, worn, line=settings.outline, cancel=cancel, **more)
+        scene = world_scene(world, chosen, dresses, line=settings.outline, cancel=cancel, **more)
     return Made(
         tile=tile,
         settings=settings,
@@ -91,7 +91,7 @@ def _worn(
     """Return what lies on a tile's copies in a world, and add what the user should know of it."""
     density = float(world.sizes.max()) / world.size * settings.pixels * TEXELS_PER_PIXEL
     on = motifs_on(tile, settings, chosen, overs, tint=settings.tint, density=density)
-    motifs = [own.moved(*part.place) for own, part in zip(on.motifs, tile.figures, strict=True)]
+    motifs = [motif.moved(*part.place) for motif, part in zip(on.motifs, tile.figures, strict=True)]
     notes += on.notes
     drawn = [replace(motif, rasters=()) for motif in motifs]
     if not on.has_pictures:
@@ -100,8 +100,8 @@ def _worn(
         notes.append("a page to turn has drawings in SVG, but no pictures of pixels")
         return CopyMotifs(world, drawn)
     pictures = list[list[Raster]]()
-    for kind, (motif, own) in enumerate(zip(motifs, world.tiling.prototiles, strict=True)):
-        plain = texture(replace(motif, parts=()), own.polygon, density)
+    for kind, (motif, prototile) in enumerate(zip(motifs, world.tiling.prototiles, strict=True)):
+        plain = texture(replace(motif, parts=()), prototile.polygon, density)
         fills = [chosen.fill(kind * world.count + colour) for colour in range(world.count)]
         seen = (tinted_picture(plain, glass(fill, on.tint)) for fill in fills)
         pictures.append([*seen] if on.tint else [plain] * world.count)
@@ -120,9 +120,9 @@ def world_of(
         tiling = tile.tiling.transformed(flip, np.zeros(2))
         return wound(tile.tiling, tiling, flip, settings)
     sign = 1 if settings.world == "sphere" else -1
-    found, seen = in_world(tile, settings.order, sign)
-    view = WorldView(settings.world or "disc", settings.page, _facing(found, settings))
-    ring = found.vectors(found.ring[:: max(1, len(found.ring) // 30)])
+    unfolding, seen = in_world(tile, settings.order, sign)
+    view = WorldView(settings.world or "disc", settings.page, _facing(unfolding, settings))
+    ring = unfolding.vectors(unfolding.ring[:: max(1, len(unfolding.ring) // 30)])
 
     def shown(motions: Array) -> Any:
         if sign > 0:
@@ -131,20 +131,20 @@ def world_of(
         large = np.ptp(places, axis=1).max(axis=1) > LEAST_COPY
         return view.meets(places) & large & np.isfinite(places.max(axis=1)).all(axis=1)
 
-    motions = copies(found, shown, MOST_COPIES)
-    numbers, _ = colours(found, motions)
+    motions = copies(unfolding, shown, MOST_COPIES)
+    numbers, _ = colours(unfolding, motions)
     if settings.colour == "one":
         numbers = 0 * numbers
     world = World(
         tile.tiling,
-        lambda points: found.vectors(points @ flip),
+        lambda points: unfolding.vectors(points @ flip),
         motions,
         numbers,
         view,
-        found,
+        unfolding,
         flip,
     )
-    notes = [f"{len(motions)} copies; {found.words}", *seen]
+    notes = [f"{len(motions)} copies; {unfolding.words}", *seen]
     if len(motions) == MOST_COPIES:
         notes.append("more copies than these are not drawn: choose a smaller {area}")
     return world, notes

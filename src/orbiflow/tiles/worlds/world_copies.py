@@ -26,17 +26,17 @@ def copies(unfolding: Unfolding, shown: Callable[[Array], Booleans], most: int) 
     Those that are not `shown`, of motions (E, 3, 3), end the way; there are `most` at most.
     """
     near, middle = unfolding.neighbours, unfolding.middle
-    found, known, ahead = [np.eye(3)], {_key(middle)}, deque([np.eye(3)])
-    while ahead and len(found) < most:
+    copied, seen, ahead = [np.eye(3)], {_key(middle)}, deque([np.eye(3)])
+    while ahead and len(copied) < most:
         motions = ahead.popleft() @ near
         keys = [_key(place) for place in motions @ middle]
-        fresh = [k for k, key in enumerate(keys) if key not in known]
-        known.update(keys[k] for k in fresh)
+        fresh = [k for k, key in enumerate(keys) if key not in seen]
+        seen.update(keys[k] for k in fresh)
         if fresh:
             kept = motions[fresh][shown(motions[fresh])]
-            found += [*kept]
+            copied += [*kept]
             ahead += [*kept]
-    return np.stack(found)[:most]
+    return np.stack(copied)[:most]
 
 
 def _key(vector: Array) -> tuple[int, ...]:
@@ -50,9 +50,9 @@ def colours(unfolding: Unfolding, motions: Array) -> tuple[Integers, int]:
     The world's group permutes the colours if a small number allows that; else each copy has the first
     colour that its neighbours leave.
     """
-    found = _by_group(unfolding, motions)
-    if found is not None:
-        return found
+    grouped = _by_group(unfolding, motions)
+    if grouped is not None:
+        return grouped
     middles = motions @ unfolding.middle
     index = {_key(place): k for k, place in enumerate(middles)}
     numbers = np.full(len(motions), -1)
@@ -84,59 +84,62 @@ def colour_moves(unfolding: Unfolding, most: int = FEW_COLOURS) -> list[Integers
     if words is None:
         return None
     for count in range(2, most + 1):
-        every = [np.array(own) for own in permutations(range(count))]
-        choices = [[own for own in every if _is_one(own, power)] for power in powers]
-        if np.prod([len(own) for own in choices]) > MOST_CHOICES:
+        every = [np.array(permutation) for permutation in permutations(range(count))]
+        choices = [
+            [permutation for permutation in every if _is_one(permutation, power)]
+            for power in powers
+        ]
+        if np.prod([len(options) for options in choices]) > MOST_CHOICES:
             return None
-        for own in product(*choices):
-            whole = own[0]
-            for permutation in own[1:]:
+        for choice in product(*choices):
+            whole = choice[0]
+            for permutation in choice[1:]:
                 whole = whole[permutation]
             if not _is_one(whole, last):
                 continue
-            moves = [_moved(word, (*own, *map(np.argsort, own))) for word in words]
+            moves = [_moved(word, (*choice, *map(np.argsort, choice))) for word in words]
             if all(move[0] != 0 for move in moves):
                 return moves
     return None
 
 
-def _is_one(own: Integers, power: int) -> bool:
-    found = np.arange(len(own))
+def _is_one(permutation: Integers, power: int) -> bool:
+    image = np.arange(len(permutation))
     for _ in range(power):
-        found = own[found]
-    return bool((found == np.arange(len(own))).all())
+        image = permutation[image]
+    return bool((image == np.arange(len(permutation))).all())
 
 
 def _moved(word: tuple[int, ...], letters: tuple[Integers, ...]) -> Integers:
     """Return the permutation of a word, whose last letter acts first."""
-    found = np.arange(len(letters[0]))
+    image = np.arange(len(letters[0]))
     for letter in reversed(word):
-        found = letters[letter][found]
-    return found
+        image = letters[letter][image]
+    return image
 
 
 def _words(turns: list[Array], goals: list[Array], middle: Array) -> list[tuple[int, ...]] | None:
     """Return goals as words of k rotations, 0 to k - 1, and their inverses, k to 2 k - 1."""
-    letters = [*turns, *(np.linalg.inv(own) for own in turns)]
-    left, found = (
+    letters = [*turns, *(np.linalg.inv(turn) for turn in turns)]
+    left, words = (
         {_key(goal @ middle): k for k, goal in enumerate(goals)},
         dict[int, tuple[int, ...]](),
     )
-    known, level = {_key(middle)}, [((), np.eye(3))]
+    seen, level = {_key(middle)}, [((), np.eye(3))]
     for _ in range(LONGEST_WORD):
         fresh = list[tuple[tuple[int, ...], Array]]()
         for word, motion in level:
             for number, letter in enumerate(letters):
                 moved = motion @ letter
-                if (key := _key(moved @ middle)) in known:
+                if (key := _key(moved @ middle)) in seen:
                     continue
-                known.add(key)
-                own = (*word, number)
-                fresh.append((own, moved))
+                seen.add(key)
+                longer = (*word, number)
+                fresh.append((longer, moved))
                 if key in left:
-                    found[left[key]] = own
-        if len(found) == len(goals):
-            return [found[k] for k in range(len(goals))]
+                    words[left[key]] = longer
+        if len(words) == len(goals):
+            return [words[k] for k in range(len(goals))]
         level = fresh
     return None
 

@@ -62,5 +62,5 @@ def write_scene(
     module, name = WRITERS[as_choice(format, tuple(WRITERS), "the format")].split(":")
     writer = getattr(import_module(module), name)
     detail = {"tolerance": tolerance, "dpi": dpi, "dxf": dxf}
-    known = writer.__kwdefaults__ or {}
-    return writer(scene, *more, **{key: value for key, value in detail.items() if key in known})
+    accepted = writer.__kwdefaults__ or {}
+    return writer(scene, *more, **{key: value for key, value in detail.items() if key in accepted})

@@ -43,14 +43,19 @@ def write_html(scene: Scene) -> str:
         "title": scene.title,
         "tile": whole.as_json(),
         "palettes": [
-            {"name": name, "colours": own.colours, "outline": own.outline, "paper": own.paper}
-            for name, own in whole.palettes().items()
+            {
+                "name": name,
+                "colours": palette.colours,
+                "outline": palette.outline,
+                "paper": palette.paper,
+            }
+            for name, palette in whole.palettes().items()
         ],
         "tint": whole.tint,
         "outline": whole.line > 0,
         "skins": [
-            _skin(own.polygon, motif, whole)
-            for own, motif in zip(whole.tiling.prototiles, whole.motifs, strict=False)
+            _skin(prototile.polygon, motif, whole)
+            for prototile, motif in zip(whole.tiling.prototiles, whole.motifs, strict=False)
         ],
     }
     script = page_script(*SHARED, "tiles/write/endless.js")

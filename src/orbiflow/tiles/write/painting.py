@@ -206,11 +206,13 @@ def _draw_raster(band: Image.Image, raster: Raster, top: int) -> None:
         return
     picture = Image.fromarray(raster.pixels, "RGBA")
     if np.allclose(raster.linear, np.eye(2), atol=1e-12):  # pixel by pixel
-        own = _transformed(picture, size, linear, offset - low, Image.Resampling.NEAREST)
+        placed = _transformed(picture, size, linear, offset - low, Image.Resampling.NEAREST)
     else:
         how = Image.Resampling.BILINEAR
-        own = _transformed(picture.convert("RGBa"), size, linear, offset - low, how).convert("RGBA")
-    band.alpha_composite(own, tuple(low.tolist()))
+        placed = _transformed(picture.convert("RGBa"), size, linear, offset - low, how).convert(
+            "RGBA"
+        )
+    band.alpha_composite(placed, tuple(low.tolist()))
 
 
 def _transformed(
@@ -320,16 +322,16 @@ class PictureStamps(Stamps):
 def laid(bent: Sequence[Warped], size: tuple[int, int]) -> Raster:
     """Return pictures on meshes, in pixels, as one picture of a size; nothing is around them."""
     picture = Image.new("RGBA", size)
-    for own in bent:
-        low = np.floor(own.points.min(axis=0) - 1).clip(0, size)
-        high = np.ceil(own.points.max(axis=0) + 1).clip(0, size)
-        if not np.isfinite(own.points).all() or (high - low < 1).any():
+    for warped in bent:
+        low = np.floor(warped.points.min(axis=0) - 1).clip(0, size)
+        high = np.ceil(warped.points.max(axis=0) + 1).clip(0, size)
+        if not np.isfinite(warped.points).all() or (high - low < 1).any():
             continue
         width, height = (high - low).astype(int).tolist()
         shown, inside = carried(
-            own.pixels, own.texels, own.points - low, own.triangles, (width, height)
+            warped.pixels, warped.texels, warped.points - low, warped.triangles, (width, height)
         )
-        mask = np.rint(own.opacity * inside * shown[..., 3]).astype(np.uint8)
+        mask = np.rint(warped.opacity * inside * shown[..., 3]).astype(np.uint8)
         shown[..., 3] = mask
         layer = Image.fromarray(shown, "RGBA")
         picture.alpha_composite(layer, (int(low[0]), int(low[1])))

@@ -52,8 +52,8 @@ def write_pdf(scene: Scene, *more: Scene, dpi: float = 300.0) -> bytes:
     canvas.setCreator("orbiflow")
     canvas.setViewerPreference("PrintScaling", "None")
     page = _Page(canvas)
-    for own in (scene, *more):
-        page.show(own, dpi)
+    for sheet in (scene, *more):
+        page.show(sheet, dpi)
     canvas.save()
     return buffer.getvalue()
 

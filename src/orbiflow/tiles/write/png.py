@@ -126,7 +126,7 @@ def _few_colours(scene: Scene) -> list[str]:
         return []
     if any(part.opacity < 1 for part in parts):
         return []
-    styles = [own.style for own in (*scene.layers, *parts)]
+    styles = [drawn.style for drawn in (*scene.layers, *parts)]
     used = {colour: None for style in styles for colour in style[:2] if colour and colour != INK}
     inks = (layer.ink for layer in scene.layers if layer.ink)
     colours = list(dict.fromkeys([GROUND, *used, *inks]))
@@ -200,7 +200,9 @@ class Textures:
         colours = {colour for part in motif.parts for colour in part.style[:2] if colour}
         key = motif, ink if INK in colours else None
         if key not in self._known and colours == {INK} and not motif.rasters:
-            other = next((own for (drawn, _), own in self._known.items() if drawn is motif), None)
+            other = next(
+                (stamp for (drawn, _), stamp in self._known.items() if drawn is motif), None
+            )
             if other is not None:  # the same in another ink
                 pixels = other.pixels.copy()
                 pixels[..., :3] = rgb(ink or "#000000")
@@ -244,8 +246,8 @@ def texture(
     grid = Grid.over(points, density)
     size = grid.width, grid.height
     placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
-    picture = laid([own for own in placed.rasters if isinstance(own, Warped)], size).pixels
-    rasters = [own for own in placed.rasters if isinstance(own, Raster)]
+    picture = laid([raster for raster in placed.rasters if isinstance(raster, Warped)], size).pixels
+    rasters = [raster for raster in placed.rasters if isinstance(raster, Raster)]
     if rasters or placed.parts:
         inked = [_inked(part, ink or "#000000") for part in placed.parts]
         shapes = [shape_of(part, least_width=least_width) for part in inked]

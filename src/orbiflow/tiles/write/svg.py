@@ -64,8 +64,8 @@ def write_svg(scene: Scene, *, tolerance: float = TOLERANCE, dpi: float = 300.0)
             elif isinstance(item, Words):
                 parts.append("    " + _words(item, number))
             else:
-                own = _part(item, number) if isinstance(item, PathPart) else _image(item)
-                parts.append("    " + own)
+                element = _part(item, number) if isinstance(item, PathPart) else _image(item)
+                parts.append("    " + element)
         parts.append("  </g>\n")
     parts.append("</svg>\n")
     return "".join(parts)
