@@ -115,14 +115,15 @@ class Pieces:
     @cached_property
     def cones(self) -> list[FreeCone]:
         """For each neighbour the directions in which the tile may leave it, to begin with."""
-        return [free_cone(self.tile.face_vectors[own.faces]) for own in self.contacts]
+        return [free_cone(self.tile.face_vectors[contact.faces]) for contact in self.contacts]
 
     def leaving_neighbour(self, number: int) -> Leaving | None:
         """Return how the tile is best drawn away from a neighbour; None if it is locked to it."""
         element, cone = self.contacts[number].element, self.cones[number]
         other = self.piece.moved(element.linear, element.translation)
         return _best(
-            _directions(cone), lambda own, most: self.blocked(self.piece, [other], own, most)
+            _directions(cone),
+            lambda direction, most: self.blocked(self.piece, [other], direction, most),
         )
 
     def leaving_stack(self, turns: Array | None = None) -> Leaving:
@@ -136,15 +137,17 @@ class Pieces:
                 one that is blocked most counts. Default: all, where they do leave, else the tile alone.
         """
         if turns is None:
-            found = self._all_leave
-            if found and (found.is_free or self.group.order == 1):
-                return found
+            leaving = self._all_leave
+            if leaving and (leaving.is_free or self.group.order == 1):
+                return leaving
             turns = np.eye(3)[None]
         center = self.tile.centroid
         radius = float(np.linalg.norm(self.tile.points - center, axis=1).max())
         near = self.group.elements_near(center, 2 * radius, source=center)[1:]
-        meshes = [self.piece.moved(own.linear, own.translation) for own in near]
-        shifts = np.array([own.linear @ center + own.translation - center for own in near])
+        meshes = [self.piece.moved(element.linear, element.translation) for element in near]
+        shifts = np.array(
+            [element.linear @ center + element.translation - center for element in near]
+        )
         rays = [ray for cone in self.cones for ray in cone.rays]
         close = 1e-6 * radius
 
@@ -153,16 +156,16 @@ class Pieces:
 
         def blocked(direction: Array, most: float) -> float:
             worst = 0.0
-            for own in direction @ turns:  # how the move looks to the tile itself
-                before = [m for m, s in zip(meshes, shifts, strict=True) if s @ own < close]
-                worst = max(worst, self.blocked(self.piece, before, own, most))
+            for way in direction @ turns:  # how the move looks to the tile itself
+                before = [m for m, s in zip(meshes, shifts, strict=True) if s @ way < close]
+                worst = max(worst, self.blocked(self.piece, before, way, most))
                 if worst > most:
                     break
             return worst
 
-        found = _best(least_pushed(pushed, np.reshape(rays, (-1, 3))), blocked)
-        assert found is not None
-        return found
+        leaving = _best(least_pushed(pushed, np.reshape(rays, (-1, 3))), blocked)
+        assert leaving is not None
+        return leaving
 
     @cached_property
     def _all_leave(self) -> Leaving | None:
@@ -173,12 +176,14 @@ class Pieces:
     def _pushed(self, directions: Array, near: float) -> Array:
         """Return how hard (n,) a tile is pushed into neighbours that are not ahead along directions."""
         center = self.tile.centroid
-        found = np.zeros(len(directions))
-        for own in self.contacts:
-            shift = own.element.linear @ center + own.element.translation - center
-            into = np.clip(self.tile.face_vectors[own.faces] @ directions.T, 0, None).sum(axis=0)
-            found += np.where(shift @ directions.T < near, into, 0.0)
-        return found.round(9)
+        pushed = np.zeros(len(directions))
+        for contact in self.contacts:
+            shift = contact.element.linear @ center + contact.element.translation - center
+            into = np.clip(self.tile.face_vectors[contact.faces] @ directions.T, 0, None).sum(
+                axis=0
+            )
+            pushed += np.where(shift @ directions.T < near, into, 0.0)
+        return pushed.round(9)
 
     def assembly(self, copies: Sequence[StackedCopy]) -> Assembly:
         """Return an order in which some copies are put together, each by a straight move.
@@ -190,31 +195,31 @@ class Pieces:
         leaving = self._all_leave
         if leaving and leaving.is_free and (order := self.order_along(copies, leaving.direction)):
             return Assembly(tuple(Step(k, -leaving.direction) for k in order[::-1]), ())
-        meshes = [self.piece.moved(own.linear, own.shift) for own in copies]
+        meshes = [self.piece.moved(copy.linear, copy.shift) for copy in copies]
         touching = self._touching(copies)
         left, taken = list(range(len(copies))), list[Step]()
         centers = copy_centers(self.tile, copies)
         while len(left) > 1:
             middle = centers[left].mean(axis=0)
             outer = sorted(left, key=lambda k: -float(np.linalg.norm(centers[k] - middle)))
-            found = next(
+            loose = next(
                 (
-                    (k, own)
+                    (k, move)
                     for k in outer
-                    if (own := self._leaving(k, left, meshes, touching, copies))
+                    if (move := self._leaving(k, left, meshes, touching, copies))
                 ),
                 None,
             )
-            if found is None:
+            if loose is None:
                 return Assembly(tuple(taken[::-1]), tuple(left))
-            taken.append(Step(found[0], -found[1].direction))
-            left.remove(found[0])
+            taken.append(Step(loose[0], -loose[1].direction))
+            left.remove(loose[0])
         first = Step(left[0], np.array([0.0, 0.0, -1.0]))
         return Assembly((first, *taken[::-1]), ())
 
     def order_along(self, copies: Sequence[StackedCopy], direction: Array) -> list[int] | None:
         """Return an order in which copies are taken away along one direction; None if there is none."""
-        meshes = [self.piece.moved(own.linear, own.shift) for own in copies]
+        meshes = [self.piece.moved(copy.linear, copy.shift) for copy in copies]
         left, order = list(range(len(copies))), list[int]()
         left.sort(key=lambda k: -float(meshes[k].centroid @ direction))
         while left:
@@ -222,24 +227,27 @@ class Pieces:
             free = (
                 k for k in left if self.blocked(meshes[k], others[k], direction, BLOCKED) <= BLOCKED
             )
-            if (found := next(free, None)) is None:
+            if (loose := next(free, None)) is None:
                 return None
-            order.append(found)
-            left.remove(found)
+            order.append(loose)
+            left.remove(loose)
         return order
 
     def _touching(self, copies: Sequence[StackedCopy]) -> dict[tuple[int, int], Contact]:
         """Return for pairs of copies that touch, which contact of the tile that is."""
-        found = dict[tuple[int, int], Contact]()
-        for one, two in combinations(range(len(copies)), 2):
-            for k, j in ((one, two), (two, one)):
+        touching = dict[tuple[int, int], Contact]()
+        for first, second in combinations(range(len(copies)), 2):
+            for k, j in ((first, second), (second, first)):
                 linear = copies[k].linear.T @ copies[j].linear
                 shift = copies[k].linear.T @ (copies[j].shift - copies[k].shift)
-                for own in self.contacts:
-                    same = np.abs(own.element.linear - linear).max() < 1e-6
-                    if same and np.abs(own.element.translation - shift).max() < 1e-6 * self.size:
-                        found[k, j] = own
-        return found
+                for contact in self.contacts:
+                    same = np.abs(contact.element.linear - linear).max() < 1e-6
+                    if (
+                        same
+                        and np.abs(contact.element.translation - shift).max() < 1e-6 * self.size
+                    ):
+                        touching[k, j] = contact
+        return touching
 
     def _leaving(
         self,
@@ -368,8 +376,8 @@ def _directions(cone: FreeCone) -> Array:
         return np.zeros((0, 3))
     rays = cone.rays[:: max(1, len(cone.rays) // 12)]
     tried = [cone.middle, *rays, *(cone.middle + ray for ray in rays)]
-    tried = [own for own in tried if np.linalg.norm(own) > 1e-6]
-    return np.stack([own / np.linalg.norm(own) for own in tried])
+    tried = [direction for direction in tried if np.linalg.norm(direction) > 1e-6]
+    return np.stack([direction / np.linalg.norm(direction) for direction in tried])
 
 
 def axes_along(direction: Array) -> Array:

@@ -74,11 +74,11 @@ class BentBody:
         """
         spacing = self.body.spacing
         reach = max(REACH, FAR * spacing)
-        found = np.isfinite(self.distance.tree.query(points, distance_upper_bound=reach)[0])
-        rest = np.flatnonzero(~found)
+        near = np.isfinite(self.distance.tree.query(points, distance_upper_bound=reach)[0])
+        rest = np.flatnonzero(~near)
         deep = self._inner_tree.query(points[rest], distance_upper_bound=INNER_REACH * spacing)[0]
-        found[rest] = np.isfinite(deep)
-        return found
+        near[rest] = np.isfinite(deep)
+        return near
 
     @property
     def strain(self) -> float:
@@ -96,13 +96,15 @@ class BentBody:
         corners = (
             np.array(np.meshgrid(*zip(low - REACH, high + REACH, strict=True))).reshape(3, -1).T
         )
-        own = corners @ inverse.T
+        local = corners @ inverse.T
         cosets, shifts = list[int](), list[Array]()
         for k, (turn, shift) in enumerate(zip(self.family.turns, self.family.shifts, strict=True)):
-            copy = own @ turn.T + shift
+            copy = local @ turn.T + shift
             ranges = [
                 np.arange(np.ceil(a - d), np.floor(b - c) + 1)
-                for a, b, c, d in zip(own.min(0), own.max(0), copy.min(0), copy.max(0), strict=True)
+                for a, b, c, d in zip(
+                    local.min(0), local.max(0), copy.min(0), copy.max(0), strict=True
+                )
             ]
             cells = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
             linear = lattice @ turn @ inverse
@@ -172,43 +174,43 @@ def bent(start: BentBody, stages: Stages = STAGES) -> BentBody:
         start: The body in its place.
         stages: How strongly it is pulled, and for how many steps.
     """
-    found, importance = start, start.body.importance
+    bent_body, importance = start, start.body.importance
     size = start.body.size
     for strength, steps in stages:
         pulled = start.body.pulled(strength)
         for step in range(steps):
-            near = contacts(found)
+            near = contacts(bent_body)
             if step % 2 == 0:
-                found = refitted(found, near)
-                near = contacts(found)
+                bent_body = refitted(bent_body, near)
+                near = contacts(bent_body)
             other = np.where(near.copy >= 0, importance[near.point], importance[:size])
             share = other / (importance[:size] + other)
-            surface = found.surface
+            surface = bent_body.surface
             places = surface.points + surface.normals * (share * near.gaps)[:, None]
-            found = found.with_nodes(pulled.solved(found.nodes, places))
-    return found
+            bent_body = bent_body.with_nodes(pulled.solved(bent_body.nodes, places))
+    return bent_body
 
 
-def refitted(found: BentBody, near: Contacts) -> BentBody:
+def refitted(bent_body: BentBody, near: Contacts) -> BentBody:
     """Return the body in another place, and another lattice, with smaller gaps and overlaps.
 
     One step of Gauss and Newton over the stretches of the lattice, the shift and the rotation.
     """
-    family, own = found.family, np.flatnonzero(near.copy >= 0)
-    if not len(own):
-        return found
-    points, normals, free = found.surface.points, found.surface.normals, family.freedom
-    copy, other = near.copy[own], near.point[own]
+    family, touching = bent_body.family, np.flatnonzero(near.copy >= 0)
+    if not len(touching):
+        return bent_body
+    points, normals, free = bent_body.surface.points, bent_body.surface.normals, family.freedom
+    copy, other = near.copy[touching], near.point[touching]
     turns = family.turns[near.copies.cosets[copy]]
     shifts = family.shifts[near.copies.cosets[copy]] + near.copies.cells[copy]
-    lattice = found.lattice
+    lattice = bent_body.lattice
     linear = lattice @ turns @ np.linalg.inv(lattice)
     facing = np.einsum("nij,nj->ni", linear, normals[other])
     middle = points.mean(axis=0)
     at = np.linalg.solve(lattice, middle)
 
     def moved(values: Array, some: Array) -> tuple[Array, Array]:
-        own_lattice = family.lattice(found.stretches + values[:free])
+        own_lattice = family.lattice(bent_body.stretches + values[:free])
         turn = Rotation.from_rotvec(values[free + 3 :]).as_matrix()
         return own_lattice, (some - middle) @ turn.T + own_lattice @ at + values[free : free + 3]
 
@@ -216,15 +218,15 @@ def refitted(found: BentBody, near: Contacts) -> BentBody:
         own_lattice, placed = moved(values, points)
         back = placed[other] @ np.linalg.inv(own_lattice).T
         images = (np.einsum("nij,nj->ni", turns, back) + shifts) @ own_lattice.T
-        return ((placed[own] - images) * facing).sum(axis=1)
+        return ((placed[touching] - images) * facing).sum(axis=1)
 
     count, step = free + 6, 1e-4
     slopes = np.stack([gaps(step * row) - gaps(-step * row) for row in np.eye(count)], axis=1)
     slopes /= 2 * step
-    weight = 1 / (1 + (near.gaps[own] / REFIT_WIDTH) ** 2)
+    weight = 1 / (1 + (near.gaps[touching] / REFIT_WIDTH) ** 2)
     square = (slopes * weight[:, None]).T @ slopes
     square[np.diag_indices(count)] += DAMPING * np.trace(square) / count
-    values = -np.linalg.solve(square, slopes.T @ (weight * near.gaps[own]))
+    values = -np.linalg.solve(square, slopes.T @ (weight * near.gaps[touching]))
     values *= min(1.0, MOST_REFIT / max(float(abs(values).max()), 1e-12))
-    _, nodes = moved(values, found.nodes)
-    return BentBody(found.body, family, found.stretches + values[:free], nodes)
+    _, nodes = moved(values, bent_body.nodes)
+    return BentBody(bent_body.body, family, bent_body.stretches + values[:free], nodes)

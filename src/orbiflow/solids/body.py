@@ -219,14 +219,16 @@ def _importance(distance: SignedDistance, surface: Mesh, edges: Integers, count:
     deep = surface.points[:, None] - surface.normals[:, None] * depths[:, None]
     out = (distance(deep.reshape(-1, 3)) > 0).reshape(len(surface.points), -1)
     thick = np.where(out.any(axis=1), depths[out.argmax(axis=1)], THICKEST)
-    found, known = np.ones(count), np.zeros(count)
-    found[: len(thick)] = np.clip((THIN / thick) ** THIN_POWER, 1, MOST_IMPORTANT)
-    known[: len(thick)] = 1
+    importance, reached = np.ones(count), np.zeros(count)
+    importance[: len(thick)] = np.clip((THIN / thick) ** THIN_POWER, 1, MOST_IMPORTANT)
+    reached[: len(thick)] = 1
     ones, others = np.concatenate([edges, edges[:, ::-1]]).T
     links = scipy.sparse.csr_matrix((np.ones(len(ones)), (ones, others)), (count, count))
     near: Any = links + scipy.sparse.identity(count)
     for _ in range(5):
-        total = near @ known
-        found = np.where(total > 0, (near @ (found * known)) / np.maximum(total, 1e-9), found)
-        known = (total > 0).astype(float)
-    return np.where(known > 0, found, 1.0)
+        total = near @ reached
+        importance = np.where(
+            total > 0, (near @ (importance * reached)) / np.maximum(total, 1e-9), importance
+        )
+        reached = (total > 0).astype(float)
+    return np.where(reached > 0, importance, 1.0)

@@ -94,7 +94,7 @@ def _main() -> int:
     _bound(int(memory), int(seconds))
     try:
         soup, content = read_here(Path(path)), io.BytesIO()
-        np.savez(content, **{k: own for k, own in soup._asdict().items() if own is not None})
+        np.savez(content, **{k: array for k, array in soup._asdict().items() if array is not None})
         output.write(content.getbuffer())
         output.close()
         return 0

@@ -64,14 +64,14 @@ class CellShape:
     @cached_property
     def faces(self) -> tuple[tuple[tuple[int, ...], ...], ...]:
         """For each kind its faces: cycles of corners, counter-clockwise from outside."""
-        return tuple(_convex_faces(own) for own in self.corners)
+        return tuple(_convex_faces(corners) for corners in self.corners)
 
     @cached_property
     def face_corners(self) -> Integers:
         """The corners (K, faces, 4, 3) of each face on the finer grid; a triangle repeats its last."""
         rows = [
-            [own[[*face, face[-1]][:4]] for face in faces]
-            for own, faces in zip(self.corners, self.faces, strict=True)
+            [corners[[*face, face[-1]][:4]] for face in faces]
+            for corners, faces in zip(self.corners, self.faces, strict=True)
         ]
         return np.array(rows)
 
@@ -85,12 +85,12 @@ class CellShape:
                 for face in faces:
                     key = self._points(kind, face, offset)
                     owners.setdefault(key, []).append((offset, kind))
-        found: list[tuple[Neighbor, ...]] = []
+        neighbors: list[tuple[Neighbor, ...]] = []
         for kind, faces in enumerate(self.faces):
             rows = [owners[self._points(kind, face, (0, 0, 0))] for face in faces]
-            own = ((0, 0, 0), kind)
-            found.append(tuple(Neighbor(*next(r for r in row if r != own)) for row in rows))
-        return tuple(found)
+            cell = ((0, 0, 0), kind)
+            neighbors.append(tuple(Neighbor(*next(r for r in row if r != cell)) for row in rows))
+        return tuple(neighbors)
 
     @cached_property
     def parts(self) -> tuple[tuple[CellPart, ...], ...]:
@@ -128,16 +128,16 @@ class CellShape:
             frozenset(e) for face in faces for e in zip(face, face[1:] + face[:1], strict=True)
         }
         ones = [frozenset([corner]) for corner in range(self.corners.shape[1])]
-        found: list[CellPart] = []
-        for own in [*ones, *sorted(edges, key=sorted)]:
-            points = sorted(self.corners[kind][sorted(own)].tolist())
+        parts: list[CellPart] = []
+        for members in [*ones, *sorted(edges, key=sorted)]:
+            points = sorted(self.corners[kind][sorted(members)].tolist())
             offset = np.array(points[0]) // self.denominator
             local = tuple(map(tuple, (np.array(points) - self.denominator * offset).tolist()))
             number = numbers.setdefault(local, len(numbers))
-            bits = sum(1 << bit for bit, face in enumerate(faces) if own <= set(face))
+            bits = sum(1 << bit for bit, face in enumerate(faces) if members <= set(face))
             x, y, z = offset.tolist()
-            found.append(CellPart((x, y, z), number, bits))
-        return tuple(found)
+            parts.append(CellPart((x, y, z), number, bits))
+        return tuple(parts)
 
 
 def _is_connected(bits: int, meet: list[list[bool]]) -> bool:
@@ -145,8 +145,8 @@ def _is_connected(bits: int, meet: list[list[bool]]) -> bool:
     members = [k for k in range(len(meet)) if bits >> k & 1]
     reached, waiting = set(members[:1]), members[:1]
     while waiting:
-        own = waiting.pop()
-        more = [k for k in members if meet[own][k] and k not in reached]
+        face = waiting.pop()
+        more = [k for k in members if meet[face][k] and k not in reached]
         reached.update(more)
         waiting.extend(more)
     return bool(members) and len(reached) == len(members)
@@ -154,7 +154,7 @@ def _is_connected(bits: int, meet: list[list[bool]]) -> bool:
 
 def _convex_faces(corners: Integers) -> tuple[tuple[int, ...], ...]:
     """Return the faces of the convex hull as cycles of corners, counter-clockwise from outside."""
-    found: dict[frozenset[int], tuple[int, ...]] = {}
+    faces: dict[frozenset[int], tuple[int, ...]] = {}
     for triple in itertools.permutations(range(len(corners)), 3):
         a, b, c = corners[list(triple)]
         normal = np.cross(b - a, c - a)
@@ -168,8 +168,8 @@ def _convex_faces(corners: Integers) -> tuple[tuple[int, ...], ...]:
             offsets @ across / np.linalg.norm(across),
             offsets @ offsets[0] / np.linalg.norm(offsets[0]),
         )
-        found.setdefault(frozenset(on.tolist()), tuple(on[np.argsort(angles)].tolist()))
-    return tuple(found.values())
+        faces.setdefault(frozenset(on.tolist()), tuple(on[np.argsort(angles)].tolist()))
+    return tuple(faces.values())
 
 
 @cache

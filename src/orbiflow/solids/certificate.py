@@ -172,18 +172,18 @@ def face_partners(group: CrystallographicGroup, mesh: Mesh) -> tuple[Integers, f
         near = np.abs(rest).max(axis=1) <= 4 * tolerance
         if coset == 0:
             near &= (first != second) | steps.any(axis=1)
-        own, other, move = first[near], second[near], steps[near] @ group.lattice.T + shift
+        face, other, move = first[near], second[near], steps[near] @ group.lattice.T + shift
         images = corners[other] @ linear.T + move[:, None]
         if np.linalg.det(linear) > 0:  # turned over, the corners run the other way
             images = images[:, ::-1]
         misses = [
-            np.linalg.norm(np.roll(images, k, axis=1) - corners[own], axis=2).max(axis=1)
+            np.linalg.norm(np.roll(images, k, axis=1) - corners[face], axis=2).max(axis=1)
             for k in range(3)
         ]
         miss = np.min(misses, axis=0)
         fits = miss <= tolerance
-        partners[own[fits]] = other[fits]
-        np.add.at(matches, own[fits], 1)
+        partners[face[fits]] = other[fits]
+        np.add.at(matches, face[fits], 1)
         error = max(error, float(miss[fits].max(initial=0.0)))
     mutual = (partners >= 0) & (matches == 1)
     mutual &= partners[np.where(partners >= 0, partners, 0)] == every
@@ -227,7 +227,7 @@ def boolean_errors(group: CrystallographicGroup, mesh: Mesh) -> tuple[float, flo
     radius = float(np.linalg.norm(mesh.points - center, axis=1).max())
     reach = radius + float(np.linalg.norm(half))
     rest, overlap, near = 8 * float(np.prod(half)), 0.0, 0
-    asked: list[Isometry] = []
+    compared: list[Isometry] = []
     for element in group.elements_near(center, reach):
         shift = element(center) - center
         middle = mesh.points @ element.linear.T + (element.translation - center)
@@ -238,8 +238,8 @@ def boolean_errors(group: CrystallographicGroup, mesh: Mesh) -> tuple[float, flo
         if np.allclose(element.linear, np.eye(3)) and np.allclose(element.translation, 0):
             continue
         near += 1
-        if not any(_are_inverse(element, other, radius) for other in asked):
-            asked.append(element)
+        if not any(_are_inverse(element, other, radius) for other in compared):
+            compared.append(element)
             overlap = max(overlap, _shared_volume(solid, copy, volume))
     return overlap / volume, rest / volume, near
 

@@ -90,16 +90,16 @@ def close_tile(
         complex: The cells.
     """
     low, high, reach = np.asarray(lower, float), np.asarray(upper, float), MARGIN
-    found = _closed_in(function, low, high, complex, reach)
+    tile = _closed_in(function, low, high, complex, reach)
     for _ in range(WIDENINGS):
-        if found.is_ball or found.missing <= FEW_MISSING:
+        if tile.is_ball or tile.missing <= FEW_MISSING:
             break
         # orbits may touch the ball only farther off
         more = 2 * reach * complex.spacing * complex.cells_per_tile ** (1 / 3)
         low, high, reach = low - more, high + more, 3 * reach
         again = _closed_in(function, low, high, complex, reach)
-        found = min(found, again, key=lambda own: own.missing)
-    return found
+        tile = min(tile, again, key=lambda attempt: attempt.missing)
+    return tile
 
 
 def ball_of_cells(
@@ -110,7 +110,7 @@ def ball_of_cells(
         close_tile(function, *bounds, cell_complex(group, round(share * detail)))
         for share in FINENESS
     )
-    return next((own for own in closed if own.is_ball), None)
+    return next((tile for tile in closed if tile.is_ball), None)
 
 
 def _closed_in(
@@ -136,13 +136,13 @@ def _closed_in(
         if not _polish(ball, wanted, size):
             break
     members = ball.members()
-    own = ball.orbit_of[members]
-    lost = values[best[own]] - values[members]
+    its_orbits = ball.orbit_of[members]
+    lost = values[best[its_orbits]] - values[members]
     return CellTile(
         complex,
         box.cells(members),
         missing=complex.cells_per_tile - len(members),
-        moved=int(np.sum(best[own] != members)),
+        moved=int(np.sum(best[its_orbits] != members)),
         loss=float(lost.mean()) / unit,
         raw_pieces=len(pieces),
         raw_strays=int(pieces.sum() - pieces.max()),
@@ -181,12 +181,12 @@ def _settled(box: CellBox, orbits: Integers, values: Array, members: Integers) -
         share = np.where(offset, places - corner, 1 - places + corner).prod(axis=1)
         np.add.at(density, tuple((corner + offset).T), share)
     density = scipy.ndimage.gaussian_filter(density, BLUR)
-    found = np.full(len(orbits), -np.inf)
+    settled = np.full(len(orbits), -np.inf)
     for part in np.array_split(inner, len(inner) // POINTS_AT_ONCE + 1):
         at = (box.centers(part) - low) / spacing
         around = scipy.ndimage.map_coordinates(density, at.T, order=1)
-        found[part] = around + FAITH * np.clip(values[part], -MOST_SPACINGS, MOST_SPACINGS)
-    return found
+        settled[part] = around + FAITH * np.clip(values[part], -MOST_SPACINGS, MOST_SPACINGS)
+    return settled
 
 
 def _evaluated(

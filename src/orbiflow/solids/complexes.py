@@ -40,10 +40,10 @@ def conventional_group(group: CrystallographicGroup) -> CrystallographicGroup:
         lattice = lattice * (1, 1, -1)
     between = _points_between(np.linalg.solve(lattice, primitive.lattice))
     cosets: list[Isometry] = []
-    for shift, own in itertools.product(between, primitive.cosets):
-        fractional = np.linalg.solve(lattice, own.translation) + shift
+    for shift, coset in itertools.product(between, primitive.cosets):
+        fractional = np.linalg.solve(lattice, coset.translation) + shift
         fractional = fractional - np.floor(fractional + 1e-9)
-        cosets.append(Isometry(own.linear, lattice @ fractional))
+        cosets.append(Isometry(coset.linear, lattice @ fractional))
     return CrystallographicGroup(lattice, tuple(cosets), group.name)
 
 
@@ -112,15 +112,15 @@ class Complex:
         Raises `GroupError` if an element maps a cell to itself.
         """
         shape = (*self.counts.tolist(), self.shape.kinds)
-        own = np.arange(np.prod(shape), dtype=np.int32).reshape(shape)
-        first = own.copy()
+        index = np.arange(np.prod(shape), dtype=np.int32).reshape(shape)
+        first = index.copy()
         for coset in range(1, self.group.order):
             for kind in range(self.shape.kinds):
                 image = self._image_numbers(coset, kind)
-                if np.any(image == own[..., kind]):
+                if np.any(image == index[..., kind]):
                     raise GroupError(_fixed_cell_message(self.group))
                 np.minimum(first[..., kind], image, out=first[..., kind])
-        numbers = np.cumsum((first == own).ravel(), dtype=np.int32) - 1
+        numbers = np.cumsum((first == index).ravel(), dtype=np.int32) - 1
         return numbers[first.ravel()].reshape(shape)
 
     def orbit_of(self, cells: Integers) -> Integers:
@@ -138,22 +138,26 @@ class Complex:
         cosets, shifts = np.full(len(start), -1), np.zeros((len(start), 3), np.int64)
         for coset, (matrix, shift) in enumerate(zip(*self.actions, strict=True)):
             rest = end - start @ matrix.T - shift
-            found = ~np.any(rest % self.grid, axis=1)
-            cosets[found], shifts[found] = coset, rest[found] // self.grid
+            carried = ~np.any(rest % self.grid, axis=1)
+            cosets[carried], shifts[carried] = coset, rest[carried] // self.grid
         if np.any(cosets < 0):
             raise GroupError("two cells are not of one orbit")
         return cosets, shifts
 
     def images(self, points: Integers, cosets: Integers, shifts: Integers) -> Integers:
         """Return points (n, 3) of the finer grid, each moved by its own element."""
-        matrices, own = self.actions
-        return np.einsum("nij,nj->ni", matrices[cosets], points) + own[cosets] + shifts * self.grid
+        matrices, translations = self.actions
+        return (
+            np.einsum("nij,nj->ni", matrices[cosets], points)
+            + translations[cosets]
+            + shifts * self.grid
+        )
 
     def preimages(self, points: Integers, cosets: Integers, shifts: Integers) -> Integers:
         """Return points (n, 3) of the finer grid, each moved by the inverse of its own element."""
-        matrices, own = self.actions
+        matrices, translations = self.actions
         inverse = np.round(np.linalg.inv(matrices)).astype(np.int64)
-        rest = points - own[cosets] - shifts * self.grid
+        rest = points - translations[cosets] - shifts * self.grid
         return np.einsum("nij,nj->ni", inverse[cosets], rest)
 
     def _image_numbers(self, coset: int, kind: int) -> Array:
@@ -183,18 +187,18 @@ def cell_complex(group: CrystallographicGroup, cubes_per_tile: int) -> Complex:
         GroupError: For a group with mirrors, of another dimension, or whose translations are not
             simple fractions of its cell.
     """
-    own = conventional_group(group)
-    if _has_mirror(own):
+    conventional = conventional_group(group)
+    if _has_mirror(conventional):
         raise GroupError(
             f"{group.name or group!r} has mirrors: a solid would be cut flat along them; choose a "
             "group without mirrors"
         )
-    shape = _shape_for(own)
+    shape = _shape_for(conventional)
     for factor in (1, 2, 3, 6):
         # more even counts keep axes and centres of symmetry off the centres of the cells
-        found = Complex(own, _counts(own, shape, cubes_per_tile, factor), shape)
-        if not _fixes_a_cell(found):
-            return found
+        cells = Complex(conventional, _counts(conventional, shape, cubes_per_tile, factor), shape)
+        if not _fixes_a_cell(cells):
+            return cells
     raise GroupError(_fixed_cell_message(group))
 
 
@@ -253,7 +257,7 @@ def _has_mirror(group: CrystallographicGroup) -> bool:
 
 def _axes(group: CrystallographicGroup, order: int) -> list[Integers]:
     """Return the directions of rotation of this order, up to sign, in coordinates of the lattice."""
-    found: dict[tuple[int, ...], Integers] = {}
+    axes: dict[tuple[int, ...], Integers] = {}
     for matrix in group.integral_parts:
         proper = matrix * round(np.linalg.det(matrix))
         powers = [np.linalg.matrix_power(proper, k) for k in range(12)]
@@ -264,8 +268,8 @@ def _axes(group: CrystallographicGroup, order: int) -> list[Integers]:
         column = projection[:, np.abs(projection).sum(axis=0).argmax()]
         axis = column // np.gcd.reduce(column)
         axis = axis * np.sign(axis[np.flatnonzero(axis)[0]])
-        found.setdefault(tuple(axis.tolist()), axis)
-    return list(found.values())
+        axes.setdefault(tuple(axis.tolist()), axis)
+    return list(axes.values())
 
 
 def _turn_about(group: CrystallographicGroup, axis: Integers, order: int) -> Integers:

@@ -49,14 +49,14 @@ def contacts(group: CrystallographicGroup, tile: Mesh) -> list[Contact]:
     """
     center = (tile.points.min(axis=0) + tile.points.max(axis=0)) / 2
     radius = float(np.linalg.norm(tile.points - center, axis=1).max())
-    found = list[Contact]()
+    touching = list[Contact]()
     for element in group.elements_near(center, 2 * radius + SAME_PLACE, source=center):
         if np.allclose(element.linear, np.eye(3)) and np.abs(element.translation).max() < 1e-9:
             continue
         faces, area = _touching(tile, element, SAME_PLACE * radius)
         if len(faces):
-            found.append(Contact(element, faces, area))
-    return sorted(found, key=lambda own: -own.area)
+            touching.append(Contact(element, faces, area))
+    return sorted(touching, key=lambda contact: -contact.area)
 
 
 def _touching(tile: Mesh, element: Isometry, near: float) -> tuple[Integers, float]:
@@ -71,8 +71,8 @@ def _touching(tile: Mesh, element: Isometry, near: float) -> tuple[Integers, flo
         for c in (tile.corners[mine], other.corners[its])
     )
     # most contacts are of equal triangles
-    found = cKDTree(its_middles).query(middles)
-    distance, place = np.asarray(found[0]), np.asarray(found[1], np.int64)
+    nearest = cKDTree(its_middles).query(middles)
+    distance, place = np.asarray(nearest[0]), np.asarray(nearest[1], np.int64)
     area = np.linalg.norm(tile.face_vectors[mine], axis=1) / 2
     same = (distance < near) & _back_to_back(tile, mine, other, its[place], near)
     rest, its_rest = mine[~same], np.setdiff1d(np.arange(len(its)), place[same])
@@ -80,13 +80,13 @@ def _touching(tile: Mesh, element: Isometry, near: float) -> tuple[Integers, flo
         return mine[same], float(area[same].sum())
     tree, its_tree = cKDTree(middles[~same]), cKDTree(its_middles[its_rest])
     pairs = tree.query_ball_tree(its_tree, reach + its_reach)
-    first = np.repeat(np.arange(len(rest)), [len(own) for own in pairs])
-    second = np.array([k for own in pairs for k in own], np.int64)
-    one, two = rest[first], its[its_rest[second]]
-    plane = _back_to_back(tile, one, other, two, near)
-    shared = _common_areas(tile, one[plane], other, two[plane])
+    first = np.repeat(np.arange(len(rest)), [len(places) for places in pairs])
+    second = np.array([k for places in pairs for k in places], np.int64)
+    left, right = rest[first], its[its_rest[second]]
+    plane = _back_to_back(tile, left, other, right, near)
+    shared = _common_areas(tile, left[plane], other, right[plane])
     touching = shared > near**2
-    faces = np.union1d(mine[same], one[plane][touching])
+    faces = np.union1d(mine[same], left[plane][touching])
     return faces, float(area[same].sum() + shared[touching].sum())
 
 
@@ -192,13 +192,13 @@ def _thin_cone(units: Array) -> FreeCone:
         rays = np.array([sign * plane[0] for sign in (1, -1) if _is_free(units, sign * plane[0])])
         return FreeCone(rays.reshape(-1, 3), rays[0] if len(rays) else None, min(len(rays), 1))
     angles = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
-    own = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ plane[:2]
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ plane[:2]
     loose = units[np.abs(units @ plane[:2].T).max(axis=1) > 10 * ALONG]
     edges = np.cross(loose, np.cross(*plane[:2]))
     edges /= np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-300)
-    tried = np.concatenate([edges, -edges, own[::1800]])
+    tried = np.concatenate([edges, -edges, circle[::1800]])
     rays = tried[(tried @ units.T <= ALONG).all(axis=1)]
-    free = own[(own @ units.T <= ALONG).all(axis=1)]
+    free = circle[(circle @ units.T <= ALONG).all(axis=1)]
     if not len(rays):
         return FreeCone(np.zeros((0, 3)), None, 0)
     deepest = free if len(free) else rays

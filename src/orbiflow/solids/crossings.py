@@ -34,18 +34,18 @@ def crossing_pairs(points: Array, faces: Integers, moved: Mask | None = None) ->
         moved: A mask (M,): of each pair at least one triangle is among these. Default: all.
     """
     corners = points[faces]
-    found = [np.empty((0, 2), np.int64)]
+    pairs = [np.empty((0, 2), np.int64)]
     for first, second in _near_pairs(corners, moved):
         same = faces[first][:, :, None] == faces[second][:, None, :]
         number = same.sum(axis=(1, 2))
         for shared, meets in enumerate((_disjoint_meet, _fans_meet, _hinges_meet)):
-            own = number == shared
-            a, b = _shared_first(corners, first[own], second[own], same[own])
-            hit = np.flatnonzero(own)[meets(a, b)]
-            found.append(np.stack([first[hit], second[hit]], axis=1))
+            chosen = number == shared
+            a, b = _shared_first(corners, first[chosen], second[chosen], same[chosen])
+            hit = np.flatnonzero(chosen)[meets(a, b)]
+            pairs.append(np.stack([first[hit], second[hit]], axis=1))
         equal = number == 3
-        found.append(np.stack([first[equal], second[equal]], axis=1))
-    return np.concatenate(found)
+        pairs.append(np.stack([first[equal], second[equal]], axis=1))
+    return np.concatenate(pairs)
 
 
 def orientation_signs(a: Array, b: Array, c: Array, d: Array) -> Integers:
@@ -124,10 +124,13 @@ def _hinges_meet(a: Array, b: Array) -> Mask:
     mine, other = np.cross(edge, a[:, 2] - a[:, 0]), np.cross(edge, b[:, 2] - a[:, 0])
     dots, sizes = np.einsum("ij,ij->i", mine, other), _norms(mine) * _norms(other)
     meet = dots > -1e-9 * sizes  # the others are folded by less than a right angle
-    own = np.flatnonzero(meet)
-    flat = orientation_signs(a[own, 0], a[own, 1], a[own, 2], b[own, 2]) == 0
-    meet[own[~flat]] = False
-    for k in own[flat]:
+    candidates = np.flatnonzero(meet)
+    flat = (
+        orientation_signs(a[candidates, 0], a[candidates, 1], a[candidates, 2], b[candidates, 2])
+        == 0
+    )
+    meet[candidates[~flat]] = False
+    for k in candidates[flat]:
         v, w, p, q = (_exact(row) for row in (*a[k], b[k, 2]))
         along = _less(w, v)
         meet[k] = _dot(_cross(along, _less(p, v)), _cross(along, _less(q, v))) > 0
@@ -138,10 +141,10 @@ def _fans_meet(a: Array, b: Array) -> Mask:
     """Return whether pairs with one common corner, the first, meet elsewhere too."""
     apart = _planes_part(a, b, 1) | _planes_part(b, a, 1)
     meet = np.zeros(len(a), bool)
-    own = np.flatnonzero(~apart)
-    own = own[~_fans_part(a[own], b[own])]
-    meet[own] = _edge_meets(a[own, 1], a[own, 2], b[own]) | _edge_meets(
-        b[own, 1], b[own, 2], a[own]
+    candidates = np.flatnonzero(~apart)
+    candidates = candidates[~_fans_part(a[candidates], b[candidates])]
+    meet[candidates] = _edge_meets(a[candidates, 1], a[candidates, 2], b[candidates]) | _edge_meets(
+        b[candidates, 1], b[candidates, 2], a[candidates]
     )
     return meet
 
@@ -150,11 +153,11 @@ def _disjoint_meet(a: Array, b: Array) -> Mask:
     """Return whether pairs without a common corner meet."""
     apart = _planes_part(a, b, 0) | _planes_part(b, a, 0)
     meet = np.zeros(len(a), bool)
-    own = np.flatnonzero(~apart)
-    own = own[~_edges_part(a[own], b[own])]
+    candidates = np.flatnonzero(~apart)
+    candidates = candidates[~_edges_part(a[candidates], b[candidates])]
     for k in range(3):
-        meet[own] |= _edge_meets(a[own, k], a[own, k - 1], b[own])
-        meet[own] |= _edge_meets(b[own, k], b[own, k - 1], a[own])
+        meet[candidates] |= _edge_meets(a[candidates, k], a[candidates, k - 1], b[candidates])
+        meet[candidates] |= _edge_meets(b[candidates, k], b[candidates, k - 1], a[candidates])
     return meet
 
 
@@ -211,11 +214,14 @@ def _edge_meets(p: Array, q: Array, triangle: Array) -> Mask:
     a, b, c = np.moveaxis(triangle, 1, 0)
     start, end = orientation_signs(a, b, c, p), orientation_signs(a, b, c, q)
     meet = np.zeros(len(p), bool)
-    own = np.flatnonzero((start * end <= 0) & ((start != 0) | (end != 0)))
+    candidates = np.flatnonzero((start * end <= 0) & ((start != 0) | (end != 0)))
     sides = np.stack(
-        [orientation_signs(p[own], q[own], u[own], v[own]) for u, v in ((a, b), (b, c), (c, a))]
+        [
+            orientation_signs(p[candidates], q[candidates], u[candidates], v[candidates])
+            for u, v in ((a, b), (b, c), (c, a))
+        ]
     )
-    meet[own] = np.all(sides >= 0, axis=0) | np.all(sides <= 0, axis=0)
+    meet[candidates] = np.all(sides >= 0, axis=0) | np.all(sides <= 0, axis=0)
     for k in np.flatnonzero((start == 0) & (end == 0)):
         meet[k] = _meets_in_plane(_exact(p[k]), _exact(q[k]), [_exact(row) for row in triangle[k]])
     return meet
@@ -238,7 +244,7 @@ def _meets_in_plane(p: Vector, q: Vector, triangle: list[Vector]) -> bool:
         if all(side(ring[k - 1], ring[k], point) * turn < 0 for point in (start, end)):
             return False
     sides = [side(start, end, point) for point in ring]
-    return not (all(own > 0 for own in sides) or all(own < 0 for own in sides))
+    return not (all(sign > 0 for sign in sides) or all(sign < 0 for sign in sides))
 
 
 def _norms(vectors: Array) -> Array:

@@ -57,11 +57,11 @@ class SignedDistance:
 
     def __call__(self, points: Array) -> Array:
         """Return the distances (n,) of points (n, 3)."""
-        found = np.empty(len(points))
+        distances = np.empty(len(points))
         for start in range(0, len(points), AT_ONCE):
             part = slice(start, start + AT_ONCE)
-            found[part] = self._quickly(points[part])
-        return found
+            distances[part] = self._quickly(points[part])
+        return distances
 
     def _quickly(self, points: Array) -> Array:
         """Return distances, by one point of the surface where that is in no doubt: far away."""
@@ -69,12 +69,12 @@ class SignedDistance:
         near: Integers
         away, near = cast(Any, self.tree.query(points, 1))
         plane = ((points - self.points[near]) * self.normals[near]).sum(axis=1)
-        found = np.copysign(away, plane)
+        distances = np.copysign(away, plane)
         if self.weights is not None:
-            found *= np.where(found < 0, self.weights[near], 1.0)
+            distances *= np.where(distances < 0, self.weights[near], 1.0)
         some = np.flatnonzero((away < FAR * self.spacing) | (abs(plane) < SLANTED * away))
-        found[some], _ = self.with_nearest(points[some])
-        return found
+        distances[some], _ = self.with_nearest(points[some])
+        return distances
 
     def with_nearest(self, points: Array) -> tuple[Array, Integers]:
         """Return the distances (n,) of points (n, 3), and the nearest of the surface's points (n,)."""
@@ -87,10 +87,10 @@ class SignedDistance:
         planes = np.einsum("nkj,nkj->nk", points[:, None] - self.points[near], self.normals[near])
         flat = (share * planes).sum(axis=1)
         far = np.clip(2 * least[:, 0] / (FAR * self.spacing) - 1, 0, 1)
-        found = (1 - far) * flat + far * np.copysign(least[:, 0], flat)
+        distances = (1 - far) * flat + far * np.copysign(least[:, 0], flat)
         if self.weights is not None:
-            found *= np.where(found < 0, (share * self.weights[near]).sum(axis=1), 1.0)
-        return found, near[:, 0]
+            distances *= np.where(distances < 0, (share * self.weights[near]).sum(axis=1), 1.0)
+        return distances, near[:, 0]
 
 
 def surface_points(mesh: Mesh, spacing: float) -> tuple[Array, Array]:
@@ -106,14 +106,16 @@ def surface_points(mesh: Mesh, spacing: float) -> tuple[Array, Array]:
     counts = np.minimum(np.ceil(sides / (EVEN * spacing)).astype(int), 64)
     points, directions = [mesh.points], [mesh.normals]
     for count in np.unique(counts[counts > 1]):
-        own = counts == count
+        faces = counts == count
         i, j = (k.ravel() for k in np.meshgrid(np.arange(count + 1), np.arange(count + 1)))
         shares = np.stack([i, j, count - i - j], axis=1)[i + j <= count] / count
         shares = shares[shares.max(axis=1) < 1]
-        points.append(np.einsum("sk,fkj->fsj", shares, corners[own]).reshape(-1, 3))
+        points.append(np.einsum("sk,fkj->fsj", shares, corners[faces]).reshape(-1, 3))
         # half of the face's own normal, or creases would be rounded off over large faces
-        found = 0.5 * np.einsum("sk,fkj->fsj", shares, normals[own]) + 0.5 * flat[own][:, None]
-        directions.append(found.reshape(-1, 3))
+        blended = (
+            0.5 * np.einsum("sk,fkj->fsj", shares, normals[faces]) + 0.5 * flat[faces][:, None]
+        )
+        directions.append(blended.reshape(-1, 3))
     spots, ways = np.concatenate(points), np.concatenate(directions)
     _, first = np.unique(
         np.round(spots / (0.3 * spacing)).astype(np.int64), axis=0, return_index=True
@@ -151,11 +153,11 @@ def _crossings(
     k = np.arange(len(face)) - np.repeat(np.cumsum(number) - number, number)
     column = first[face] + np.stack([k // sizes[face, 1], k % sizes[face, 1]], axis=1)
     a, b, c = np.moveaxis(corners[face], 1, 0)
-    one, two, at = b - a, c - a, column - a[:, :2]
-    twice = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    left, right, at = b - a, c - a, column - a[:, :2]
+    twice = left[:, 0] * right[:, 1] - left[:, 1] * right[:, 0]
     twice = np.where(twice == 0, 1e-300, twice)
-    u = (at[:, 0] * two[:, 1] - at[:, 1] * two[:, 0]) / twice
-    v = (one[:, 0] * at[:, 1] - one[:, 1] * at[:, 0]) / twice
+    u = (at[:, 0] * right[:, 1] - at[:, 1] * right[:, 0]) / twice
+    v = (left[:, 0] * at[:, 1] - left[:, 1] * at[:, 0]) / twice
     met = (u >= 0) & (v >= 0) & (u + v <= 1)
-    height = a[:, 2] + u * one[:, 2] + v * two[:, 2]
+    height = a[:, 2] + u * left[:, 2] + v * right[:, 2]
     return column[met], height[met], -np.sign(twice[met]).astype(int)

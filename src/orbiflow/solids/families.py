@@ -90,7 +90,7 @@ class GroupFamily:
                 matrix[i, j] = matrix[j, i] = 1.0 if i == j else np.sqrt(0.5)
                 symmetric.append(matrix)
         rows = np.array(symmetric)
-        lost = [own @ rows - rows @ own for own in self.base.linear_parts]
+        lost = [linear @ rows - rows @ linear for linear in self.base.linear_parts]
         trace = np.trace(rows, axis1=1, axis2=2)[:, None]
         system = np.concatenate([np.concatenate(lost, axis=1).reshape(6, -1), trace], axis=1).T
         return np.einsum("ak,aij->kij", scipy.linalg.null_space(system), rows)
@@ -102,10 +102,10 @@ class GroupFamily:
 
     def stretch(self, values: ArrayLike) -> Array:
         """Return the matrix (3, 3) that stretches the base by so many numbers (k,)."""
-        own = np.asarray(values, float)
+        amounts = np.asarray(values, float)
         return (
-            scipy.linalg.expm(np.einsum("k,kij->ij", own, self.stretches))
-            if len(own)
+            scipy.linalg.expm(np.einsum("k,kij->ij", amounts, self.stretches))
+            if len(amounts)
             else np.eye(3)
         )
 

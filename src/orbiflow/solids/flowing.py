@@ -74,20 +74,20 @@ def flowed_tile(
         group: A space group without mirrors, whose tiles have the volume 1.
         stages: Fields and steps, the coarse ones first.
     """
-    own = starting_surface(function, body, group)
-    smoother = Smoother(group, own)
+    surface = starting_surface(function, body, group)
+    smoother = Smoother(group, surface)
     for stage in stages:
         waves = max(1, round(group.cell_volume ** (1 / 3) / stage.wavelength))
         field = FourierField(group, waves, smoothness=SMOOTHNESS)
         for step in range(stage.steps):
-            fine = divided_to(own, stage.edge)
-            if step == 0 or fine is not own:
+            fine = divided_to(surface, stage.edge)
+            if step == 0 or fine is not surface:
                 smoother = Smoother(group, fine)
-            found = uncrossed(smoother.evened(moved(function, field, fine), EVENNESS), smoother)
-            if found is None:
+            evened = uncrossed(smoother.evened(moved(function, field, fine), EVENNESS), smoother)
+            if evened is None:
                 break
-            own = found
-    return own.mesh
+            surface = evened
+    return surface.mesh
 
 
 def starting_surface(
@@ -98,9 +98,9 @@ def starting_surface(
     for cells in START_CELLS:
         tile = close_tile(function, *box, cell_complex(group, cells))
         if tile.is_ball:
-            found = _surface(tile, function)
-            if not len(crossing_pairs(found.mesh.points, found.mesh.faces)):
-                return found
+            surface = _surface(tile, function)
+            if not len(crossing_pairs(surface.mesh.points, surface.mesh.faces)):
+                return surface
     return dirichlet_cell(group, best_site(body, group))
 
 
@@ -135,27 +135,27 @@ def _surface(tile: CellTile, function: Function) -> MatchedSurface:
     return MatchedSurface.of(tile.complex.group, tile_surface(tile, function))
 
 
-def divided_to(own: MatchedSurface, edge: float) -> MatchedSurface:
+def divided_to(surface: MatchedSurface, edge: float) -> MatchedSurface:
     """Return a surface without edges longer than `edge`; the same if it has none."""
-    while (long := own.edge_lengths > edge).any():
-        own = own.divided(long)
-    return own
+    while (long := surface.edge_lengths > edge).any():
+        surface = surface.divided(long)
+    return surface
 
 
-def moved(function: Function, field: FourierField, own: MatchedSurface) -> MatchedSurface:
+def moved(function: Function, field: FourierField, surface: MatchedSurface) -> MatchedSurface:
     """Return a surface moved by the flow of a field towards where the function is 0.
 
     The field is shortened so that none of the edges changes by much of its length.
     """
     with one_thread(), torch.no_grad():
-        found = fitted_field(function, field, own.mesh)
-        points = torch.from_numpy(own.mesh.points)
-        a, b = torch.from_numpy(own.mesh.edges.T)
-        speeds = found(points)
+        fitted = fitted_field(function, field, surface.mesh)
+        points = torch.from_numpy(surface.mesh.points)
+        a, b = torch.from_numpy(surface.mesh.edges.T)
+        speeds = fitted(points)
         changes = (speeds[a] - speeds[b]).norm(dim=1) / (points[a] - points[b]).norm(dim=1)
         share = min(1.0, STEEPEST / max(float(changes.max()), 1e-12))
-        flow = Flow(found.with_parameters(share * found.parameters_), steps=1, warn=False)
-        return own.with_points(flow.carried(points).numpy())
+        flow = Flow(fitted.with_parameters(share * fitted.parameters_), steps=1, warn=False)
+        return surface.with_points(flow.carried(points).numpy())
 
 
 def fitted_field(function: Function, field: FourierField, mesh: Mesh) -> FourierField:
@@ -174,7 +174,7 @@ def fitted_field(function: Function, field: FourierField, mesh: Mesh) -> Fourier
         along = (moves * normals).sum(dim=1, keepdim=True) * normals
         return field.adjoint(points, areas * (along + SLIDING * moves)) + DAMPING * values
 
-    found = torch.zeros(field.size, dtype=torch.float64)
+    solution = torch.zeros(field.size, dtype=torch.float64)
     rest = field.adjoint(points, areas * wanted * normals + pull)
     way, square = rest.clone(), rest @ rest
     for _ in range(SOLVER_STEPS):
@@ -182,10 +182,10 @@ def fitted_field(function: Function, field: FourierField, mesh: Mesh) -> Fourier
             break
         image = resisted(way)
         share = square / (way @ image)
-        found, rest = found + share * way, rest - share * image
+        solution, rest = solution + share * way, rest - share * image
         before, square = square, rest @ rest
         way = rest + square / before * way
-    return field.with_parameters(found)
+    return field.with_parameters(solution)
 
 
 def areas_and_pull(mesh: Mesh, tension: Array) -> tuple[Array, Array]:

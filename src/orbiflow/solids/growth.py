@@ -27,7 +27,7 @@ class CellBox:
         self.kinds = complex.shape.kinds
         self.strides = np.array([self.size[1] * self.size[2], self.size[2], 1])
         self.neighbor_steps = [
-            [self.kinds * self._step(own.offset) + own.kind - kind for own in row]
+            [self.kinds * self._step(neighbor.offset) + neighbor.kind - kind for neighbor in row]
             for kind, row in enumerate(complex.shape.neighbors)
         ]
 
@@ -36,14 +36,14 @@ class CellBox:
         """The areas (K, faces) of the faces of each kind of cell, in squared spacings."""
         shape = self.complex.shape
         most = max(map(len, shape.faces))
-        found = np.zeros((self.kinds, most))
+        areas = np.zeros((self.kinds, most))
         for kind, faces in enumerate(shape.faces):
             for k, face in enumerate(faces):
                 corners = self.complex.places(shape.corners[kind][list(face)])
                 offsets = corners[1:] - corners[0]
                 vectors = np.cross(offsets[:-1], offsets[1:])
-                found[kind, k] = np.linalg.norm(vectors.sum(axis=0)) / 2
-        return found / self.complex.spacing**2
+                areas[kind, k] = np.linalg.norm(vectors.sum(axis=0)) / 2
+        return areas / self.complex.spacing**2
 
     @property
     def number_of_cells(self) -> int:
@@ -71,8 +71,8 @@ class CellBox:
         """Return the cells (n, faces) behind the faces of inner cells; -1 where there is no face."""
         faces = max(map(len, self.neighbor_steps))
         steps = np.array([row + [0] * (faces - len(row)) for row in self.neighbor_steps])
-        own = steps[numbers % self.kinds]
-        return np.where(own, numbers[:, None] + own, -1)
+        offsets = steps[numbers % self.kinds]
+        return np.where(offsets, numbers[:, None] + offsets, -1)
 
     def centers(self, numbers: Integers) -> Array:
         """Return the centres (n, 3) in space of cells with these numbers (n,)."""
@@ -255,11 +255,11 @@ class BallOfCells:
                 added = self._pair_with(cell, rank)
             else:
                 continue  # it comes back as soon as another of its neighbours is attached
-            for own in added:
-                self.attach(own)
-            for own in added:
-                for step in steps[own % kinds]:
-                    other = own + step
+            for attached in added:
+                self.attach(attached)
+            for attached in added:
+                for step in steps[attached % kinds]:
+                    other = attached + step
                     if other in rank and holder[orbits[other]] < 0:
                         heapq.heappush(waiting, rank[other])
 
@@ -269,11 +269,11 @@ class BallOfCells:
 
     def _pair_with(self, cell: int, rank: dict[int, int]) -> list[int]:
         """Return a cell and a neighbour that can be attached together; nothing if there is none."""
-        own = self.orbits[cell]
+        cell_orbit = self.orbits[cell]
         others = [cell + step for step in self.box.neighbor_steps[cell % self.box.kinds]]
         for other in sorted((c for c in others if c in rank), key=rank.__getitem__):
             orbit = self.orbits[other]
-            if self.holder[orbit] < 0 and orbit != own and self._shares_disc({cell, other}):
+            if self.holder[orbit] < 0 and orbit != cell_orbit and self._shares_disc({cell, other}):
                 return [cell, other]
         return []
 

@@ -59,8 +59,8 @@ def measured(
         importance: Of the bent body's points (N,).
         strain: Of the bent body.
     """
-    both = [points_inside(own, GRAIN) for own in (tile, target)]
-    cells = [{*map(bytes, np.rint(own / GRAIN).astype(np.int16))} for own in both]
+    both = [points_inside(mesh, GRAIN) for mesh in (tile, target)]
+    cells = [{*map(bytes, np.rint(points / GRAIN).astype(np.int16))} for points in both]
     overlap = len(cells[0] & cells[1]) / len(cells[0] | cells[1])
     shadows = [
         _shadow_overlap(both[0], both[1], side)
@@ -72,11 +72,11 @@ def measured(
     return SolidLikeness(overlap, float(np.mean(shadows)), kept, smooth, strain)
 
 
-def _shadow_overlap(one: Array, two: Array, side: Array) -> float:
+def _shadow_overlap(first: Array, second: Array, side: Array) -> float:
     """Return the IoU of the shadows of points (n, 3), which lie evenly, along a direction (3,)."""
     across = np.linalg.svd(side[None])[2][1:]
-    flat = [own @ across.T / (1.5 * GRAIN) for own in (one, two)]
-    cells = [{*map(bytes, np.floor(own).astype(np.int16))} for own in flat]
+    flat = [points @ across.T / (1.5 * GRAIN) for points in (first, second)]
+    cells = [{*map(bytes, np.floor(shadow).astype(np.int16))} for shadow in flat]
     return len(cells[0] & cells[1]) / len(cells[0] | cells[1])
 
 

@@ -57,12 +57,12 @@ class PrintedParts:
 
     def bodies(self) -> dict[str, Manifold]:
         """Return each copy as a body of its own, in its place."""
-        found = dict[str, Manifold]()
+        bodies = dict[str, Manifold]()
         for name, body in self.parts.items():
             for k, place in enumerate(self.places.get(name, [np.eye(3, 4)]), 1):
-                own = f"{name}, {k}" if name in self.places else name
-                found[own] = body.transform(place)
-        return found
+                label = f"{name}, {k}" if name in self.places else name
+                bodies[label] = body.transform(place)
+        return bodies
 
     def file(self, format: str, title: str = "") -> bytes:
         """Return the content of a file, "3mf" with colours or "stl" without."""
@@ -180,8 +180,8 @@ def make_block(
             f"Where a copy is lifted out, {100 * leaving.blocked:.2g} % of it meet what is around: "
             "the block was opened for it."
         )
-    found = (block - cut).decompose()
-    base = max(found, key=lambda body: body.volume())
+    remains = (block - cut).decompose()
+    base = max(remains, key=lambda body: body.volume())
     tile = moved_body(offset_body(_in_mm(own.tile, own), -clearance / 2), turn)
     parts = _all_on_bed({"starting block": base, "tile": tile})
     notes += print_advice(parts["starting block"], name="The starting block").sentences
@@ -288,8 +288,8 @@ def _upwards(direction: Array) -> Array:
 
 def _coarser(body: Manifold) -> Manifold:
     """Return a body with fewer triangles whose surface has hardly moved."""
-    found = body.simplify(GRAIN)
-    return body if found.is_empty() else found
+    coarse = body.simplify(GRAIN)
+    return body if coarse.is_empty() else coarse
 
 
 def _box(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Manifold:
@@ -329,9 +329,9 @@ def _beside(
     step = np.array(kinds[0].bounding_box()[3:5]) + APART
     _, y, z, right, *_ = box.bounding_box()
     columns = int(np.ceil(np.sqrt(len(names))))
-    found = dict[str, Manifold]()
+    placed = dict[str, Manifold]()
     for k, (name, copy) in enumerate(zip(names, stack, strict=True)):
         row, column = divmod(k, columns)
         place = (right + APART + column * step[0], y + row * step[1], z)
-        found[name] = kinds[copy.is_mirrored].translate(place)
-    return found
+        placed[name] = kinds[copy.is_mirrored].translate(place)
+    return placed

@@ -79,11 +79,11 @@ class MatchedSurface:
         tree = cKDTree(points)
         images, sources, turns = list[Integers](), list[Integers](), list[Array]()
         for element in group.elements_near(center, reach):
-            away, own = tree.query(element(points), distance_upper_bound=SAME_PLACE)
-            found = np.flatnonzero(np.isfinite(away))
-            images.append(np.asarray(own)[found])
-            sources.append(found)
-            turns.append(np.tile(element.linear, (len(found), 1, 1)))
+            away, nearest = tree.query(element(points), distance_upper_bound=SAME_PLACE)
+            matched = np.flatnonzero(np.isfinite(away))
+            images.append(np.asarray(nearest)[matched])
+            sources.append(matched)
+            turns.append(np.tile(element.linear, (len(matched), 1, 1)))
         rows, columns, parts = (np.concatenate(k) for k in (images, sources, turns))
         parts = parts / np.bincount(rows, minlength=n)[rows, None, None]
         order = np.argsort(rows, kind="stable")
@@ -124,14 +124,14 @@ class MatchedSurface:
         middles = self.mesh.points[self.mesh.edges[cut]].mean(axis=1)
         points = np.concatenate([self.mesh.points, middles])
         faces, parents = _divided_faces(self.mesh.faces, number[of_faces], orbits)
-        found = replace(
+        divided = replace(
             self,
             mesh=Mesh(points, faces),
             linear=self.linear[parents],
             shift=self.shift[parents],
             partners=np.zeros(len(faces), np.int64),
         )
-        return replace(found, partners=found._partners_of(self.partners, parents))
+        return replace(divided, partners=divided._partners_of(self.partners, parents))
 
     def _back(self, points: Array, faces: Integers) -> Array:
         """Return points (n, k, 3) moved by the inverse of the element behind a face (n,) each."""
@@ -175,12 +175,15 @@ def _divided_faces(
     _, second, third = np.take_along_axis(orbits, turned, axis=1).T
     parts = [
         (count == 0, (a, b, c)),
-        *((count == 1, own) for own in ((a, ab, c), (ab, b, c))),
+        *((count == 1, corners) for corners in ((a, ab, c), (ab, b, c))),
         (count == 2, (ca, bc, c)),
-        *(((count == 2) & (second < third), own) for own in ((a, b, bc), (a, bc, ca))),
-        *(((count == 2) & (second > third), own) for own in ((a, b, ca), (b, bc, ca))),
-        *((count == 3, own) for own in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))),
+        *(((count == 2) & (second < third), corners) for corners in ((a, b, bc), (a, bc, ca))),
+        *(((count == 2) & (second > third), corners) for corners in ((a, b, ca), (b, bc, ca))),
+        *(
+            (count == 3, corners)
+            for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        ),
     ]
-    parents = [np.flatnonzero(own) for own, _ in parts]
-    cut = [np.stack(corners, axis=1)[own] for own, corners in parts]
+    parents = [np.flatnonzero(chosen) for chosen, _ in parts]
+    cut = [np.stack(corners, axis=1)[chosen] for chosen, corners in parts]
     return np.concatenate(cut), np.concatenate(parents).astype(np.int64)

@@ -73,13 +73,13 @@ def simplified(body: Manifold, most: int) -> Manifold:
     """Return a body of at most `most` triangles, or as few as leave it its looks."""
     box = np.array(body.bounding_box()).reshape(2, 3)
     size = float(np.linalg.norm(box[1] - box[0]))
-    found, tolerance = body, 1e-5 * size
+    best, tolerance = body, 1e-5 * size
     # with a coarser tolerance the library breaks thin parts and has more triangles again
-    while found.num_tri() > most and tolerance < COARSEST * size:
+    while best.num_tri() > most and tolerance < COARSEST * size:
         tried, tolerance = body.simplify(tolerance), 1.6 * tolerance
-        if 0 < tried.num_tri() < found.num_tri():
-            found = tried
-    return found
+        if 0 < tried.num_tri() < best.num_tri():
+            best = tried
+    return best
 
 
 def _cleaned(soup: Soup, notes: list[str]) -> Mesh:
@@ -163,8 +163,8 @@ def _neighbours(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
     order = np.argsort(key, kind="stable")
     _, start, counts = np.unique(key[order], return_index=True, return_counts=True)
     pair = start[counts == 2]
-    one, other = order[pair], order[pair + 1]
-    return one // 3, other // 3, half[one, 0] != half[other, 0]
+    first, other = order[pair], order[pair + 1]
+    return first // 3, other // 3, half[first, 0] != half[other, 0]
 
 
 def _without_holes(mesh: Mesh, notes: list[str]) -> Mesh:
@@ -230,21 +230,21 @@ def _bodies(mesh: Mesh, notes: list[str]) -> list[Manifold]:
     order = np.argsort(labels, kind="stable")
     patches = np.split(order, np.cumsum(np.bincount(labels))[:-1])
     pieces = [mesh.of_faces(patch) for patch in patches]
-    open_area = sum(own.area for own in pieces if not own.is_closed)
+    open_area = sum(piece.area for piece in pieces if not piece.is_closed)
     if open_area > SCRAP * mesh.area:
         raise OrbiflowError(INNER_WALLS)
     if open_area > 0:
         notes.append("Loose faces were left out.")
-    closed = [own for own in pieces if own.is_closed]
-    whole = max(closed, key=lambda own: abs(own.volume), default=None)
+    closed = [piece for piece in pieces if piece.is_closed]
+    whole = max(closed, key=lambda piece: abs(piece.volume), default=None)
     if whole is None or abs(whole.volume) <= 1e-6 * np.prod(np.ptp(whole.points, axis=0)):
         raise OrbiflowError("encloses no volume; make it the surface of a body")
     if whole.volume < 0:
         notes.append("The surface was inside out, and was turned.")
     return [
-        as_body(own if own.volume > 0 else Mesh(own.points, own.faces[:, ::-1]))
-        for own in closed
-        if own.volume
+        as_body(piece if piece.volume > 0 else Mesh(piece.points, piece.faces[:, ::-1]))
+        for piece in closed
+        if piece.volume
     ]
 
 
@@ -254,14 +254,14 @@ def _one_body(bodies: list[Manifold], notes: list[str]) -> Manifold:
         return bodies[0]
     whole = united(bodies)
     pieces = as_mesh(whole).pieces()
-    outer = [own for own in pieces if own.volume > 0]
+    outer = [piece for piece in pieces if piece.volume > 0]
     largest = outer[0].volume
-    parts = [own for own in outer if own.volume > SCRAP * largest]
+    parts = [piece for piece in outer if piece.volume > SCRAP * largest]
     if len(parts) > 1:
         raise OrbiflowError(
             f"holds {len(parts)} bodies that do not touch; join them, or keep one of them"
         )
-    hidden = sum(_is_within(own, bodies) for own in bodies)
+    hidden = sum(_is_within(body, bodies) for body in bodies)
     joined = len(bodies) - hidden - (len(outer) - 1)
     if joined > 1:
         notes.append(f"{joined} overlapping bodies were united.")

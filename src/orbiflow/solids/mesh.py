@@ -84,8 +84,8 @@ class Mesh:
     @cached_property
     def normals(self) -> Array:
         """The outer unit normals at the points (N, 3), means of the faces' by their areas."""
-        found = self.sums_at_points(np.repeat(self.face_vectors, 3, axis=0))
-        return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300)
+        sums = self.sums_at_points(np.repeat(self.face_vectors, 3, axis=0))
+        return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-300)
 
     @property
     def area(self) -> float:
@@ -123,9 +123,9 @@ class Mesh:
 
     def pieces(self) -> list[Mesh]:
         """Return the connected pieces, the largest volume first."""
-        own = self.piece_of_faces
-        found = [self.of_faces(own == k) for k in range(own.max(initial=-1) + 1)]
-        return sorted(found, key=lambda piece: -abs(piece.volume))
+        numbers = self.piece_of_faces
+        parts = [self.of_faces(numbers == k) for k in range(numbers.max(initial=-1) + 1)]
+        return sorted(parts, key=lambda piece: -abs(piece.volume))
 
     def of_faces(self, kept: ArrayLike) -> Mesh:
         """Return the mesh of some faces, by a mask or numbers, with the points that they use."""
@@ -147,6 +147,6 @@ class Mesh:
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
     """Return one mesh of several, which keep their points apart."""
-    starts = np.cumsum([0, *(len(own.points) for own in meshes[:-1])])
-    faces = [own.faces + start for own, start in zip(meshes, starts, strict=True)]
-    return Mesh(np.concatenate([own.points for own in meshes]), np.concatenate(faces))
+    starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes[:-1])])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
+    return Mesh(np.concatenate([mesh.points for mesh in meshes]), np.concatenate(faces))

@@ -48,9 +48,9 @@ def offset_body(mesh: Mesh, distance: float) -> Manifold:
         kept[np.unique(mesh.faces[turned])] *= 0.5
         moved = Mesh(mesh.points + kept * steps, mesh.faces)
         turned = _turned(moved, mesh)
-    found = whole + as_body(moved) if distance > 0 else whole ^ as_body(moved)
-    parts = found.decompose()
-    return max(parts, key=lambda part: part.volume()) if len(parts) > 1 else found
+    grown = whole + as_body(moved) if distance > 0 else whole ^ as_body(moved)
+    parts = grown.decompose()
+    return max(parts, key=lambda part: part.volume()) if len(parts) > 1 else grown
 
 
 def _turned(moved: Mesh, mesh: Mesh) -> Array:
@@ -69,9 +69,9 @@ def _unit_offsets(mesh: Mesh) -> Array:
     corners = mesh.corners
     angles = np.zeros((len(mesh.faces), 3))
     for k in range(3):
-        one, two = (corners[:, (k + j) % 3] - corners[:, k] for j in (1, 2))
-        lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
-        cosines = np.einsum("ij,ij->i", one, two) / np.maximum(lengths, 1e-300)
+        first, second = (corners[:, (k + j) % 3] - corners[:, k] for j in (1, 2))
+        lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+        cosines = np.einsum("ij,ij->i", first, second) / np.maximum(lengths, 1e-300)
         angles[:, k] = np.arccos(np.clip(cosines, -1, 1))
     shape = len(mesh.points), len(mesh.faces)
     rows, columns = mesh.faces.ravel(), np.repeat(np.arange(len(mesh.faces)), 3)
@@ -80,6 +80,6 @@ def _unit_offsets(mesh: Mesh) -> Array:
     total = np.maximum(np.asarray(sums.sum(axis=1)).reshape(-1, 1, 1), 1e-300)
     # along directions that no face has, a point stays
     matrices = squares.reshape(-1, 3, 3) / total + 1e-3 * np.eye(3)
-    found = np.linalg.solve(matrices, (sums @ normals)[:, :, None] / total)[:, :, 0]
-    lengths = np.linalg.norm(found, axis=1, keepdims=True)
-    return found * np.minimum(1.0, MITRE / np.maximum(lengths, 1e-300))
+    offsets = np.linalg.solve(matrices, (sums @ normals)[:, :, None] / total)[:, :, 0]
+    lengths = np.linalg.norm(offsets, axis=1, keepdims=True)
+    return offsets * np.minimum(1.0, MITRE / np.maximum(lengths, 1e-300))

@@ -70,12 +70,12 @@ def fill(
         on_event(
             Note(f"the file's size is no size to print: the longest side is made {goal_size:g} mm")
         )
-    for own in settings.emphasised:
-        if isinstance(own, Painted):
+    for emphasis in settings.emphasised:
+        if isinstance(emphasis, Painted):
             share = f"{100 * checked_painting(read.painting).share:.2g} % of the surface"
-            matters = f"matters {own.weight:g} times as much as the rest"
+            matters = f"matters {emphasis.weight:g} times as much as the rest"
             on_event(Note(f"what is painted, {share}, {matters}"))
-    found = search.fill(
+    solids = search.fill(
         read.mesh,
         settings.replace(up=settings.up or usual_up(mesh)),
         name=mesh.stem,
@@ -85,18 +85,18 @@ def fill(
     )
     stopped = cancel.cancelled
     summary = {"mesh": str(mesh), "seconds": time.perf_counter() - begin, "stopped": stopped}
-    if not found:
+    if not solids:
         on_event(Note(_nothing_found(settings, out), warning=True))
         return Outcome({**summary, "solids": []}, "nothing found")
     remark = STOPPED if stopped else ""
     if stopped:
-        on_event(Note(f"{STOPPED} Solids that were found by then: {len(found)}.", warning=True))
+        on_event(Note(f"{STOPPED} Solids that were found by then: {len(solids)}.", warning=True))
     # what was found is written to the end
     workers = settings.workers or cores()
     run_folder.write_run(
-        found, out, workers=workers, summary=summary, remark=remark, on_event=on_event
+        solids, out, workers=workers, summary=summary, remark=remark, on_event=on_event
     )
-    on_event(_table(found))
+    on_event(_table(solids))
     where = f"look at {out / run_folder.OVERVIEW} first, or open {out / run_folder.INDEX}"
     on_event(Note(f"written to {out} in {time.perf_counter() - begin:.0f} s; {where}"))
     document = read_json(out / run_folder.SOLIDS, "a run of orbiflow fill")
@@ -124,14 +124,14 @@ def _table(solids: list[EscherSolid]) -> Table:
     """Return a table of solids, best first."""
     rows = [
         (
-            own.group_name,
-            f"{own.likeness.overlap:.2f}",
-            f"{own.likeness.shadows:.2f}",
-            f"{own.likeness.kept:.2f}",
-            f"{own.likeness.strain:.2f}",
-            " x ".join(f"{side:.0f}" for side in own.size) + " mm",
+            solid.group_name,
+            f"{solid.likeness.overlap:.2f}",
+            f"{solid.likeness.shadows:.2f}",
+            f"{solid.likeness.kept:.2f}",
+            f"{solid.likeness.strain:.2f}",
+            " x ".join(f"{side:.0f}" for side in solid.size) + " mm",
         )
-        for own in solids
+        for solid in solids
     ]
     columns = ("group", "overlap", "shadows", "kept", "bent", "size")
     return Table("Solids, best first", columns, tuple(rows))
@@ -165,16 +165,16 @@ def build(
 
     from orbiflow.solids import making, run_folder
 
-    own = run_folder.as_solid(result, solid)
-    out = out or Path(f"{own.name}-{settings.kind}.{settings.file_format}")
+    taken = run_folder.as_solid(result, solid)
+    out = out or Path(f"{taken.name}-{settings.kind}.{settings.file_format}")
     check_output_file(out, *([Path(result)] if isinstance(result, str | Path) else []))
-    own.require_certified()
-    own = own.sized(settings.size)
+    taken.require_certified()
+    taken = taken.sized(settings.size)
     cancel.check()
-    made = making.make(own, settings)
-    title = f"{settings.kind} of {own.name} in {own.group_name}, in mm"
+    made = making.make(taken, settings)
+    title = f"{settings.kind} of {taken.name} in {taken.group_name}, in mm"
     write_atomic(out, made.file(settings.file_format, title))
     for event in (*map(Note, made.notes), Written(out)):
         on_event(event)
-    summary = {"file": str(out), "kind": settings.kind, "group": own.group_name}
+    summary = {"file": str(out), "kind": settings.kind, "group": taken.group_name}
     return Outcome({**summary, "parts": len(made.bodies()), "notes": list(made.notes)})

@@ -53,22 +53,22 @@ def read_3mf(data: bytes) -> Soup:
     roots = {name: _parsed(text) for name, text in _models(data).items()}
     if not roots:
         raise OrbiflowError("holds no 3D model; export it again")
-    known = Resources({}, {})
+    resources = Resources({}, {})
     for name, root in roots.items():
-        for own in root.iter():
-            number = name, own.get("id", "")
-            if own.tag == "object":
-                known.objects[number] = own
-            elif own.tag in PALETTES:
-                colours = [_colour(one.get(PALETTES[own.tag], "")) for one in own]
-                known.palettes[number] = {str(k): colour for k, colour in enumerate(colours)}
+        for element in root.iter():
+            number = name, element.get("id", "")
+            if element.tag == "object":
+                resources.objects[number] = element
+            elif element.tag in PALETTES:
+                colours = [_colour(entry.get(PALETTES[element.tag], "")) for entry in element]
+                resources.palettes[number] = {str(k): colour for k, colour in enumerate(colours)}
     placed = list[Soup]()
     main, root = next(iter(roots.items()))
     unit = MILLIMETRES.get(root.get("unit", "millimeter"))
     if unit is None:
         raise OrbiflowError(f"is in an unknown unit, {root.get('unit')!r}; export it in mm")
     for item in (item for build in root.iter("build") for item in build.iter("item")):
-        _place(item, main, np.diag([unit, unit, unit, 1.0]), known, placed)
+        _place(item, main, np.diag([unit, unit, unit, 1.0]), resources, placed)
     return Soup.joined(placed)
 
 
@@ -100,13 +100,13 @@ def _parsed(text: bytes) -> ElementTree.Element:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise OrbiflowError(f"is not a 3MF file, or is cut off: {error}") from error
-    for own in root.iter():
-        own.tag = str(own.tag).rpartition("}")[2]
+    for element in root.iter():
+        element.tag = str(element.tag).rpartition("}")[2]
     return root
 
 
 def _place(
-    use: ElementTree.Element, file: str, outer: Array, known: Resources, placed: list[Soup]
+    use: ElementTree.Element, file: str, outer: Array, resources: Resources, placed: list[Soup]
 ) -> None:
     """Add the meshes of what an item or a component uses, in their places, to a list.
 
@@ -115,28 +115,28 @@ def _place(
     named = [value for name, value in use.attrib.items() if name.rpartition("}")[2] == "path"]
     file = named[0].lstrip("/").lower() if named else file
     number = use.get("objectid", "")
-    if (own := known.objects.get((file, number))) is None:
+    if (element := resources.objects.get((file, number))) is None:
         raise OrbiflowError(f"places object {number!r}, which is not there; export it again")
-    if own.get("type", "model") != "model":
+    if element.get("type", "model") != "model":
         return  # a support of the print, or another thing that is no part of the body
     matrix = outer @ _matrix(use.get("transform"))
-    if (mesh := own.find("mesh")) is not None:
+    if (mesh := element.find("mesh")) is not None:
         points = _numbers(mesh, "vertex", ("x", "y", "z"), float)
         faces = _numbers(mesh, "triangle", ("v1", "v2", "v3"), np.int64)
         if faces.size and not 0 <= faces.min() <= faces.max() < len(points):
             raise OrbiflowError("has triangles of points that are not there; export it again")
         soup = Soup(points @ matrix[:3, :3].T + matrix[:3, 3], faces)
-        if (colours := _colours(own, mesh, file, known.palettes)) is not None:
+        if (colours := _colours(element, mesh, file, resources.palettes)) is not None:
             soup = soup.with_corner_colours(colours)
         if np.linalg.det(matrix[:3, :3]) < 0:
             soup = soup._replace(faces=soup.faces[:, ::-1])
         placed.append(soup)
-    for component in own.iter("component"):
-        _place(component, file, matrix, known, placed)
+    for component in element.iter("component"):
+        _place(component, file, matrix, resources, placed)
 
 
 def _colours(
-    own: ElementTree.Element,
+    element: ElementTree.Element,
     mesh: ElementTree.Element,
     file: str,
     palettes: dict[tuple[str, str], Palette],
@@ -148,20 +148,20 @@ def _colours(
     """
     if not palettes:
         return None
-    usual, first = own.get("pid", ""), own.get("pindex", "")
-    found, none = list[list[list[float]]](), [np.nan] * 3
+    usual, first = element.get("pid", ""), element.get("pindex", "")
+    rows, none = list[list[list[float]]](), [np.nan] * 3
     for face in mesh.iter("triangle"):
         palette = palettes.get((file, face.get("pid", usual)), {})
-        one = face.get("p1", first)
-        entries = one, face.get("p2", one), face.get("p3", one)
-        found.append([palette.get(entry, none) for entry in entries])
-    colours = np.array(found, float).reshape(-1, 3, 3)
+        corner = face.get("p1", first)
+        entries = corner, face.get("p2", corner), face.get("p3", corner)
+        rows.append([palette.get(entry, none) for entry in entries])
+    colours = np.array(rows, float).reshape(-1, 3, 3)
     return colours if np.isfinite(colours).any() else None
 
 
 def _colour(text: str) -> list[float]:
-    found = _COLOUR.fullmatch(text)
-    return [channel / 255 for channel in bytes.fromhex(found[1])] if found else [np.nan] * 3
+    match = _COLOUR.fullmatch(text)
+    return [channel / 255 for channel in bytes.fromhex(match[1])] if match else [np.nan] * 3
 
 
 def _matrix(text: str | None) -> Array:
@@ -177,7 +177,7 @@ def _matrix(text: str | None) -> Array:
 
 def _numbers(mesh: ElementTree.Element, tag: str, names: tuple[str, ...], kind: type) -> Array:
     try:
-        rows = [[own.attrib[name] for name in names] for own in mesh.iter(tag)]
+        rows = [[element.attrib[name] for name in names] for element in mesh.iter(tag)]
         return np.array(rows, dtype="U32").astype(kind).reshape(-1, 3)
     except (KeyError, ValueError, OverflowError):
         raise OrbiflowError(f"has a {tag} that is not complete; export it again") from None

@@ -49,9 +49,9 @@ class Painting:
         if soup.colours is None:
             return None
         places, _, _ = spread(mesh.points, mesh.faces, PLACES)
-        known, faces, shares = spread(soup.points, soup.faces, 4 * PLACES)
+        sources, faces, shares = spread(soup.points, soup.faces, 4 * PLACES)
         colours = np.einsum("nk,nkc->nc", shares, soup.colours[soup.faces[faces]])
-        colours = colours[np.asarray(cKDTree(known).query(places)[1])]
+        colours = colours[np.asarray(cKDTree(sources).query(places)[1])]
         coloured = np.isfinite(colours).all(axis=1)
         if not coloured.any():
             return None
@@ -111,8 +111,8 @@ def spread(points: Array, faces: Integers, count: int) -> tuple[Array, Integers,
     ends = np.cumsum(areas)
     number = np.arange(count)
     face = np.minimum(np.searchsorted(ends, (number + 0.5) / count * ends[-1]), len(faces) - 1)
-    one, two = np.random.default_rng(0).uniform(size=(2, count))
-    fold = one + two > 1
-    one, two = np.where(fold, 1 - one, one), np.where(fold, 1 - two, two)
-    shares = np.stack([1 - one - two, one, two], axis=1)
+    u, v = np.random.default_rng(0).uniform(size=(2, count))
+    fold = u + v > 1
+    u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
+    shares = np.stack([1 - u - v, u, v], axis=1)
     return np.einsum("nk,nkc->nc", shares, corners[face]), face, shares

@@ -109,7 +109,7 @@ def solid_gif(
     for k, picture in enumerate(few):
         strip.paste(picture, (0, k * size))
     colours = strip.quantize(255, Image.Quantize.MEDIANCUT)
-    plain = [own.quantize(palette=colours, dither=Image.Dither.NONE) for own in drawn]
+    plain = [picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in drawn]
     buffer, lasts = io.BytesIO(), 1000 * seconds / frames
     plain[0].save(
         buffer, "GIF", save_all=True, append_images=plain[1:], duration=round(lasts), loop=0
@@ -143,7 +143,7 @@ class Stack:
 
     def ball(self, parts: Sequence[ShadedPart]) -> tuple[tuple[float, float, float], float]:
         """Return the middle of the stack, and how far its parts reach from there."""
-        places = np.concatenate([own.corners.reshape(-1, 3) for own in parts])
+        places = np.concatenate([part.corners.reshape(-1, 3) for part in parts])
         x, y, z = self._centers.mean(axis=0).tolist()
         return (x, y, z), float(np.linalg.norm(places - (x, y, z), axis=1).max())
 

@@ -127,10 +127,10 @@ def best_poses(
     """
     cover = Cover(family, points)
     drawn = [_random_pose(family, random) for _ in range(tried)]
-    marks = np.array([cover.of(*own) for own in drawn])
+    marks = np.array([cover.of(*pose) for pose in drawn])
     best = np.argsort(-marks, kind="stable")[:climbed]
-    found = [_climbed(cover, drawn[k], float(marks[k]), random, steps) for k in best]
-    return sorted(found, key=lambda pose: -pose.cover)
+    poses = [_climbed(cover, drawn[k], float(marks[k]), random, steps) for k in best]
+    return sorted(poses, key=lambda pose: -pose.cover)
 
 
 def polished(
@@ -147,11 +147,11 @@ def polished(
         random: Where steps are drawn from.
         steps: Of each climb.
     """
-    cover, found = Cover(poses[0].family, points, FINENESS), list[Pose]()
-    for own in poses:
-        start = own.stretches, own.turn, own.place
-        found.append(_climbed(cover, start, cover.of(*start), random, steps, POLISHING_STEP))
-    return sorted(found, key=lambda pose: -pose.cover)
+    cover, better = Cover(poses[0].family, points, FINENESS), list[Pose]()
+    for pose in poses:
+        start = pose.stretches, pose.turn, pose.place
+        better.append(_climbed(cover, start, cover.of(*start), random, steps, POLISHING_STEP))
+    return sorted(better, key=lambda pose: -pose.cover)
 
 
 def _random_pose(family: GroupFamily, random: np.random.Generator) -> tuple[Array, Array, Array]:
@@ -168,16 +168,16 @@ def _climbed(
     steps: int,
     size: float = 1.0,
 ) -> Pose:
-    own = start
+    current = start
     for _ in range(steps):
-        stretches, turn, place = own
+        stretches, turn, place = current
         tried = (
             stretches + size * random.normal(0, LATTICE_STEP, len(stretches)),
             Rotation.from_rotvec(size * random.normal(0, TURN_STEP, 3)).as_matrix() @ turn,
             place + size * random.normal(0, SHIFT_STEP, 3),
         )
-        if (found := cover.of(*tried)) > mark:
-            own, mark, size = tried, found, min(1.3 * size, MOST_STEP)
+        if (reached := cover.of(*tried)) > mark:
+            current, mark, size = tried, reached, min(1.3 * size, MOST_STEP)
         else:
             size = max(0.985 * size, LEAST_STEP)
-    return Pose(cover.family, *own, mark)
+    return Pose(cover.family, *current, mark)

@@ -85,12 +85,12 @@ def thinnest_part(body: Manifold, mesh: Mesh | None = None) -> float:
     inwards = -mesh.face_vectors[chosen] / lengths[chosen, None]
     starts = mesh.corners[chosen].mean(axis=1)
     reach = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    found = list[float]()
+    depths = list[float]()
     for start, inward in zip(starts + 1e-6 * reach * inwards, inwards, strict=True):
         hits = body.ray_cast(start.tolist(), (start + reach * inward).tolist())
         if hits and np.dot(np.asarray(hits[0].normal), inward) > OPPOSITE:
-            found.append(float(np.linalg.norm(np.asarray(hits[0].position) - start)))
-    return float(np.quantile(found, THINNEST_SHARE)) if found else reach
+            depths.append(float(np.linalg.norm(np.asarray(hits[0].position) - start)))
+    return float(np.quantile(depths, THINNEST_SHARE)) if depths else reach
 
 
 def overhang_share(mesh: Mesh, up: tuple[float, float, float]) -> float:
@@ -106,7 +106,7 @@ def lying(mesh: Mesh) -> Array:
     """Return the rotation (3, 3) by which a mesh in mm lies steadily with the least overhang."""
     hull = ConvexHull(mesh.points)
     middle = mesh.centroid
-    best, found = np.inf, np.eye(3)
+    best, rotation = np.inf, np.eye(3)
     normals, numbers = np.unique(hull.equations[:, :3].round(4), axis=0, return_inverse=True)
     sizes = np.bincount(numbers.ravel(), _areas(mesh.points[hull.simplices]))
     for number in np.argsort(-sizes, kind="stable")[:24]:
@@ -115,8 +115,8 @@ def lying(mesh: Mesh) -> Array:
             continue
         share = overhang_share(mesh, tuple((-down).tolist()))
         if share < best - 1e-9:
-            best, found = share, _turned_down(down)
-    return found
+            best, rotation = share, _turned_down(down)
+    return rotation
 
 
 def _areas(corners: Array) -> Array:

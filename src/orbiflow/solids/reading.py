@@ -74,8 +74,8 @@ def read_mesh(path: str | Path) -> ReadMesh:
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        known = ", ".join(READERS)
-        raise InputFileError(f"{path}: a mesh is read from {known}; export it as one of them")
+        endings = ", ".join(READERS)
+        raise InputFileError(f"{path}: a mesh is read from {endings}; export it as one of them")
     with system_errors(InputFileError, f"{path}: cannot be read"):
         size = path.stat().st_size
         if size > MAX_BYTES:
@@ -109,11 +109,11 @@ def _read_stl(data: bytes, _: Path) -> Soup:
             )
         corners = np.frombuffer(data, STL_TRIANGLE, count, 84)["corners"].astype(float)
     elif is_text:
-        found = _CORNER.findall(data.lower())
-        check_counts(len(found), len(found) // 3)
-        if len(found) % 3 or b"endsolid" not in data[-1000:].lower():
+        words = _CORNER.findall(data.lower())
+        check_counts(len(words), len(words) // 3)
+        if len(words) % 3 or b"endsolid" not in data[-1000:].lower():
             raise OrbiflowError("is cut off, or is not an STL file; export it again")
-        corners = _numbers(found, float).reshape(-1, 3, 3)
+        corners = _numbers(words, float).reshape(-1, 3, 3)
     else:
         raise OrbiflowError("is not an STL file; export it again")
     return Soup(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
@@ -139,11 +139,11 @@ def _read_obj(data: bytes, _: Path) -> Soup:
     if any(len(point) != 3 for point in points):
         raise OrbiflowError("has a point without three coordinates; export it again")
     soup = Soup(_numbers(points, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3))
-    if all(own is NO_COLOUR for own in colours):
+    if all(colour is NO_COLOUR for colour in colours):
         return soup
-    found = _numbers(colours, float).reshape(-1, 3)
+    shades = _numbers(colours, float).reshape(-1, 3)
     # some programs write 0 to 255
-    return soup._replace(colours=found / (255 if np.nanmax(found) > 1 else 1))
+    return soup._replace(colours=shades / (255 if np.nanmax(shades) > 1 else 1))
 
 
 def _index(word: bytes, count: int) -> int:
@@ -166,9 +166,9 @@ def _numbers(words: Any, kind: type) -> Array:
 
 def _read_ply(data: bytes, path: Path) -> Soup:
     """Read a PLY by trimesh, once its header's counts are known to be within the bounds."""
-    head, found, _ = data[: 2**16].partition(b"end_header")
+    head, marker, _ = data[: 2**16].partition(b"end_header")
     counts = dict(re.findall(rb"element\s+(\S+)\s+(\d{1,18})\b", head))
-    if not data.startswith(b"ply") or not found or b"vertex" not in counts:
+    if not data.startswith(b"ply") or not marker or b"vertex" not in counts:
         raise OrbiflowError("is not a PLY file; export it again")
     points, faces = (int(counts.get(name, b"0")) for name in (b"vertex", b"face"))
     check_counts(points, faces)

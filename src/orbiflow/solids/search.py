@@ -121,10 +121,10 @@ class SolidGoal:
         size = settings.size or usual_size(mesh)
         millimetres = size / longest if size else side
         weights = [
-            own.weights
-            if isinstance(own, EmphasisSphere)
-            else partial(checked_painting(painting).weights, own.weight)
-            for own in settings.emphasised
+            emphasis.weights
+            if isinstance(emphasis, EmphasisSphere)
+            else partial(checked_painting(painting).weights, emphasis.weight)
+            for emphasis in settings.emphasised
         ]
         weight = partial(_product, weights, center, side) if weights else None
         return cls(name, unit, weight, millimetres, np.array(AXES[settings.up or "z"]).T)
@@ -148,7 +148,7 @@ def usual_size(mesh: Mesh) -> float | None:
 
 def _product(weights: Sequence[Weight], center: Array, side: float, points: Array) -> Array:
     """Return the product (n,) of weights that are given in the coordinates of the file."""
-    return np.prod([own(center + side * points) for own in weights], axis=0)
+    return np.prod([weight(center + side * points) for weight in weights], axis=0)
 
 
 def fill(
@@ -181,7 +181,7 @@ def fill(
     make = _tile_maker(settings)
     effort, goal = EFFORTS[settings.effort], SolidGoal.of(mesh, settings, name, painting)
     usual = SEPARABLE_GROUPS if settings.separable else USUAL_GROUPS[: effort.groups]
-    families = [GroupFamily.named(own) for own in settings.groups or usual]
+    families = [GroupFamily.named(group_name) for group_name in settings.groups or usual]
     if settings.separable:
         effort = effort._replace(per_group=effort.quick)  # of few groups more poses
         for family in families:
@@ -198,24 +198,24 @@ def fill(
     best = [poses[k] for k in order[: effort.full]]
     body = goal.body(effort.fine)
     bodies = team.each(partial(_bent, goal, body, effort.stages), best, "bending in detail", 0.6)
-    waiting = _by_groups([own for own in bodies if own is not None])
-    found = list[EscherSolid]()
+    waiting = _by_groups([candidate for candidate in bodies if candidate is not None])
+    solids = list[EscherSolid]()
 
-    def keep(own: EscherSolid | None) -> None:
-        if own is not None:
-            found.append(own)
-            on_solid(own)
+    def keep(solid: EscherSolid | None) -> None:
+        if solid is not None:
+            solids.append(solid)
+            on_solid(solid)
 
     wanted = max(effort.closed, settings.tiles)
     try:
-        while waiting and len(found) < wanted:
-            missing = wanted - len(found)
+        while waiting and len(solids) < wanted:
+            missing = wanted - len(solids)
             some, waiting = waiting[:missing], waiting[missing:]
             team.each(partial(_solid, goal, body, make, effort.grain), some, "closing", 0.9, keep)
     except Cancelled:
-        if not found:
+        if not solids:
             raise
-    return sorted(_by_groups(found)[: settings.tiles], key=_rank)
+    return sorted(_by_groups(solids)[: settings.tiles], key=_rank)
 
 
 class BentPose(NamedTuple):
@@ -253,8 +253,8 @@ def _rank(own: BentPose | EscherSolid) -> float:
 def _by_groups(every: Sequence[Kind]) -> list[Kind]:
     """Return all, the best first: the best of each group before others of one."""
     ordered = sorted(every, key=_rank)
-    firsts = {own.group_name: own for own in reversed(ordered)}.values()
-    others = [own for own in ordered if not any(own is first for first in firsts)]
+    firsts = {entry.group_name: entry for entry in reversed(ordered)}.values()
+    others = [entry for entry in ordered if not any(entry is first for first in firsts)]
     return [*sorted(firsts, key=_rank), *others]
 
 
@@ -272,9 +272,9 @@ def starting_poses(
 
 def quick_bend(body: Body, pose: Pose) -> tuple[float, Pose]:
     """Return what a pose costs once its body has bent a little."""
-    found = bent(BentBody.of(body, pose), QUICK_STAGES)
-    lost, twice = coverage(found)
-    return lost + twice + STRAIN_COST * found.strain, pose
+    bent_body = bent(BentBody.of(body, pose), QUICK_STAGES)
+    lost, twice = coverage(bent_body)
+    return lost + twice + STRAIN_COST * bent_body.strain, pose
 
 
 def coverage(found: BentBody) -> tuple[float, float]:
@@ -300,39 +300,41 @@ def coverage(found: BentBody) -> tuple[float, float]:
 def _bent(goal: SolidGoal, body: Body, stages: Stages, pose: Pose) -> BentPose | None:
     """Return the body of a pose, bent with all detail, or None if it came apart."""
     begin = time.process_time()
-    found = bent(BentBody.of(body, pose), stages)
-    if not found.strain < MOST_STRAIN:
+    bent_body = bent(BentBody.of(body, pose), stages)
+    if not bent_body.strain < MOST_STRAIN:
         return None
-    fine = Mesh(body.carried(found.nodes, goal.mesh.points), goal.mesh.faces)
-    turn, shift = rigid_motion(body.rest, found.nodes)
+    fine = Mesh(body.carried(bent_body.nodes, goal.mesh.points), goal.mesh.faces)
+    turn, shift = rigid_motion(body.rest, bent_body.nodes)
     target = goal.mesh.moved(turn, shift)
-    importance = body.importance[cKDTree(found.surface.points).query(fine.points)[1]]
-    likeness = measured(fine, target, fine, importance, found.strain)
-    place = found.family, found.stretches, found.nodes
+    importance = body.importance[cKDTree(bent_body.surface.points).query(fine.points)[1]]
+    likeness = measured(fine, target, fine, importance, bent_body.strain)
+    place = bent_body.family, bent_body.stretches, bent_body.nodes
     return BentPose(*place, fine, target, importance, likeness, time.process_time() - begin)
 
 
 def _solid(
-    goal: SolidGoal, body: Body, make: TileMaker, grain: float, own: BentPose
+    goal: SolidGoal, body: Body, make: TileMaker, grain: float, bent_pose: BentPose
 ) -> EscherSolid | None:
     """Return the solid of a bent body, or None if it is not one piece without handles."""
     begin = time.process_time()
-    found, group = BentBody(body, *own[:3]), own.family.group(own.stretches)
-    tile = make(_depth(own.mesh, found, grain), own.mesh, group)
+    bent_body, group = BentBody(body, *bent_pose[:3]), bent_pose.family.group(bent_pose.stretches)
+    tile = make(_depth(bent_pose.mesh, bent_body, grain), bent_pose.mesh, group)
     if tile is None:
         return None
-    turn, _ = rigid_motion(body.rest, own.nodes)
-    likeness = measured(tile, own.target, own.mesh, own.importance, own.likeness.strain)
+    turn, _ = rigid_motion(body.rest, bent_pose.nodes)
+    likeness = measured(
+        tile, bent_pose.target, bent_pose.mesh, bent_pose.importance, bent_pose.likeness.strain
+    )
     solid = EscherSolid(
         name=goal.name,
         group=group,
         tile=tile,
-        target=own.target,
-        bent=own.mesh,
+        target=bent_pose.target,
+        bent=bent_pose.mesh,
         millimetres=goal.millimetres,
         likeness=likeness,
         upright=turn @ goal.axes,
-        seconds=own.seconds + time.process_time() - begin,
+        seconds=bent_pose.seconds + time.process_time() - begin,
     )
     return solid if solid.certificate.valid else None
 

@@ -114,27 +114,27 @@ class _Lines:
         center = inside.mean(axis=0)
         radius = float(np.linalg.norm(inside - center, axis=1).max())
         near = group.elements_near(center, 2 * radius, source=center)
-        turns = np.array([own.linear for own in near])
-        shifts = np.array([own.translation for own in near])
+        turns = np.array([element.linear for element in near])
+        shifts = np.array([element.translation for element in near])
         return cls(depth, values, bounds, turns, shifts, turns @ center + shifts - center)
 
     def kept(self, direction: Array, step: float) -> float:
         """Return the volume that the exact tile and the sorted one share."""
-        values, own, _, _ = self._values(direction, step)
+        values, itself, _, _ = self._values(direction, step)
         return float(
-            ((values.argmax(axis=0) == own) & (sorted_labels(values) == own)).sum() * step**3
+            ((values.argmax(axis=0) == itself) & (sorted_labels(values) == itself)).sum() * step**3
         )
 
     def sorted_function(self, direction: Array, step: float) -> Function:
         """Return a function that is above 0 in the sorted tile, and a little deeper as `depth` is."""
-        values, own, axes, start = self._values(direction, step)
-        inside = np.where(sorted_labels(values) == own, 0.5, -0.5)
+        values, itself, axes, start = self._values(direction, step)
+        inside = np.where(sorted_labels(values) == itself, 0.5, -0.5)
         soft = scipy.ndimage.gaussian_filter(inside, BLUR)
 
         def wanted(points: Array) -> Array:
             at = (points @ axes - start) / step
-            found = scipy.ndimage.map_coordinates(soft, at.T, order=1, mode="nearest")
-            return found + FAITH * np.clip(self.depth(points), -DEEPEST, DEEPEST)
+            blurred = scipy.ndimage.map_coordinates(soft, at.T, order=1, mode="nearest")
+            return blurred + FAITH * np.clip(self.depth(points), -DEEPEST, DEEPEST)
 
         return wanted
 
@@ -150,18 +150,18 @@ class _Lines:
         places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1)
         points = (start + step * places) @ axes.T
         order = np.argsort(self.offsets @ direction, kind="stable")
-        found = np.empty((len(order), *counts), np.float32)
+        depths = np.empty((len(order), *counts), np.float32)
         for place, k in enumerate(order):
-            found[place] = self._depths((points - self.shifts[k]) @ self.turns[k])
-        return found, int(np.flatnonzero(order == 0)[0]), axes, start
+            depths[place] = self._depths((points - self.shifts[k]) @ self.turns[k])
+        return depths, int(np.flatnonzero(order == 0)[0]), axes, start
 
     def _depths(self, points: Array) -> Array:
         """Return depths between the grid's values; off the grid they fall with the distance."""
         low = self.bounds[0]
         inside = np.clip(points, low, low + FINE * (np.array(self.values.shape) - 1))
         at = np.moveaxis((inside - low) / FINE, -1, 0)
-        found = scipy.ndimage.map_coordinates(self.values, at, order=1)
-        return found - np.linalg.norm(points - inside, axis=-1)
+        depths = scipy.ndimage.map_coordinates(self.values, at, order=1)
+        return depths - np.linalg.norm(points - inside, axis=-1)
 
 
 def sorted_labels(values: Array) -> Array:

@@ -142,10 +142,10 @@ def _steps_between_copies(
     at, coset, shift = pairs[:, 0], pairs[:, 1], pairs[:, 2:]
     reach = 0.5 * spacing * np.concatenate([np.eye(3), -np.eye(3)])
     around = points[:, None] + reach
-    own = function(around.reshape(-1, 3)).reshape(-1, 6)
+    depths = function(around.reshape(-1, 3)).reshape(-1, 6)
     rest = around[at] - (group.translations[coset] + shift @ group.lattice.T)[:, None]
     back = np.einsum("nji,nkj->nki", group.linear_parts[coset], rest)
-    excess = own[at] - function(back.reshape(-1, 3)).reshape(-1, 6)
+    excess = depths[at] - function(back.reshape(-1, 3)).reshape(-1, 6)
     slopes = (excess[:, :3] - excess[:, 3:]) / spacing
     steepness = np.linalg.norm(slopes, axis=1)
     floor = 0.3 * np.median(steepness)
@@ -166,10 +166,10 @@ def patch_vectors(corners: Array, three: Array) -> Array:
 
     The last corner of those with `three` (n,) corners is a repeated one.
     """
-    found = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    vectors = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     a, b, c = np.moveaxis(corners[three, :3], 1, 0)
-    found[three] = np.cross(b - a, c - a)
-    return found
+    vectors[three] = np.cross(b - a, c - a)
+    return vectors
 
 
 def _orbit_normals(orbits: PointOrbits, points: Array, patches: Integers) -> Array:
@@ -180,8 +180,8 @@ def _orbit_normals(orbits: PointOrbits, points: Array, patches: Integers) -> Arr
         np.add.at(normals, patches[:, k], vectors)
     # from the other side the normal is opposite: one point stands for its orbit
     _, first = np.unique(orbits.number, return_index=True)
-    found = np.einsum("nij,nj->ni", orbits._turns[first], normals[first])
-    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300)
+    turned = np.einsum("nij,nj->ni", orbits._turns[first], normals[first])
+    return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-300)
 
 
 def _smoothing_edges(

@@ -32,15 +32,15 @@ class Soup(NamedTuple):
     @classmethod
     def joined(cls, parts: Sequence[Soup]) -> Soup:
         """Return all triangles of several meshes."""
-        starts = np.cumsum([0, *(len(own.points) for own in parts)])[:-1]
-        moved = [own.faces + start for own, start in zip(parts, starts, strict=True)]
+        starts = np.cumsum([0, *(len(part.points) for part in parts)])[:-1]
+        moved = [part.faces + start for part, start in zip(parts, starts, strict=True)]
         colours = [
-            np.full(own.points.shape, np.nan) if own.colours is None else own.colours
-            for own in parts
+            np.full(part.points.shape, np.nan) if part.colours is None else part.colours
+            for part in parts
         ]
-        coloured = any(own.colours is not None for own in parts)
+        coloured = any(part.colours is not None for part in parts)
         return cls(
-            np.concatenate([np.zeros((0, 3)), *(own.points for own in parts)]),
+            np.concatenate([np.zeros((0, 3)), *(part.points for part in parts)]),
             np.concatenate([np.zeros((0, 3), np.int64), *moved]),
             np.concatenate(colours) if coloured else None,
         )

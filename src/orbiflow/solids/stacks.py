@@ -60,14 +60,14 @@ def stack_of(group: CrystallographicGroup, tile: Mesh, count: int) -> list[Stack
     """
     source = tile.centroid
     spacing = (group.cell_volume / group.order) ** (1 / 3)
-    best, found = np.inf, list[StackedCopy]()
+    best, compact = np.inf, list[StackedCopy]()
     for halves in product((0.0, 0.25, 0.5), repeat=3):
         copies = _nearest(group, source, source + group.lattice @ halves, count, spacing)
-        centers = np.stack([own.linear @ source + own.shift for own in copies])
+        centers = np.stack([copy.linear @ source + copy.shift for copy in copies])
         spread = float(((centers - centers.mean(axis=0)) ** 2).sum())
-        if spread < best * (1 - 1e-9) and any(_is_itself(own) for own in copies):
-            best, found = spread, copies
-    return sorted(found, key=lambda own: not _is_itself(own))
+        if spread < best * (1 - 1e-9) and any(_is_itself(copy) for copy in copies):
+            best, compact = spread, copies
+    return sorted(compact, key=lambda copy: not _is_itself(copy))
 
 
 def _nearest(
@@ -79,11 +79,11 @@ def _nearest(
     while len(elements) < count:
         radius *= 1.25
         elements = group.elements_near(center, radius, source=source)
-    numbered = [_numbered(group, own.linear, own.translation) for own in elements]
+    numbered = [_numbered(group, element.linear, element.translation) for element in elements]
 
-    def order(own: StackedCopy) -> tuple[float, int, tuple[int, int, int]]:
-        distance = np.linalg.norm(own.linear @ source + own.shift - center)
-        return round(float(distance) / spacing, 6), own.coset, own.cell
+    def order(copy: StackedCopy) -> tuple[float, int, tuple[int, int, int]]:
+        distance = np.linalg.norm(copy.linear @ source + copy.shift - center)
+        return round(float(distance) / spacing, 6), copy.coset, copy.cell
 
     return sorted(numbered, key=order)[:count]
 
@@ -115,7 +115,7 @@ def copy_colour(group: CrystallographicGroup, copy: StackedCopy) -> str:
     if group.order in FEW_COSETS or _turn(copy, 2) == 0:
         return colour
     channels = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
-    return "#" + "".join(f"{round(0.86 * own):02x}" for own in channels)
+    return "#" + "".join(f"{round(0.86 * channel):02x}" for channel in channels)
 
 
 def _turn(copy: StackedCopy, count: int) -> int:
@@ -127,7 +127,7 @@ def _turn(copy: StackedCopy, count: int) -> int:
 def copy_centers(tile: Mesh, copies: Sequence[StackedCopy]) -> Array:
     """Return the centres of mass (n, 3) of copies of a tile."""
     center = tile.centroid
-    return np.stack([own.linear @ center + own.shift for own in copies])
+    return np.stack([copy.linear @ center + copy.shift for copy in copies])
 
 
 def lighter(mesh: Mesh, most: int) -> Mesh:

@@ -115,10 +115,10 @@ def boundary_patches(tile: CellTile) -> Patches:
     inside[numbers] = True
     behind = box.neighbors(numbers)
     rows, sides = np.nonzero((behind >= 0) & ~inside[behind])
-    own, other = tile.cells[rows], box.cells(behind[rows, sides])
+    inner, other = tile.cells[rows], box.cells(behind[rows, sides])
     source = tile.cells[complex.orbit_of(other)]
     cosets, shifts = complex.elements_between(source, other)
-    corners = shape.denominator * own[:, None, :3] + shape.face_corners[own[:, 3], sides]
+    corners = shape.denominator * inner[:, None, :3] + shape.face_corners[inner[:, 3], sides]
     points, flat = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     faces = flat.reshape(-1, 4)
     repeated = np.repeat(np.stack([cosets, *shifts.T], axis=1), 4, axis=0)
@@ -134,7 +134,7 @@ def _rows_in(table: Integers, rows: Integers) -> Integers:
     low = np.minimum(table.min(axis=0), rows.min(axis=0))
     size = np.maximum(table.max(axis=0), rows.max(axis=0)) - low + 1
     keys, wanted = (
-        np.ravel_multi_index(tuple((own - low).T), tuple(size)) for own in (table, rows)
+        np.ravel_multi_index(tuple((entries - low).T), tuple(size)) for entries in (table, rows)
     )
     return np.asarray(np.searchsorted(keys, wanted), np.int64)
 
@@ -285,10 +285,10 @@ def _partner_triangles(
     order = np.argsort(owners, kind="stable")
     first = np.searchsorted(owners[order], patches.partners[owners])
     last = np.searchsorted(owners[order], patches.partners[owners], side="right")
-    best, found = np.full(len(faces), np.inf), np.zeros(len(faces), np.int64)
+    best, partners = np.full(len(faces), np.inf), np.zeros(len(faces), np.int64)
     for k in range(int((last - first).max())):
         other = order[np.minimum(first + k, last - 1)]
         distance = np.linalg.norm(centers[other] - back, axis=1)
         nearer = distance < best
-        best[nearer], found[nearer] = distance[nearer], other[nearer]
-    return found
+        best[nearer], partners[nearer] = distance[nearer], other[nearer]
+    return partners

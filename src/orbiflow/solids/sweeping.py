@@ -36,9 +36,9 @@ def lifted(body: Manifold, top: float) -> Manifold:
     seen = nearest_triangles(
         ((corners - start) / pitch + (0.5, 0.5, 0)) * (1, 1, -1), width, height
     )
-    known = seen.covered
-    floor = np.where(known, low[2] - pitch * seen.depth, 0.0)
-    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    covered = seen.covered
+    floor = np.where(covered, low[2] - pitch * seen.depth, 0.0)
+    nearest = distance_transform_edt(~covered, return_distances=False, return_indices=True)
     floor = floor[tuple(np.asarray(nearest))]
     lowest = minimum_filter(floor, 3)
     floor = np.where(floor - lowest > STEEP * pitch, lowest, floor)

@@ -77,8 +77,8 @@ def by_trimesh(kind: str, data: bytes, files: Mapping[str, bytes] | None = None)
         scene = trimesh.load_scene(
             io.BytesIO(data), file_type=kind, resolver=files, skip_materials=True, process=False
         )
-        parts = [own for own in scene.dump(concatenate=False) if hasattr(own, "faces")]
-        return Soup.joined([_coloured(own) for own in parts])
+        parts = [part for part in scene.dump(concatenate=False) if hasattr(part, "faces")]
+        return Soup.joined([_coloured(part) for part in parts])
     except OrbiflowError:
         raise
     # what a broken file does to a reader is of any kind
@@ -90,10 +90,10 @@ def _coloured(part: Any) -> Soup:
     """Return a mesh of trimesh, with the colours of its points or faces."""
     points = np.asarray(part.vertices, float).reshape(-1, 3)
     soup = Soup(points, np.asarray(part.faces, np.int64).reshape(-1, 3))
-    found = np.asarray(part.vertex_attributes.get(COLOURS, ()))
-    if found.shape in ((len(points), 3), (len(points), 4)):
-        most = np.iinfo(found.dtype).max if found.dtype.kind in "iu" else 1
-        return soup._replace(colours=found[:, :3] / most)
+    stored = np.asarray(part.vertex_attributes.get(COLOURS, ()))
+    if stored.shape in ((len(points), 3), (len(points), 4)):
+        most = np.iinfo(stored.dtype).max if stored.dtype.kind in "iu" else 1
+        return soup._replace(colours=stored[:, :3] / most)
     if part.visual.kind == "vertex":
         return soup._replace(colours=part.visual.vertex_colors[:, :3] / 255)
     if part.visual.kind == "face":

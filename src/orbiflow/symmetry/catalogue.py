@@ -208,13 +208,13 @@ def flat_manifold(name: str, cell: ArrayLike | None = None) -> CrystallographicG
     >>> flat_manifold("hantzsche-wendt").order
     4
     """
-    own = ALIASES.get(name, name)
-    if own not in FLAT_MANIFOLDS:
-        known = ", ".join((*FLAT_MANIFOLDS, *ALIASES))
-        raise GroupError(f"unknown flat manifold {name!r}; there are {known}")
+    plain_name = ALIASES.get(name, name)
+    if plain_name not in FLAT_MANIFOLDS:
+        names = ", ".join((*FLAT_MANIFOLDS, *ALIASES))
+        raise GroupError(f"unknown flat manifold {name!r}; there are {names}")
     if cell is None:
-        cell = (1, 1, 1, 90, 90, 120 if own in ("tricosm", "hexacosm") else 90)
-    return group_from_operators(FLAT_MANIFOLDS[own], cell_lattice(cell), name=name)
+        cell = (1, 1, 1, 90, 90, 120 if plain_name in ("tricosm", "hexacosm") else 90)
+    return group_from_operators(FLAT_MANIFOLDS[plain_name], cell_lattice(cell), name=name)
 
 
 SYMBOL = re.compile(r"-?[PABCFIRH] ?[-1-6mabcden].*|[1-9]\d{0,2}(?: ?: ?-?\w+)?|(?i:hall) ?[:=].*")

@@ -76,16 +76,16 @@ def symmetry_elements(
 
 
 def _centers(elements: list[Isometry], middle: Array, reach: float) -> list[RotationCenter]:
-    found: list[RotationCenter] = []
+    centers: list[RotationCenter] = []
     for g in sorted(elements, key=_angle):
         if _angle(g) < 1e-6:
             continue
         point = np.linalg.solve(np.eye(2) - g.linear, g.translation)
         if np.linalg.norm(point - middle) > reach * (1 + 1e-9):
             continue
-        if all(np.linalg.norm(point - other.point) > 1e-6 * reach for other in found):
-            found.append(RotationCenter(point, round(2 * np.pi / _angle(g))))
-    return found
+        if all(np.linalg.norm(point - other.point) > 1e-6 * reach for other in centers):
+            centers.append(RotationCenter(point, round(2 * np.pi / _angle(g))))
+    return centers
 
 
 def _angle(g: Isometry) -> float:
@@ -93,12 +93,12 @@ def _angle(g: Isometry) -> float:
 
 
 def _lines(elements: list[Isometry], middle: Array, reach: float) -> list[GlideLine]:
-    found: list[GlideLine] = []
+    lines: list[GlideLine] = []
     for line in sorted((_axis(g, middle, reach) for g in elements), key=lambda item: item.shift):
         distance = float(np.linalg.norm(line.line.point - middle))
-        if distance <= reach * (1 + 1e-9) and not any(_same(line, other, reach) for other in found):
-            found.append(line)
-    return found
+        if distance <= reach * (1 + 1e-9) and not any(_same(line, other, reach) for other in lines):
+            lines.append(line)
+    return lines
 
 
 def _axis(g: Isometry, middle: Array, reach: float) -> GlideLine:
@@ -232,8 +232,8 @@ class DirichletDomain:
         # neighbours are at most twice as far as the domain's farthest point
         reach = 2 * float(np.linalg.norm(self.group.lattice)) * (1 + 1e-9)
         sites = [g(self.site) for g in self.group.elements_near(self.site, reach)]
-        found = Voronoi(np.stack(sites))
-        place = found.vertices[found.regions[found.point_region[0]]]
+        diagram = Voronoi(np.stack(sites))
+        place = diagram.vertices[diagram.regions[diagram.point_region[0]]]
         _, first = np.unique(place.round(9), axis=0, return_index=True)
         offset = place[first] - self.site
         order = np.arctan2(offset[:, 1], offset[:, 0]).argsort() if self.group.dim == 2 else ...
@@ -245,8 +245,8 @@ class DirichletDomain:
         Differentiable almost everywhere for torch tensors.
         """
         wrapped = self.group.wrap(points)
-        own: Any = wrapped
-        plain: Array = own.detach().cpu().numpy() if is_tensor(own) else own
+        values: Any = wrapped
+        plain: Array = values.detach().cpu().numpy() if is_tensor(values) else values
         flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
         nearest = np.empty(len(flat), dtype=np.int64)
         for start in range(0, len(flat), 16384):  # bounds the distance table

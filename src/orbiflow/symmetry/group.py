@@ -217,7 +217,7 @@ class CrystallographicGroup:
         """
         center = np.asarray(center, dtype=np.float64)
         source = center if source is None else np.asarray(source, dtype=np.float64)
-        found: list[tuple[float, Isometry]] = []
+        near: list[tuple[float, Isometry]] = []
         reach = radius * np.linalg.norm(self.inverse_lattice, axis=1)
         for coset in self.cosets:
             middle = self.inverse_lattice @ (center - coset(source))
@@ -229,9 +229,9 @@ class CrystallographicGroup:
             shifts = steps @ self.lattice.T + coset.translation
             distance = np.linalg.norm(coset.linear @ source + shifts - center, axis=1)
             for i in np.flatnonzero(distance <= radius):
-                found.append((float(distance[i]), Isometry(coset.linear, shifts[i])))
-        found.sort(key=lambda item: item[0])
-        return [element for _, element in found]
+                near.append((float(distance[i]), Isometry(coset.linear, shifts[i])))
+        near.sort(key=lambda item: item[0])
+        return [element for _, element in near]
 
     def conjugate(
         self, linear: ArrayLike, offset: ArrayLike | None = None
@@ -371,10 +371,10 @@ def _finite_closure(
     """Return all products modulo the lattice, or None if there are more than `max_order`."""
     elements: list[Isometry] = []
     waiting = [identity(basis.shape[0])]
-    known: dict[bytes, list[Array]] = {}  # translations modulo the lattice, by linear part
+    translations: dict[bytes, list[Array]] = {}  # translations modulo the lattice, by linear part
     for element in waiting:  # grows while it is walked
         integral = np.linalg.solve(basis, element.linear @ basis)
-        same = known.setdefault(np.round(integral).astype(np.int64).tobytes(), [])
+        same = translations.setdefault(np.round(integral).astype(np.int64).tobytes(), [])
         fractional = np.linalg.solve(basis, element.translation)
         offsets = fractional - np.reshape(same, (-1, len(basis)))
         if (np.abs(offsets - np.round(offsets)).max(axis=1) <= 10 * TOLERANCE).any():

@@ -95,25 +95,25 @@ def settings_named(gemmi: Any, name: str) -> list[Any]:
     written = [part.lower() for part in re.findall(r"^[A-Za-z]|[^ ]+", text)]
     if not text or not re.fullmatch(r"[A-Za-z][-_/ A-Za-z0-9]*", text):
         return []
-    found = [
+    symbols = [
         symbol
         for symbol in _symbols(gemmi).get("".join(written).replace("_", ""), ())
         if _is_written(written, symbol.parts) and _has_extension(symbol.setting, extension)
     ]
-    usual = [symbol.setting for symbol in found if symbol.is_usual]
-    return usual or [symbol.setting for symbol in found]
+    usual = [symbol.setting for symbol in symbols if symbol.is_usual]
+    return usual or [symbol.setting for symbol in symbols]
 
 
 def settings_numbered(gemmi: Any, text: str) -> list[Any]:
     """Return all rows that a number means, such as "62", "No. 225", "#225", "227:2" or "62:cab"."""
-    found = _NUMBERED.fullmatch(text.strip())
-    if found is None:
+    match = _NUMBERED.fullmatch(text.strip())
+    if match is None:
         return []
-    extension = _plain_extension(found[2] or "")
+    extension = _plain_extension(match[2] or "")
     return [
         row
         for row in gemmi.spacegroup_table()
-        if row.number == int(found[1]) and _has_extension(row, extension)
+        if row.number == int(match[1]) and _has_extension(row, extension)
     ]
 
 
@@ -152,12 +152,12 @@ def _is_surely_of_hall(gemmi: Any, text: str) -> bool:
 
 def _without_extension(text: str) -> tuple[str, str]:
     """Return a symbol and the setting after it: an origin, axes, or the cell of a monoclinic group."""
-    found = _EXTENSION.search(text)
-    if found is None and re.fullmatch(r"R.+[HR]", text, re.IGNORECASE):
+    match = _EXTENSION.search(text)
+    if match is None and re.fullmatch(r"R.+[HR]", text, re.IGNORECASE):
         return text[:-1].strip(), text[-1].upper()
-    if found is None:
+    if match is None:
         return text, ""
-    return text[: found.start()], _plain_extension(found[1] or found[2] or found[3])
+    return text[: match.start()], _plain_extension(match[1] or match[2] or match[3])
 
 
 def _plain_extension(given: str) -> str:
@@ -166,26 +166,28 @@ def _plain_extension(given: str) -> str:
 
 
 def _has_extension(setting: Any, extension: str) -> bool:
-    own = setting.ext.strip("\0")
+    ending = setting.ext.strip("\0")
     cell = re.sub(r"^-?([abc])\d?$", r"\1", setting.qualifier)  # of monoclinic settings, the axis
-    return extension in ("", own, setting.qualifier, cell)
+    return extension in ("", ending, setting.qualifier, cell)
 
 
 def _is_written(written: Sequence[str], parts: Sequence[str]) -> bool:
     """Whether a symbol of these parts is written so: blanks between them, "_" in screw axes."""
-    spans, own = _spans(parts), _spans([part.replace("_", "") for part in written])
+    spans, written_spans = _spans(parts), _spans([part.replace("_", "") for part in written])
     letters = "".join(written)
     marks = [at for at, letter in enumerate(letters) if letter == "_"]
     subscripts = {at - count for count, at in enumerate(marks)}
     screws = {start + 1 for (start, _), part in spans.items() if re.match(r"[2346][1-5]", part)}
     # numbers apart are apart in the symbol: "P 2 1" is not P 21, and "P 32 1" not P 3 2 1
-    numbers = {span for span, part in own.items() if part.isdigit() and len(own) > 2}
+    numbers = {
+        span for span, part in written_spans.items() if part.isdigit() and len(written_spans) > 2
+    }
     if subscripts:  # a screw axis without one stands alone
-        screws_left = screws - subscripts - {start + 1 for start, _ in own}
+        screws_left = screws - subscripts - {start + 1 for start, _ in written_spans}
     else:
         screws_left = set[int]()
     return (
-        {end for _, end in own} <= {end for _, end in spans}
+        {end for _, end in written_spans} <= {end for _, end in spans}
         and subscripts <= screws
         and numbers <= spans.keys()
         and not screws_left

@@ -101,7 +101,7 @@ def _named(name: int | str, origin: int | None) -> tuple[str, list[str]]:
     """Return the name that a group goes by, and all its operators in the conventional cell."""
     gemmi, text = _gemmi(), str(name).strip()
     rows = settings_numbered(gemmi, text)
-    if known := rows[0] if rows else find_setting(gemmi, text):
+    if row := rows[0] if rows else find_setting(gemmi, text):
         if has_two_origins(rows or settings_named(gemmi, text)):
             if origin is None:
                 raise GroupError(
@@ -109,11 +109,11 @@ def _named(name: int | str, origin: int | None) -> tuple[str, list[str]]:
                     f"{text + ':1'!r} for the first, on a site of the highest symmetry, or "
                     f"{text + ':2'!r} for the second, on a centre of inversion"
                 )
-            known = gemmi.find_spacegroup_by_name(f"{known.hm}:{origin}")
-        return known.xhm(), [op.triplet() for op in known.operations()]
-    if found := find_hall(gemmi, text):
-        known = gemmi.find_spacegroup_by_ops(gemmi.GroupOps(found))
-        return known.xhm() if known else text, [op.triplet() for op in found]
+            row = gemmi.find_spacegroup_by_name(f"{row.hm}:{origin}")
+        return row.xhm(), [op.triplet() for op in row.operations()]
+    if operations := find_hall(gemmi, text):
+        row = gemmi.find_spacegroup_by_ops(gemmi.GroupOps(operations))
+        return row.xhm() if row else text, [op.triplet() for op in operations]
     raise GroupError(
         f"unknown space group {described(name)}: give a number from 1 to 230, a Hermann-Mauguin "
         'symbol such as "P 21 21 21" or "R -3 m:H", or a Hall symbol such as "Hall: -P 2ybc"'
@@ -145,18 +145,18 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
         listed = next((values[tag] for tag in _OPERATORS if tag in values), None)
         names, settings = _names(values)
         if listed is None:
-            one = (name for name in names if not has_two_origins(_settings(_gemmi(), name)))
-            group = space_group(next(one, names[0]), cell)
+            unambiguous = (name for name in names if not has_two_origins(_settings(_gemmi(), name)))
+            group = space_group(next(unambiguous, names[0]), cell)
         else:
             basis = cell_lattice(cell)
             group = group_from_operators(listed, basis, name="".join(names[:1]).removeprefix(_SAID))
             if not names:
                 _warn_of_finer_lattice(group, listed, basis)
-            own = _row_of(operators(group, basis))
-            if own is not None:
-                settings[f"its {len(listed)} operators"] = [own]
+            row = _row_of(operators(group, basis))
+            if row is not None:
+                settings[f"its {len(listed)} operators"] = [row]
                 is_known = names and (_SAID in names[0] or _settings(_gemmi(), names[0]))
-                group = group if is_known else replace(group, name=own.xhm())
+                group = group if is_known else replace(group, name=row.xhm())
             else:
                 _check_type(group, listed, basis, settings)
         _check_agreement(settings)
@@ -179,16 +179,16 @@ def _names(values: dict[str, list[str]]) -> tuple[list[str], dict[str, list[Any]
         if tag in _HALL:
             if (hall := find_hall(gemmi, _SAID + text)) is None:
                 continue
-            found = [row] if (row := _row_of([op.triplet() for op in hall])) else []
+            rows = [row] if (row := _row_of([op.triplet() for op in hall])) else []
         elif tag in _NUMBERS and re.fullmatch("0+", text):
             continue
         else:
-            found = _settings(gemmi, text)
-            if tag in _NUMBERS and not found:
+            rows = _settings(gemmi, text)
+            if tag in _NUMBERS and not rows:
                 raise GroupError(f"{tag} {described(text)} is no number of a group: 1 to 230 are")
         names.append(_SAID + text if tag in _HALL else text)
-        if found:
-            settings[f"{tag} {text}"] = found
+        if rows:
+            settings[f"{tag} {text}"] = rows
     return names, settings
 
 
@@ -204,7 +204,7 @@ def _check_agreement(settings: dict[str, list[Any]]) -> None:
     if not settings or _have_common(halls.values()):
         return
     if not _have_common(numbers.values()):
-        said = ", ".join(f"{what} is of number {min(own)}" for what, own in numbers.items())
+        said = ", ".join(f"{what} is of number {min(options)}" for what, options in numbers.items())
     else:
         named = {what: rows[0] for what, rows in settings.items() if not what.startswith(_NUMBERS)}
         said = ", ".join(f"{what} is of the setting {row.xhm()}" for what, row in named.items())
@@ -224,17 +224,17 @@ def _check_type(
     Only rotations and screws, reflections and glides are compared, by their counts. The operators may
     imply no translations but those listed or of the names' own centring.
     """
-    known = [row for rows in settings.values() for row in rows]
-    most = max((len(row.operations().cen_ops) for row in known), default=np.inf)
+    named = [row for rows in settings.values() for row in rows]
+    most = max((len(row.operations().cen_ops) for row in named), default=np.inf)
     implied = _translations_in(group, basis)
     if implied > max(most, _translations_listed(listed)):
         raise GroupError(
             f"it contradicts itself: its operators imply {implied} translations within its cell and "
             f"its name {most:.0f}; one of them may be mistyped, or rounded too coarsely"
         )
-    own = element_counts(group)
+    counts = element_counts(group)
     for what, rows in settings.items():
-        if own != element_counts(space_group(f"{_SAID}{rows[0].hall}")):
+        if counts != element_counts(space_group(f"{_SAID}{rows[0].hall}")):
             raise GroupError(
                 f"it contradicts itself: its {len(listed)} operators are of another type of group, of "
                 f"order {group.order}, than {what}; correct it, or remove what is wrong"
@@ -287,11 +287,11 @@ def _translations_listed(listed: list[str]) -> int:
 
 def _warn_of_finer_lattice(group: CrystallographicGroup, listed: list[str], basis: Array) -> None:
     """Warn where operators that no name goes with imply translations that are not among them."""
-    implied, given = _translations_in(group, basis), _translations_listed(listed)
-    if implied > given:
+    implied, stated = _translations_in(group, basis), _translations_listed(listed)
+    if implied > stated:
         warnings.warn(
             f"the {len(listed)} operators imply {implied} translations within the cell and list "
-            f"{given}: its lattice is finer than the cell; is one mistyped, say 1/3 for 1/2?",
+            f"{stated}: its lattice is finer than the cell; is one mistyped, say 1/3 for 1/2?",
             DataWarning,
             stacklevel=3,
         )
@@ -317,9 +317,9 @@ def _values_by_tag(block: Any, cif: Any) -> dict[str, list[str]]:
             columns |= {tag: values[i::width] for i, tag in enumerate(item.loop.tags)}
     columns = {tag.lower().replace(".", "_"): values for tag, values in columns.items()}
     wanted = columns.keys() & {*_CELL, *_OPERATORS, *_SYMBOLS}
-    known = {tag: [cif.as_string(text) for text in columns[tag]] for tag in wanted}
+    texts = {tag: [cif.as_string(text) for text in columns[tag]] for tag in wanted}
     unknown = ({""}, {"."}, {"?"})  # as some programs write them, in quotes
-    return {tag: values for tag, values in known.items() if {*values} not in unknown}
+    return {tag: values for tag, values in texts.items() if {*values} not in unknown}
 
 
 def cif_text(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> str:

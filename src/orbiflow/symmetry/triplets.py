@@ -54,10 +54,12 @@ def group_from_operators(
         isometries = [Isometry(basis @ t[:, :d] @ inverse, basis @ t[:, d]) for t in tables]
     except NotAnIsometryError as error:
         nearest = fitting_cell(np.stack(tables)[:, :, :d], basis)
-        own, other = (np.round(cell, 6).tolist() for cell in (cell_parameters(basis), nearest or 0))
+        parameters, other = (
+            np.round(cell, 6).tolist() for cell in (cell_parameters(basis), nearest or 0)
+        )
         cure = f"the nearest that fits has {other}" if nearest else "they fit no cell"
         raise LatticeMismatchError(
-            f"the operators do not fit a cell with lengths and angles {own}; {cure}"
+            f"the operators do not fit a cell with lengths and angles {parameters}; {cure}"
         ) from error
     return generated(basis, isometries, name).primitive()
 
