@@ -18,7 +18,7 @@ class OrbiflowError(ValueError):
 
 def with_names(template: str, named: Callable[[str], str]) -> str:
     """Return a text with each name in single braces called what a function returns for it."""
-    text = NAME_IN_BRACES.sub(lambda found: named(found[1]), template)
+    text = NAME_IN_BRACES.sub(lambda match: named(match[1]), template)
     return text.replace("{{", "{").replace("}}", "}")
 
 
@@ -78,8 +78,8 @@ class SettingError(OrbiflowError):
     @property
     def about(self) -> str:
         """The first setting that the message names, "" if it names none."""
-        found = NAME_IN_BRACES.search(self.template)
-        return found[1] if found else ""
+        match = NAME_IN_BRACES.search(self.template)
+        return match[1] if match else ""
 
     def named(self, name: Callable[[str], str]) -> str:
         """Return the message, with each setting called what `name` returns for it."""

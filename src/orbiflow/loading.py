@@ -97,31 +97,31 @@ def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
         CertificationError: for a tile that does not tile, unless it may be uncertified.
     """
     path = as_path(path, "the folder")
-    known = (MODEL, RESULT, TILE_MODEL, SOLIDS, SOLID)
+    names = (MODEL, RESULT, TILE_MODEL, SOLIDS, SOLID)
     if path.is_dir():
-        has = {name: (path / name).is_file() for name in known}
+        has = {name: (path / name).is_file() for name in names}
     elif path.is_file():
-        has = {name: name == path.name for name in known}
+        has = {name: name == path.name for name in names}
         has[MODEL] |= path.suffix == ".safetensors" and not has[TILE_MODEL] | has[SOLID]
     else:
         raise InputFileError(
             f"{path}: no such folder; give what orbiflow density fit or orbiflow escherize wrote"
         )
-    found = [name for name, there in has.items() if there]
-    if len(found) > 1:
+    present = [name for name, there in has.items() if there]
+    if len(present) > 1:
         raise InputFileError(
-            f"{path} holds {' and '.join(found)}, of two commands: give the file that you mean"
+            f"{path} holds {' and '.join(present)}, of two commands: give the file that you mean"
         )
-    if not found:
+    if not present:
         raise InputFileError(
             f"{path} holds no {MODEL} and no {RESULT}: give the folder that orbiflow density fit or "
             "orbiflow escherize wrote, or that of a tile in it"
         )
-    if found in ([SOLIDS], [SOLID]):
-        return _solids(path, found[0], uncertified)
-    if found == [MODEL]:
+    if present in ([SOLIDS], [SOLID]):
+        return _solids(path, present[0], uncertified)
+    if present == [MODEL]:
         return _estimator(path)
-    if found == [RESULT]:
+    if present == [RESULT]:
         return _run(path, uncertified)
     return _tile_folder(path if path.is_dir() else path.parent, uncertified)
 
@@ -177,8 +177,8 @@ def _estimator(path: Path) -> DensityEstimator:
     try:
         if "settings" in document:  # a marginal or a conditional was not fitted
             report = from_json(FitReport, document["report"], "report")
-            given = dict(document["settings"])
-            settings = {name: given[name] for name in REPORTED if name in given}
+            stored = dict(document["settings"])
+            settings = {name: stored[name] for name in REPORTED if name in stored}
         if unit := density.space.settings().get("unit"):
             settings["unit"] = unit
         return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)
@@ -188,8 +188,8 @@ def _estimator(path: Path) -> DensityEstimator:
 
 def _solids(path: Path, name: str, uncertified: bool) -> EscherSolid | list[EscherSolid]:
     solids = read_run(path) if name == SOLIDS else [read_solid(path)]
-    for own in [] if uncertified else solids:
-        own.require_certified()
+    for solid in [] if uncertified else solids:
+        solid.require_certified()
     return solids if name == SOLIDS else solids[0]
 
 

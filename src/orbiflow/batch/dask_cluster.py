@@ -103,15 +103,15 @@ class DaskCluster(Executor):
                         return
                     alone = True
                     out.send(suspects.pop())
-                for one in out.came():
+                for sent in out.came():
                     out.fill(waiting, room)  # now: what comes next takes the caller its time
-                    answer = self._answer(one, alone)
+                    answer = self._answer(sent, alone)
                     if answer is not None:
                         yield answer
                         continue
-                    key = one.parcel.key
+                    key = sent.parcel.key
                     tell(Note(f"workers died while they were at {key}; it is tried again alone"))
-                    suspects.append(one.parcel)
+                    suspects.append(sent.parcel)
         finally:
             out.recall()
 
@@ -146,12 +146,12 @@ class DaskCluster(Executor):
                 f"{self.address} --nthreads 1 --nworkers N`"
             ) from error
         try:
-            found = client.run(_version_asker())
+            versions = client.run(_version_asker())
         except Exception as error:
             raise OrbiflowError(
                 f"the workers of {self.address} cannot be asked: {error}"
             ) from error
-        for worker, version in found.items():
+        for worker, version in versions.items():
             if version != __version__:
                 has = "no orbiflow" if version is None else f"orbiflow {version}"
                 raise OrbiflowError(
@@ -217,8 +217,8 @@ class _Out:
 
     def came(self) -> list[_Sent]:
         """Return those that have come back; if there are none, after a while."""
-        came = [one for one in self.sent if one.result.done()]
-        self.sent = [one for one in self.sent if one not in came]
+        came = [sent for sent in self.sent if sent.result.done()]
+        self.sent = [sent for sent in self.sent if sent not in came]
         if not came:
             time.sleep(POLL_SECONDS)
         return came
@@ -228,11 +228,11 @@ class _Out:
         left, self.sent = self.sent, []
         with suppress(Exception):  # the scheduler may have gone
             if left:
-                self.client.cancel([one.future for one in left], force=True)
+                self.client.cancel([sent.future for sent in left], force=True)
         # that ends them; if they were cancelled first, asyncio would print a traceback of each
-        concurrent.futures.wait([one.result for one in left], SECONDS_BETWEEN_LOOKS)
-        for one in left:
-            one.result.cancel()
+        concurrent.futures.wait([sent.result for sent in left], SECONDS_BETWEEN_LOOKS)
+        for sent in left:
+            sent.result.cancel()
 
 
 async def _fetched(client: Client, future: Future) -> Any:

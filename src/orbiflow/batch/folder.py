@@ -328,11 +328,13 @@ class BatchFolder:
         with system_errors(OutputError, what, "choose another folder"):
             if not self.path.exists() or (self.path / self.overview.journal).exists():
                 return
-            known = (*LITTER, LOCK)
-            found = next((p for p in sorted(self.path.iterdir()) if p.name not in known), None)
-        if found is not None:
+            harmless = (*LITTER, LOCK)
+            stranger = next(
+                (p for p in sorted(self.path.iterdir()) if p.name not in harmless), None
+            )
+        if stranger is not None:
             raise OutputError(
-                f"{self.path} holds {found.name}, which is of no earlier {self.overview.what}: "
+                f"{self.path} holds {stranger.name}, which is of no earlier {self.overview.what}: "
                 "choose another folder or move it"
             )
 

@@ -53,8 +53,8 @@ class Parcel:
     def header(self) -> str:
         """Return all but the files' bytes, as text."""
         reads = [[key, name, len(data)] for key, (name, data) in self.files.items()]
-        known = {"call": self.call.to_json(), "writes": self.writes, "reads": reads}
-        return json.dumps({"version": __version__, **known})
+        facts = {"call": self.call.to_json(), "writes": self.writes, "reads": reads}
+        return json.dumps({"version": __version__, **facts})
 
     @property
     def data(self) -> bytes:

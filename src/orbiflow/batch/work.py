@@ -173,8 +173,8 @@ def folder_names(
 
 def _names(path: str) -> Iterator[str]:
     """Possible names, from the best to those that are as good as unique."""
-    *first, last = (PurePosixPath(own) for own in path.split(PAIRED))
-    plain = "-".join(_plain(str(own.parent / own.stem)) for own in (*first, last))
+    *first, last = (PurePosixPath(part) for part in path.split(PAIRED))
+    plain = "-".join(_plain(str(part.parent / part.stem)) for part in (*first, last))
     ending = _plain(last.suffix[1:])
     yield plain
     yield f"{plain}-{ending}"
@@ -259,8 +259,8 @@ def run_files(
     if not files:
         raise InputFileError(f"{source} holds one file that can be read, and a pair needs two")
     with BatchFolder(out, kind, sheet or ContactSheet(kind, title)) as folder:
-        given = {file: entry.name for file, entry in folder.journal.entries.items()}
-        names = folder_names(files, given, RESERVED)
+        taken = {file: entry.name for file, entry in folder.journal.entries.items()}
+        names = folder_names(files, taken, RESERVED)
         read = {file: partial(read_file, source / file, kind.most_bytes) for file in listing}
         items: list[Item] = []
         for file in files:
@@ -332,8 +332,8 @@ def _said_before(
         if failed:
             text += f", {failed} have failed before ({{retry_failed}} does them again)"
         yield Advice(f"{text}, {len(todo)} to do")
-    known = set(folder.keys)
-    others = sorted(entry.name for key, entry in entries.items() if key not in known)
+    keys = set(folder.keys)
+    others = sorted(entry.name for key, entry in entries.items() if key not in keys)
     if others:
         named = ", ".join(others[:MOST_NAMED]) + (", ..." if len(others) > MOST_NAMED else "")
         yield f"{len(others)} earlier results are {gone}; they are kept and not listed: {named}"
@@ -361,8 +361,8 @@ class _Batch:
             try:
                 files = item.files(self.kind)
             except OrbiflowError as error:
-                known = (item.key, item.name, "", item.settings(self.kind), __version__)
-                self._finish(Entry(*known, "failed", str(error)), {}, None)
+                facts = (item.key, item.name, "", item.settings(self.kind), __version__)
+                self._finish(Entry(*facts, "failed", str(error)), {}, None)
                 continue
             parcel = Parcel(item.key, item.call, self.kind.writes, files)
             self.at_work[item.key] = item, code_of(parcel.data)
@@ -394,9 +394,9 @@ class _Batch:
 def _entry(answer: WorkerReply, item: Item, code: str, kind: BatchKind) -> Entry | None:
     """What the journal says of an answer, None of what was interrupted."""
     end = answer.end
-    known = (item.key, item.name, code, item.settings(kind), __version__)
+    facts = (item.key, item.name, code, item.settings(kind), __version__)
     if isinstance(end, Failed):
-        return Entry(*known, "failed", end.message)
+        return Entry(*facts, "failed", end.message)
     if end.state == "cancelled":
         return None
     seconds = end.summary.get("seconds")
@@ -404,8 +404,8 @@ def _entry(answer: WorkerReply, item: Item, code: str, kind: BatchKind) -> Entry
         failed = end.summary.get("failed") or ()
         reasons = Counter(str(failure["reason"]) for failure in failed).most_common(1)
         reason = reasons[0][0] if reasons else "nothing was found"
-        return Entry(*known, "nothing found", reason, {}, seconds)
-    return Entry(*known, "done", "", kind.best(end.summary), seconds)
+        return Entry(*facts, "nothing found", reason, {}, seconds)
+    return Entry(*facts, "done", "", kind.best(end.summary), seconds)
 
 
 def _figures(entry: Entry, kind: BatchKind) -> str:

@@ -82,9 +82,9 @@ def app_for(words: Sequence[str]) -> App:
     )
     for name, text in GROUPS.items():
         app.command(App(name=name, help=text, help_epilogue=""))
-    asked = _operation(words)
-    whole = asked is not None or "--install-completion" in words  # a list needs no options
-    for place, name in enumerate([asked.name] if asked else OPERATIONS):
+    operation = _operation(words)
+    whole = operation is not None or "--install-completion" in words  # a list needs no options
+    for place, name in enumerate([operation.name] if operation else OPERATIONS):
         *group, command = name.split()
         home = app[group[0]] if group else app
         home.command(
@@ -96,7 +96,7 @@ def app_for(words: Sequence[str]) -> App:
             group_arguments=ARGUMENTS,
             group_parameters=OPTIONS,
         )
-    if asked is None:
+    if operation is None:
         app.register_install_completion_command()  # pyright: ignore[reportUnknownMemberType]
     return app
 
@@ -110,13 +110,13 @@ def summary(name: str) -> str:
 @cache
 def _docstrings(module: str) -> dict[str, str]:
     file = Path(__file__).parents[1].joinpath(*module.split(".")[1:]).with_suffix(".py")
-    found = [n for n in ast.parse(file.read_bytes()).body if isinstance(n, ast.FunctionDef)]
-    return {node.name: ast.get_docstring(node) or "" for node in found}
+    functions = [n for n in ast.parse(file.read_bytes()).body if isinstance(n, ast.FunctionDef)]
+    return {node.name: ast.get_docstring(node) or "" for node in functions}
 
 
 def _operation(words: Sequence[str]) -> Operation | None:
-    given = [word for word in words if word[:1] != "-"]
-    names = (" ".join(given[:count]) for count in (1, 2))
+    plain = [word for word in words if word[:1] != "-"]
+    names = (" ".join(plain[:count]) for count in (1, 2))
     return next((find(name) for name in names if name in OPERATIONS), None)
 
 
@@ -125,9 +125,9 @@ def _command(operation: Operation) -> Callable[..., int]:
     fields = {entry.name: entry for entry in operation.fields if not entry.of_class(Hidden)}
 
     def command(*words: Any, **options: Any) -> int:
-        found = signature.bind(*words, **options).arguments.items()
-        given = {name: _value(fields[name], word) for name, word in found if word is not None}
-        return _do(operation, given)
+        bound = signature.bind(*words, **options).arguments.items()
+        values = {name: _value(fields[name], word) for name, word in bound if word is not None}
+        return _do(operation, values)
 
     named = _namer(operation)
     headings = dict.fromkeys(entry.group for entry in fields.values() if entry.group)
@@ -256,10 +256,10 @@ def _mistake(
 def _check_values(words: Sequence[str], operation: Operation | None) -> None:
     """Refuse an option whose value is missing, so that the next option would be taken for it."""
     fields = operation.fields if operation else ()
-    known = {name for field in fields for name in (*field.option.names, field.option.off)}
+    names = {name for field in fields for name in (*field.option.names, field.option.off)}
     valued = {name: field for field in fields for name in field.option.names}
     for word, after in pairwise(words):
-        if after in known and word in valued and not valued[word].is_of(FlagKind):
+        if after in names and word in valued and not valued[word].is_of(FlagKind):
             raise _needs_value(valued[word])
 
 
@@ -270,18 +270,18 @@ def _needs_value(field: Field) -> SettingError:
 def _repeated(word: str, words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError:
     """Return what is wrong where an option is given again, or a flag both ways."""
     for option in (field.option for field in fields):
-        given = dict.fromkeys(w for w in words if w in (*option.names, option.off))
-        if word in given and option.off in given and len(given) > 1:
-            return OrbiflowError(f"{' and '.join(given)} exclude each other; give one of them")
+        repeats = dict.fromkeys(w for w in words if w in (*option.names, option.off))
+        if word in repeats and option.off in repeats and len(repeats) > 1:
+            return OrbiflowError(f"{' and '.join(repeats)} exclude each other; give one of them")
     return OrbiflowError(f"{word} is given more than once; give it once")
 
 
 def _unknown(words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError | None:
     """Return what is wrong with the first unknown option, if there is one."""
-    known = [name for field in fields for name in (*field.option.names, field.option.off) if name]
+    names = [name for field in fields for name in (*field.option.names, field.option.off) if name]
     for word in words:
         option = word.split("=")[0]
-        if option[:2] == "--" and option[2:3].isalpha() and option not in known:
-            hint = meant(option, known) or "see --help"
+        if option[:2] == "--" and option[2:3].isalpha() and option not in names:
+            hint = meant(option, names) or "see --help"
             return OrbiflowError(f"unknown option {option}; {hint}")
     return None

@@ -74,13 +74,13 @@ def mark_symmetry(
     """
     low, high = np.array(window[:2]), np.array(window[2:])
     middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    found = symmetry_elements(group, middle, reach)
-    for line in found.lines:
+    elements = symmetry_elements(group, middle, reach)
+    for line in elements.lines:
         ends = np.stack([line.line.point + s * reach * line.line.direction for s in (-1.0, 1.0)])
         style = "-" if line.is_mirror else (0, (5, 3))
         axes.plot(*ends.T, color=halo, linewidth=pen(2.2), alpha=0.5, zorder=4)
         axes.plot(*ends.T, color=LINE_COLOUR, linewidth=pen(1.2), linestyle=style, zorder=5)
-    for center in found.centers:
+    for center in elements.centers:
         sign = center.point + center_sign(center.order, size)
         axes.fill(
             *sign.T, facecolor=CENTER_COLOURS[center.order], edgecolor=halo, linewidth=pen(0.6),
@@ -110,10 +110,10 @@ def cell_ring(group: CrystallographicGroup, middle: Array) -> Array:
     """
     basis = reduced_basis(group.lattice)
     reach = 2 * float(np.linalg.norm(basis, axis=0).max())
-    found = symmetry_elements(group, middle, reach).centers
-    highest = max((center.order for center in found), default=0)
+    centers = symmetry_elements(group, middle, reach).centers
+    highest = max((center.order for center in centers), default=0)
     half = basis.sum(axis=1) / 2
-    corners = [center.point for center in found if center.order == highest] or [middle - half]
+    corners = [center.point for center in centers if center.order == highest] or [middle - half]
     corner = min(corners, key=lambda point: round(float(np.linalg.norm(point + half - middle)), 9))
     return corner + np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) @ basis.T
 

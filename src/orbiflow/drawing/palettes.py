@@ -58,9 +58,9 @@ class Palette(NamedTuple):
         >>> palette("e76f51").shortage(3)
         ('3 colours are needed and the palette has 1: the others are paler shades of it',)
         """
-        own, first = len(self.colours), "it" if len(self.colours) == 1 else "the first"
-        needed = f"{count} colours are needed and the palette has {own}"
-        return (f"{needed}: the others are paler shades of {first}",) * (own < count)
+        size, first = len(self.colours), "it" if len(self.colours) == 1 else "the first"
+        needed = f"{count} colours are needed and the palette has {size}"
+        return (f"{needed}: the others are paler shades of {first}",) * (size < count)
 
     def ink(self, index: int) -> str:
         """Return the colour of lines on colour number `index`: outline or paper, whichever shows.
@@ -163,13 +163,13 @@ def _written_out(text: str) -> Palette:
     named: dict[str, str] = {}
     for part in text.split(","):
         name, _, value = part.strip().rpartition("=")
-        found = _HEX.fullmatch(value.strip())
-        if found is None or name not in ("", "outline", "paper") or name in named:
+        match = _HEX.fullmatch(value.strip())
+        if match is None or name not in ("", "outline", "paper") or name in named:
             raise OrbiflowError(
                 f"palette: {part.strip()[:40]!r} is no colour; write rrggbb, outline=rrggbb or "
                 "paper=rrggbb (each of these once), such as e76f51,2a9d8f,outline=1b2f38"
             )
-        colour = "#" + found[1].lower()
+        colour = "#" + match[1].lower()
         if name:
             named[name] = colour
         else:

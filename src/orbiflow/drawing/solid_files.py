@@ -60,8 +60,8 @@ def write_3mf(
     mirror the part.
     """
     meshes = {name: body.to_mesh64() for name, body in parts.items()}
-    texts = {name: list(map(_transform, own)) for name, own in (places or {}).items()}
-    together = {part for own in (groups or {}).values() for part in own[1:]}
+    texts = {name: list(map(_transform, moves)) for name, moves in (places or {}).items()}
+    together = {part for members in (groups or {}).values() for part in members[1:]}
     numbers: dict[Any, int] = {name: number for number, name in enumerate(meshes, 1)}
     numbers |= {(name, "all"): len(meshes) + 1 + k for k, name in enumerate(groups or {}, 1)}
     values = {
@@ -101,22 +101,24 @@ def read_triangles(path: Path) -> list[Array]:
         return [np.frombuffer(path.read_bytes()[84:], STL_TRIANGLE)["corners"].astype(float)]
     with zipfile.ZipFile(path) as archive:
         model = ElementTree.fromstring(archive.read("3D/3dmodel.model"))
-    found, groups = dict[str, Array](), dict[str, list[str]]()
-    for own in model.iter(f"{CORE}object"):
-        parts = [part.get("objectid", "") for part in own.iter(f"{CORE}component")]
+    triangles, groups = dict[str, Array](), dict[str, list[str]]()
+    for element in model.iter(f"{CORE}object"):
+        parts = [part.get("objectid", "") for part in element.iter(f"{CORE}component")]
         if parts:
-            groups[own.get("id", "")] = parts
+            groups[element.get("id", "")] = parts
             continue
         points, corners = (
-            [list(row.attrib.values()) for row in own.iter(CORE + tag)]
+            [list(row.attrib.values()) for row in element.iter(CORE + tag)]
             for tag in ("vertex", "triangle")
         )
-        found[own.get("id", "")] = np.array(points, float)[np.array([c[:3] for c in corners], int)]
+        triangles[element.get("id", "")] = np.array(points, float)[
+            np.array([c[:3] for c in corners], int)
+        ]
     placed = list[Array]()
     for item in model.iter(f"{CORE}item"):
         name = item.get("objectid", "")
         for part in groups.get(name, [name]):
-            corners = found[part]
+            corners = triangles[part]
             if text := item.get("transform"):
                 rows = np.array(text.split(), float).reshape(4, 3)
                 corners = corners @ rows[:3] + rows[3]

@@ -148,7 +148,7 @@ def draw_solids(
     seen = nearest_triangles(places, width, height)
     part = owner[seen.triangle[seen.covered]]
     directions = _unit(seen.interpolated(normals @ view.axes))
-    colours = np.array([_linear(rgb(own.colour)) for own in parts], np.float32).reshape(-1, 3)
+    colours = np.array([_linear(rgb(shaded.colour)) for shaded in parts], np.float32).reshape(-1, 3)
     dimmed = _openness(seen, directions, scale * HOLLOW_RADIUS)
     pixels = np.empty((len(part), 4), np.uint8)
     pixels[:, 3] = 255
@@ -171,7 +171,9 @@ def solid_picture(parts: Sequence[Array], size: tuple[int, int] = (1000, 750)) -
         size: Width and height in pixels.
     """
     colours = palette("festival").colours
-    shaded = [ShadedPart.flat(own, colours[k % len(colours)]) for k, own in enumerate(parts)]
+    shaded = [
+        ShadedPart.flat(triangles, colours[k % len(colours)]) for k, triangles in enumerate(parts)
+    ]
     return draw_solids(shaded, size)
 
 
@@ -190,9 +192,9 @@ def crease_normals(points: Array, faces: Integers, crease: float = CREASE) -> Ar
     around = counts[faces.ravel()]
     corner, place = each(around)
     other = order[starts[faces.ravel()][corner] + place] // 3
-    own = corner // 3
-    alike = np.einsum("ij,ij->i", units[own], units[other]) >= np.cos(np.radians(crease)) - 1e-9
-    corner, other = corner[alike | (own == other)], other[alike | (own == other)]
+    face = corner // 3
+    alike = np.einsum("ij,ij->i", units[face], units[other]) >= np.cos(np.radians(crease)) - 1e-9
+    corner, other = corner[alike | (face == other)], other[alike | (face == other)]
     sums = [np.bincount(corner, vectors[other, k], faces.size) for k in range(3)]
     return _unit(np.stack(sums, axis=1)).reshape(-1, 3, 3)
 
@@ -282,11 +284,11 @@ def _openness(seen: SeenTriangles, directions: Array, radius: float) -> Array:
 def _shifted(values: NDArray[np.float32], dx: int, dy: int) -> NDArray[np.float32]:
     """Return an array whose value at (y, x) is another's at (y + dy, x + dx), far back beyond it."""
     height, width = values.shape
-    found = np.full_like(values, -1e9)
+    shifted = np.full_like(values, -1e9)
     to = slice(max(0, -dy), min(height, height - dy)), slice(max(0, -dx), min(width, width - dx))
     of = slice(max(0, dy), min(height, height + dy)), slice(max(0, dx), min(width, width + dx))
-    found[to] = values[of]
-    return found
+    shifted[to] = values[of]
+    return shifted
 
 
 def _outline(seen: SeenTriangles, part: Integers, scale: float) -> Array:
@@ -299,13 +301,13 @@ def _outline(seen: SeenTriangles, part: Integers, scale: float) -> Array:
         before: list[slice] = [slice(None), slice(None)]
         after = before.copy()
         before[axis], after[axis] = slice(None, -1), slice(1, None)
-        one, other = tuple(before), tuple(after)
-        step = depth[one] - depth[other]
+        here, other = tuple(before), tuple(after)
+        step = depth[here] - depth[other]
         ends = np.clip((abs(step) / scale - 0.02) / 0.05, 0, 1)
-        ends[parts[one] != parts[other]] = 1.0
+        ends[parts[here] != parts[other]] = 1.0
         kept = 1 - (1 - OUTLINE) * ends
         # the line lies on what is in front
-        light[one] = np.where(step >= 0, np.minimum(kept, light[one]), light[one])
+        light[here] = np.where(step >= 0, np.minimum(kept, light[here]), light[here])
         light[other] = np.where(step <= 0, np.minimum(kept, light[other]), light[other])
     return light[seen.covered]
 

@@ -41,17 +41,17 @@ class SeenTriangles(NamedTuple):
     def interpolated(self, values: Array) -> NDArray[np.float32]:
         """Return what covered pixels (m, c) have, row by row, of values (n, 3, c) at the corners."""
         row, column = np.nonzero(self.covered)
-        own = self.triangle[row, column]
+        owner = self.triangle[row, column]
         # affine in the picture, as the corners' shares are
         fields: Array = self.planes @ values
-        found = np.empty((len(own), values.shape[2]), np.float32)
-        for first in range(0, len(own), PIXELS_AT_ONCE):
+        seen = np.empty((len(owner), values.shape[2]), np.float32)
+        for first in range(0, len(owner), PIXELS_AT_ONCE):
             part = slice(first, first + PIXELS_AT_ONCE)
-            field = fields[own[part]]
-            asked = field[:, 0] * (column[part, None] + 0.5)
-            asked += field[:, 1] * (row[part, None] + 0.5)
-            found[part] = asked + field[:, 2]
-        return found
+            field = fields[owner[part]]
+            sums = field[:, 0] * (column[part, None] + 0.5)
+            sums += field[:, 1] * (row[part, None] + 0.5)
+            seen[part] = sums + field[:, 2]
+        return seen
 
 
 def nearest_triangles(corners: Array, width: int, height: int) -> SeenTriangles:
@@ -87,16 +87,16 @@ def nearest_triangles(corners: Array, width: int, height: int) -> SeenTriangles:
         count = np.floor(right - 0.5 + 1e-6).astype(int) - first + 1
         line, column = each(np.clip(count, 0, width))
         column += first[line]
-        own = which[line]
-        z = heights[own, 0] * (column + 0.5)
-        z += heights[own, 1] * (row[line] + 0.5)
-        z += heights[own, 2]
+        owner = which[line]
+        z = heights[owner, 0] * (column + 0.5)
+        z += heights[owner, 1] * (row[line] + 0.5)
+        z += heights[owner, 2]
         place = row[line] * width + column
         ahead = z > depth[place]
-        place, z, own = place[ahead], z[ahead], own[ahead]
+        place, z, owner = place[ahead], z[ahead], owner[ahead]
         np.maximum.at(depth, place, z)
         on_top = z == depth[place]
-        triangle[place[on_top]] = own[on_top]
+        triangle[place[on_top]] = owner[on_top]
     shape = height, width
     return SeenTriangles(triangle.reshape(shape), depth.reshape(shape), planes)
 

@@ -26,9 +26,9 @@ def rendered(package: str, template: str, **values: Any) -> str:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     def load(name: str) -> str:
-        own = resources.files(package).joinpath(name)
+        local = resources.files(package).joinpath(name)
         shared = resources.files("orbiflow.drawing").joinpath(name)
-        return (own if own.is_file() else shared).read_text("utf-8")
+        return (local if local.is_file() else shared).read_text("utf-8")
 
     pages = Environment(
         loader=FunctionLoader(load),

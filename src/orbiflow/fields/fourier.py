@@ -386,14 +386,18 @@ class FourierField(InvariantField):
         trigonometric polynomial of degree n is largest it falls no faster than cos(n x), so that N
         points miss at most a factor cos(pi n / N), axis by axis.
         """
-        own = self._stacked(self.parameters_)
-        bound = coefficient_bound(self.group, self.basis, own * self.scale)
+        parameters = self._stacked(self.parameters_)
+        bound = coefficient_bound(self.group, self.basis, parameters * self.scale)
         d, sides = self.group.dim, [max(1, POINTS_PER_WAVE * k) for k in self._orders]
-        if len(own) * d * d * math.prod(sides) <= MAX_GRID_VALUES:
-            axes = [torch.arange(n, dtype=own.dtype, device=own.device) / n for n in sides]
+        if len(parameters) * d * d * math.prod(sides) <= MAX_GRID_VALUES:
+            axes = [
+                torch.arange(n, dtype=parameters.dtype, device=parameters.device) / n for n in sides
+            ]
             u = torch.stack(torch.meshgrid(*axes, indexing="ij")).reshape(1, d, -1)
-            slopes = evaluate(self._jacobian_weights(self.weights()), u.expand(len(own), -1, -1))
-            slopes = slopes.mT.reshape(len(own), -1, d, d)
+            slopes = evaluate(
+                self._jacobian_weights(self.weights()), u.expand(len(parameters), -1, -1)
+            )
+            slopes = slopes.mT.reshape(len(parameters), -1, d, d)
             power = linalg.matrix_power(slopes.mT @ slopes, 4)
             # the norm of the power is hardly larger than its largest singular value, and quick
             largest = linalg.matrix_norm(power).amax(dim=-1).pow(1 / 8)

@@ -264,15 +264,15 @@ class InvariantField(nn.Module, ABC):
         >>> each(torch.rand(5, 7, 2)).shape  # seven points of each context
         torch.Size([5, 7, 2])
         """
-        own = self.parameters_
+        current = self.parameters_
         if parameters.shape[-1:] != (self.size,) or parameters.dim() > 1 + self.stackable:
             wanted = f"({self.size},)" + f" or (S, {self.size})" * self.stackable
             raise OrbiflowError(
                 f"expected parameters of shape {wanted}, got {tuple(parameters.shape)}"
             )
-        if parameters.dtype != own.dtype:
+        if parameters.dtype != current.dtype:
             raise OrbiflowError(
-                f"expected parameters of the field's dtype, {own.dtype}, got {parameters.dtype}: "
+                f"expected parameters of the field's dtype, {current.dtype}, got {parameters.dtype}: "
                 f"convert them, or the field with .to({parameters.dtype})"
             )
         view = copy.copy(self)  # shallow: it shares the basis
@@ -282,23 +282,23 @@ class InvariantField(nn.Module, ABC):
 
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""
-        d, own = self.group.dim, self.parameters_
-        stack = len(own) if own.dim() == 2 else None
+        d, parameters = self.group.dim, self.parameters_
+        stack = len(parameters) if parameters.dim() == 2 else None
         if points.shape[-1:] != (d,) or (
             stack is not None and (points.dim() < 2 or len(points) != stack)
         ):
             expected = f"(..., {d})" if stack is None else f"({stack}, ..., {d})"
             raise OrbiflowError(f"expected points of shape {expected}, got {tuple(points.shape)}")
-        if points.dtype != own.dtype:
+        if points.dtype != parameters.dtype:
             raise OrbiflowError(
-                f"expected points of the field's dtype, {own.dtype}, got {points.dtype}: convert the "
-                f"points with .to({own.dtype}) or the field with .to({points.dtype})"
+                f"expected points of the field's dtype, {parameters.dtype}, got {points.dtype}: "
+                f"convert the points with .to({parameters.dtype}) or the field with .to({points.dtype})"
             )
 
     def _fill_buffers(self) -> None:
-        own = self.parameters_
+        parameters = self.parameters_
         which = self.max_frequency, self.divergence_free
-        key = *which, self.smoothness, own.dtype, own.device, self.layout
+        key = *which, self.smoothness, parameters.dtype, parameters.device, self.layout
         for name, tensor in _constants(self.group, *key).items():
             self.register_buffer(name, tensor, persistent=False)
 

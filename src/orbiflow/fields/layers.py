@@ -43,8 +43,8 @@ def bound_of_layers(network: object, bound: Callable[[object], float | None]) ->
     does: Any = type(network).forward  # a subclass may do something else
     if does is cast(Any, nn.Sequential).forward and isinstance(network, nn.Sequential):
         bounds = [bound(layer) for layer in network]
-        known = [own for own in bounds if own is not None]
-        return math.prod(known) if len(known) == len(bounds) else None
+        limits = [limit for limit in bounds if limit is not None]
+        return math.prod(limits) if len(limits) == len(bounds) else None
     for kind, slope in SLOPES.items():
         if does is kind.forward:
             return slope(network)

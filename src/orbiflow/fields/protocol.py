@@ -35,27 +35,27 @@ VectorField = Callable[[Tensor], Tensor]
 
 def jacobian(field: VectorField, points: Tensor) -> Tensor:
     """Return dV_i / dp_j at points (..., d), as (..., d, d): exact, d backward passes."""
-    own: Any = getattr(field, "jacobian", None)
-    return own(points) if own else _by_autograd(field, points)[1]
+    method: Any = getattr(field, "jacobian", None)
+    return method(points) if method else _by_autograd(field, points)[1]
 
 
 def divergence(field: VectorField, points: Tensor) -> Tensor:
     """Return the trace of the Jacobian at points (..., d), as (...,): exact."""
-    own: Any = getattr(field, "divergence", None)
-    return own(points) if own else _trace(jacobian(field, points))
+    method: Any = getattr(field, "divergence", None)
+    return method(points) if method else _trace(jacobian(field, points))
 
 
 def prepared(field: VectorField) -> VectorField:
     """Return the field as a function for many evaluations at fixed parameters."""
-    own: Any = getattr(field, "bound", None)
-    return own() if own else partial(_values, field)
+    method: Any = getattr(field, "bound", None)
+    return method() if method else partial(_values, field)
 
 
 def prepared_with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
     """Return, as `prepared` does, a function for V and its divergence, sharing work if possible."""
-    own: Any = getattr(field, "bound_with_divergence", None)
-    if own:
-        return own()
+    method: Any = getattr(field, "bound_with_divergence", None)
+    if method:
+        return method()
     if hasattr(field, "divergence"):
         return lambda points: (_values(field, points), divergence(field, points.clone()))
     joint = prepared_with_jacobian(field)
@@ -69,9 +69,9 @@ def prepared_with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Ten
 
 def prepared_with_jacobian(field: VectorField) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
     """Return, as `prepared` does, a function for V and its Jacobian, sharing work if possible."""
-    own: Any = getattr(field, "bound_with_jacobian", None)
-    if own:
-        return own()
+    method: Any = getattr(field, "bound_with_jacobian", None)
+    if method:
+        return method()
     if hasattr(field, "jacobian"):
         return lambda points: (_values(field, points), jacobian(field, points.clone()))
     return lambda points: _by_autograd(field, points)
@@ -79,11 +79,11 @@ def prepared_with_jacobian(field: VectorField) -> Callable[[Tensor], tuple[Tenso
 
 def lipschitz_bound(field: object) -> float | None:
     """Return the field's own bound of its Jacobian's spectral norm, that of its layers, or None."""
-    own: Any = getattr(field, "lipschitz_bound", None)
-    if own is None:
+    method: Any = getattr(field, "lipschitz_bound", None)
+    if method is None:
         return bound_of_layers(field, lipschitz_bound)
-    found = own()
-    return None if found is None else float(found.max())
+    bound = method()
+    return None if bound is None else float(bound.max())
 
 
 def _values(field: VectorField, points: Tensor) -> Tensor:
@@ -148,12 +148,12 @@ def plain_gradients(
         return [next(gradients) if n else None for n in needed]
 
     def of_wanted(*wanted: Tensor) -> Any:
-        given = iter(wanted)
-        return function(*(next(given) if n else t for n, t in zip(needed, inputs, strict=True)))
+        rest = iter(wanted)
+        return function(*(next(rest) if n else t for n, t in zip(needed, inputs, strict=True)))
 
     wanted = [t for n, t in zip(needed, inputs, strict=True) if n]
-    found = iter(torch.func.vjp(of_wanted, *wanted)[1](cotangents))
-    return [next(found) if n else None for n in needed]
+    pulled = iter(torch.func.vjp(of_wanted, *wanted)[1](cotangents))
+    return [next(pulled) if n else None for n in needed]
 
 
 def refuse_old_batches(*gradients: Tensor) -> None:

@@ -77,11 +77,11 @@ class Symmetrized(nn.Module):
 
         Only the given field is differentiated, not the symmetrization: R^-1 J R has the trace of J.
         """
-        own = prepared_with_divergence(self.field)
+        evaluate = prepared_with_divergence(self.field)
 
         def joint(points: Tensor) -> tuple[Tensor, Tensor]:
             with self._explaining(points):
-                values, divergence = own(points)
+                values, divergence = evaluate(points)
                 return _checked(values, points), divergence.to(points.dtype)
 
         if self._blended:
@@ -141,8 +141,12 @@ def _try_out(field: VectorField, dim: int) -> None:
     module = isinstance(field, nn.Module)
     if module and any(True for _ in field.buffers()):
         return  # an evaluation may change them
-    own = next(field.parameters(), None) if module else None
-    points = torch.zeros(3, dim, dtype=torch.float64) if own is None else own.new_zeros(3, dim)
+    parameter = next(field.parameters(), None) if module else None
+    points = (
+        torch.zeros(3, dim, dtype=torch.float64)
+        if parameter is None
+        else parameter.new_zeros(3, dim)
+    )
     with torch.no_grad(), cast(Any, torch.random).fork_rng(devices=[]):
         try:
             values: object = field(points)

@@ -96,9 +96,9 @@ class Flow(nn.Module):
         bijective: bool = False,
     ) -> None:
         super().__init__()
-        given: Any = fields
+        untyped: Any = fields
         several = isinstance(fields, nn.ModuleList) or not callable(fields)
-        listed: list[Any] = list(given) if several else [given]
+        listed: list[Any] = list(untyped) if several else [untyped]
         if not listed:
             raise OrbiflowError("a flow needs at least one vector field")
         for field in listed:
@@ -255,8 +255,8 @@ class Flow(nn.Module):
             return values, jacobian @ both[1]
 
         points, log_det = state
-        one = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
-        start = (points, one.expand(*points.shape, -1))
+        unit = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
+        start = (points, unit.expand(*points.shape, -1))
         # a method's step of the variational equation is the derivative of its step
         moved, derivative = self.integrator.step(tangents, start, h)
         return moved, log_det + linalg.slogdet(derivative).logabsdet
@@ -271,8 +271,8 @@ class Flow(nn.Module):
                 ) from error
 
     def extra_repr(self) -> str:
-        own = f"steps={self.steps}, method={self.method}, duration={self.duration}"
-        return f"{own}, bijective=True" if self.bijective else own
+        text = f"steps={self.steps}, method={self.method}, duration={self.duration}"
+        return f"{text}, bijective=True" if self.bijective else text
 
 
 def _check_points(points: Tensor) -> None:
@@ -295,12 +295,12 @@ def _slope(field: VectorField, *, with_log_det: bool, exact: bool) -> Callable[[
 
     def slope(state: State) -> State:
         points = state[0]
-        found: State = evaluate(points) if with_log_det else (evaluate(points),)
-        if found[0].shape != points.shape:
+        slopes: State = evaluate(points) if with_log_det else (evaluate(points),)
+        if slopes[0].shape != points.shape:
             raise OrbiflowError(
                 "a field must give vectors of its points' shape: expected "
-                f"{tuple(points.shape)}, got {tuple(found[0].shape)}"
+                f"{tuple(points.shape)}, got {tuple(slopes[0].shape)}"
             )
-        return found
+        return slopes
 
     return slope

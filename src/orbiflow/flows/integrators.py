@@ -186,10 +186,10 @@ def _warning(flow: Flow, points: Tensor, inverse: bool) -> str:
 def _provably_fine(flow: Flow) -> bool:
     """Return whether the fields' bounds prove the error of a step small: (h L)^p / (p + 1)!."""
     bounds = [lipschitz_bound(field) for field in flow.fields()]
-    known = [bound for bound in bounds if bound is not None]
-    if len(known) < len(bounds):
+    finite = [bound for bound in bounds if bound is not None]
+    if len(finite) < len(bounds):
         return False
-    product = abs(flow.duration) / flow.steps * max(known)
+    product = abs(flow.duration) / flow.steps * max(finite)
     order = flow.integrator.order
     return product**order / math.factorial(order + 1) <= COARSE_ERROR / 10
 

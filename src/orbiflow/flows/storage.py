@@ -47,9 +47,9 @@ class Writer:
             return self._series(field)
         if kind is Symmetrized:
             inner = self.header(field.field, f"{place}.field")
-            own = {"group": self._group(field.group), "periodic": field.periodic, "field": inner}
+            facts = {"group": self._group(field.group), "periodic": field.periodic, "field": inner}
             along = {} if field.along is None else {"along": field.along}
-            return {"kind": "symmetrized", **own, **along}
+            return {"kind": "symmetrized", **facts, **along}
         if is_perceptron(field):
             features, *layers = field
             linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
@@ -68,16 +68,16 @@ class Writer:
         return {"kind": "own", "name": _own_name(field, place)}
 
     def _series(self, field: FourierField | SplineField) -> dict[str, Any]:
-        own = field.parameters_
+        parameters = field.parameters_
         return {
             "kind": _SERIES_NAMES[type(field)],
             "group": self._group(field.group),
             "max_frequency": field.max_frequency,
             "smoothness": float(field.smoothness),
             "divergence_free": field.divergence_free,
-            "batch": len(own) if own.dim() == 2 else None,
-            "parameters": own.shape[-1],
-            "dtype": _dtype(own),
+            "batch": len(parameters) if parameters.dim() == 2 else None,
+            "parameters": parameters.shape[-1],
+            "dtype": _dtype(parameters),
         }
 
     def _group(self, group: CrystallographicGroup) -> int:

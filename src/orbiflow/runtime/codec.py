@@ -59,13 +59,13 @@ def from_json(hint: Any, value: Any, place: str = "the document") -> Any:
     entries = getattr(hint, "_fields", ())
     if is_dataclass(cast(object, hint)) and is_a(value, dict):
         entry_hints = typing.get_type_hints(hint)
-        known = {entry.name: entry for entry in fields(hint)}
+        declared = {entry.name: entry for entry in fields(hint)}
         needed = {
             name
-            for name, entry in known.items()
+            for name, entry in declared.items()
             if entry.default is MISSING and entry.default_factory is MISSING
         }
-        wrong = sorted(set(value) - set(known)) or sorted(needed - set(value))
+        wrong = sorted(set(value) - set(declared)) or sorted(needed - set(value))
         if wrong:
             which = "unknown" if wrong[0] in value else "missing"
             raise SettingError(literal(f"{place}: {which} entry {wrong[0]!r}"))

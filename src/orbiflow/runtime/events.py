@@ -197,10 +197,10 @@ def event_from_json(document: object) -> Event:
         raise SettingError(
             f"unknown kind of event {literal(described(kind))}; there are {', '.join(EVENTS)}"
         )
-    given = {name: value for name, value in document.items() if name not in ("kind", "template")}
+    values = {name: value for name, value in document.items() if name not in ("kind", "template")}
     fields = _fields(EVENTS[kind])
-    check_names(given, fields.values(), kind)
-    read = {name: _read(fields[name], value) for name, value in given.items()}
+    check_names(values, fields.values(), kind)
+    read = {name: _read(fields[name], value) for name, value in values.items()}
     template = document.get("template")
     for name in ("text", "message"):
         if isinstance(template, str) and name in read:

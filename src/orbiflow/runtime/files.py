@@ -153,25 +153,25 @@ class ResultFolder:
         if not self._real.exists():
             return False
         entries = [p for p in self._real.iterdir() if p != staged and not _is_litter(p.name)]
-        known: set[str] = self._known(self._real) if entries else set()
-        above = {str(parent) for name in known for parent in PurePosixPath(name).parents}
+        earlier: set[str] = self._known(self._real) if entries else set()
+        above = {str(parent) for name in earlier for parent in PurePosixPath(name).parents}
         while entries:
             path = entries.pop()
             name = path.relative_to(self._real).as_posix()
             folder = path.is_dir() and not path.is_symlink()
-            if name not in (above if folder else known):
+            if name not in (above if folder else earlier):
                 raise OutputError(
                     f"{self.path} holds {name}, which is of no earlier run: choose another "
                     "folder or move it"
                 )
             if folder:
                 entries += [p for p in path.iterdir() if not _is_litter(p.name)]
-        return bool(known)
+        return bool(earlier)
 
     def _new_folder(self) -> Path:
-        own = self._real
-        there = own.exists()
-        path = own / _temporary() if there else own.with_name(f".{own.name}{_temporary()}")
+        folder = self._real
+        there = folder.exists()
+        path = folder / _temporary() if there else folder.with_name(f".{folder.name}{_temporary()}")
         path.mkdir()
         return path
 
@@ -297,16 +297,16 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
     # a link is replaced, not followed
     target = _real(out.parent) / out.name
     for read in filter(None, reads):
-        folder, known = _run_around(read)
-        if not known or _real(folder) not in target.parents:
+        folder, files = _run_around(read)
+        if not files or _real(folder) not in target.parents:
             continue
         name = target.relative_to(_real(folder)).as_posix()
-        if name in known:
+        if name in files:
             raise OutputError(
                 f"cannot write {out}: {name} is a file of the run in {folder}, which is read: choose "
                 "another place"
             )
-        if _holds_one_run(folder, known):
+        if _holds_one_run(folder, files):
             raise OutputError(
                 f"cannot write {out}: {folder}, which is read, holds the files of one run alone, and "
                 "the next run there would refuse others: choose another place"
@@ -315,26 +315,26 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
 
 def _run_around(read: Path) -> tuple[Path, set[str]]:
     """Return the folder of the run that is read, or that it is part of, and its files, if any."""
-    if read.is_dir() and (known := _files_of_run(read)):
-        return read, known
+    if read.is_dir() and (files := _files_of_run(read)):
+        return read, files
     whole = _real(read) if read.is_dir() else read
-    known = _files_of_run(whole.parent)
-    is_part = any(name == whole.name or name.startswith(f"{whole.name}/") for name in known)
-    return whole.parent, known if is_part else set()
+    files = _files_of_run(whole.parent)
+    is_part = any(name == whole.name or name.startswith(f"{whole.name}/") for name in files)
+    return whole.parent, files if is_part else set()
 
 
 def _files_of_run(folder: Path) -> set[str]:
     """Return the files of earlier runs in a folder; the file that is read, alone, is a copy."""
     from orbiflow.settings import RUN_FOLDERS
 
-    found: set[str] = set()
+    files: set[str] = set()
     for read, place in RUN_FOLDERS.items():
         if (folder / read).is_file():
             module, name = place.split(":")
             names: set[str] = getattr(import_module(module), name)(folder)
             if any((folder / name).is_file() for name in names if name != read):
-                found |= names
-    return found
+                files |= names
+    return files
 
 
 def _holds_one_run(folder: Path, known: set[str]) -> bool:

@@ -115,13 +115,13 @@ class Operation:
     @cached_property
     def fields(self) -> tuple[Field, ...]:
         """All parameters, settings flattened, in the order of the signature."""
-        found: list[Field] = []
+        entries: list[Field] = []
         for part in self._parts.values():
-            found += [part] if isinstance(part, Field) else fields_of(part)
-        names = [entry.name for entry in found]
+            entries += [part] if isinstance(part, Field) else fields_of(part)
+        names = [entry.name for entry in entries]
         if len(set(names)) < len(names):
             raise TypeError(f"settings of {self.name} share a name: {sorted(names)}")
-        return tuple(found)
+        return tuple(entries)
 
     @cached_property
     def _parts(self) -> dict[str, Field | type[Settings]]:
@@ -157,8 +157,8 @@ class Operation:
     @cached_property
     def _argument_docs(self) -> dict[str, str]:
         text = inspect.getdoc(self.function) or ""
-        found = re.search(r"\nArgs:\n((?:    .*\n?|\n)*)", text)
-        entries = re.split(r"^    (?=\w+: )", found[1] if found else "", flags=re.MULTILINE)
+        section = re.search(r"\nArgs:\n((?:    .*\n?|\n)*)", text)
+        entries = re.split(r"^    (?=\w+: )", section[1] if section else "", flags=re.MULTILINE)
         return dict(entry.split(": ", 1) for entry in entries if ": " in entry)
 
     def call(self, given: Mapping[str, Any]) -> Call:
@@ -169,23 +169,23 @@ class Operation:
             if isinstance(part, Field):
                 arguments[name] = part.read(given[name]) if name in given else part.default
             else:
-                own = {entry.name for entry in fields_of(part)}
-                arguments[name] = part(**{key: given[key] for key in given if key in own})
+                names = {entry.name for entry in fields_of(part)}
+                arguments[name] = part(**{key: given[key] for key in given if key in names})
         return self._ruled(Call(self, arguments, frozenset(given)))
 
     def bound(self, arguments: Mapping[str, Any]) -> Call:
         """Return a call with these arguments of the function, checked."""
         checked = dict(arguments)
-        given: set[str] = set()
+        names: set[str] = set()
         for name, part in self._parts.items():
             if name not in arguments:
                 continue
             if isinstance(part, Field):
                 checked[name] = part.read(arguments[name])
-                given.add(name)
+                names.add(name)
             else:
-                given |= as_instance(arguments[name], part, name).fields_given
-        return self._ruled(Call(self, checked, frozenset(given)))
+                names |= as_instance(arguments[name], part, name).fields_given
+        return self._ruled(Call(self, checked, frozenset(names)))
 
     def _ruled(self, call: Call) -> Call:
         simple = [part for part in self._parts.values() if isinstance(part, Field)]
@@ -236,17 +236,19 @@ class Call:
 
         send(Started(self.operation.name))
         try:
-            own = self.operation
-            with naming_extras(f"orbiflow {own.name}"):
-                outcome = own.function(**self.arguments, on_event=send, cancel=cancel or Cancel())
+            called = self.operation
+            with naming_extras(f"orbiflow {called.name}"):
+                outcome = called.function(
+                    **self.arguments, on_event=send, cancel=cancel or Cancel()
+                )
         except Cancelled:
             send(Finished("cancelled", {}))
             raise
         except Exception as error:
-            known = isinstance(error, OrbiflowError)
-            message = advice_of(error) if known else f"{type(error).__name__}: {error}"
+            is_mistake = isinstance(error, OrbiflowError)
+            message = advice_of(error) if is_mistake else f"{type(error).__name__}: {error}"
             if not broken:
-                send(Failed(message, "mistake" if known else "error"))
+                send(Failed(message, "mistake" if is_mistake else "error"))
             raise
         send(Finished(outcome.state, outcome.summary))
         return outcome
@@ -367,8 +369,8 @@ def call_from_json(document: object) -> Call:
     """
     if not isinstance(document, dict):
         raise SettingError(f"expected a JSON object, got {literal(described(document))}")
-    given = dict(cast(dict[str, Any], document))
-    version, name = given.pop("schema_version", None), given.pop("operation", None)
+    values = dict(cast(dict[str, Any], document))
+    version, name = values.pop("schema_version", None), values.pop("operation", None)
     if version != SCHEMA_VERSION:
         raise SettingError(
             f"{{schema_version}} must be {SCHEMA_VERSION}, got {literal(described(version))}; "
@@ -376,4 +378,4 @@ def call_from_json(document: object) -> Call:
         )
     if not isinstance(name, str):
         raise SettingError(f"{{operation}} must be a name, got {literal(described(name))}")
-    return find(name).call(given)
+    return find(name).call(values)

@@ -43,7 +43,7 @@ class Team:
 
         Raises `Cancelled` if the token was cancelled.
         """
-        found: list[Any] = [None] * len(items)
+        results: list[Any] = [None] * len(items)
         begin, self.share = self.share, share
 
         def ended(count: int) -> None:
@@ -54,21 +54,21 @@ class Team:
             with one_thread(), one_blas_thread():
                 for k, item in enumerate(items):
                     self.cancel.check()
-                    found[k] = do(item)
-                    tell(found[k])
+                    results[k] = do(item)
+                    tell(results[k])
                     ended(k + 1)
-            return found
+            return results
         job, count = partial(_job, do), 0
-        own = work(job, items, self.workers, context=self.context, cancel=self.cancel)
-        with contextlib.closing(own) as news:
-            for one in news:
-                if one.done:
+        running = work(job, items, self.workers, context=self.context, cancel=self.cancel)
+        with contextlib.closing(running) as news:
+            for event in news:
+                if event.done:
                     count += 1
-                    found[one.index] = one.value
-                    tell(one.value)
+                    results[event.index] = event.value
+                    tell(event.value)
                     ended(count)
         self.cancel.check()
-        return found
+        return results
 
 
 def _job(do: Callable[[Any], Any], item: Any, _tell: object, _cancel: object) -> Any:

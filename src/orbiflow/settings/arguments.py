@@ -201,12 +201,12 @@ def as_array(values: Any, name: str, shape: Shape, *, finite: bool = True) -> ND
         # NumPy has no bfloat16
         values = (values.double() if values.is_floating_point() else values).numpy()
     try:
-        given = np.asarray(values)
-        if given.dtype.kind not in "biuf":
-            given = given.astype(object)  # so that neither text nor complex numbers slip through
-            if any(isinstance(item, str | bytes | complex) for item in given.ravel()):
+        raw = np.asarray(values)
+        if raw.dtype.kind not in "biuf":
+            raw = raw.astype(object)  # so that neither text nor complex numbers slip through
+            if any(isinstance(item, str | bytes | complex) for item in raw.ravel()):
                 raise TypeError
-        array = np.array(given, dtype=np.float64)
+        array = np.array(raw, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise refusal(name, wanted, values) from error
     if not _fits(array.shape, shape):
@@ -264,9 +264,9 @@ def described(value: Any) -> str:
         return f"{what} of shape {tuple(value.shape)}"
     if is_a(value, list | tuple | dict | set):
         return f"a {type(value).__name__} of {len(value)}"
-    given: Any = str(value) if is_a(value, Path) else value
-    if is_a(given, str | bytes | abstract.Number | None):
-        return f"{given.item() if hasattr(given, 'item') else given!a:.60}"
+    shown: Any = str(value) if is_a(value, Path) else value
+    if is_a(shown, str | bytes | abstract.Number | None):
+        return f"{shown.item() if hasattr(shown, 'item') else shown!a:.60}"
     return _with_article(type(value).__name__)
 
 

@@ -182,11 +182,11 @@ class FlagKind(Kind):
     wanted, schema = "true or false", {"type": "boolean"}
 
     def read(self, value: Any, *, text: bool = False) -> bool:
-        known = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-        found = known.get(value.lower()) if text else value
-        if not isinstance(found, bool):
+        words = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+        flag = words.get(value.lower()) if text else value
+        if not isinstance(flag, bool):
             raise RefusedValue
-        return found
+        return flag
 
 
 class NumberKind(Kind):
@@ -203,9 +203,9 @@ class NumberKind(Kind):
         made, abstract = (int, Integral) if self.whole else (float, Real)
         if not text and (isinstance(value, bool) or not isinstance(value, abstract)):
             raise RefusedValue
-        given: Any = value
+        untyped: Any = value
         try:
-            number = made(given)
+            number = made(untyped)
         except (OverflowError, ValueError):
             raise RefusedValue from None
         if number not in self.allowed:
@@ -315,15 +315,15 @@ def kind_of(annotation: Any) -> Kind:
     >>> kind_of(Literal["svg", "pdf"] | None).wanted
     'svg or pdf'
     """
-    found: dict[type, Any] = {}
+    marks: dict[type, Any] = {}
     if typing.get_origin(annotation) is typing.Annotated:
         annotation, *metadata = typing.get_args(annotation)
-        found = {type(entry): entry for entry in metadata}
-    if OneOf in found:
-        return ChoiceKind(tuple(found[OneOf].names))
-    saved = found.get(InMemory)
-    kind = SavedKind(saved.wanted) if saved else _plain_kind(annotation, found)
-    return ParsedKind(found[Parsed], kind) if Parsed in found else kind
+        marks = {type(entry): entry for entry in metadata}
+    if OneOf in marks:
+        return ChoiceKind(tuple(marks[OneOf].names))
+    saved = marks.get(InMemory)
+    kind = SavedKind(saved.wanted) if saved else _plain_kind(annotation, marks)
+    return ParsedKind(marks[Parsed], kind) if Parsed in marks else kind
 
 
 def _plain_kind(annotation: Any, found: Mapping[type, Any]) -> Kind:

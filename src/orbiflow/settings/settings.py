@@ -207,8 +207,8 @@ class Field:
     @cached_property
     def group(self) -> str:
         """Its heading in the help."""
-        own = self.of_class(HelpHeading)
-        return self.class_group if own is None else own.name
+        heading = self.of_class(HelpHeading)
+        return self.class_group if heading is None else heading.name
 
     @cached_property
     def kind(self) -> Kind:
@@ -238,8 +238,8 @@ class Field:
 
     def is_of(self, kind: type[Kind]) -> bool:
         """Return whether its values are of a kind, None apart."""
-        own = self.kind.inner if isinstance(self.kind, OptionalKind) else self.kind
-        return isinstance(own, kind)
+        inner = self.kind.inner if isinstance(self.kind, OptionalKind) else self.kind
+        return isinstance(inner, kind)
 
     @property
     def rules(self) -> tuple[Rule, ...]:
@@ -249,19 +249,19 @@ class Field:
     @cached_property
     def option(self) -> Option:
         """What the command line calls it, always with a long name."""
-        found, own = self.of_class(Option) or Option(), self.name.replace("_", "-")
-        long = any(name.startswith("--") for name in found.names)
+        option, spelled = self.of_class(Option) or Option(), self.name.replace("_", "-")
+        long = any(name.startswith("--") for name in option.names)
         has_off = self.is_of(FlagKind) and self.default is not False
         return Option(
-            *(found.names if long else (f"--{own}", *found.names)),
-            off=found.off or (f"--no-{own}" if has_off else ""),
+            *(option.names if long else (f"--{spelled}", *option.names)),
+            off=option.off or (f"--no-{spelled}" if has_off else ""),
         )
 
     @property
     def default_text(self) -> str:
         """The default in words, "" for none and for flags."""
-        if (found := self.of_class(DefaultText)) is not None:
-            return found.text
+        if (stated := self.of_class(DefaultText)) is not None:
+            return stated.text
         if self.required or self.default is None or self.default is False or self.default == ():
             return ""
         return f"{_word(self.kind.plain(self.default))} {self.kind.unit}".strip()
@@ -275,7 +275,7 @@ class Field:
 
         With `text`, it comes from the command line.
         """
-        return self._read(lambda given: self.kind.read(given, text=text), value)
+        return self._read(lambda word: self.kind.read(word, text=text), value)
 
     def finish(self, value: Any, values: Mapping[str, Any]) -> Any:
         """Return the value of a text that could not be read without another field."""
@@ -342,11 +342,11 @@ class Settings:
         return (), {name: getattr(self, name) for name in self.fields_given}
 
     def __post_init__(self) -> None:
-        known = {entry.name: entry for entry in fields_of(type(self))}
-        given = {name: getattr(self, name) for name in known if name in self.fields_given}
-        self._take(given, known)
-        self._take({k: v for k, v in self.defaults().items() if k not in given}, known)
-        check_rules(known.values(), vars(self), self.fields_given)
+        entries = {entry.name: entry for entry in fields_of(type(self))}
+        chosen = {name: getattr(self, name) for name in entries if name in self.fields_given}
+        self._take(chosen, entries)
+        self._take({k: v for k, v in self.defaults().items() if k not in chosen}, entries)
+        check_rules(entries.values(), vars(self), self.fields_given)
         self.check()
 
     def _take(self, values: Mapping[str, Any], known: Mapping[str, Field]) -> None:
@@ -367,8 +367,8 @@ class Settings:
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values of some fields."""
-        given = {name: getattr(self, name) for name in self.fields_given}
-        return type(self)(**{**given, **changes})
+        chosen = {name: getattr(self, name) for name in self.fields_given}
+        return type(self)(**{**chosen, **changes})
 
     def values(self) -> dict[str, Any]:
         """Return all fields as JSON has them, whether given or not."""
@@ -384,8 +384,8 @@ class FileSettings(Settings):
 
     @property
     def _formats(self) -> tuple[str, ...]:
-        (found,) = (entry for entry in fields_of(type(self)) if entry.name == "format")
-        return found.kind.choices
+        (format_field,) = (entry for entry in fields_of(type(self)) if entry.name == "format")
+        return format_field.kind.choices
 
     @property
     def usual_format(self) -> str:
@@ -399,18 +399,18 @@ class FileSettings(Settings):
 
     def for_file(self, out: Path | None) -> Self:
         """Return these settings with the format that a file's ending decides, if it fits the field."""
-        given, formats = vars(self)["format"], self._formats
+        chosen, formats = vars(self)["format"], self._formats
         ending = out.suffix.lower().lstrip(".") if out else ""
-        if given is None and ending and ending not in formats:
+        if chosen is None and ending and ending not in formats:
             raise SettingError(
                 f"{{out}} ends in .{literal(ending)}; give {{format}}, or end it in "
                 f"{one_of([f'.{name}' for name in formats])}"
             )
-        if given is not None and ending in formats and given != ending:
+        if chosen is not None and ending in formats and chosen != ending:
             raise SettingError(
-                f"{{out}} ends in .{ending} but {{format}} is {given}; make them the same"
+                f"{{out}} ends in .{ending} but {{format}} is {chosen}; make them the same"
             )
-        return self.replace(format=given or ending or self.usual_format)
+        return self.replace(format=chosen or ending or self.usual_format)
 
 
 @cache
@@ -454,10 +454,10 @@ def _docs(cls: type) -> dict[str, str]:
     """Return the strings under the fields of a class, from its source."""
     if cls in (object, Settings):
         return {}
-    (found,) = ast.parse(inspect.cleandoc("\n" + inspect.getsource(cls))).body
-    assert isinstance(found, ast.ClassDef)
+    (definition,) = ast.parse(inspect.cleandoc("\n" + inspect.getsource(cls))).body
+    assert isinstance(definition, ast.ClassDef)
     docs: dict[str, str] = {}
-    for pair in itertools.pairwise(found.body):
+    for pair in itertools.pairwise(definition.body):
         match pair:
             case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(
                 value=ast.Constant(value=str(text))

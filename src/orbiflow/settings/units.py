@@ -57,10 +57,10 @@ def length(text: str, dpi: float | None = None) -> float:
     >>> length("4 cm"), length("1in"), length("0"), length("150px", 300)
     (40.0, 25.4, 0.0, 12.7)
     """
-    found = re.fullmatch(rf"\s*({_NUMBER})\s*({_UNIT})\s*", text, flags=re.IGNORECASE)
-    if not found:
+    match = re.fullmatch(rf"\s*({_NUMBER})\s*({_UNIT})\s*", text, flags=re.IGNORECASE)
+    if not match:
         raise OrbiflowError(f"{text!r} is not a length; write a number and its unit, such as 40mm")
-    number, unit = found[1], found[2].lower()
+    number, unit = match[1], match[2].lower()
     return 0.0 if float(number) == 0 and not unit else _millimetres(number, unit, text, number, dpi)
 
 
@@ -90,12 +90,12 @@ def size(text: str, dpi: float | None = None) -> tuple[float, float]:
     ((300.0, 200.0), (25.4, 50.0), (25.4, 12.7))
     """
     pattern = rf"\s*({_NUMBER})\s*({_UNIT})\s*[x×]\s*({_NUMBER})\s*({_UNIT})\s*"
-    found = re.fullmatch(pattern, text, flags=re.IGNORECASE)
-    if not found:
+    match = re.fullmatch(pattern, text, flags=re.IGNORECASE)
+    if not match:
         raise OrbiflowError(
             f"{text!r} is not a width and a height; write both and their unit, such as 300x200mm"
         )
-    width, first, height, last = found[1], found[2].lower(), found[3], found[4].lower()
+    width, first, height, last = match[1], match[2].lower(), match[3], match[4].lower()
     both = f"{width}x{height}"
     return (
         _millimetres(width, first or last, text, both, dpi),
@@ -137,10 +137,10 @@ def colour(text: str) -> str:
     >>> colour("2A9D8F")
     '#2a9d8f'
     """
-    found = re.fullmatch(r"\s*#?([0-9a-fA-F]{6})\s*", text)
-    if not found:
+    match = re.fullmatch(r"\s*#?([0-9a-fA-F]{6})\s*", text)
+    if not match:
         raise OrbiflowError(f"{text!r} is not a colour; write it as #rrggbb, such as #2a9d8f")
-    return f"#{found[1].lower()}"
+    return f"#{match[1].lower()}"
 
 
 _Side = Annotated[float, Range(above=0, most=LONGEST_SIDE)]
@@ -209,8 +209,10 @@ def _millimetres(number: str, unit: str, text: str, numbers: str, dpi: float | N
     """Return a number of a unit in mm; `numbers` are all of the text's, for the message."""
     units = MILLIMETRES if dpi is None else {**MILLIMETRES, "px": MILLIMETRES["in"] / dpi}
     if not unit:
-        known = [f"{numbers}{name}" for name in units if name != "pt"]
-        raise OrbiflowError(f"{text!r} has no unit; write {', '.join(known[:-1])} or {known[-1]}")
+        choices = [f"{numbers}{name}" for name in units if name != "pt"]
+        raise OrbiflowError(
+            f"{text!r} has no unit; write {', '.join(choices[:-1])} or {choices[-1]}"
+        )
     if unit not in units:
         raise OrbiflowError(
             f"{text!r} has the unknown unit {unit!r}; use one of {', '.join(units)}"
