@@ -113,6 +113,7 @@ class BatchKind:
     - `opens`: The page in a result's folder that a card with a picture opens, "" for the folder.
     - `written`: Returns the paths of what an earlier run wrote into a folder.
     - `endings`, `most_bytes`: For a folder of files, the endings and the largest size of those read.
+    - `second`: The parameter that takes the second file of each pair; "" where items are single files.
     """
 
     things: str
@@ -128,6 +129,7 @@ class BatchKind:
     written: Callable[[Path], set[str]]
     endings: Sequence[str] = ()
     most_bytes: int = 0
+    second: str = ""
 
 
 class Overview(Protocol):

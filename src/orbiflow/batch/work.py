@@ -231,41 +231,37 @@ class Counts:
 def run_files(
     source: Path,
     out: Path,
-    kind: BatchKind,
-    title: str,
+    sheet: ContactSheet,
     call_of: Callable[[str, str], Call],
     match: str | None,
     settings: WorkSettings,
     tell: Sink,
     cancel: Cancel,
-    *,
-    sheet: ContactSheet | None = None,
-    second: str = "",
 ) -> Outcome:
     """Make a call for every file of a folder, and put its result into a folder as it comes.
 
     `call_of` returns the call for a file's name and the name of its results' folder; `match` is a
-    pattern of names, None for all that can be read. With `second`, the name of a parameter, each call
-    takes two of the files, every pair once, and `call_of` is given both names, joined by `PAIRED`. The
-    `sheet` is written over the results, by default a plain one of the title. The outcome's summary has
-    `folder`, `table` and `page`; the number of `files`, and how many of them are `done`, gave
-    `nothing`, `failed` or are `left`; how many were `kept` from before; `seconds`.
+    pattern of names, None for all that can be read. The `sheet` is written over the results. If its
+    kind has a `second` file, each call takes two of the files, every pair once, and `call_of` is given
+    both names, joined by `PAIRED`. The outcome's summary has `folder`, `table` and `page`; the number
+    of `files`, and how many of them are `done`, gave `nothing`, `failed` or are `left`; how many were
+    `kept` from before; `seconds`.
     """
-    begin = time.perf_counter()
+    begin, kind = time.perf_counter(), sheet.kind
     if match is not None and not match.strip():
         raise SettingError("{match} must be a pattern of names, such as *.svg")
     listing = listed(source, kind.endings, match, out)
-    files = [PAIRED.join(pair) for pair in combinations(listing, 2)] if second else listing
+    files = [PAIRED.join(pair) for pair in combinations(listing, 2)] if kind.second else listing
     if not files:
         raise InputFileError(f"{source} holds one file that can be read, and a pair needs two")
-    with BatchFolder(out, kind, sheet or ContactSheet(kind, title)) as folder:
+    with BatchFolder(out, kind, sheet) as folder:
         taken = {file: entry.name for file, entry in folder.journal.entries.items()}
         names = folder_names(files, taken, RESERVED)
         read = {file: partial(read_file, source / file, kind.most_bytes) for file in listing}
         items: list[Item] = []
         for file in files:
-            first, _, other = file.partition(PAIRED) if second else (file, "", "")
-            more = {second: read[other]} if second else {}
+            first, _, other = file.partition(PAIRED) if kind.second else (file, "", "")
+            more = {kind.second: read[other]} if kind.second else {}
             items.append(Item(file, names[file], call_of(file, names[file]), read[first], more))
         left_out = f" or that {match} leaves out" if match else ""
         gone = f"of files that are not in {source}{left_out}"

@@ -74,10 +74,8 @@ def batch(
         return find("escherize").call({**shared, **options, **fixed, **words, **more})
 
     title = f"{'Pairs' if pairs else 'Tiles'} of {folder.name or 'a folder'}"
-    kind = TILES if pairs is None else PAIRS
-    sheet, reads = (None, "") if pairs is None else (PairSheet(kind, title), "second")
-    running = match, work, on_event, cancel
-    return run_files(folder, out, kind, title, call_of, *running, sheet=sheet, second=reads)
+    sheet = PairSheet(PAIRS, title) if pairs else ContactSheet(TILES, title)
+    return run_files(folder, out, sheet, call_of, match, work, on_event, cancel)
 
 
 def _best(summary: Summary) -> dict[str, Any]:
@@ -122,7 +120,7 @@ TILES = BatchKind(
     written=_written,
 )
 
-PAIRS = replace(TILES, things="pairs", items="pairs")
+PAIRS = replace(TILES, things="pairs", items="pairs", second="second")
 
 
 class PairSheet(ContactSheet):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
-from orbiflow.batch import BatchKind, Column, Summary, WorkSettings, run_files
+from orbiflow.batch import BatchKind, Column, ContactSheet, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
 from orbiflow.density.data import asked_roles
 from orbiflow.density.fitting import DensitySettings
@@ -278,8 +278,8 @@ def batch(
     def call_of(name: str, _results: str) -> runtime.Call:
         return runtime.find("density fit").call({**given, "data": name, "out": "out"})
 
-    title = f"Densities of {folder.name or 'a folder'}"
-    return run_files(folder, out, DENSITIES, title, call_of, match, work, on_event, cancel)
+    sheet = ContactSheet(DENSITIES, f"Densities of {folder.name or 'a folder'}")
+    return run_files(folder, out, sheet, call_of, match, work, on_event, cancel)
 
 
 def _figures(summary: Summary) -> dict[str, Any]:
