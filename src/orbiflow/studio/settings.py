@@ -70,6 +70,25 @@ class Limits(Settings):
     """Streams of events at a time."""
 
 
+class TakeAway(Settings):
+    """What is made of a tile to take away."""
+
+    makes: str
+    """The operation that makes it: export, art, solid or animate."""
+
+    tile: int
+    """The number of the tile."""
+
+    settings: str = "{}"
+    """Its settings, as JSON."""
+
+    picture: bool = False
+    """Whether the pictures that were uploaded go onto the figures."""
+
+    drawing: str = ""
+    """What was drawn on the tile, as JSON."""
+
+
 class SearchChoice(Settings, group="Search"):
     """How tiles are searched for in the studio."""
 

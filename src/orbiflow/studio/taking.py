@@ -28,7 +28,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.settings import Range
 from orbiflow.studio.kinds_of_work import WITH_DRAWING, file_name, making_call
-from orbiflow.studio.settings import Job
+from orbiflow.studio.settings import Job, TakeAway
 from orbiflow.studio.tile_files import tile_folder
 from orbiflow.studio.words import OF_PICTURE, PREFIXES
 
@@ -98,11 +98,7 @@ def files_of(folder: Path) -> list[dict[str, Any]]:
 @operation("studio preview")
 def preview(
     job: Job,
-    makes: str,
-    tile: int,
-    settings: str = "{}",
-    picture: bool = False,
-    drawing: str = "",
+    choice: TakeAway,
     side: Annotated[int, Range(100, 2000)] = 800,
     *,
     on_event: Sink = ignore,
@@ -113,7 +109,6 @@ def preview(
     The outcome has the `image`, a PNG in base 64, and its `notes`.
 
     Args:
-        makes: As for `studio take`, like the others.
         side: The pixels of the picture's longer side, where it can be chosen.
     """
     del on_event
@@ -125,9 +120,8 @@ def preview(
             notes.append(event.text)
 
     try:
-        pictures = _small_pictures if picture else None
-        result, files, given = _asked(job, makes, tile, settings, pictures, drawing, folder)
-        call = making_call(makes, given, result, **files)
+        result, files, wanted = _asked(job, choice, _small_pictures, folder)
+        call = making_call(choice.makes, wanted, result, **files)
         image = _drawn(call, folder, side, hear, cancel)
         return Outcome({"image": base64.b64encode(image).decode(), "notes": notes})
     finally:
@@ -186,32 +180,17 @@ def _small_dpi(settings: Any, side: float) -> float:
 
 @operation("studio take")
 def take(
-    job: Job,
-    makes: str,
-    tile: int,
-    settings: str = "{}",
-    picture: bool = False,
-    drawing: str = "",
-    called: str = "",
-    *,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
+    job: Job, choice: TakeAway, called: str = "", *, on_event: Sink = ignore, cancel: Cancel = NEVER
 ) -> Outcome:
     """Write what a user takes away of a tile.
 
     Args:
-        makes: The operation that writes it: export, art, solid or animate.
-        tile: The number of the tile.
-        settings: Its settings, as JSON.
-        picture: Whether the pictures that were uploaded go onto the figures.
-        drawing: What was drawn on the tile, as JSON.
         called: The name of the project, with which that of the file begins.
     """
     folder = make_folder(export_folder(job.project, job.task))
-    pictures = _pictures if picture else None
-    result, files, given = _asked(job, makes, tile, settings, pictures, drawing, folder)
-    name = file_name(makes, given, result, called)
-    call = making_call(makes, given, result, out=folder / name, **files)
+    result, files, wanted = _asked(job, choice, _pictures, folder)
+    name = file_name(choice.makes, wanted, result, called)
+    call = making_call(choice.makes, wanted, result, out=folder / name, **files)
     done = call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
     written = files_of(folder)
     preview = False
@@ -226,7 +205,7 @@ def take(
             "files": written,
             "preview": preview,
             "facts": facts,
-            "chosen": json.loads(settings),
+            "chosen": json.loads(choice.settings),
             "made": time.time(),
         }
     )
@@ -243,20 +222,14 @@ def _in_one_file(files: list[Path], name: Path) -> list[dict[str, Any]]:
 
 
 def _asked(
-    job: Job,
-    makes: str,
-    tile: int,
-    settings: str,
-    pictures: Callable[[Path, Path], dict[str, Any]] | None,
-    drawing: str,
-    folder: Path,
+    job: Job, choice: TakeAway, pictures: Callable[[Path, Path], dict[str, Any]], folder: Path
 ) -> tuple[Path, dict[str, Any], dict[str, Any]]:
     """Return the tile's folder, the files that go onto it and the settings that a browser wants."""
-    given, result = json.loads(settings), tile_folder(job.project, tile)
-    files = {} if pictures is None else pictures(job.project, result)
-    if drawing and makes in WITH_DRAWING:
-        return with_drawing(drawing, result, files, given, folder / SCRATCH)
-    return result, files, given
+    wanted, result = json.loads(choice.settings), tile_folder(job.project, choice.tile)
+    files = pictures(job.project, result) if choice.picture else {}
+    if choice.drawing and choice.makes in WITH_DRAWING:
+        return with_drawing(choice.drawing, result, files, wanted, folder / SCRATCH)
+    return result, files, wanted
 
 
 def _pictures(home: Path, result: Path) -> dict[str, Any]:
