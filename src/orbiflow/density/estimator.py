@@ -65,8 +65,8 @@ def _refuse_targets(y: object) -> None:
 
 def _signature() -> inspect.Signature:
     """The constructor's parameters, which include all settings by name."""
-    own = {"columns": None, "unit": None, "missing": "refuse"}
-    others = own | {entry.name: entry.default for entry in fields_of(DensitySettings)}
+    first = {"columns": None, "unit": None, "missing": "refuse"}
+    others = first | {entry.name: entry.default for entry in fields_of(DensitySettings)}
     kinds = inspect.Parameter
     return inspect.Signature(
         [kinds("space", kinds.POSITIONAL_OR_KEYWORD, default="torus")]
@@ -175,16 +175,16 @@ class DensityEstimator(GivenCovariates):
         _, sample_weight, groups, *aligned = alongside(
             X=X, sample_weight=sample_weight, groups=groups, **beside
         )
-        known = None if given is None else self._read_given(X, aligned[0] if aligned else given)
-        rows = self.read_rows(X) if known is None else known[0]
+        read = None if given is None else self._read_given(X, aligned[0] if aligned else given)
+        rows = self.read_rows(X) if read is None else read[0]
         sample_weight, groups = rows.beside(sample_weight, groups)
-        if groups is None and known is None and not self.settings().flow_alone:
+        if groups is None and read is None and not self.settings().flow_alone:
             groups = runs_of_draws(X)
         how: dict[str, Any] = {"weights": sample_weight, "groups": groups, "progress": progress}
         pooled = self._fit(rows, **how)
-        if known is not None:
+        if read is not None:
             points = self._chart(rows.values)
-            self.report_ = fit_conditional(pooled, points, *known[1:], self.settings(), **how)
+            self.report_ = fit_conditional(pooled, points, *read[1:], self.settings(), **how)
         return self
 
     def read_rows(self, X: Any, others: Sequence[str] = (), apart: Sequence[str] = ()) -> TableRows:
@@ -192,9 +192,9 @@ class DensityEstimator(GivenCovariates):
 
         Columns `others` are kept as what is given; roles of the names `apart` are of no data.
         """
-        known = self._columns(apart)
-        rows = X if isinstance(X, TableRows) else known.read(X, others)
-        self.space_ = known.of(rows)
+        columns = self._columns(apart)
+        rows = X if isinstance(X, TableRows) else columns.read(X, others)
+        self.space_ = columns.of(rows)
         return rows
 
     def _fit(self, read: TableRows, groups: ArrayLike | None, **how: Any) -> ChosenFit:
@@ -205,9 +205,9 @@ class DensityEstimator(GivenCovariates):
         settings.check_rows(self.missing, None if groups is None else "groups")
         names = read.columns if read.source.is_named else None
         how |= {"groups": groups, "missing": self.missing, "columns": names}
-        found = fit_chosen(self.space_, points, settings, **how)
-        self._keep(found, read)
-        return found
+        fit = fit_chosen(self.space_, points, settings, **how)
+        self._keep(fit, read)
+        return fit
 
     def _keep(self, found: ChosenFit, read: TableRows) -> None:
         """Set what there is after a fit to data."""
@@ -236,12 +236,12 @@ class DensityEstimator(GivenCovariates):
         ['mean_phi', 'concentration_phi']
         """
         self._fitted()
-        found = getattr(self, "report_", None)
-        if found is None or found.parametric is None:
+        report = getattr(self, "report_", None)
+        if report is None or report.parametric is None:
             raise OrbiflowError(
                 'this density is of no parametric family alone: fit one, such as components="kent"'
             )
-        return {one.name: one for one in found.parametric.parameters}
+        return {parameter.name: parameter for parameter in report.parametric.parameters}
 
     def marginal(self, *columns: str | int) -> DensityEstimator:
         """An estimator of some of the columns alone, by their columns' names or numbers from 0.
@@ -274,14 +274,14 @@ class DensityEstimator(GivenCovariates):
         """
         density, names = self._fitted(), self._column_names()
         both: list[tuple[str | int, float]] = [*(given or {}).items(), *angles.items()]
-        known = given_named(self.space_, both, names)
+        fixed = given_named(self.space_, both, names)
         columns = axes_named([name for name, _ in both], names)
         values = {names[k]: float(value) for k, (_, value) in zip(columns, both, strict=True)}
         for doubt in given_doubts(self.space_, values, names):
             warnings.warn(doubt, DataWarning, stacklevel=2)
         left = [k for k in range(len(names)) if k not in columns]
         kept, axes = chosen_columns(self.space_, left, len(names))
-        return self._of(conditional(density, known, axes), [names[k] for k in kept])
+        return self._of(conditional(density, fixed, axes), [names[k] for k in kept])
 
     def at(self, given: Mapping[str, Any] | None = None, /, **values: Any) -> DensityEstimator:
         """The density where covariates have some values: `at(temperature=295, residue="GLY")`."""
@@ -436,14 +436,14 @@ class DensityEstimator(GivenCovariates):
     def _changed(self, names: Iterable[str]) -> dict[str, Any]:
         """Parameters that are not at their defaults."""
         defaults = inspect.signature(type(self)).parameters
-        given = {name: getattr(self, name) for name in names}
-        return {name: v for name, v in given.items() if v != defaults[name].default}
+        values = {name: getattr(self, name) for name in names}
+        return {name: v for name, v in values.items() if v != defaults[name].default}
 
     def _columns(self, apart: Sequence[str] = ()) -> DataColumns:
         lower = {name.casefold() for name in apart}
-        asked = asked_roles(self.columns)
-        own = {key: role for key, role in asked.items() if str(key).casefold() not in lower}
-        return DataColumns(self.space, self.unit, own, self.settings().seed)
+        roles = asked_roles(self.columns)
+        of_data = {key: role for key, role in roles.items() if str(key).casefold() not in lower}
+        return DataColumns(self.space, self.unit, of_data, self.settings().seed)
 
     def _checked(self, X: ArrayLike) -> Array:
         """Return data in the order of the fit; warn of those that seem to be in another unit."""

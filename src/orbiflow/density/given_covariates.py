@@ -97,7 +97,7 @@ class GivenCovariates(FittedFigures):
         """
         (axis,) = axes_named([of], self._column_names())
         values = np.asarray(at)
-        densities = (self._density_at({**(given or {}), along: one}) for one in values)
+        densities = (self._density_at({**(given or {}), along: value}) for value in values)
         return trend_of(densities, axis, values, levels=levels)
 
     def _covariates(

@@ -90,8 +90,8 @@ def _mean(space: RotationSpace, points: Tensor, shares: Tensor) -> tuple[Tensor,
     """
     some = torch.linspace(0, len(points) - 1, min(MOST_LOOKED_AT, len(points))).round().long()
     begin = some[torch.linspace(0, len(some) - 1, min(STARTS, len(some))).round().long()]
-    found = [_settled(space, points[some], shares[some], start) for start in points[begin]]
-    best = max(found, key=lambda one: one[0])[1]
+    settled = [_settled(space, points[some], shares[some], start) for start in points[begin]]
+    best = max(settled, key=lambda one: one[0])[1]
     _, mean, near = _settled(space, points, shares, best)
     return space.project(mean[None])[0], near.numpy()
 

@@ -158,15 +158,15 @@ def summarize_angles(
         raise OrbiflowError("the columns are angles in several units: convert them to one")
     values, names = read.values, read.columns
     turn = whole_turn(read.unit or "radians")
-    found: list[AngleSummary] = []
+    summaries: list[AngleSummary] = []
     for name, column in zip(names, values.T, strict=True):
-        own, rows = chosen_rows(column[:, None], weights, groups, level)
-        found.append(_angle_summary(name, own[:, 0] / turn, turn, rows))
+        angles, rows = chosen_rows(column[:, None], weights, groups, level)
+        summaries.append(_angle_summary(name, angles[:, 0] / turn, turn, rows))
     pairs: list[Correlation] = []
     for i, j in combinations(range(len(names)), 2):
-        own, rows = chosen_rows(values[:, [i, j]], weights, groups, level)
-        pairs.append(_correlation(names[i], names[j], own * (2 * np.pi / turn), rows))
-    return found, pairs
+        angles, rows = chosen_rows(values[:, [i, j]], weights, groups, level)
+        pairs.append(_correlation(names[i], names[j], angles * (2 * np.pi / turn), rows))
+    return summaries, pairs
 
 
 def _angle_summary(name: str, turns: Array, turn: float, rows: WeighedRows) -> AngleSummary:
@@ -243,8 +243,8 @@ def _sine_p(products: Array, rows: WeighedRows) -> float | None:
 def _fisher_lee(a: Array, b: Array, rows: WeighedRows) -> float | None:
     """Return Fisher and Lee's correlation, by sums over rows (Fisher, 1993, equation 6.36)."""
     sums = [complex(rows.mean(np.exp(1j * x))) for x in (a - b, a + b, 2 * a, 2 * b)]
-    minus, plus, one, two = (abs(s) ** 2 for s in sums)
-    below = math.sqrt(max(0.0, (1 - one) * (1 - two)))
+    minus, plus, first, two = (abs(s) ** 2 for s in sums)
+    below = math.sqrt(max(0.0, (1 - first) * (1 - two)))
     return (minus - plus) / below if below > 1e-12 else None
 
 

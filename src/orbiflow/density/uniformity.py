@@ -129,7 +129,7 @@ def _rao_tail(excess: float, count: int, end: float) -> float:
     at = ((knots[1:] + knots[:-1])[:, None] / 2 + half[:, None] * nodes).ravel()
     shifted = count * at - np.arange(count)[:, None]
     sums = ((shifted >= 0) & (shifted < 1)).astype(np.float64)
-    found, logs = np.zeros_like(at), special.gammaln(np.arange(1.0, count + 2))
+    total, logs = np.zeros_like(at), special.gammaln(np.arange(1.0, count + 2))
     for short in range(1, count):
         if short > 1:
             after = np.concatenate([sums[1:], np.zeros((1, len(at)))])
@@ -138,8 +138,8 @@ def _rao_tail(excess: float, count: int, end: float) -> float:
         long = count - short
         log = logs[count - 1] + logs[count] - logs[short] - logs[long] - logs[long - 1]
         log = log + (long - 1) * np.log(at) - (short - 1) * math.log(count)
-        found += np.exp(log) * sums[0]
-    return float(min(1.0, (half[:, None] * weights).ravel() @ found))
+        total += np.exp(log) * sums[0]
+    return float(min(1.0, (half[:, None] * weights).ravel() @ total))
 
 
 def bingham_p(vectors: Array, rows: WeighedRows) -> float | None:

@@ -39,9 +39,9 @@ class WeighedRows:
         weighted = self.weights[:, None] * values
         if self.groups is None:
             return weighted
-        found = np.zeros((int(self.groups.max()) + 1, values.shape[1]))
-        np.add.at(found, self.groups, weighted)
-        return found
+        sums = np.zeros((int(self.groups.max()) + 1, values.shape[1]))
+        np.add.at(sums, self.groups, weighted)
+        return sums
 
     @property
     def units(self) -> int:
@@ -59,18 +59,18 @@ def chosen_rows(
 ) -> tuple[Array, WeighedRows]:
     """Return the rows that have all values and a weight."""
     whole = np.isfinite(values).all(axis=1)
-    given = np.ones(len(values)) if weights is None else as_numbers(weights, "weights")
-    if given.shape != whole.shape or not (np.isfinite(given).all() and (given >= 0).all()):
+    counts = np.ones(len(values)) if weights is None else as_numbers(weights, "weights")
+    if counts.shape != whole.shape or not (np.isfinite(counts).all() and (counts >= 0).all()):
         raise OrbiflowError(f"weights must be {len(values)} numbers, none below 0")
-    whole &= given > 0
+    whole &= counts > 0
     if not whole.any():
         raise OrbiflowError("there is no row with a value and a weight")
-    own, numbers = given[whole], None
+    kept, numbers = counts[whole], None
     if groups is not None:
-        numbers = group_numbers(group_numbers(groups, len(values))[whole], len(own))
-    even = bool((own == own[0]).all())
+        numbers = group_numbers(group_numbers(groups, len(values))[whole], len(kept))
+    even = bool((kept == kept[0]).all())
     level = as_number(level, "level", 0.5, 0.999)
-    return values[whole], WeighedRows(own / own.sum(), numbers, even, level)
+    return values[whole], WeighedRows(kept / kept.sum(), numbers, even, level)
 
 
 def tail(of: Any, *arguments: float) -> float:

@@ -173,8 +173,8 @@ def compare_samples(
     divergence = None
     if settings.divergence:
         try:
-            told: Progress = lambda share, what: progress(0.3 + 0.7 * share, what)  # noqa: E731
-            divergence = cross_fitted(both.space, points, first, members, settings, told)
+            rest: Progress = lambda share, what: progress(0.3 + 0.7 * share, what)  # noqa: E731
+            divergence = cross_fitted(both.space, points, first, members, settings, rest)
         except OrbiflowError as error:
             notes.append(f"how far apart they are was not estimated: {error}")
     return DataComparison(
@@ -350,9 +350,9 @@ def cross_fitted(
 
 def _figures(sums: Array) -> Array:
     """Return accuracy, Jensen-Shannon divergence and both divergences (B, 4) from sums (B, 8)."""
-    one, other = sums[:, 1:4] / sums[:, :1], sums[:, 5:] / sums[:, 4:5]
-    even = (one[:, :2] + other[:, :2]) / 2
-    return np.concatenate([even, one[:, 2:], other[:, 2:]], axis=1)
+    first, other = sums[:, 1:4] / sums[:, :1], sums[:, 5:] / sums[:, 4:5]
+    even = (first[:, :2] + other[:, :2]) / 2
+    return np.concatenate([even, first[:, 2:], other[:, 2:]], axis=1)
 
 
 def _held_out_ratio(

@@ -88,13 +88,13 @@ def resampled_sums(table: Array, resamples: int, rng: np.random.Generator) -> Ar
     """Return sums (B, k) of a table (G, k) over G rows drawn with replacement, `resamples` times."""
     count = len(table)
     size = max(1, BLOCK_ENTRIES // count)
-    found: list[Array] = []
+    sums: list[Array] = []
     for start in range(0, resamples, size):
         number = min(size, resamples - start)
         drawn = rng.integers(count, size=(number, count)) + count * np.arange(number)[:, None]
         weights = np.bincount(drawn.ravel(), minlength=number * count).reshape(number, count)
-        found.append(weights.astype(np.float64) @ table)
-    return np.concatenate(found)
+        sums.append(weights.astype(np.float64) @ table)
+    return np.concatenate(sums)
 
 
 MAX_FOLDS = 1000
@@ -214,16 +214,16 @@ def mmd_test(
     dots = [images[0] @ image.mT for image in images]  # their exponentials are kernels
     top = float(dots[0].diagonal().mean())
     counts = np.maximum(_pair_sums(apart.double(), labels), 1) if alike else None
-    found: list[Array] = []
+    statistics: list[Array] = []
     for scale in _scales(top - dots[0], apart, rng):
         kernel = sum(((dot - top) / scale).exp() for dot in dots)
         assert isinstance(kernel, Tensor)
         if counts is None:
-            found.append(_squares(kernel, labels))
+            statistics.append(_squares(kernel, labels))
         else:
-            own, other, between = _pair_sums(kernel * apart, labels) / counts
-            found.append(own + other - 2 * between)
-    table = np.stack(found)
+            within, other, between = _pair_sums(kernel * apart, labels) / counts
+            statistics.append(within + other - 2 * between)
+    table = np.stack(statistics)
     spread = table.std(axis=1, keepdims=True)
     largest = ((table - table.mean(axis=1, keepdims=True)) / np.maximum(spread, 1e-300)).max(axis=0)
     p = float((largest >= largest[0] - 1e-12).mean())
@@ -235,23 +235,23 @@ def _are_alike(first: Array, groups: Groups, level: float, permutations: int) ->
 
     Check that a difference, however large, can be told from chance at this level.
     """
-    own, other = (np.bincount(groups.index, side, groups.count) for side in (first, ~first))
-    shared = (own > 0) & (other > 0)
-    alone = (own + other)[~shared]
-    alike = bool((own == other)[shared].all() and (alone == alone[:1]).all())
+    sizes, other = (np.bincount(groups.index, side, groups.count) for side in (first, ~first))
+    shared = (sizes > 0) & (other > 0)
+    alone = (sizes + other)[~shared]
+    alike = bool((sizes == other)[shared].all() and (alone == alone[:1]).all())
     highest, both = 1 - level + 1e-12, int(shared.sum())
-    one, two = (int((side > 0).sum()) - both for side in (own, other))
+    mine, two = (int((side > 0).sum()) - both for side in (sizes, other))
     common = each = 1 + math.ceil(-math.log2(highest))
     if alike:
         each = next(n for n in range(3, common + 3) if 2 / math.comb(2 * n, n) <= highest)
         # two rows that happen to be far from all others show no density of their own
-        ways = math.comb(one + two, one) if min(one, two) > 2 else 1
-        enough = (1 + (one == two)) / (ways << both) <= highest
+        ways = math.comb(mine + two, mine) if min(mine, two) > 2 else 1
+        enough = (1 + (mine == two)) / (ways << both) <= highest
     else:
-        enough = both + min(one, two) >= common
+        enough = both + min(mine, two) >= common
     if not enough:
         raise OrbiflowError(
-            f"the data sets have {one} and {two} {groups.what} of their own and {both} in common: too "
+            f"the data sets have {mine} and {two} {groups.what} of their own and {both} in common: too "
             f"few to tell a difference from chance at level {level:g}, which takes {each} of each data "
             f"set's own or {common} in common"
         )
@@ -280,25 +280,25 @@ def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array
 def _scales(distances: Tensor, apart: Tensor, rng: np.random.Generator) -> list[float]:
     """Return quantiles of half the squared distances of pairs that are not of one group."""
     pairs = torch.as_tensor(rng.integers(len(distances), size=(2, PAIRS)))
-    found = distances[pairs[0], pairs[1]][apart[pairs[0], pairs[1]]]
-    quantiles = torch.tensor(DISTANCE_QUANTILES, dtype=found.dtype)
-    return listed(torch.quantile(found, quantiles).clamp_min(MIN_SCALE))
+    lengths = distances[pairs[0], pairs[1]][apart[pairs[0], pairs[1]]]
+    quantiles = torch.tensor(DISTANCE_QUANTILES, dtype=lengths.dtype)
+    return listed(torch.quantile(lengths, quantiles).clamp_min(MIN_SCALE))
 
 
 def _permuted(first: Array, groups: Groups, permutations: int, rng: np.random.Generator) -> Tensor:
     """Return labels (N, 1 + P), 1 for the first data set: first as observed, then permuted."""
-    own = np.bincount(groups.index, first, groups.count) > 0
+    in_first = np.bincount(groups.index, first, groups.count) > 0
     other = np.bincount(groups.index, ~first, groups.count) > 0
-    both, single = own & other, np.flatnonzero(own != other)
-    found = np.empty((len(first), 1 + permutations))
-    found[:, 0] = first
+    both, single = in_first & other, np.flatnonzero(in_first != other)
+    table = np.empty((len(first), 1 + permutations))
+    table[:, 0] = first
     for k in range(1, 1 + permutations):
-        side = own.copy()
-        side[single] = own[rng.permutation(single)]
+        side = in_first.copy()
+        side[single] = in_first[rng.permutation(single)]
         turned = both & (rng.random(groups.count) < 0.5)
         of_row = groups.index
-        found[:, k] = np.where(both[of_row], first ^ turned[of_row], side[of_row])
-    return torch.as_tensor(found)
+        table[:, k] = np.where(both[of_row], first ^ turned[of_row], side[of_row])
+    return torch.as_tensor(table)
 
 
 def _flipped(first: Array, groups: Groups, permutations: int, rng: np.random.Generator) -> Tensor:

@@ -83,8 +83,8 @@ def cross_validate(
     scores = np.full(len(fold), np.nan)
     for number in range(folds):
         seen, unseen = read.only(fold != number), read.only(fold == number)
-        own = DensityEstimator(**estimator.get_params())
-        own.fit(seen, given=given if declared or given is None else seen.given)
-        known = None if given is None else unseen.given
-        scores[fold == number] = own.score_samples(unseen.values, given=known)
+        fit = DensityEstimator(**estimator.get_params())
+        fit.fit(seen, given=given if declared or given is None else seen.given)
+        cells_unseen = None if given is None else unseen.given
+        scores[fold == number] = fit.score_samples(unseen.values, given=cells_unseen)
     return CrossValidatedRows(scores, fold, read.weights)

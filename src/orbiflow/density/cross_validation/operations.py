@@ -50,11 +50,11 @@ def cross_validate_table(
         data: CSV, TSV, NPY or Parquet.
         out: Folder for the results; an earlier cross-validation there is resumed.
     """
-    asked = CrossValidation(data, out, density, rows, cv)
+    task = CrossValidation(data, out, density, rows, cv)
 
     from orbiflow.density.cross_validation.overview import run
 
-    return run(asked, work, on_event, cancel)
+    return run(task, work, on_event, cancel)
 
 
 @runtime.operation("density fold")
@@ -124,7 +124,7 @@ def _held(data: Path, folds: NDArray[Any], fold: int, name: str) -> NDArray[Any]
 
     held = folds == fold
     if not held.any() or held.all():
-        some = ", ".join(f"{one:g}" for one in np.unique(folds)[:20])
+        some = ", ".join(f"{number:g}" for number in np.unique(folds)[:20])
         raise SettingError(
             literal(f"{data}: {'all' if held.any() else 'none'} of its {len(held)} rows are of ")
             + f"{{fold}} {fold} by "

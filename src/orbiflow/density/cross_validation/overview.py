@@ -95,22 +95,22 @@ class CvOverview:
     def _report(
         self, found: HeldOut, done: Sequence[tuple[Fit, batch.Entry]], waiting: int
     ) -> bytes:
-        asked, rows, cv = self.asked, self.splits[0].rows, self.asked.cv
+        task, rows, cv = self.asked, self.splits[0].rows, self.asked.cv
         states = [entry.state for _, entry in done]
         comparison = self.comparison
         document: dict[str, Any] = {
             "kind": "cross-validation",
             "version": __version__,
-            "data": str(asked.data),
+            "data": str(task.data),
             "space": {"name": rows.space.name, "unit": rows.space.unit},
             "columns": list(rows.columns),
             "settings": {
                 **{name: getattr(cv, name) for name in ("folds", "times", "level", "bootstrap")},
-                "missing": asked.rows.missing,
+                "missing": task.rows.missing,
                 "columns": rows.declaration,
-                **{name: getattr(asked.density, name) for name in ("repeats", "effort", "seed")},
+                **{name: getattr(task.density, name) for name in ("repeats", "effort", "seed")},
             },
-            "components": asked.settings,
+            "components": task.settings,
             "rows": len(rows.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
             "uniform": float(uniform_logs(rows.space, rows.values).mean()),
@@ -154,10 +154,10 @@ def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
 def _stamp(path: Path) -> tuple[int, int] | None:
     """Return what a change of a file is noticed by."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return found.st_size, found.st_mtime_ns
+    return status.st_size, status.st_mtime_ns
 
 
 FITS = batch.BatchKind(
@@ -193,15 +193,15 @@ def run(
         counts = batch.run_items(
             items, work, folder, tell, cancel, gone="of other folds or settings"
         )
-    found = overview.comparison
-    failed = isinstance(found, str)
-    for text in [f"no comparison: {found}"] if failed else found.words():
+    comparison = overview.comparison
+    failed = isinstance(comparison, str)
+    for text in [f"no comparison: {comparison}"] if failed else comparison.words():
         tell(runtime.Note(text))
     summary = {
         "folder": str(out),
         **{key: str(out / name) for key, name in files.items()},
         "fits": len(fits),
-        "comparison": None if failed else runtime.to_json(found),
+        "comparison": None if failed else runtime.to_json(comparison),
         "seconds": time.perf_counter() - begin,
     }
     return counts.outcome(len(fits), out / TABLE, out / PAGE, summary, tell)
@@ -211,7 +211,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     """Return a fit as batches take it, with all that decides its result besides the rows."""
     rows, density = split.rows, asked.density
     width = len(rows.columns)
-    own = rows.own_names
+    names = rows.own_names
     columns = [
         str(k) if role is None else f"{k}={role}" for k, role in enumerate(rows.roles, start=1)
     ]
@@ -222,7 +222,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         width += 1
         # a flow alone has no components to choose
         columns.append(f"{width}={'ignore' if fit.components == ('flow',) else 'group'}")
-    given: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         "data": Path("rows.npy"),
         "space": asked.density.space,
         "cell": asked.density.cell,
@@ -231,8 +231,8 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         "columns": tuple(columns),
         "held": str(width + 1),
         "missing": asked.rows.kept_missing,
-        "unit": rows.unit if own else None,
-        "form": asked.density.rotation_form(own),
+        "unit": rows.unit if names else None,
+        "form": asked.density.rotation_form(names),
         "crystal": asked.density.crystal,
         "specimen": asked.density.specimen,
         "passive": asked.density.passive or None,
@@ -241,7 +241,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         "effort": density.effort,
         "seed": density.seed,
     }
-    call = runtime.find("density fold").call({k: v for k, v in given.items() if v is not None})
+    call = runtime.find("density fold").call({k: v for k, v in arguments.items() if v is not None})
     return batch.Item(fit.key, fit.name, call, split.read)
 
 

@@ -50,8 +50,8 @@ class CvSettings(Settings, group="Cross-validation"):
     @property
     def others(self) -> dict[str, Components]:
         """The components of the other settings that are fitted, by name."""
-        asked = ("kernels",) if self.against is None else self.against
-        return dict(_setting_in(text) for text in asked if text != UNIFORM)
+        texts = ("kernels",) if self.against is None else self.against
+        return dict(_setting_in(text) for text in texts if text != UNIFORM)
 
 
 class CvDensitySettings(SpaceSettings, ComponentSettings, group="Density"):
@@ -85,10 +85,10 @@ class CrossValidation:
     @property
     def settings(self) -> dict[str, Components]:
         """The components by the name of each setting that is fitted, the one in question first."""
-        found = dict([setting_of(self.density.components, "components")])
+        settings = dict([setting_of(self.density.components, "components")])
         for name, components in self.cv.others.items():
-            found.setdefault(name, components)
-        return found
+            settings.setdefault(name, components)
+        return settings
 
     @property
     def names(self) -> list[str]:
@@ -114,8 +114,8 @@ def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, Compo
             f"{{{field}}} must be of {', '.join(KNOWN)} with commas between{others}, got "
             + literal(repr(", ".join(unknown)))
         )
-    own = tuple(name for name in KNOWN if name in components)
-    return (DEFAULT, None) if own == COMPONENTS else ("+".join(own), own)
+    ordered = tuple(name for name in KNOWN if name in components)
+    return (DEFAULT, None) if ordered == COMPONENTS else ("+".join(ordered), ordered)
 
 
 def _setting_in(text: str) -> tuple[str, Components]:

@@ -116,8 +116,8 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
         together = place.numpy()
     elif asked.density.repeats == "rounding":
         tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
-    own = {field.name: getattr(rows, field.name) for field in fields(rows)}
-    return CvRows(**own, together=together, space=space)
+    parts = {field.name: getattr(rows, field.name) for field in fields(rows)}
+    return CvRows(**parts, together=together, space=space)
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:
@@ -168,14 +168,14 @@ class HeldOut:
         """Return split and fold, from 1, and the weighted means (S,) of its whole, common rows."""
         rows, common = splits[0].rows, self.common
         weights = np.ones(len(rows.whole)) if rows.weights is None else rows.weights
-        found: list[tuple[int, int, Array]] = []
+        means: list[tuple[int, int, Array]] = []
         for number, split in enumerate(splits):
             for fold in range(1, int(split.fold.max()) + 1):
                 chosen = (split.fold == fold) & common[number] & rows.whole
                 if chosen.any():
                     mean = self.scores[:, number, chosen] @ weights[chosen] / weights[chosen].sum()
-                    found.append((number + 1, fold, mean))
-        return found
+                    means.append((number + 1, fold, mean))
+        return means
 
 
 def held_out(
@@ -193,8 +193,8 @@ def held_out(
         if entry is None or entry.state != "done":
             continue
         held = np.flatnonzero(splits[fit.split - 1].fold == fit.fold)
-        found = _read(folder / entry.name / SCORES, held)
-        scores[settings.index(fit.setting), fit.split - 1, held] = found
+        logs = _read(folder / entry.name / SCORES, held)
+        scores[settings.index(fit.setting), fit.split - 1, held] = logs
     if UNIFORM in settings:
         scores[settings.index(UNIFORM)] = uniform_logs(rows.space, rows.values).numpy()
     return HeldOut(tuple(settings), scores)

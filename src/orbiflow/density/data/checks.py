@@ -155,10 +155,10 @@ def check_turn(column: Checked, turn: float, what: str, *, are_new: bool = False
 
     New ones, of a density that is known, may be two turns away: its intervals may reach over a turn.
     """
-    known = column.known
-    if not len(known):
+    values = column.known
+    if not len(values):
         return
-    low, high = float(known.min()), float(known.max())
+    low, high = float(values.min()), float(values.max())
     most = math.ceil(turn) if what == "cycle" else turn * (1 + TURN_TOLERANCE)
     most *= 2 if what == "axial" or are_new else 1  # either end of a line may be written
     far = high if high >= -low else low
@@ -174,10 +174,10 @@ def check_turn(column: Checked, turn: float, what: str, *, are_new: bool = False
 
 def check_real(column: Checked, role: Role) -> list[str]:
     """Refuse real numbers that a column cannot have, and return what makes one doubt others."""
-    known = column.known
-    if not len(known):
+    values = column.known
+    if not len(values):
         return []
-    low, high = float(known.min()), float(known.max())
+    low, high = float(values.min()), float(values.max())
     if role.kind == "bounded":
         if low < role.low or high > role.high:
             far = low if low < role.low else high
@@ -187,7 +187,7 @@ def check_real(column: Checked, role: Role) -> list[str]:
         cure = "and is declared as positive: declare the column as linear"
         cure += ", or leave out those rows, as 0 is a mass of its own" if low == 0 else ""
         raise column.refusal([low], cure)
-    refuse_codes(column, known)
+    refuse_codes(column, values)
     return doubts_of_ends(column)
 
 
@@ -221,9 +221,9 @@ def doubts_of_ends(column: Checked) -> list[str]:
 
 def _doubts_of_degrees(column: Checked) -> list[str]:
     """Return a doubt where angles that were read as degrees fill a turn of radians."""
-    known, turn = column.known, TURNS["radians"]
-    fills = len(known) >= FEW_ROWS and np.ptp(known) > FULL_SHARE_OF_TURN * turn
-    if not fills or np.abs(known).max() > turn * (1 + TURN_TOLERANCE) or (known % 1 == 0).all():
+    values, turn = column.known, TURNS["radians"]
+    fills = len(values) >= FEW_ROWS and np.ptp(values) > FULL_SHARE_OF_TURN * turn
+    if not fills or np.abs(values).max() > turn * (1 + TURN_TOLERANCE) or (values % 1 == 0).all():
         return []
     return [
         f"{column.name!r} lies within 2 pi and was read as degrees: if these are radians, declare "
@@ -234,12 +234,12 @@ def _doubts_of_degrees(column: Checked) -> list[str]:
 def _doubts_of_circles(columns: Sequence[Checked]) -> list[str]:
     """Return a doubt where two real columns are the cosine and the sine of an angle."""
     doubts: list[str] = []
-    for one, other in combinations(columns, 2):
-        lengths = np.hypot(one.values, other.values)
+    for first, other in combinations(columns, 2):
+        lengths = np.hypot(first.values, other.values)
         lengths = lengths[np.isfinite(lengths)]
         if len(lengths) >= FEW_ROWS and np.abs(lengths - 1).max() < ON_CIRCLE:
             doubts.append(
-                f"{one.name!r} and {other.name!r} lie on a circle, as the cosine and the sine of an "
+                f"{first.name!r} and {other.name!r} lie on a circle, as the cosine and the sine of an "
                 "angle do: a density of angles takes the angle itself (numpy.arctan2)"
             )
     return doubts
@@ -283,7 +283,9 @@ def check_values(
         elif role is not None and role.is_real:
             doubts += check_real(column, role)
     pairs = zip(columns, roles, strict=True)
-    doubts += _doubts_of_circles([own for own, role in pairs if role is not None and role.is_real])
+    doubts += _doubts_of_circles(
+        [real for real, role in pairs if role is not None and role.is_real]
+    )
     if space in DIRECTIONS and len(coordinates) == 2:
         return doubts + _check_places(*coordinates, space=space, unit=unit)
     for column in coordinates:
@@ -328,8 +330,8 @@ def _check_places(lat: Checked, lon: Checked, *, space: str, unit: str | None) -
 
 def fraction_doubts(values: Array, lengths: Sequence[float]) -> list[str]:
     """Return a doubt if points (N, d) may be fractions of a cell, whose sides (d,) are much longer."""
-    known = values[np.isfinite(values).all(axis=1)]
-    are_inside = bool(((known >= 0) & (known < 1)).all()) and len(known) >= FEW_ROWS
+    whole = values[np.isfinite(values).all(axis=1)]
+    are_inside = bool(((whole >= 0) & (whole < 1)).all()) and len(whole) >= FEW_ROWS
     return [
         "all coordinates lie in [0, 1), in the unit of the cell: if they are fractions of the cell, "
         "give that option (fractional)"

@@ -228,20 +228,20 @@ class _Choice:
     def in_space(self) -> Columns:
         """Return the columns of a space that is no torus, and those beside it."""
         said, notes, cycles = self.said, list[str](), [k for k in self.data if self._is_cycle(k)]
-        own = [k for k, role in self.data.items() if role is None and k not in cycles]
-        own = own or [
+        of_space = [k for k, role in self.data.items() if role is None and k not in cycles]
+        of_space = of_space or [
             k for k, role in self.data.items() if role is not None and role.kind == "angle"
         ]
-        beside = {k: self._role(k, role) for k, role in self.data.items() if k not in own}
-        if not own:
-            own, notes = self._by_names()
-        self._check_count(own, WIDTHS.get(said.space, said.widths))
-        self._check_names(own)
-        unit, form = self._unit_of(own), said.form_of(self._names(own))
-        lacks_unit = unit is None and is_angular(said.space, len(own), form)
-        angles = {k: Role("angle") for k in own if lacks_unit}
-        self._ask({**angles, **beside}, [k for k in own if not lacks_unit])
-        return [*own, *beside], (*(None for _ in own), *beside.values()), unit, notes
+        beside = {k: self._role(k, role) for k, role in self.data.items() if k not in of_space}
+        if not of_space:
+            of_space, notes = self._by_names()
+        self._check_count(of_space, WIDTHS.get(said.space, said.widths))
+        self._check_names(of_space)
+        unit, form = self._unit_of(of_space), said.form_of(self._names(of_space))
+        lacks_unit = unit is None and is_angular(said.space, len(of_space), form)
+        angles = {k: Role("angle") for k in of_space if lacks_unit}
+        self._ask({**angles, **beside}, [k for k in of_space if not lacks_unit])
+        return [*of_space, *beside], (*(None for _ in of_space), *beside.values()), unit, notes
 
     def _is_cycle(self, column: int) -> bool:
         role = self._named(column)
@@ -256,10 +256,12 @@ class _Choice:
             if table.is_named and space in (*DIRECTIONS, "klein-bottle"):
                 self._ask_for_space(self._names(numeric))
             return numeric, []
-        own = [self.free[k] for k in way.columns]
-        taken = f"took {', '.join(self._names(own))} as {way.words}: results have this order, too"
-        notes = [taken] * (own != sorted(own)) + [way.note] * bool(way.note)
-        return own, [*notes, *self._left_out(own)]
+        of_space = [self.free[k] for k in way.columns]
+        taken = (
+            f"took {', '.join(self._names(of_space))} as {way.words}: results have this order, too"
+        )
+        notes = [taken] * (of_space != sorted(of_space)) + [way.note] * bool(way.note)
+        return of_space, [*notes, *self._left_out(of_space)]
 
     def _ask_for_space(self, names: Sequence[str]) -> None:
         """Ask which columns are the space's own: names do not say it."""
@@ -311,10 +313,10 @@ class _Choice:
         units = sorted({str(unit) for unit in (self.said.unit, *(r.unit for r in roles)) if unit})
         in_degrees = self.said.space in VECTORS
         if set(units) - ({"degrees"} if in_degrees else {*units[:1]}):
-            one = "degrees" if in_degrees else "one unit"
+            wanted = "degrees" if in_degrees else "one unit"
             raise SettingError(
                 literal(f"{listing(self._names(own))} are in {' and in '.join(units)}, and the ")
-                + f"{literal(self.said.space)} takes {one}: convert them (numpy.degrees)"
+                + f"{literal(self.said.space)} takes {wanted}: convert them (numpy.degrees)"
             )
         return units[0] if units else "radians" if self.table.is_array and not in_degrees else None
 

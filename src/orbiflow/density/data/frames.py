@@ -97,10 +97,10 @@ def columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
     names: Any = getattr(frame, "columns", None)
     if names is None or callable(names):
         return None
-    own: Any = frame
-    if hasattr(own, "iloc"):  # pandas
-        return [(n, cells_of(own.iloc[:, k])) for k, n in enumerate(names)]
-    parts = own.get_columns() if hasattr(own, "get_columns") else np.asarray(own).T  # polars
+    table: Any = frame
+    if hasattr(table, "iloc"):  # pandas
+        return [(n, cells_of(table.iloc[:, k])) for k, n in enumerate(names)]
+    parts = table.get_columns() if hasattr(table, "get_columns") else np.asarray(table).T  # polars
     return [(n, cells_of(cells)) for n, cells in zip(names, parts, strict=True)]
 
 

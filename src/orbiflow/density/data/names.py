@@ -130,7 +130,7 @@ def arrangements(space: str, names: Sequence[str], width: int | None = None) -> 
         kinds = ()
     else:  # of a quotient
         kinds = [
-            _lettered(own, "coordinates") for own in ("xyz", "xy") if width in (None, len(own))
+            _lettered(xyz, "coordinates") for xyz in ("xyz", "xy") if width in (None, len(xyz))
         ]
     split = [[w.translate(_GREEK) for w in words_of(n) if w not in _IGNORED] for n in names]
     for alike in kinds:
@@ -151,7 +151,7 @@ def _ways(kind: NamedColumns, names: Sequence[Sequence[str]]) -> Iterator[NamedC
                 by_stem[-1].setdefault(stem, []).append(column)
     for stem in by_stem[0]:
         places = product(*(columns.get(stem, ()) for columns in by_stem))
-        for columns in islice((own for own in places if len(set(own)) == len(own)), MOST_WAYS):
+        for columns in islice((way for way in places if len(set(way)) == len(way)), MOST_WAYS):
             yield kind._replace(columns=columns)
 
 

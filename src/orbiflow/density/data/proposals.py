@@ -58,20 +58,20 @@ def proposed_role(
     >>> proposed_role("phase", np.array([0.02, 0.97])), proposed_role("id", np.arange(3.0))
     ('angle:turns', 'ignore')
     """
-    known, words = values[np.isfinite(values)], set(words_of(name))
+    finite, words = values[np.isfinite(values)], set(words_of(name))
     role = role or role_named(name)
     if role is not None and not role.lacks_unit:
         return str(role)
-    if not len(known):
+    if not len(finite):
         return "ignore"
     if (turn := foreign_unit(name)) is not None:
         return f"cycle:{turn:.10g}"
-    low, high = float(known.min()), float(known.max())
-    are_whole = bool((known == np.round(known)).all())
+    low, high = float(finite.min()), float(finite.max())
+    are_whole = bool((finite == np.round(finite)).all())
     is_axis = bool(words & AXIAL) if role is None else role.kind == "axial"
     is_angle = role is not None or is_axis or bool(words & (LATITUDES | LONGITUDES))
     if role is None:
-        if len(known) > 2 and bool((np.diff(known) == 1).all()):
+        if len(finite) > 2 and bool((np.diff(finite) == 1).all()):
             return "ignore"
         if words & WEIGHTS:
             return "weight"
@@ -81,12 +81,12 @@ def proposed_role(
         return "linear"
     if words & PARTS_OF_VECTORS and max(-low, high) <= 1:
         return "ignore"  # the sine of an angle is none
-    unit = unit_by_size(known)
+    unit = unit_by_size(finite)
     if by_size and not is_angle and not words & OTHERS and unit not in (None, "turns"):
         is_angle = high - low > (math.pi if unit == "radians" else 90.0)
     if not is_angle:
         return "positive" if low > 0 else "linear"
-    if not is_axis and are_whole and low >= 0 and 6 < high <= TENS_IN_TURN and len(known) > 20:
+    if not is_axis and are_whole and low >= 0 and 6 < high <= TENS_IN_TURN and len(finite) > 20:
         return f"cycle:{TENS_IN_TURN:g}"
     kind = "axial" if is_axis and high - low <= 180 else "angle"
     return f"{kind}:{unit_named(name) or unit or 'degrees'}"
@@ -94,9 +94,9 @@ def proposed_role(
 
 def unit_by_size(values: Array) -> str | None:
     """Return the unit that angles (N,) may have by their size, None beyond every turn."""
-    known = values[np.isfinite(values)]
-    known = np.abs(known[~np.isin(known, codes_among(known, TURNS["degrees"]))])
-    most = float(known.max(initial=0.0))
+    finite = values[np.isfinite(values)]
+    finite = np.abs(finite[~np.isin(finite, codes_among(finite, TURNS["degrees"]))])
+    most = float(finite.max(initial=0.0))
     if most <= 1 and float(np.min(values, initial=0.0)) >= 0:
         return "turns"
     if most <= TURNS["radians"] * (1 + TURN_TOLERANCE):
@@ -110,8 +110,8 @@ def undeclared(
     """Return the error that asks for what columns (N,) are, with the words that answer it."""
     ranges: list[str] = []
     for name, values in columns.items():
-        known = values[np.isfinite(values)]
-        range_of = f"{known.min():.5g} to {known.max():.5g}" if len(known) else "no value"
+        finite = values[np.isfinite(values)]
+        range_of = f"{finite.min():.5g} to {finite.max():.5g}" if len(finite) else "no value"
         ranges.append(f"{short(name)} ({range_of})")
     quoted = f"'{proposal}'" if re.search(r"[\s()'°]", proposal) else proposal
     them = "they are" if len(columns) > 1 else "it is"

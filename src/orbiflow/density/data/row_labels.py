@@ -77,9 +77,9 @@ def _labels_of(table: Any) -> Any:
 def _check_labels(name: str, labels: Any, called: str, wanted: Any) -> None:
     """Refuse labels of rows that are not those wanted, each once."""
     what = ""
-    for own, index in ((called, wanted), (name, labels)):
+    for what_table, index in ((called, wanted), (name, labels)):
         if not index.is_unique:
-            what = f", and those of {own} repeat"
+            what = f", and those of {what_table} repeat"
     if not what and (apart := len(labels.symmetric_difference(wanted))):
         what = f", of which {apart} are in one of them alone"
     if what:

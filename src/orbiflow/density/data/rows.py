@@ -172,7 +172,7 @@ def rows_of(
     """
     notes, names = list(chosen.notes), tuple(table.names[k] for k in chosen.columns)
     values = np.stack([table.numbers(k) for k in chosen.columns], axis=1)
-    known = {
+    cells_given = {
         table.names[k]: _given_cells(table, k) for k in (found_column(table, g) for g in given)
     }
     side = {kind: table.numbers(k) for kind, k in chosen.side.items() if kind != "group"}
@@ -181,8 +181,8 @@ def rows_of(
         kept = rows_where(table, where)
         notes.append(f"read {kept.sum()} of {len(kept)} rows: those of {', '.join(where)}")
     _refuse_empty(table, values[kept], names)
-    lacking = {table.names[chosen.side[kind]]: np.isnan(own) for kind, own in side.items()}
-    lacking |= {name: missing_among(cells) for name, cells in known.items()}
+    lacking = {table.names[chosen.side[kind]]: np.isnan(entries) for kind, entries in side.items()}
+    lacking |= {name: missing_among(cells) for name, cells in cells_given.items()}
     labels = None
     if "group" in chosen.side:
         labels = words_of_cells(table.cells(chosen.side["group"]))
@@ -191,7 +191,7 @@ def rows_of(
         lacking = dict(zip(names, np.isnan(values).T, strict=True)) | lacking
     gone = kept & np.logical_or.reduce([*lacking.values(), ~kept])
     if gone.any() and missing != "drop":
-        _refuse_missing(table, {name: own & kept for name, own in lacking.items()}, names)
+        _refuse_missing(table, {name: entries & kept for name, entries in lacking.items()}, names)
     elif gone.any():
         first = table.place(int(np.flatnonzero(gone)[0]))
         some = f"{int(gone.sum())} row{'s' * (int(gone.sum()) > 1)}"
@@ -202,14 +202,14 @@ def rows_of(
     cure = "; leave such rows out with {missing_codes} inf {drop_missing}" if table.is_file else ""
     for name, column in zip(names, values.T, strict=True):
         _refuse_rows(table, np.isinf(column) & kept, name, "is infinite: correct it" + cure)
-    for kind, own in side.items():
-        wrong, what = own < 0, "weights must be 0 or more"
+    for kind, entries in side.items():
+        wrong, what = entries < 0, "weights must be 0 or more"
         if kind == "count":
-            wrong, what = wrong | (own % 1 != 0), "counts must be whole numbers from 0 on"
-        name, wrong = table.names[chosen.side[kind]], (wrong | np.isinf(own)) & kept
+            wrong, what = wrong | (entries % 1 != 0), "counts must be whole numbers from 0 on"
+        name, wrong = table.names[chosen.side[kind]], (wrong | np.isinf(entries)) & kept
         what = (
-            f"is declared as {kind}, and {what}, got {own[wrong.argmax()]:g}: correct it, or declare "
-            "others with {columns}"
+            f"is declared as {kind}, and {what}, got {entries[wrong.argmax()]:g}: correct it, or "
+            "declare others with {columns}"
         )
         _refuse_rows(table, wrong, name, what)
     strike = _strike_beside_dip(names) if chosen.space in DIRECTIONS else None
@@ -232,7 +232,7 @@ def rows_of(
         rows = rows.repeat(counts.astype(np.int64))
     return TableRows(
         table, np.arange(len(values), dtype=np.int64), values, names, chosen.roles, chosen.unit,
-        side.get("weight"), labels, known, tuple(notes),
+        side.get("weight"), labels, cells_given, tuple(notes),
     ).only(rows)  # fmt: skip
 
 
@@ -269,8 +269,8 @@ def _refuse_missing(
     table: DataTable, lacking: Mapping[str, NDArray[np.bool_]], data: Sequence[str]
 ) -> None:
     """Refuse cells that are missing, of columns of data and of others."""
-    count = sum(int(own.sum()) for own in lacking.values())
-    row, name = min((int(own.argmax()), name) for name, own in lacking.items() if own.any())
+    count = sum(int(cells.sum()) for cells in lacking.values())
+    row, name = min((int(cells.argmax()), name) for name, cells in lacking.items() if cells.any())
     kind = MissingCellsError if name in data else SettingError
     cure = "; fill them in, or leave their rows out" + " with {drop_missing}" * table.is_file
     raise kind(

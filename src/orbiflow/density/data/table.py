@@ -126,7 +126,7 @@ class DataTable:
         called = tuple(name for name, _ in columns)
         is_named = all(is_a(name, str) for name in called)
         called = called if is_named else tuple(numbered(len(called)))
-        categories = frozenset(k for k, (_, own) in enumerate(columns) if has_categories(own))
+        categories = frozenset(k for k, (_, column) in enumerate(columns) if has_categories(column))
         return cls(called, is_named, parts, categories=categories)
 
     @property
@@ -145,8 +145,8 @@ class DataTable:
         cells = self.columns[column]
         if cells.dtype.kind != "O" or self.text is None:
             return cells.dtype.kind in "fiu" or (cells.dtype.kind == "O" and _are_numbers(cells))
-        known = ~self._missing(column)
-        return 2 * int(np.isfinite(self._floats(column)[known]).sum()) > max(1, int(known.sum()))
+        there = ~self._missing(column)
+        return 2 * int(np.isfinite(self._floats(column)[there]).sum()) > max(1, int(there.sum()))
 
     def has_numbers_as_text(self, column: int) -> bool:
         """Return whether most cells of a frame's column, from 0, are the text of a number."""
@@ -213,8 +213,8 @@ class DataTable:
 
 
 def _are_numbers(cells: NDArray[Any]) -> bool:
-    known = [cell for cell in cells if not is_missing(cell)]
-    return bool(known) and all(is_a(c, Real) and not is_a(c, bool) for c in known)
+    there = [cell for cell in cells if not is_missing(cell)]
+    return bool(there) and all(is_a(c, Real) and not is_a(c, bool) for c in there)
 
 
 def numbered(count: int) -> list[str]:

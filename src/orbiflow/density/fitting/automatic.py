@@ -133,11 +133,11 @@ def fit_chosen(
     """
     if settings.parametric:
         how: dict[str, Any] = {"groups": groups, "columns": columns, "seed": settings.seed}
-        found = fit_parametric(space, points, settings.parametric, weights=weights, **how)
-        return ChosenFit(*found)
+        fit = fit_parametric(space, points, settings.parametric, weights=weights, **how)
+        return ChosenFit(*fit)
     if settings.flow_alone:
-        found = fit_density(space, points, settings.flow, weights=weights, progress=progress)
-        return ChosenFit(*found)
+        fit = fit_density(space, points, settings.flow, weights=weights, progress=progress)
+        return ChosenFit(*fit)
     how = {"missing": missing, "weights": weights, "groups": groups, "progress": progress}
     return fit_in_folds(space, points, settings, **how)
 
@@ -172,9 +172,9 @@ def fit_automatic(
     settings = DensitySettings() if settings is None else settings
     as_instance(settings, DensitySettings, "settings")
     how: dict[str, Any] = {"weights": weights, "groups": groups, "progress": progress}
-    found = fit_in_folds(space, points, settings, missing=missing, **how)
-    assert isinstance(found.density, Mixture)
-    return found.density, found.report
+    fit = fit_in_folds(space, points, settings, missing=missing, **how)
+    assert isinstance(fit.density, Mixture)
+    return fit.density, fit.report
 
 
 @training()
@@ -197,18 +197,18 @@ def fit_in_folds(
     rows, settings, notes = _rows(space, points, weights, groups, settings, check_missing(missing))
     if folds is not None:
         rows = replace(folds.rows, points=rows.points)
-    found = repeats_of(space, rows[is_whole(rows)].points)
-    whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
-    taken_for = found.taken_for(settings.repeats)
-    if found.places < LEAST_PLACES and not (taken_for == "rounding" and found.can_be_undone):
+    repeats = repeats_of(space, rows[is_whole(rows)].points)
+    whole = " that lack no angle" if repeats.places + repeats.rows < len(rows) else ""
+    taken_for = repeats.taken_for(settings.repeats)
+    if repeats.places < LEAST_PLACES and not (taken_for == "rounding" and repeats.can_be_undone):
         raise OrbiflowError(
-            f"a density needs at least {LEAST_PLACES} different points{whole}, got {found.places} "
+            f"a density needs at least {LEAST_PLACES} different points{whole}, got {repeats.places} "
             f"among {len(rows)}"
         )
-    together = taken_for == "rounding" and not found.can_be_undone
-    if taken_for == "rounding" and found.can_be_undone:  # as they may have been before
+    together = taken_for == "rounding" and not repeats.can_be_undone
+    if taken_for == "rounding" and repeats.can_be_undone:  # as they may have been before
         noise = torch.Generator().manual_seed(settings.seed)
-        rows = replace(rows, points=spread_evenly(space, rows.points, found, noise))
+        rows = replace(rows, points=spread_evenly(space, rows.points, repeats, noise))
     if folds is None:
         generator = torch.Generator().manual_seed(settings.seed)
         how: dict[str, Any] = {"generator": generator, "fast": settings.is_fast}
@@ -217,8 +217,8 @@ def fit_in_folds(
         folds = replace(folds, rows=rows)
     narrowest, crowded = narrowest_for(space, rows[is_whole(rows)].points)
     limited = limit_notes(space, crowded)
-    if together and found.step is not None:  # a deviation of one step
-        narrowest = min(narrowest, 1 / space.step_angle(found.step) ** 2)
+    if together and repeats.step is not None:  # a deviation of one step
+        narrowest = min(narrowest, 1 / space.step_angle(repeats.step) ** 2)
     families = _families(space, folds, settings, together, narrowest)
     enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
     flows = "flow" in settings.allowed and not flow_obstacle(space) and enough
@@ -237,9 +237,9 @@ def fit_in_folds(
     evidence = Evidence.of(space, families, candidates, folds.rows, weights)
     density = evidence.assembled(tried.flow, tried.share)
     rest = 1 - tried.share
-    parts = (*tried.evidence, *(replace(one, share=one.share * rest) for one in others))
-    report = _report(density, folds, candidates, weights, tried, parts, found)
-    for note in (*found.warnings(settings.repeats), *limited):
+    parts = (*tried.evidence, *(replace(part, share=part.share * rest) for part in others))
+    report = _report(density, folds, candidates, weights, tried, parts, repeats)
+    for note in (*repeats.warnings(settings.repeats), *limited):
         warnings.warn(note, DataWarning, stacklevel=7)
     after = (
         *weights_note(folds.rows),
@@ -247,7 +247,7 @@ def fit_in_folds(
         *report.notes,
         *_untried_note(folds, settings, flows),
         *settings.left_out,
-        *found.notes(taken_for),
+        *repeats.notes(taken_for),
         *limited,
         *steps_note(report.steps, report.integration_error),
     )
@@ -289,14 +289,16 @@ def _rows(
     """Rows that say anything, the parts that can be fitted to them, and what to say of it."""
     points, weights, groups = alongside(points=points, weights=weights, groups=groups)
     if missing == "refuse":
-        own = own_points(space, points)
-        labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
-        return weighed(own, weights, labels), settings, []
-    own, known = observed_points(space, points)
-    labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(known)))[known]
-    given = None if weights is None else weights_of(weights, len(known))[known]
-    rows = weighed(own, given, labels)
-    notes = missing_notes(rows, int((~known).sum()))
+        canonical = own_points(space, points)
+        labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(canonical)))
+        return weighed(canonical, weights, labels), settings, []
+    canonical, has_any = observed_points(space, points)
+    labels = (
+        None if groups is None else torch.as_tensor(group_numbers(groups, len(has_any)))[has_any]
+    )
+    kept_weights = None if weights is None else weights_of(weights, len(has_any))[has_any]
+    rows = weighed(canonical, kept_weights, labels)
+    notes = missing_notes(rows, int((~has_any).sum()))
     if not bool(rows.points.isnan().any()):
         return rows, settings, notes
     chosen = tuple(part for part in settings.allowed if part in MARGINAL_PARTS)

@@ -138,8 +138,8 @@ class _Maximization:
         seen, d = seen_angles(2 * math.pi * rows.points), len(order)
         before = order[:-1]
         self.regressors = torch.cat([before.new_zeros(1), 1 + before, 1 + d + before])
-        known = seen[:, d + self.regressors]
-        products = (known[:, :, None] * known[:, None, :]).flatten(1)
+        before_waves = seen[:, d + self.regressors]
+        products = (before_waves[:, :, None] * before_waves[:, None, :]).flatten(1)
         weights = torch.ones_like(seen[:, 0]) if rows.weights is None else rows.weights
         size = max(1, BLOCK_ENTRIES // components)
         parts = (torch.split(part, size) for part in (seen, products, weights))
@@ -148,8 +148,8 @@ class _Maximization:
     def __call__(self, mixture: VonMisesChains, *, bent: bool) -> VonMisesChains:
         sums, precise = self._expectation(mixture, bent)
         d, weight = mixture.means.shape[1], sums.counts.sum(dim=0)[1:]
-        own = sums.seen[1:]
-        center = torch.atan2(own[:, 1 : 1 + d], own[:, 1 + d :])
+        waves = sums.seen[1:]
+        center = torch.atan2(waves[:, 1 : 1 + d], waves[:, 1 + d :])
         means = torch.zeros_like(mixture.means)
         means[1:, :, 0] = center
         if bent:
@@ -167,11 +167,12 @@ class _Maximization:
         scaled = mixture.concentrations / scale[:, None, None]
         peaks = (mixture.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)).exp()
         fits = ChainFits(mixture.means, mixture.concentrations, mixture.order, regressed=bent)
-        found = [_shared(block, fits, peaks, scale) for block in self.blocks]
+        pairs = [_shared(block, fits, peaks, scale) for block in self.blocks]
         totals = (
-            torch.stack(parts).sum(dim=0) for parts in zip(*[own for own, _ in found], strict=True)
+            torch.stack(parts).sum(dim=0)
+            for parts in zip(*[sums for sums, _ in pairs], strict=True)
         )
-        return _Sums(*totals), [precise for _, precise in found]
+        return _Sums(*totals), [precise for _, precise in pairs]
 
     def _spread(self, means: Tensor, sums: _Sums, precise: list[Tensor]) -> Tensor:
         """Return sums (K, d) of 1 less the cosine of residuals of means (K, d, p)."""
@@ -210,7 +211,7 @@ class _Maximization:
         gram = local @ gram @ local.mT
         force = self._forces(mixture, sums)[1:] @ local.mT
         slopes = mixture.means[1:] @ back
-        found = torch.zeros_like(slopes)
+        regressed = torch.zeros_like(slopes)
         for i, used in enumerate(self.allowed):
             at = used.nonzero()[:, 0]
             ridge = SLOPE_PRECISION / kappa[:, i, None] * torch.ones(len(at)).to(kappa)
@@ -219,17 +220,17 @@ class _Maximization:
             # the constant is free
             right = force[:, i, at] - ridge * torch.cat([0 * now[:, :1], now[:, 1:]], dim=1)
             matrix = bessel[:, i, None, None] * gram[:, at][:, :, at] + torch.diag_embed(ridge)
-            found[:, i, at] = now + linalg.solve(matrix, right)
-        return (found @ local) * self.allowed
+            regressed[:, i, at] = now + linalg.solve(matrix, right)
+        return (regressed @ local) * self.allowed
 
     def _forces(self, mixture: VonMisesChains, sums: _Sums) -> Tensor:
         """Return sums (K, d, p) of waves times sines of residuals; the first angle has a constant."""
         first, d = self.order[0], len(self.order)
-        constant, found = mixture.means[:, first, 0], torch.zeros_like(mixture.means)
-        found[:, self.order[1:]] = sums.force
+        constant, forces = mixture.means[:, first, 0], torch.zeros_like(mixture.means)
+        forces[:, self.order[1:]] = sums.force
         sine, cosine = sums.seen[:, 1 + first], sums.seen[:, 1 + d + first]
-        found[:, first, 0] = constant.cos() * sine - constant.sin() * cosine
-        return found
+        forces[:, first, 0] = constant.cos() * sine - constant.sin() * cosine
+        return forces
 
 
 def _shared(block: _Block, fits: ChainFits, peaks: Tensor, scale: Tensor) -> tuple[_Sums, Tensor]:
@@ -376,9 +377,9 @@ def _factor_shape(
 def _fitted(
     rows: Rows, held: Rows, axes: tuple[int, ...], size: int, generator: torch.Generator
 ) -> VonMisesChains:
-    own, beside = (Rows(part.points[:, list(axes)], part.weights) for part in (rows, held))
-    start = spread_chains(Torus(len(axes)), own, size, torch.arange(len(axes)), generator)
-    return fit_chain_mixture(start, own, beside, MAX_ITERATIONS)
+    train, beside = (Rows(part.points[:, list(axes)], part.weights) for part in (rows, held))
+    start = spread_chains(Torus(len(axes)), train, size, torch.arange(len(axes)), generator)
+    return fit_chain_mixture(start, train, beside, MAX_ITERATIONS)
 
 
 class Screen:

@@ -147,9 +147,9 @@ def candidates_of(
             waiting += map(begun, range(1, folds.used))
     keys = [key for key in blocks[-1] if all(key in block for block in blocks)]
     table = torch.cat([torch.stack([block[key] for key in keys]) for block in blocks], dim=1)
-    known = [own for own in weights if own is not None]
+    counts = [count_of_rows for count_of_rows in weights if count_of_rows is not None]
     sizes = tuple(len(block[FLOOR, FLOOR]) for block in blocks)
-    return Candidates(keys, table, fitted, sizes, torch.cat(known) if known else None)
+    return Candidates(keys, table, fitted, sizes, torch.cat(counts) if counts else None)
 
 
 def _fitted(family: Family, folds: Folds, number: int, say: Tell) -> Fitted:
@@ -177,12 +177,12 @@ def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: 
     best_weights = stacking_weights(table, held.weights)
     weights: list[float] = listed(best_weights)
     for family in families:
-        own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
-        if own:
-            best = max(own, key=lambda name, f=family.name: held.mean(block[f, name]))
-            some = [name for name, w in own.items() if w >= family.negligible]
+        shares = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
+        if shares:
+            best = max(shares, key=lambda name, f=family.name: held.mean(block[f, name]))
+            some = [name for name, w in shares.items() if w >= family.negligible]
             if family.kept is not None:
-                some = sorted(some, key=lambda name, w=own: -w[name])[: family.kept]
+                some = sorted(some, key=lambda name, w=shares: -w[name])[: family.kept]
             family.keep({best, *some})
     return stacked(table, best_weights)
 
@@ -207,20 +207,22 @@ def judged(
     """
     table, own_weights = candidates.table, candidates.row_weights
     whole, uniform = stacked(table, weights), table[-1]
-    found: list[ComponentEvidence] = []
+    evidence: list[ComponentEvidence] = []
     names = dict.fromkeys(family for family, _ in candidates.keys if family != FLOOR)
     for name in names:
-        own = candidates.of(name)
-        alone = stacked(table, candidates.mixed(own))
-        share = float(weights[own & ~candidates.floor].sum())
+        of_family = candidates.of(name)
+        alone = stacked(table, candidates.mixed(of_family))
+        share = float(weights[of_family & ~candidates.floor].sum())
         gain = Gain(0.0, 0.0)
         if share:
-            others = ~own if among is None else among & ~own
+            others = ~of_family if among is None else among & ~of_family
             without = stacked(table, candidates.mixed(others | candidates.floor))
             gain = gain_of(whole, without, own_weights)
         above = mean_of(alone - uniform, own_weights)
-        found.append(ComponentEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))
-    return found
+        evidence.append(
+            ComponentEvidence(name, share, above, gain.nats, gain.error, table.shape[1])
+        )
+    return evidence
 
 
 @dataclass(frozen=True)
@@ -254,12 +256,12 @@ class Evidence:
         for fold in range(len(candidates.sizes)):
             rest = candidates.fold != fold
             counts = None if candidates.row_weights is None else candidates.row_weights[rest]
-            own = torch.zeros_like(shares)
-            own[live] = shares[live]
+            of_fold = torch.zeros_like(shares)
+            of_fold[live] = shares[live]
             if bool(rest.any()):
                 table, floor = candidates.table[live][:, rest], candidates.floor[live]
-                own[live] = sparse_weights(table, floor, counts)
-            apart.append(own)
+                of_fold[live] = sparse_weights(table, floor, counts)
+            apart.append(of_fold)
         return cls(space, families, candidates, rows, shares, apart)
 
     @property
@@ -295,10 +297,10 @@ class Evidence:
             ]
             fitted = self.candidates.fitted[family.name]
             final = family.final(self.rows, fitted, [name for name, _ in chosen])
-            found = before if family.precedes_floor else after
-            found += [(weight, part) for (_, weight), part in zip(chosen, final, strict=True)]
+            parts = before if family.precedes_floor else after
+            parts += [(weight, part) for (_, weight), part in zip(chosen, final, strict=True)]
         floor = float(self.shares[self.candidates.floor].sum())
-        found = [*before, (floor, UniformDensity(self.space)), *after]
-        total = sum(weight for weight, _ in found)
-        others = [((1 - share) * weight / total, part) for weight, part in found]
+        parts = [*before, (floor, UniformDensity(self.space)), *after]
+        total = sum(weight for weight, _ in parts)
+        others = [((1 - share) * weight / total, part) for weight, part in parts]
         return mixture_of(others if flow is None else [(share, flow), *others])

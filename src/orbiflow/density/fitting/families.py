@@ -104,28 +104,28 @@ class KernelFamily(Family):
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         say("kernels")
-        found = self._estimates(train, self._names)
+        estimates = self._estimates(train, self._names)
         if number == 0 and len(held) >= MIN_TELLING_ROWS and self.space.dim <= MOST_DIM:
-            self._names = list(found)
+            self._names = list(estimates)
             if len(train) >= MANY_ROWS and len(held) >= 2 * MIN_TELLING_ROWS:
-                self.keep(self._promising(found, held[:MIN_TELLING_ROWS]))
-                found = {name: found[name] for name in self._names}
-        return found
+                self.keep(self._promising(estimates, held[:MIN_TELLING_ROWS]))
+                estimates = {name: estimates[name] for name in self._names}
+        return estimates
 
     def _promising(self, found: dict[str, Density], held: Rows) -> set[str]:
         """Return what has any weight by some of the rows held out, and the best alone."""
         names = [*found, ""]
-        own = {name: at_observed(part, held.points) for name, part in found.items()}
-        own[""] = at_observed(UniformDensity(self.space), held.points)
-        weights = stacking_weights(torch.stack([own[name] for name in names]), held.weights)
-        best = max(found, key=lambda name: held.mean(own[name]))
+        logs = {name: at_observed(part, held.points) for name, part in found.items()}
+        logs[""] = at_observed(UniformDensity(self.space), held.points)
+        weights = stacking_weights(torch.stack([logs[name] for name in names]), held.weights)
+        best = max(found, key=lambda name: held.mean(logs[name]))
         kept = zip(names, weights, strict=True)
         return {best, *(name for name, weight in kept if name and weight >= PROMISING_WEIGHT)}
 
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del folds
-        found = self._estimates(rows, names)
-        return [found[name] for name in names]
+        estimates = self._estimates(rows, names)
+        return [estimates[name] for name in names]
 
     def keep(self, names: set[str]) -> None:
         if (every := self._names) is not None:
@@ -133,19 +133,19 @@ class KernelFamily(Family):
             self._names = list(compress(every, near))
 
     def _estimates(self, rows: Rows, only: Collection[str] | None) -> dict[str, Density]:
-        known = is_whole(rows)
-        whole = rows[known]
+        are_whole = is_whole(rows)
+        whole = rows[are_whole]
         if self._tuned is None:  # once: the first rows of all folds are much the same
             self._tuned = (tuned_concentrations(self.space, whole, self.narrowest),)
-        found = kernel_estimates(
+        estimates = kernel_estimates(
             self.space, whole, narrowest=self.narrowest, repeats=self.repeats, only=only,
             tuned=self._tuned[0],
         )  # fmt: skip
         if len(whole) == len(rows):
-            return dict(found)
+            return dict(estimates)
         total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())
-        rest = rows[~known]
-        return {name: with_incomplete(part, rest, total) for name, part in found.items()}
+        rest = rows[~are_whole]
+        return {name: with_incomplete(part, rest, total) for name, part in estimates.items()}
 
 
 class SizedFamily(Family):
@@ -160,7 +160,7 @@ class SizedFamily(Family):
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del rows
         parts = ([fold[name] for fold in folds if name in fold] for name in names)
-        return [_mean(own) for own in parts]
+        return [_mean(of_size) for of_size in parts]
 
     def keep(self, names: set[str]) -> None:
         self.sizes = tuple(sorted(map(int, names)))
@@ -303,10 +303,10 @@ def _mean(parts: list[Density]) -> Density:
 
 def _grown(fit: Callable[[int], Density], sizes: Iterable[int], held: Rows) -> dict[str, Density]:
     """Return fits of growing size, until one is clearly worse on the held-out rows than the best."""
-    found: dict[str, Density] = {}
+    fits: dict[str, Density] = {}
     best: Tensor | None = None
     for size in sizes:
-        part = found[str(size)] = fit(size)
+        part = fits[str(size)] = fit(size)
         with torch.no_grad():
             score = at_observed(part, held.points)
         if best is not None:
@@ -315,4 +315,4 @@ def _grown(fit: Callable[[int], Density], sizes: Iterable[int], held: Rows) -> d
                 break
         if best is None or held.mean(score) > held.mean(best):
             best = score
-    return found
+    return fits

@@ -366,11 +366,11 @@ def conjugate_gradients(
 
 def refuse_flow_settings(settings: DensitySettings, space: Space) -> None:
     """Refuse settings of a flow on a space that has none."""
-    given = list(settings.of_flow)
-    if given:
+    chosen = list(settings.of_flow)
+    if chosen:
         where = f"a torus of {space.dim} angles" if space.is_torus else f"the {space.name}"
-        names = ", ".join(f"{{{name}}}" for name in given)
+        names = ", ".join(f"{{{name}}}" for name in chosen)
         raise SettingError(
             f"{names} would have no effect on {where}, where there is no flow; leave "
-            f"{'it' if len(given) == 1 else 'them'} out"
+            f"{'it' if len(chosen) == 1 else 'them'} out"
         )

@@ -86,8 +86,8 @@ class Rivals:
     def outdo(self, flow: FlowDensity, hope: float) -> bool:
         """Return whether a flow gains nothing beside them and is more than `hope` nats below them."""
         others, uniform, held = self._known.result()
-        own = at_observed(flow.with_steps(2 * flow.flow.steps), held.points)
-        worth = _worth([torch.stack([others, own, uniform])], [held])
+        logs = at_observed(flow.with_steps(2 * flow.flow.steps), held.points)
+        worth = _worth([torch.stack([others, logs, uniform])], [held])
         assert worth.others is not None
         return not _is_worth_it(worth) and worth.others - worth.alone > hope
 
@@ -108,8 +108,8 @@ def try_flow(
         rows, start = folds.held(number), sum(map(len, held))
         columns = candidates.table[:, start : start + len(rows)]
         with torch.no_grad():
-            own = density.log_prob(rows.points)
-        tables.append(torch.stack([stacked(columns, weights), own, columns[-1]]))
+            logs = density.log_prob(rows.points)
+        tables.append(torch.stack([stacked(columns, weights), logs, columns[-1]]))
         held.append(rows)
         return _worth(tables, held)
 
@@ -127,19 +127,19 @@ def try_flow(
 
 def _worth(tables: list[Tensor], held: list[Rows]) -> ComponentEvidence:
     """Judge a flow by log densities (3, N) at rows held out: the others', its own, the uniform one."""
-    others, own, uniform = torch.cat(tables, dim=1)
-    known = [rows.weights for rows in held if rows.weights is not None]
-    row_weights = torch.cat(known) if known else None
-    table = torch.stack([others, own])
+    others, logs, uniform = torch.cat(tables, dim=1)
+    counts = [rows.weights for rows in held if rows.weights is not None]
+    row_weights = torch.cat(counts) if counts else None
+    table = torch.stack([others, logs])
     both = stacking_weights(table, row_weights)
     gain = gain_of(stacked(table, both), others, row_weights)
     return ComponentEvidence(
         "flow",
         float(both[1]),
-        mean_of(own - uniform, row_weights),
+        mean_of(logs - uniform, row_weights),
         gain.nats,
         gain.error,
-        len(own),
+        len(logs),
         mean_of(others - uniform, row_weights),
     )
 

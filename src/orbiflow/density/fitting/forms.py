@@ -146,8 +146,8 @@ class ExponentialForm(Form):
     def mean_log(self, shape: Tensor, frame: Tensor, cloud: Cloud) -> Tensor:
         vector, values = self.coefficients(shape, cloud.width)
         squares = ((frame @ cloud.tensor) * frame).sum(dim=1)
-        own = vector @ (frame @ cloud.mean) + values @ squares
-        return own - log_fisher_bingham(values, vector)
+        exponent = vector @ (frame @ cloud.mean) + values @ squares
+        return exponent - log_fisher_bingham(values, vector)
 
     def density(self, space: Space, at: Start) -> Density:
         vector, values = self.coefficients(at.shape, len(at.frame))
@@ -212,13 +212,13 @@ class Watson(ExponentialForm):
         _refuse_if(float(squares[0]) > 1 - FLAT, "all rows are the same axis")
         _refuse_if(float(squares[-1]) < FLAT, "the rows lie in a plane through the origin")
         width = cloud.width
-        found: list[Start] = []
+        starts: list[Start] = []
         for end in (0, -1):
             s = squares[end]
             # a bound of Sra and Karp, The multivariate Watson distribution (2013)
             guess = (width * s - 1) / (2 * s * (1 - s)) * (1 + (1 - s) * 2 / (width - 1))
-            found.append(Start(_completed(axes[end]), guess[None]))
-        return found
+            starts.append(Start(_completed(axes[end]), guess[None]))
+        return starts
 
 
 class Bingham(ExponentialForm):
@@ -243,13 +243,13 @@ class Bingham(ExponentialForm):
 
 def _quaternion_tensors() -> Tensor:
     """Return matrices B (9, 4, 4) for which a rotation's entries, row by row, are q.Bq."""
-    found, unit = np.zeros((9, 4, 4)), np.eye(4)
+    tensors, unit = np.zeros((9, 4, 4)), np.eye(4)
     for i, j in combinations(range(4), 2):
         some = np.stack([unit[i], unit[j], unit[i] + unit[j]])  # quaternions of any length
-        one, other, both = Rotation.from_quat(some).as_matrix().reshape(3, 9)
-        found[:, i, i], found[:, j, j] = one, other
-        found[:, i, j] = found[:, j, i] = both - (one + other) / 2
-    return torch.tensor(found)
+        first, other, both = Rotation.from_quat(some).as_matrix().reshape(3, 9)
+        tensors[:, i, i], tensors[:, j, j] = first, other
+        tensors[:, i, j] = tensors[:, j, i] = both - (first + other) / 2
+    return torch.tensor(tensors)
 
 
 class MatrixFisher(Bingham):
@@ -313,8 +313,8 @@ class VonMisesSineForm(Form):
         return [(0, 1), (2, 3)]
 
     def logs(self, shape: Tensor, y: Tensor) -> Tensor:
-        own = shape[0] * y[:, 0] + shape[1] * y[:, 2] + shape[2] * y[:, 1] * y[:, 3]
-        return own - log_sine(shape)
+        exponent = shape[0] * y[:, 0] + shape[1] * y[:, 2] + shape[2] * y[:, 1] * y[:, 3]
+        return exponent - log_sine(shape)
 
     def mean_log(self, shape: Tensor, frame: Tensor, cloud: Cloud) -> Tensor:
         mean, both = frame @ cloud.mean, frame[1] @ cloud.tensor @ frame[3]

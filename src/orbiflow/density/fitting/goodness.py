@@ -42,20 +42,20 @@ def smooth_test(
             (M, p) of draws from the fitted density.
     """
     seen = [_features(*side) for side in sides]
-    rows, draws = (torch.cat([one[k] for one in seen], dim=1) for k in (0, 1))
-    for one, other in islice(combinations(range(len(seen)), 2), MOST_MOMENTS // 4):
+    rows, draws = (torch.cat([first[k] for first in seen], dim=1) for k in (0, 1))
+    for first, other in islice(combinations(range(len(seen)), 2), MOST_MOMENTS // 4):
         # whether factors go together: products of what has degree 1
         rows, draws = (
-            torch.cat([now, _products(seen[one][k], seen[other][k])], dim=1)
+            torch.cat([now, _products(seen[first][k], seen[other][k])], dim=1)
             for k, now in enumerate((rows, draws))
         )
     scores = torch.cat([local.scores(drawn) for local, _, drawn in sides], dim=1)
-    own = torch.cat([local.scores(vectors) for local, vectors, _ in sides], dim=1)
+    scores_of_rows = torch.cat([local.scores(vectors) for local, vectors, _ in sides], dim=1)
     scores = scores - scores.mean(dim=0)
     mean, spread = draws.mean(dim=0), draws.std(dim=0).clamp_min(1e-300)
     rows, draws = (rows - mean) / spread, (draws - mean) / spread
     fitted = linalg.lstsq(scores, draws, driver="gelsd").solution
-    rows, draws = rows - own @ fitted, draws - scores @ fitted
+    rows, draws = rows - scores_of_rows @ fitted, draws - scores @ fitted
     count, drawn = len(rows), len(draws)
     values, axes = linalg.eigh(draws.mT @ draws / drawn)
     kept = values > REDUNDANT * float(values.max().clamp_min(REDUNDANT))
@@ -70,10 +70,10 @@ def smooth_test(
         p = float(special.chdtrc(degrees, statistic))
         return Goodness(statistic, degrees, p, "chi-square")
     rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
-    table, found = draws.numpy(), np.empty(RESAMPLES)
+    table, statistics = draws.numpy(), np.empty(RESAMPLES)
     for k in range(RESAMPLES):
-        found[k] = count * (table[rng.integers(drawn, size=count)].mean(axis=0) ** 2).sum()
-    p = (1 + int((found >= statistic).sum())) / (1 + RESAMPLES)
+        statistics[k] = count * (table[rng.integers(drawn, size=count)].mean(axis=0) ** 2).sum()
+    p = (1 + int((statistics >= statistic).sum())) / (1 + RESAMPLES)
     return Goodness(statistic, degrees, p, "resampling")
 
 
@@ -91,14 +91,14 @@ def _features(local: Local, vectors: Tensor, drawn: Tensor) -> tuple[Tensor, Ten
         degrees, middle = (1, 2, 3), draws.mean(dim=0)
     scale = ((draws - middle) ** 2).mean(dim=0).sqrt().clamp_min(1e-150)
     rows, draws = (rows - middle) / scale, (draws - middle) / scale
-    found: list[tuple[Tensor, Tensor]] = []
+    moments: list[tuple[Tensor, Tensor]] = []
     for degree in degrees:
         # where rows are close together, the first coordinate is of degree 2 in the others
         first = int(degree == 3 and local.form.about == "directions")
         which = list(combinations_with_replacement(range(first, local.width), degree))
-        if found and len(found) + len(which) > MOST_MOMENTS:
+        if moments and len(moments) + len(which) > MOST_MOMENTS:
             break
         for powers in which:
-            found.append((rows[:, powers].prod(dim=1), draws[:, powers].prod(dim=1)))
-    first, second = zip(*found, strict=True)
+            moments.append((rows[:, powers].prod(dim=1), draws[:, powers].prod(dim=1)))
+    first, second = zip(*moments, strict=True)
     return torch.stack(first, dim=1), torch.stack(second, dim=1)

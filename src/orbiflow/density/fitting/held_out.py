@@ -79,16 +79,18 @@ def folds_of(
         group = torch.arange(len(rows))
     used = next((count for most, count in USED if len(rows) <= most), 2)
     used = min(used, FAST_USED) if fast else used
-    found = Folds(rows, group % folds, min(used, folds))
+    dealt_folds = Folds(rows, group % folds, min(used, folds))
     if rows.groups is None:
-        return found
-    left = min(len(places(found.train(number).points)[0]) for number in range(found.used))
+        return dealt_folds
+    left = min(
+        len(places(dealt_folds.train(number).points)[0]) for number in range(dealt_folds.used)
+    )
     if left < LEAST_PLACES:
         raise OrbiflowError(
             f"groups: where whole groups are held out, {left} different rows are left to fit to, and "
             f"{LEAST_PLACES} are needed: more or smaller groups"
         )
-    return found
+    return dealt_folds
 
 
 def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
@@ -96,11 +98,11 @@ def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
     if bool((sizes == sizes[0]).all()):
         return np.arange(len(sizes)) % folds
     heap = [(0, k) for k in range(folds)]
-    found = np.empty(len(sizes), dtype=np.int64)
+    fold = np.empty(len(sizes), dtype=np.int64)
     for place, size in enumerate(sizes.tolist()):
-        rows, found[place] = heap[0]
-        heapq.heapreplace(heap, (rows + size, int(found[place])))
-    return found
+        rows, fold[place] = heap[0]
+        heapq.heapreplace(heap, (rows + size, int(fold[place])))
+    return fold
 
 
 TOLERANCE_NATS = 1e-4
@@ -131,8 +133,8 @@ def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor
     """
     relative = (table - table.amax(dim=0)).exp()
     weights = torch.full_like(table[:, 0], 1 / len(table))
-    own = torch.ones_like(table[0]) if row_weights is None else row_weights.to(table)
-    shares = own / own.sum()
+    counts = torch.ones_like(table[0]) if row_weights is None else row_weights.to(table)
+    shares = counts / counts.sum()
     for iteration in range(MAX_ITERATIONS):
         ratio = relative @ (shares / (weights @ relative))
         if iteration % ITERATIONS_PER_CHECK == 0 and float(ratio.max()) - 1 < TOLERANCE_NATS:
@@ -169,8 +171,8 @@ def sparse_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = N
     """
     weights = stacking_weights(table, row_weights)
     kept = (weights >= MIN_WEIGHT) | always
-    found = torch.zeros_like(weights)
-    found[kept] = stacking_weights(table[kept], row_weights)
+    sparse = torch.zeros_like(weights)
+    sparse[kept] = stacking_weights(table[kept], row_weights)
     least = 0.5 / (table.shape[1] + 1)
-    found[always] = found[always].clamp_min(least)
-    return found / found.sum()
+    sparse[always] = sparse[always].clamp_min(least)
+    return sparse / sparse.sum()

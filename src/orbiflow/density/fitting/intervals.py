@@ -64,28 +64,28 @@ def direction_parameters(
     axis = local.at.frame[number]
     ways: list[Tensor] = []
     places: list[int] = []
-    for place, (one, other) in enumerate(local.planes):
-        if number in (one, other):
-            far = local.at.frame[other if number == one else one]
-            ways.append(far if number == one else -far)
+    for place, (first, other) in enumerate(local.planes):
+        if number in (first, other):
+            far = local.at.frame[other if number == first else first]
+            ways.append(far if number == first else -far)
             places.append(place)
-    own = covariance[places][:, places]
+    tangent = covariance[places][:, places]
     values = writing.write(axis)
     slopes = np.stack([_slope(writing, axis, way) for way in ways], axis=1)
     cone, variances = None, np.full(len(values), np.inf)
-    if bool(own.isfinite().all()):
-        variances = np.einsum("ki,ij,kj->k", slopes, own.numpy(), slopes)
-        across = special.chdtri(len(places), 1 - LEVEL) * float(linalg.eigvalsh(own)[-1])
+    if bool(tangent.isfinite().all()):
+        variances = np.einsum("ki,ij,kj->k", slopes, tangent.numpy(), slopes)
+        across = special.chdtri(len(places), 1 - LEVEL) * float(linalg.eigvalsh(tangent)[-1])
         cone = math.degrees(math.sqrt(across)) if across < (math.pi / 2) ** 2 else None
-    found: list[Parameter] = []
+    parameters: list[Parameter] = []
     columns = zip(writing.names, values.tolist(), variances, writing.limits, strict=True)
     for label, value, variance, most in columns:
         error = None if cone is None or not np.isfinite(variance) else math.sqrt(variance)
         low, high = _ends(value, error)
         if low is not None and high is not None:
             low, high = max(low, -most), min(high, most)
-        found.append(Parameter(f"{name}_{label}", value, error, low, high, writing.unit))
-    return found, cone
+        parameters.append(Parameter(f"{name}_{label}", value, error, low, high, writing.unit))
+    return parameters, cone
 
 
 def _slope(writing: Writing, axis: Tensor, way: Tensor) -> Array:
@@ -119,10 +119,10 @@ def shape_parameters(local: Local, covariance: Tensor) -> list[Parameter]:
     values: list[float] = listed(reported(origin))
     slopes = derivatives.jacobian(reported, origin)
     unknown = covariance.diagonal().isinf()
-    told = torch.where(unknown | unknown[:, None], 0.0, covariance)
-    variances = torch.einsum("ki,ij,kj->k", slopes, told, slopes)
+    determined = torch.where(unknown | unknown[:, None], 0.0, covariance)
+    variances = torch.einsum("ki,ij,kj->k", slopes, determined, slopes)
     lost = (slopes[:, unknown].abs() > 1e-9).any(dim=1)
-    found: list[Parameter] = []
+    parameters: list[Parameter] = []
     for name, value, variance, is_lost in zip(
         local.form.names(local.width), values, listed(variances), listed(lost), strict=True
     ):
@@ -133,8 +133,8 @@ def shape_parameters(local: Local, covariance: Tensor) -> list[Parameter]:
             low, high = value / factor, value * factor
         elif low is not None and high is not None:
             low, high = max(low, local.form.bounds[0]), min(high, local.form.bounds[1])
-        found.append(Parameter(name, value, error, low, high))
-    return found
+        parameters.append(Parameter(name, value, error, low, high))
+    return parameters
 
 
 def concentration_interval(shortfall: float, rows: float, width: int) -> tuple[float, float]:
@@ -152,7 +152,7 @@ def concentration_interval(shortfall: float, rows: float, width: int) -> tuple[f
     if (width - 1) / (2 * shortfall) > CLOSE_CONCENTRATION * (width - 1):
         quantiles = special.chdtri(free, [1 - tail, tail])
         wanted = [2 * rows * shortfall * (width - 1) / (2 * q) for q in quantiles]
-        low, high = (concentration(max(0.0, 1 - own), width, own) for own in wanted)
+        low, high = (concentration(max(0.0, 1 - short), width, short) for short in wanted)
         return float(low or 0.0), math.inf if high is None else float(high)
     resultant = 1 - shortfall
 
@@ -162,11 +162,11 @@ def concentration_interval(shortfall: float, rows: float, width: int) -> tuple[f
     high = 1.0 + 4 * width / shortfall
     # a length that is short by chance, even without any concentration, would leave nothing
     least = tail * _resultant_cdf(resultant, 0.0, rows, width)
-    found: Any = optimize.brentq(below, 0.0, high, args=(least,), xtol=1e-10)
+    upper: Any = optimize.brentq(below, 0.0, high, args=(least,), xtol=1e-10)
     if below(0.0, 1 - tail) <= 0:
-        return 0.0, float(found)
+        return 0.0, float(upper)
     low: Any = optimize.brentq(below, 0.0, high, args=(1 - tail,), xtol=1e-10)
-    return float(low), float(found)
+    return float(low), float(upper)
 
 
 def concentration(resultant: float, width: int, below: float | None = None) -> float | None:
@@ -189,8 +189,8 @@ def concentration(resultant: float, width: int, below: float | None = None) -> f
 
 def _resultant_cdf(resultant: float, kappa: float, rows: float, width: int) -> float:
     """Return the probability of a mean resultant length up to `resultant`, for a normal mean vector."""
-    found = moments(torch.tensor(kappa, dtype=torch.float64), width)
-    mean, along, across = float(found.mean), float(found.along), float(found.across)
+    there = moments(torch.tensor(kappa, dtype=torch.float64), width)
+    mean, along, across = (float(there.mean), float(there.along), float(there.across))
     levels = (np.arange(QUANTILES) + 0.5) / QUANTILES
     first = mean + math.sqrt(along / rows) * special.ndtri(levels)
     rest = np.maximum(resultant**2 - first**2, 0.0) * rows / across

@@ -25,8 +25,8 @@ def for_conditionals(evidence: Evidence, folds: Folds, dim: int) -> Evidence:
     tables: list[Tensor] = []
     for fold in range(folds.used):
         whole, parts = folds.held(fold).points, evidence.parts(fold)
-        both = torch.stack([own.log_prob(whole) for own in parts])
-        alone = torch.stack([log_of_covariates(own, whole, dim) for own in parts])
+        both = torch.stack([part.log_prob(whole) for part in parts])
+        alone = torch.stack([log_of_covariates(part, whole, dim) for part in parts])
         tables.append(torch.stack([both, alone]))
     table, candidates = torch.cat(tables, dim=2), evidence.candidates
     counts = candidates.row_weights
@@ -62,7 +62,7 @@ def _conditional_shares(table: Tensor, counts: Tensor, start: Tensor, floor: Ten
         (gradient,) = torch.autograd.grad(value, logits)
         return float(value.detach()), gradient.numpy()
 
-    found = optimize.minimize(loss, start.log().numpy(), jac=True, method="L-BFGS-B").x
-    best = torch.softmax(torch.tensor(found), dim=0)
+    logits_found = optimize.minimize(loss, start.log().numpy(), jac=True, method="L-BFGS-B").x
+    best = torch.softmax(torch.tensor(logits_found), dim=0)
     best[floor] = best[floor].maximum(start[floor])
     return best / best.sum()

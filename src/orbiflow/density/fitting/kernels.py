@@ -100,12 +100,12 @@ def spreads(
     They are of all centers, or of the first `most`.
     """
     images = space.features(centers)
-    own = images[0, :most]
+    features = images[0, :most]
     tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
-    _, nearest = tree.query(own.numpy(), k=neighbours[-1] + 1)
+    _, nearest = tree.query(features.numpy(), k=neighbours[-1] + 1)
     near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
     # a chord's square is nearly the angle's
-    square = by_sphere((near - own[:, None]) ** 2, len(space.spheres)).sum(dim=-2)
+    square = by_sphere((near - features[:, None]) ** 2, len(space.spheres)).sum(dim=-2)
     square /= square.new_tensor(space.spheres)
     return [square[:, :m].mean(dim=1) + 1 / MAX_CONCENTRATION for m in neighbours]
 
@@ -147,38 +147,40 @@ def kernel_estimates(
     narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
     rows = rows[: min(MOST_CENTERS, MOST_IMAGES // space.kernel_images)]
-    train, own = rows.points, torch.full((len(rows),), 1 / len(rows), dtype=torch.float64)
+    train, shares = rows.points, torch.full((len(rows),), 1 / len(rows), dtype=torch.float64)
     if rows.weights is not None:
-        own = rows.weights / rows.weights.sum()
-    found: dict[str, AdaptiveKernels] = {}
-    start = even_kernels(space, train, WIDEST, own)
+        shares = rows.weights / rows.weights.sum()
+    estimates: dict[str, AdaptiveKernels] = {}
+    start = even_kernels(space, train, WIDEST, shares)
     for kappa in ladder(narrowest):
         name = f"width {kappa**-0.5:.2g}"
         if only is None or name in only:
-            found[name] = start.with_concentrations(torch.full_like(start.concentrations, kappa))
+            estimates[name] = start.with_concentrations(
+                torch.full_like(start.concentrations, kappa)
+            )
     if tuned is not None:
         for scale in TUNED_SCALES:
             name = f"tuned, {scale:g}"
             if only is None or name in only:
                 kappa = (scale * tuned).clamp(WIDEST / 100, narrowest)
-                found[name] = start.with_concentrations(kappa.expand_as(start.concentrations))
+                estimates[name] = start.with_concentrations(kappa.expand_as(start.concentrations))
     counts, place = places(train)
     first = torch.full((len(counts),), len(train)).scatter_reduce(
         0, place, torch.arange(len(train)), "amin"
     )
     centers, weights = train[first], counts.double() / len(train)
     if rows.weights is not None:
-        weights = torch.zeros_like(weights).index_add_(0, place, own)
+        weights = torch.zeros_like(weights).index_add_(0, place, shares)
     if only is None or any(name.startswith("near") for name in only):
         start = even_kernels(space, centers, WIDEST, weights)
         for name, kappa in _near_concentrations(space, centers, narrowest):
             if only is None or name in only:
-                found[name] = start.with_concentrations(kappa)
+                estimates[name] = start.with_concentrations(kappa)
     repeated = counts > 1
     if repeats and bool(repeated.any()):
         weights = weights[repeated] / weights[repeated].sum()
-        found["repeated"] = even_kernels(space, centers[repeated], narrowest, weights)
-    return found
+        estimates["repeated"] = even_kernels(space, centers[repeated], narrowest, weights)
+    return estimates
 
 
 def even_kernels(space: Space, centers: Tensor, kappa: float, weights: Tensor) -> AdaptiveKernels:
@@ -231,12 +233,12 @@ def fit_mixture(
     chosen = far_apart(away, len(seen), components, generator, whole.weights)
     kappa = seen.new_full((components, len(space.spheres)), 10.0)
     start = seen[chosen].clone(), kappa, seen.new_full((components,), 1 / components)
-    found = _climbed(space, step, start, iterations, MIN_GAIN_NATS * len(first), narrowest)
+    climbed = _climbed(space, step, start, iterations, MIN_GAIN_NATS * len(first), narrowest)
     if first is not train:
         *_, step = _stage(space, train, components)
         most = min(iterations, LAST_ITERATIONS)
-        found = _climbed(space, step, found, most, MIN_GAIN_NATS * len(train), narrowest)
-    mean, kappa, weights = found
+        climbed = _climbed(space, step, climbed, most, MIN_GAIN_NATS * len(train), narrowest)
+    mean, kappa, weights = climbed
     return AdaptiveKernels(space, space.lifted(mean), kappa, weights)
 
 
@@ -265,10 +267,10 @@ def _climbed(
     mean, kappa, weights = start
     last = -math.inf
     for _ in range(most):
-        count, known, total, score = step(mean, kappa, weights)
+        count, seen, total, score = step(mean, kappa, weights)
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
-        resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (known + PRIOR_POINTS)
+        resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (seen + PRIOR_POINTS)
         kappa = concentrations_of(resultant, space.spheres).clamp(WIDEST / 100, narrowest)
         if score - last < least_gain:
             break
@@ -316,7 +318,7 @@ def _expectation(
     rows, offsets = rows.mT.contiguous(), offsets + weights.log()
     count, total, score = torch.zeros_like(weights), torch.zeros_like(mean), 0.0
     unknown: Tensor | float = 0.0
-    for images, own, absent in blocks:
+    for images, counts, absent in blocks:
         share = (images @ rows).add_(offsets)
         if absent is not None:  # a factor that is not there has no constant either
             share += (absent @ (special.i0e(kappa).log() + kappa).mT)[:, None]
@@ -325,8 +327,8 @@ def _expectation(
         flat.sub_(top[:, None]).clamp_min_(FAINT_LOG).mul_(LOG2_E).exp2_()
         every = flat.sum(dim=1)
         likelihood, row = every.log() + top, every.reciprocal()
-        if own is not None:
-            likelihood, row = likelihood * own, row * own
+        if counts is not None:
+            likelihood, row = likelihood * counts, row * counts
         count += row @ share.sum(dim=1)
         if absent is not None:
             unknown = unknown + share[:, 0].mT @ (absent * row[:, None])
@@ -345,8 +347,8 @@ def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
 
 def concentrations_of(resultant: Tensor, spheres: Sequence[int]) -> Tensor:
     """Return the concentrations (K, F) of mean cosines on spheres of these dimensions."""
-    found = torch.empty_like(resultant)
+    kappa = torch.empty_like(resultant)
     for dim in set(spheres):
-        own = [k for k, sphere in enumerate(spheres) if sphere == dim]
-        found[:, own] = concentration(resultant[:, own], dim)
-    return found
+        alike = [k for k, sphere in enumerate(spheres) if sphere == dim]
+        kappa[:, alike] = concentration(resultant[:, alike], dim)
+    return kappa

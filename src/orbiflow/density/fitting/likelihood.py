@@ -163,7 +163,7 @@ def refine(
     stopped = "iterations"
     try:
         if iterations:  # SciPy does one at least
-            found = scipy.optimize.minimize(
+            result = scipy.optimize.minimize(
                 loss,
                 objective.get(),
                 jac=True,
@@ -178,7 +178,7 @@ def refine(
                     "gtol": 1e-7,
                 },
             )
-            if found.nit < iterations:
+            if result.nit < iterations:
                 stopped = "converged"
     except Stop as stop:
         stopped = stop.reason
@@ -215,8 +215,8 @@ class _Descent:
             self._look()
             if ITERATIONS_PER_SCORE * (len(self.scores) - 1 - self.best) >= MAX_IDLE_ITERATIONS:
                 raise Stop("validation")
-            for asked, hope in self.hopes.items():
-                if self.hopeless and self.done - ITERATIONS_PER_SCORE < asked <= self.done:
+            for iteration, hope in self.hopes.items():
+                if self.hopeless and self.done - ITERATIONS_PER_SCORE < iteration <= self.done:
                     halfway = self.scores[min(len(self.scores) // 2, len(self.scores) - 2)]
                     if self.hopeless(hope * (halfway - self.scores[-1])):
                         raise Stop("outdone")

@@ -36,8 +36,8 @@ def turned(frame: Tensor, angles: Tensor, planes: list[tuple[int, int]]) -> Tens
     """
     turn = frame.new_zeros(frame.shape)
     if planes:
-        one, other = torch.tensor(planes).mT
-        turn = turn.index_put((one, other), angles).index_put((other, one), -angles)
+        first, other = torch.tensor(planes).mT
+        turn = turn.index_put((first, other), angles).index_put((other, first), -angles)
     return frame + turn @ frame + turn @ turn @ frame / 2
 
 
@@ -96,16 +96,16 @@ class Local:
         turns, p = len(self.planes), self.width
         skew = torch.zeros(p, p, dtype=torch.float64)
         if turns:
-            one, other = torch.tensor(self.planes).mT
-            skew[one, other], skew[other, one] = step[:turns], -step[:turns]
+            first, other = torch.tensor(self.planes).mT
+            skew[first, other], skew[other, first] = step[:turns], -step[:turns]
         frame = linalg.matrix_exp(skew) @ self.at.frame
         return Local(self.form, Start(frame, self.at.shape + step[turns:]), p)
 
 
 def at_maximum(form: Form, cloud: Cloud) -> Local:
     """Return a family where the likelihood of a cloud is highest, by Newton's method."""
-    found = [_climbed(Local(form, start, cloud.width), cloud) for start in form.starts(cloud)]
-    best = max(found, key=lambda one: float(one.mean_log(one.origin(), cloud)))
+    maxima = [_climbed(Local(form, start, cloud.width), cloud) for start in form.starts(cloud)]
+    best = max(maxima, key=lambda one: float(one.mean_log(one.origin(), cloud)))
     return Local(form, form.ordered(best.at), cloud.width)
 
 
@@ -115,8 +115,8 @@ def highest_log_likelihood(name: str, vectors: Tensor) -> tuple[float, int]:
     It is per area of the whole sphere, of unit vectors (N, p).
     """
     cloud = Cloud(vectors, None)
-    found = at_maximum(FORMS[name], cloud)
-    return len(vectors) * float(found.mean_log(found.origin(), cloud)), len(found.origin())
+    local = at_maximum(FORMS[name], cloud)
+    return len(vectors) * float(local.mean_log(local.origin(), cloud)), len(local.origin())
 
 
 def _climbed(local: Local, cloud: Cloud) -> Local:
@@ -178,7 +178,7 @@ def covariance(
     none = values < SINGULAR**0.5
     inverse = (axes / torch.where(none, math.inf, values)) @ axes.mT * scale[:, None] * scale
     if even and groups is None:
-        found = inverse / rows
+        spread = inverse / rows
     else:
         terms = local.scores(cloud.vectors) * cloud.weights[:, None]
         if groups is not None:
@@ -187,7 +187,7 @@ def covariance(
                 return torch.full_like(information, math.inf)
             terms = terms.new_zeros(count, terms.shape[1]).index_add(0, groups, terms)
             terms = terms * math.sqrt(count / (count - 1))
-        found = inverse @ (terms.mT @ terms) @ inverse
+        spread = inverse @ (terms.mT @ terms) @ inverse
     unknown = (axes[:, none].abs() > 1e-6).any(dim=1)
-    found[unknown.nonzero(), unknown.nonzero()] = math.inf
-    return found
+    spread[unknown.nonzero(), unknown.nonzero()] = math.inf
+    return spread

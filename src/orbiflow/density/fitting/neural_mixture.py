@@ -59,15 +59,15 @@ def fit_networks(
     features, seen = space.features(rows.points).float(), x.float()
     weights = torch.ones(len(x)) if rows.weights is None else rows.weights.float()
     layers = _start(space, features[0], seen, train, generator)
-    best = [own.detach().clone() for own in layers]
+    best = [tensor.detach().clone() for tensor in layers]
     least = [math.inf] * len(train)
     optimizer = adam(layers, RATE)
-    size = min(BATCH, *(len(own) for own in train))
+    size = min(BATCH, *(len(tensor) for tensor in train))
     steps = min(STEPS, EPOCHS * max(1, len(train[0]) // size))
     mixture = NeuralMixture(space, layers)
-    batches = [_batches(own, size, generator) for own in train]
+    batches = [_batches(tensor, size, generator) for tensor in train]
     for step in range(1, steps + 1):
-        chosen = torch.stack([next(own) for own in batches])
+        chosen = torch.stack([next(tensor) for tensor in batches])
         with torch.enable_grad():
             logs = mixture.logs(features[:, chosen], seen[chosen])
             loss = -(weights[chosen] * logs).sum() / size
@@ -78,12 +78,12 @@ def fit_networks(
             group["lr"] = rate
         optimizer.step()
         with torch.no_grad():
-            for own in layers[::2]:
-                own.mul_(1 - rate * DECAY)
+            for tensor in layers[::2]:
+                tensor.mul_(1 - rate * DECAY)
         if step % max(1, steps // LOOKS) == 0 or step == steps:
             tell(step / steps)
             _keep(mixture, features, seen, weights, apart, best, least)
-    return NeuralMixture(space, [own.double() for own in best])
+    return NeuralMixture(space, [tensor.double() for tensor in best])
 
 
 @torch.no_grad()
@@ -97,9 +97,9 @@ def _keep(
     least: list[float],
 ) -> None:
     """Keep the layers of each mixture that is better on rows apart than before."""
-    for number, own in enumerate(apart):
-        logs = mixture.alone(number).logs(features[:, own][:, None], x[own][None])[0]
-        score = -float(weights[own] @ logs / weights[own].sum())
+    for number, rows in enumerate(apart):
+        logs = mixture.alone(number).logs(features[:, rows][:, None], x[rows][None])[0]
+        score = -float(weights[rows] @ logs / weights[rows].sum())
         if score < least[number]:
             least[number] = score
             for kept, layer in zip(best, mixture.layers, strict=True):
@@ -125,8 +125,8 @@ def _start(
         return torch.randn(*shape, generator=generator) / math.sqrt(shape[-2])
 
     bias = torch.zeros(count, kernels, per)
-    for number, own in enumerate(train):
-        chosen = own[torch.randint(len(own), (kernels,), generator=generator)]
+    for number, rows in enumerate(train):
+        chosen = rows[torch.randint(len(rows), (kernels,), generator=generator)]
         bias[number, :, : features.shape[1]] = features[chosen]
     layers = [
         random(count, width, HIDDEN),
@@ -136,4 +136,4 @@ def _start(
         random(count, HIDDEN, kernels * per) / 4,
         bias.reshape(count, 1, -1),
     ]
-    return [own.requires_grad_() for own in layers]
+    return [rows.requires_grad_() for rows in layers]

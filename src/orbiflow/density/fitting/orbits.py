@@ -57,11 +57,11 @@ class Orbits:
         order = torch.as_tensor(KDTree(self.points.numpy(), leafsize=BLOCK_POINTS).indices)
         self._blocks: list[_Block] = []
         for rows in torch.split(order, BLOCK_POINTS):
-            own = self.points[rows]
-            middle = torch.nn.functional.normalize(own.mean(dim=0), dim=0)
-            radius = float((own @ middle).clamp(-1, 1).min().acos())
+            near = self.points[rows]
+            middle = torch.nn.functional.normalize(near.mean(dim=0), dim=0)
+            radius = float((near @ middle).clamp(-1, 1).min().acos())
             self._blocks.append(
-                _Block(own, None if weights is None else weights[rows], middle, radius)
+                _Block(near, None if weights is None else weights[rows], middle, radius)
             )
 
     def away(self, row: int) -> Tensor:
@@ -92,20 +92,20 @@ class Orbits:
             at = (largest > bottom + LEFT_OUT_LOG - math.log(len(sharp))).nonzero()[:, 0]
             some = (rows[at] * LOG2_E).mT.to(dtype).contiguous()
             bias = ((offsets[at] - top) * LOG2_E).to(dtype)
-            for points, own in block.parts(max(1, BLOCK_ENTRIES // len(at))):
+            for points, counts in block.parts(max(1, BLOCK_ENTRIES // len(at))):
                 share, high = torch.addmm(bias, points.to(dtype), some), 0.0
                 if top - bottom > WIDE_LOG:
                     high = share.amax(dim=1)
                     share.sub_(high[:, None]).clamp_min_(FAINT_LOG)
                 every = share.exp2_().sum(dim=1)
                 likelihood, row = (every.log2() + high).double() / LOG2_E + top, every.reciprocal()
-                if own is not None:
-                    likelihood, row = likelihood * own, row * own
+                if counts is not None:
+                    likelihood, row = likelihood * counts, row * counts
                 weighed = torch.cat([(points * row[:, None]).mT, row[None]]).to(dtype)
                 sums.index_add_(1, at, (weighed @ share).double())
                 score += float(likelihood.sum())
         total, count = sums[:-1].mT, sums[-1]
         # each sum is turned from where its image is to the component
         turned = total.reshape(each, -1, total.shape[1]) @ self.elements.mT
-        own = count.reshape(each, -1).sum(dim=0)
-        return own, own[:, None], turned.sum(dim=0), score
+        counts = count.reshape(each, -1).sum(dim=0)
+        return counts, counts[:, None], turned.sum(dim=0), score

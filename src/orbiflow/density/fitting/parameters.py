@@ -79,8 +79,8 @@ class ParametricFit:
 
         heads = ("parameter", "estimate", "error", f"{100 * self.level:g} % from", "to", "unit")
         rows = [
-            (one.name, *map(shown, (one.value, one.error, one.low, one.high)), one.unit)
-            for one in self.parameters
+            (p.name, *map(shown, (p.value, p.error, p.low, p.high)), p.unit)
+            for p in self.parameters
         ]
         return Table(f"Parameters of the {self.family} density", heads, tuple(rows))
 

@@ -143,9 +143,9 @@ def fit_parametric(
     ['mean_lat', 'mean_lon', 'concentration']
     """
     points, weights, groups = alongside(points=points, weights=weights, groups=groups)
-    own = own_points(space, points)
-    labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
-    rows = weighed(own, weights, labels)
+    canonical = own_points(space, points)
+    labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(canonical)))
+    rows = weighed(canonical, weights, labels)
     if rows.groups is not None:  # numbered anew, without rows of no weight
         rows = Rows(
             rows.points,
@@ -154,7 +154,7 @@ def fit_parametric(
         )
     sides = _sides(space, name, rows, columns)
     density = _density(space, name, sides)
-    found = _parametric(space, name, rows, sides, density, seed)
+    fit = _parametric(space, name, rows, sides, density, seed)
     counts, _ = places(rows.points)
     train = mean_nll(density, rows.points, rows.weights)
     report = FitReport(
@@ -162,15 +162,15 @@ def fit_parametric(
         duplicates=len(rows) - len(counts),
         train=len(rows),
         validation=0,
-        start_nll=train + found.gain,
+        start_nll=train + fit.gain,
         train_nll=train,
-        validation_nll=train + found.free / found.rows,
+        validation_nll=train + fit.free / fit.rows,
         stages=(),
         steps=1,
         mass=1.0 if space.dim == 2 else None,
         integration_error=0.0,
         effective=None if rows.weights is None else effective_rows(rows.weights),
-        parametric=found,
+        parametric=fit,
         notes=(*weights_note(rows), *lone_groups_note(rows.groups)),
     )
     return density, report
@@ -179,7 +179,7 @@ def fit_parametric(
 def _sides(space: Space, name: str, rows: Rows, columns: Sequence[str] | None) -> list[Side]:
     """Return the family at its maximum on each factor of the space: each angle of a torus is one."""
     require_family(space, name)
-    found: list[Side] = []
+    sides: list[Side] = []
     for title, vectors, writings in _factors(space, name, rows.points, columns):
         cloud = Cloud(vectors, rows.weights)
         if len(vectors) <= cloud.width:
@@ -194,8 +194,8 @@ def _sides(space: Space, name: str, rows: Rows, columns: Sequence[str] | None) -
                 f"the rows are so close together that the {name} density would have a concentration "
                 f"above {MAX_CONCENTRATION:g}, for which there are too few digits"
             )
-        found.append(Side(title, cloud, local, writings))
-    return found
+        sides.append(Side(title, cloud, local, writings))
+    return sides
 
 
 def _factors(
@@ -212,7 +212,7 @@ def _factors(
         limits = tuple(_largest(column, unit) for column in space.columns)
         writing = Writing(partial(_written, space), names, space.periods, limits, unit)
         return [("", space.features(points)[0], (writing,))]
-    found: list[tuple[str, Tensor, tuple[Writing, ...]]] = []
+    factors: list[tuple[str, Tensor, tuple[Writing, ...]]] = []
     for axis, column in enumerate(names):
         angles = 2 * math.pi * points[:, axis]
         vectors = torch.stack([angles.cos(), angles.sin()], dim=1)
@@ -220,11 +220,11 @@ def _factors(
         writing = Writing(
             write, (column,), space.periods[axis : axis + 1], (math.inf,), str(space.unit)
         )
-        found.append((column, vectors, (writing,)))
+        factors.append((column, vectors, (writing,)))
     if name == SINE:
-        _, vectors, writings = zip(*found, strict=True)
+        _, vectors, writings = zip(*factors, strict=True)
         return [("", torch.cat(vectors, dim=1), sum(writings, ()))]
-    return found
+    return factors
 
 
 def _largest(column: str, unit: str) -> float:
@@ -278,15 +278,15 @@ def _parametric(
         free += len(spread)
         for k, (label, number) in enumerate(local.form.directions(local.width)):
             writing = side.writings[k % len(side.writings)]
-            own, cone = direction_parameters(label, number, local, spread, writing)
-            parameters += own
+            coordinates, cone = direction_parameters(label, number, local, spread, writing)
+            parameters += coordinates
             cones[f"{label}_{side.name}" if side.name else label] = cone
         shapes = shape_parameters(local, spread)
         if local.form.name == DIRECTIONS and even:
             shapes = [_inverted(shapes[0], side.cloud, count)]
-        parameters += [_of_side(one, side.name) for one in shapes]
+        parameters += [_of_side(parameter, side.name) for parameter in shapes]
     if name == SINE:
-        parameters = [_of_columns(one, sides[0].writings) for one in parameters]
+        parameters = [_of_columns(parameter, sides[0].writings) for parameter in parameters]
     if name in (ANGLES, SINE):
         cones = {}  # the interval of an angle says it
     mean = float(rows.mean(density.log_prob(rows.points, measure="natural")))

@@ -80,11 +80,11 @@ def fit_product_chains(
         sums = _expectation(chains, train)
         weights = (sums.rows + 0.01) / (sums.rows + 0.01).sum()
         slopes = linalg.solve(sums.products + prior.diag(), sums.targets)
-        known = sums.rows[:, None] + PRIOR_POINTS
-        resultant = (sums.cosines + PRIOR_POINTS * PRIOR_RESULTANT) / known
+        counts = sums.rows[:, None] + PRIOR_POINTS
+        resultant = (sums.cosines + PRIOR_POINTS * PRIOR_RESULTANT) / counts
         kappa = concentrations_of(resultant, base.spheres).clamp(WIDEST / 100, narrowest)
         length = linalg.vector_norm(sums.lines, dim=1)
-        sharp = concentration((length + PRIOR_POINTS * PRIOR_RESULTANT) / known)
+        sharp = concentration((length + PRIOR_POINTS * PRIOR_RESULTANT) / counts)
         center = torch.atan2(sums.lines[:, 1], sums.lines[:, 0]) / (2 * math.pi) % 1
         sharp = sharp.clamp(WIDEST / 100, narrowest)
         chains = ProductChains(space, weights, center, sharp, slopes, kappa)
@@ -101,8 +101,8 @@ def _expectation(chains: ProductChains, train: Rows) -> _Sums:
     size = max(1, BLOCK_ENTRIES // entries)
     weights = [None] if train.weights is None else torch.split(train.weights, size)
     for k, points in enumerate(torch.split(train.points, size)):
-        own, turns = points[:, : base.chart_dim], points[:, base.chart_dim :]
-        images, row = base.features(own), weights[k] if train.weights is not None else None
+        places, turns = points[:, : base.chart_dim], points[:, base.chart_dim :]
+        images, row = base.features(places), weights[k] if train.weights is not None else None
         logs, cosines = chains.image_logs(images, turns)
         every = logs.logsumexp(dim=(0, 2))
         shares = (logs - every[:, None]).exp()
@@ -121,4 +121,4 @@ def _expectation(chains: ProductChains, train: Rows) -> _Sums:
                 score,
             )
         )
-    return _Sums(*(torch.stack(own).sum(dim=0) for own in zip(*parts, strict=True)))
+    return _Sums(*(torch.stack(places).sum(dim=0) for places in zip(*parts, strict=True)))

@@ -115,18 +115,18 @@ class Repeats:
         ]
 
     def _found(self) -> str:
-        found = f"{self.rows} of {self.rows + self.places} rows repeat an earlier one"
+        words = f"{self.rows} of {self.rows + self.places} rows repeat an earlier one"
         if any(self.heaps):
-            return f"{found}; {'; '.join(self._heaped())}"
+            return f"{words}; {'; '.join(self._heaped())}"
         if self.is_rounding:
             steps = dict.fromkeys(f"{step:g}" for step in (*self.spread, self.step) if step)
-            return f"{found}, as many as rounding to {' and '.join(steps)} brings about"
+            return f"{words}, as many as rounding to {' and '.join(steps)} brings about"
         if any(self.spread):
             named = zip(self.columns, self.spread, strict=True)
             return "; ".join(f"values of {name} are rounded to {s:g}" for name, s in named if s)
         if self.step is not None:
-            return f"{found}, far more than rounding to {self.step:g} brings about"
-        return f"{found}, and the values are not rounded: they are places of their own"
+            return f"{words}, far more than rounding to {self.step:g} brings about"
+        return f"{words}, and the values are not rounded: they are places of their own"
 
     def _heaped(self) -> list[str]:
         named = zip(self.columns, self.spread, self.heaps, strict=True)
@@ -146,8 +146,8 @@ class Repeats:
         steps = np.tile(np.array(self.spread), (len(data), 1))
         for k, heap in enumerate(self.heaps):
             if heap:
-                own = heap.holds(data[:, k], turns[k]) & (chance < heap.of_multiples)
-                steps[own, k] = heap.step
+                heaped = heap.holds(data[:, k], turns[k]) & (chance < heap.of_multiples)
+                steps[heaped, k] = heap.step
         return steps
 
 
@@ -159,40 +159,45 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
     """
     counts, _ = places(points)
     rows = len(points) - len(counts)
-    found = Repeats(rows, len(counts), None, None, columns=tuple(space.columns))
+    repeats = Repeats(rows, len(counts), None, None, columns=tuple(space.columns))
     data = _coordinates(space, points)
     if data is None or len(counts) < FEWEST_OF_STEPS:
-        return found
+        return repeats
     turns = [*space.periods]
-    steps = [step_of(own, turn) for own, turn in zip(data.T, turns, strict=True)]
+    steps = [step_of(column, turn) for column, turn in zip(data.T, turns, strict=True)]
     columns = list(zip(data.T, steps, turns, strict=True))
     if len(counts) < FEWEST_VALUES and not all(  # few may be states, but not parts of a turn
-        step is not None and known_step(step, turn) > 0 and are_parts_of(own, step, turn)
-        for own, step, turn in columns
+        step is not None and known_step(step, turn) > 0 and are_parts_of(column, step, turn)
+        for column, step, turn in columns
     ):
-        return found
+        return repeats
     moving = np.ptp(data, axis=0) > 0
     if heaps := _heaps(data, steps, turns):
         spread = [known_step(step, turn) for step, turn in zip(steps, turns, strict=True)]
-        return replace(found, spread=tuple(spread), heaps=heaps)
+        return replace(repeats, spread=tuple(spread), heaps=heaps)
     if rows and all(step or not moves for step, moves in zip(steps, moving, strict=True)):
         explained = share_explained(data, steps, turns, moving)
-        found = replace(found, step=max(step or 0.0 for step in steps), explained=explained)
-    if found.step is not None and not found.is_rounding and rows > FEW_REPEATS_SHARE * len(points):
+        repeats = replace(repeats, step=max(step or 0.0 for step in steps), explained=explained)
+    if (
+        repeats.step is not None
+        and not repeats.is_rounding
+        and rows > FEW_REPEATS_SHARE * len(points)
+    ):
         coarse = [
-            coarser_step(own, step, max(turns)) for own, step in zip(data.T, steps, strict=True)
+            coarser_step(column, step, max(turns))
+            for column, step in zip(data.T, steps, strict=True)
         ]
         again = share_explained(data, coarse, turns, moving)
-        twice = replace(found, step=max(step or 0.0 for step in coarse), explained=again)
+        twice = replace(repeats, step=max(step or 0.0 for step in coarse), explained=again)
         if twice.is_rounding:
-            found, steps = twice, coarse
+            repeats, steps = twice, coarse
     if rows <= FEW_REPEATS_SHARE * len(points):
-        spread = [spread_of(own, step) for own, step in zip(data.T, steps, strict=True)]
-    elif found.is_rounding:
+        spread = [spread_of(column, step) for column, step in zip(data.T, steps, strict=True)]
+    elif repeats.is_rounding:
         spread = [known_step(step, turn) for step, turn in zip(steps, turns, strict=True)]
     else:
-        return found
-    return replace(found, spread=tuple(spread))
+        return repeats
+    return replace(repeats, spread=tuple(spread))
 
 
 def _heaps(
@@ -204,10 +209,10 @@ def _heaps(
     repeat at all.
     """
     columns = list(zip(data.T, steps, turns, strict=True))
-    heaps = tuple(heap_of(own, step, turn) for own, step, turn in columns)
+    heaps = tuple(heap_of(column, step, turn) for column, step, turn in columns)
     inside = np.ones(len(data), dtype=bool)
-    for (own, _, turn), heap in zip(columns, heaps, strict=True):
-        inside &= True if heap is None else heap.holds(own, turn)
+    for (column, _, turn), heap in zip(columns, heaps, strict=True):
+        inside &= True if heap is None else heap.holds(column, turn)
     if not any(heaps) or not inside.any():
         return None
     coarse = [step if heap is None else heap.step for step, heap in zip(steps, heaps, strict=True)]

@@ -108,12 +108,12 @@ def _are_multiples(values: Array, step: float, turn: float, off: float) -> bool:
 
 def _multiples(values: Array, step: float, turn: float, off: float) -> NDArray[np.bool_]:
     """Return which values (N,), or those a turn further, are multiples of a step but for rounding."""
-    found = np.zeros(len(values), dtype=bool)
+    are_multiples = np.zeros(len(values), dtype=bool)
     turns = {0.0} if turn and _is_whole(turn / step) else {0.0, turn, -turn}
     for turned in turns:
         count = (values + turned) / step
-        found |= abs(count - np.round(count)) * step < off
-    return found
+        are_multiples |= abs(count - np.round(count)) * step < off
+    return are_multiples
 
 
 def cells_of(column: Array, step: float | None) -> NDArray[np.int64]:
@@ -152,7 +152,7 @@ def share_explained(
         round(turn / step) if step and _is_whole(turn / step) else 0
         for step, turn in zip(steps, turns, strict=True)
     ]
-    cells = np.stack([cells_of(own, s) for own, s in zip(data.T, steps, strict=True)], axis=1)
+    cells = np.stack([cells_of(column, s) for column, s in zip(data.T, steps, strict=True)], axis=1)
     return _explained(cells[:, moving], around=np.array(around)[moving])
 
 
@@ -195,8 +195,8 @@ class Heap(NamedTuple):
 
     def holds(self, column: Array, turn: float) -> NDArray[np.bool_]:
         """Return which values (N,) are multiples of the step, as all values of the heap are."""
-        known = column[np.isfinite(column)]
-        return _multiples(column, self.step, turn, _off(known))
+        finite = column[np.isfinite(column)]
+        return _multiples(column, self.step, turn, _off(finite))
 
 
 LEAST_HEAP = 0.05
@@ -218,7 +218,7 @@ def heap_of(column: Array, step: float | None, turn: float) -> Heap | None:
     values, counts = np.unique(column, return_counts=True)
     if len(values) < FEWEST_VALUES or len(values) > (1 - LEAST_HEAP) * len(column):
         return None
-    found: list[Heap] = []
+    heaps: list[Heap] = []
     for coarse in _heap_steps(step, turn, values):
         there = _count_at(values, counts, coarse, turn)
         chance = 0.0
@@ -226,9 +226,9 @@ def heap_of(column: Array, step: float | None, turn: float) -> Heap | None:
             chance = sum(_count_at(values + s, counts, coarse, turn) for s in (-step, step)) / 2
         error = np.sqrt(there + chance / 2)
         if there - chance > max(LEAST_HEAP * len(column), SURE_HEAP * error):
-            found.append(Heap(coarse, (there - chance) / len(column), 1 - chance / there))
-    most = max((heap.share for heap in found), default=0.0)
-    likely = [heap for heap in found if heap.share >= AS_LARGE * most]
+            heaps.append(Heap(coarse, (there - chance) / len(column), 1 - chance / there))
+    most = max((heap.share for heap in heaps), default=0.0)
+    likely = [heap for heap in heaps if heap.share >= AS_LARGE * most]
     return next((heap for heap in likely if _is_heap(values, counts, step, turn, heap)), None)
 
 

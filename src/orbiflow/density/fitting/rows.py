@@ -38,7 +38,7 @@ class Rows:
 
     def __getitem__(self, chosen: Tensor | slice) -> Rows:
         beside = (self.weights, self.groups, self.numbers)
-        return Rows(self.points[chosen], *(None if own is None else own[chosen] for own in beside))
+        return Rows(self.points[chosen], *(None if c is None else c[chosen] for c in beside))
 
     def to(self, dtype: torch.dtype) -> Rows:
         """Return the rows with points and weights in a dtype."""
@@ -100,17 +100,17 @@ def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) ->
 
 def weights_of(weights: Any, rows: int) -> Tensor:
     """Return the weights of so many rows, as they were given."""
-    given = cells_of(weights)
-    if is_tensor(given):
-        given = given.double()
-    elif np.asarray(given).dtype.kind == "b":  # which rows count
-        given = np.asarray(given, dtype=np.float64)
-    own = torch.tensor(as_numbers(given, "weights"))
-    if own.shape != (rows,):
+    cells = cells_of(weights)
+    if is_tensor(cells):
+        cells = cells.double()
+    elif np.asarray(cells).dtype.kind == "b":  # which rows count
+        cells = np.asarray(cells, dtype=np.float64)
+    counts = torch.tensor(as_numbers(cells, "weights"))
+    if counts.shape != (rows,):
         raise OrbiflowError(
-            f"expected a weight for each of {rows} rows, got an array {tuple(own.shape)}"
+            f"expected a weight for each of {rows} rows, got an array {tuple(counts.shape)}"
         )
-    return own
+    return counts
 
 
 def lone_groups_note(groups: Tensor | None) -> list[str]:
@@ -135,19 +135,19 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     numbers = torch.arange(len(points))
     if weights is None:
         return Rows(points, None, groups, numbers)
-    own = weights_of(weights, len(points))
-    bad = torch.nonzero(~(own.isfinite() & (own >= 0)))[:, 0]
+    mass = weights_of(weights, len(points))
+    bad = torch.nonzero(~(mass.isfinite() & (mass >= 0)))[:, 0]
     if len(bad):
         raise OrbiflowError(
-            f"weights must be finite and at least 0; row {int(bad[0]) + 1} has {float(own[bad[0]]):g}"
+            f"weights must be finite and at least 0; row {int(bad[0]) + 1} has {float(mass[bad[0]]):g}"
             f"{row_count(len(bad))}"
         )
-    if not bool((own > 0).any()):
+    if not bool((mass > 0).any()):
         raise OrbiflowError("all weights are 0: no row is left to fit to")
-    kept = Rows(points, own, groups, numbers)[own > 0]
+    kept = Rows(points, mass, groups, numbers)[mass > 0]
     assert kept.weights is not None
-    own = kept.weights / kept.weights.max()
-    return replace(kept, weights=None if bool((own == own[0]).all()) else own / own.mean())
+    mass = kept.weights / kept.weights.max()
+    return replace(kept, weights=None if bool((mass == mass[0]).all()) else mass / mass.mean())
 
 
 def weights_note(rows: Rows) -> list[str]:
@@ -184,9 +184,9 @@ def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
     """Return canonical points (N, d) of a torus, and which rows have an angle at all."""
     as_instance(space, Space, "space", "see `make_space`")
     check_torus(space, "densities of rows that lack angles")
-    own = observed_rows(points, "points", space).detach().clone()
-    known = ~own.isnan().all(dim=1)
-    return space.project(own[known]), known
+    canonical = observed_rows(points, "points", space).detach().clone()
+    has_any = ~canonical.isnan().all(dim=1)
+    return space.project(canonical[has_any]), has_any
 
 
 def is_whole(rows: Rows) -> Tensor:

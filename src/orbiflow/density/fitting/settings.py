@@ -150,8 +150,8 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
     @property
     def parametric(self) -> str | None:
         """The parametric family that is fitted alone."""
-        own = self.components or ()
-        return own[0] if len(own) == 1 and own[0] in PARAMETRIC else None
+        names = self.components or ()
+        return names[0] if len(names) == 1 and names[0] in PARAMETRIC else None
 
     @property
     def flow_alone(self) -> bool:
@@ -185,5 +185,5 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
     def of_flow(self) -> dict[str, Any]:
         """What was given of a flow, by name."""
         names = [entry.name for entry in fields_of(FlowOptions)]
-        given = {name: getattr(self, name) for name in names if name in self.fields_given}
-        return {name: value for name, value in given.items() if value is not None}
+        values = {name: getattr(self, name) for name in names if name in self.fields_given}
+        return {name: value for name, value in values.items() if value is not None}

@@ -76,8 +76,8 @@ def tuned_concentrations(space: Space, rows: Rows, narrowest: float) -> Tensor |
 
     starts = (np.full(count, start).clip(*bounds) for start in STARTS)
     how: dict[str, Any] = {"jac": True, "method": "L-BFGS-B", "bounds": [bounds] * count}
-    found = [minimize(loss, start, options={"maxiter": STEPS}, **how) for start in starts]
-    best = min(found, key=lambda one: float(one.fun))
+    searches = [minimize(loss, start, options={"maxiter": STEPS}, **how) for start in starts]
+    best = min(searches, key=lambda one: float(one.fun))
     return torch.tensor(np.exp(best.x))[where]
 
 
@@ -89,7 +89,7 @@ def _distances(space: Space, points: Tensor, spheres: int) -> Tensor:
     images = by_sphere(space.features(points), spheres)
     entries = images.shape[0] * len(points) * spheres
     count = min(len(points), max(20, min(MOST_ASKED, MOST_ENTRIES // entries)))
-    asked, row = images[0, :count], torch.arange(count)
-    away = torch.stack([((asked[:, None] - image) ** 2).sum(dim=2) / 2 for image in images], dim=1)
+    some, row = images[0, :count], torch.arange(count)
+    away = torch.stack([((some[:, None] - image) ** 2).sum(dim=2) / 2 for image in images], dim=1)
     away[row, :, row] = OUT_OF_REACH
     return away.flatten(1, 2).float()

@@ -36,12 +36,12 @@ def chosen_columns(space: Space, columns: Sequence[int], width: int) -> Chosen:
     Raises `OrbiflowError` if these have no meaning without the others.
     """
     first = space.together and width - space.chart_dim + space.together
-    own = sorted(column for column in columns if column < first)
+    of_base = sorted(column for column in columns if column < first)
     rest = [column for column in columns if column >= first]
-    if own and (own != list(range(first)) or first == width):
+    if of_base and (of_base != list(range(first)) or first == width):
         space.of_axes([0])  # which says why not
-    every = range(space.together) if own else ()
-    return Chosen([*own, *rest], [*every, *(c - first + space.together for c in rest)])
+    every = range(space.together) if of_base else ()
+    return Chosen([*of_base, *rest], [*every, *(c - first + space.together for c in rest)])
 
 
 def check_torus(space: Space, what: str) -> Torus:
@@ -56,14 +56,14 @@ def check_torus(space: Space, what: str) -> Torus:
 
 def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
     """Return the numbers of the angles to keep, 0 to dim - 1, each once."""
-    given: Any = [axes] if isinstance(axes, numbers.Integral) else axes
+    several: Any = [axes] if isinstance(axes, numbers.Integral) else axes
     try:
-        found = tuple(as_whole(axis, "axes", 0, dim - 1) for axis in given)
+        kept = tuple(as_whole(axis, "axes", 0, dim - 1) for axis in several)
     except TypeError:
         raise OrbiflowError(f"axes must be numbers of angles, got {axes!r}") from None
-    if not found or len(set(found)) < len(found):
+    if not kept or len(set(kept)) < len(kept):
         raise OrbiflowError(f"axes must name one angle or more, each once, got {axes!r}")
-    return found
+    return kept
 
 
 def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
@@ -82,7 +82,7 @@ def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
     >>> axes_named(["psi", 0], ["phi", "psi"])
     [1, 0]
     """
-    axes = [_named_axis(one, names) for one in wanted]
+    axes = [_named_axis(name, names) for name in wanted]
     for twice in [axis for k, axis in enumerate(axes) if axis in axes[:k]]:
         raise OrbiflowError(f"column {names[twice]!r} is given twice: name each once")
     return axes
@@ -111,23 +111,23 @@ def given_named(
     space: Space, given: Iterable[tuple[str | int, float]], names: Sequence[str]
 ) -> dict[int, float]:
     """Return chart coordinates by their numbers, from values in the data's units by columns."""
-    known: dict[int, float] = {}
+    by_column: dict[int, float] = {}
     for key, value in given:
         column = _named_axis(key, names)
-        if column in known:
+        if column in by_column:
             raise OrbiflowError(f"{names[column]!r} is given twice")
-        known[column] = as_number(value, repr(names[column]))
-    columns, axes = chosen_columns(space, list(known), len(names))
-    values = [known[column] for column in columns]
+        by_column[column] = as_number(value, repr(names[column]))
+    columns, axes = chosen_columns(space, list(by_column), len(names))
+    values = [by_column[column] for column in columns]
     alone = [axis for axis in axes if axis >= space.together]
     whole = values[: len(values) - len(alone)]
-    found: dict[int, float] = {}
+    coordinates: dict[int, float] = {}
     if whole:
-        found |= enumerate(listed(space.parts[0].cover([whole])[0]))
+        coordinates |= enumerate(listed(space.parts[0].cover([whole])[0]))
     for axis, value in zip(alone, values[len(whole) :], strict=True):
         number = torch.tensor(value, dtype=torch.float64)
-        found[axis] = float(lines_of(space).axes[axis - space.together].turns(number))
-    return found
+        coordinates[axis] = float(lines_of(space).axes[axis - space.together].turns(number))
+    return coordinates
 
 
 def lines_of(space: Space) -> Torus:
@@ -161,7 +161,7 @@ def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Te
     """Return what `log_prob_observed` does, at points (N, d) of any space if none lacks anything."""
     if not bool(points.isnan().any()):
         return density.log_prob(points, measure=measure)
-    found = torch.zeros(len(points), dtype=torch.float64)
+    logs = torch.zeros(len(points), dtype=torch.float64)
     patterns, number = unique(~points.isnan(), dim=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
         observed: list[int] = listed(torch.nonzero(pattern)[:, 0])
@@ -169,11 +169,11 @@ def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Te
         if not observed:
             continue
         some = points[rows][:, observed]
-        own = density.space.of_axes(observed)
+        space = density.space.of_axes(observed)
         whole = len(observed) == density.space.chart_dim
         value = density.log_prob(some) if whole else density.log_marginal(some, observed)
-        found[rows] = value + own.log_density_factor(some, measure)
-    return found
+        logs[rows] = value + space.log_density_factor(some, measure)
+    return logs
 
 
 def chart_of_rows(space: Space, data: ArrayLike, *, may_lack: bool) -> Tensor:

@@ -51,10 +51,10 @@ def data_doubts(
         return []
     called = [f"column{k}" for k in range(1, width + 1)] if names is None else list(names)
     roles = space.roles(width)
-    own = getattr(space, "form", None)
+    form = getattr(space, "form", None)
     unit = "degrees" if space.data_name in DIRECTIONS else space.data_unit(width)
     doubts = check_values(
-        space.data_name, values, called, roles, unit, form=own, place=place, are_new=True
+        space.data_name, values, called, roles, unit, form=form, place=place, are_new=True
     )
     _check_beside_middle(space, values, called, place)
     angles = [k for k, role in enumerate(roles) if _is_angle(role, space, width)]
@@ -82,9 +82,9 @@ def _check_beside_middle(
     for axis, line in enumerate(lines):
         if not isinstance(line, Line) or line.kind != "linear":
             continue
-        known = line.centre + 2 * line.scale * np.linspace(-1, 1, KNOWN)
+        about_middle = line.centre + 2 * line.scale * np.linspace(-1, 1, KNOWN)
         column = Checked(str(names[first + axis]), values[:, first + axis], place)
-        refuse_codes(column, np.append(column.values, known))
+        refuse_codes(column, np.append(column.values, about_middle))
 
 
 def _is_angle(role: Role | None, space: Space, width: int) -> bool:
@@ -130,10 +130,10 @@ def _is_likelier(density: Density, values: Array, factor: float | Array) -> bool
         return False
     some = whole[:: 1 + len(whole) // MOST_ROWS]
     try:
-        one, other = (
+        plain, other = (
             at_observed(density, density.space.to_chart(data), measure="uniform")
             for data in (some, some * factor)
         )
     except OrbiflowError:  # beyond what the space takes
         return False
-    return float(torch.median(other - one)) > 0
+    return float(torch.median(other - plain)) > 0

@@ -115,13 +115,13 @@ def conditional(
             nat.
     """
     space = as_instance(density, Density, "density").space
-    known, values = given_axes(given, space.chart_dim)
-    space.of_axes(known)
-    left = [axis for axis in range(space.chart_dim) if axis not in known]
+    fixed, values = given_axes(given, space.chart_dim)
+    space.of_axes(fixed)
+    left = [axis for axis in range(space.chart_dim) if axis not in fixed]
     kept = kept_axes(left if axes is None else axes, space.chart_dim)
-    if set(kept) & set(known):
-        raise OrbiflowError(f"axes {sorted(set(kept) & set(known))} are given and cannot be kept")
-    split = Split(space.chart_dim, kept, known, values)
+    if set(kept) & set(fixed):
+        raise OrbiflowError(f"axes {sorted(set(kept) & set(fixed))} are given and cannot be kept")
+    split = Split(space.chart_dim, kept, fixed, values)
     return _restricted(density, split, space, accuracy, progress)
 
 
@@ -138,12 +138,12 @@ def _restricted(
     closed, left = density.restricted(split, space)
     error = Error(0.0, 0.0)
     if left and space.dim > MOST_TABULATED:
-        parts = [(log, PartialDensity(own, how)) for log, own, how in left]
-        whole = _mixture([*closed, *((log + own.log_given, own) for log, own in parts)])
+        parts = [(log, PartialDensity(part, how)) for log, part, how in left]
+        whole = _mixture([*closed, *((log + part.log_given, part) for log, part in parts)])
         say(0.5, "comparing")
         error = _spread(whole)
     elif left:
-        parts = [_Left(*one) for one in left]
+        parts = [_Left(*entry) for entry in left]
         whole, error = _refined(closed, parts, space, accuracy, say)
         say(1.0, "comparing")
         error = _compared(whole, closed, parts) or error
@@ -210,15 +210,15 @@ class _Left:
 
     def exact(self, points: Tensor) -> Tensor:
         """Return its exact log density (N,) at points (N, r), with its weight."""
-        given = points.new_tensor(self.split.values).expand(len(points), -1)
-        whole = torch.cat([points, given], dim=1)
+        fixed = points.new_tensor(self.split.values).expand(len(points), -1)
+        whole = torch.cat([points, fixed], dim=1)
         return self.log + self.density.log_marginal(whole, list(self.split.observed))
 
     def refine(self, space: Space, tick: Callable[[], None]) -> list[tuple[float, Density]]:
         """Find kernels of the next level, and return those of the level before."""
         before = self.found
         more = kernels_for(self.density, self.split, space, self.levels, tick)
-        self.found, self.levels = [(self.log + log, own) for log, own in more], self.levels + 1
+        self.found, self.levels = [(self.log + log, part) for log, part in more], self.levels + 1
         return before
 
     def compare(self, before: Tensor, now: Tensor) -> None:
@@ -243,20 +243,22 @@ def _refined(
     """
 
     def refine(one: _Left) -> list[tuple[float, Density]]:
-        share = sum(own.levels for own in left) / (LEVELS * len(left))
+        share = sum(each.levels for each in left) / (LEVELS * len(left))
         return one.refine(space, partial(say, share, f"integrating, level {one.levels + 1}"))
 
     def whole() -> Mixture:
-        return _mixture([*closed, *(part for one in left for part in one.found)])
+        return _mixture([*closed, *(part for each in left for part in each.found)])
 
     def now() -> Tensor:
-        return torch.stack([known, *(one.logs for one in left)]).logsumexp(dim=0)
+        return torch.stack([logs_of_closed, *(each.logs for each in left)]).logsumexp(dim=0)
 
     for one in left:
         refine(one)
     before = [refine(one) for one in left]
     points = _checked_points(whole(), CHECKED)
-    known = _log_sum(closed, points) if closed else points.new_full((len(points),), -math.inf)
+    logs_of_closed = (
+        _log_sum(closed, points) if closed else points.new_full((len(points),), -math.inf)
+    )
     for one in left:
         one.logs = _log_sum(one.found, points)
     for one, old in zip(left, before, strict=True):
@@ -278,31 +280,31 @@ def _compared(whole: Mixture, closed: list[Weighted], left: list[_Left]) -> Erro
 
     The largest is looked for about the worst points.
     """
-    terms = [one.terms() for one in left]
-    known = [one for one in terms if one is not None]
-    count = min(CHECKED, COMPARED // max(1, sum(known)))
-    if len(known) < len(left) or count < FEWEST_CHECKED:
+    terms = [component.terms() for component in left]
+    counts = [component for component in terms if component is not None]
+    count = min(CHECKED, COMPARED // max(1, sum(counts)))
+    if len(counts) < len(left) or count < FEWEST_CHECKED:
         return None
 
     def off(points: Tensor) -> Tensor:
-        exact = [one.exact(points) for one in left]
+        exact = [component.exact(points) for component in left]
         if closed:
             exact.append(_log_sum(closed, points))
         return torch.stack(exact).logsumexp(dim=0) - whole.log_prob(points)
 
     points = _checked_points(whole, count)
-    found = off(points)
-    shift = found.new_zeros(())
+    changes = off(points)
+    shift = changes.new_zeros(())
     if left[0].split.given:  # the density of what is given, of which the samples tell
-        shift = found[:count].logsumexp(dim=0) - math.log(count)
-    found = found - shift
+        shift = changes[:count].logsumexp(dim=0) - math.log(count)
+    changes = changes - shift
     generator = torch.Generator().manual_seed(2)
     for reach in SEARCHED:
-        worst = points[found.abs().topk(max(1, count // NEAR)).indices].repeat(NEAR, 1)
+        worst = points[changes.abs().topk(max(1, count // NEAR)).indices].repeat(NEAR, 1)
         noise = torch.randn(worst.shape, dtype=torch.float64, generator=generator)
         near = (worst + reach * noise) % 1
-        points, found = torch.cat([points, near]), torch.cat([found, off(near) - shift])
-    usual, largest = found[:count].square().mean().sqrt(), found.abs().max()
+        points, changes = torch.cat([points, near]), torch.cat([changes, off(near) - shift])
+    usual, largest = changes[:count].square().mean().sqrt(), changes.abs().max()
     return Error(float(usual) + EXACT.usual, float(largest) + EXACT.largest)
 
 
@@ -321,14 +323,14 @@ def _error_of(off: Tensor) -> Error:
 
 
 def _log_sum(parts: list[tuple[float, Density]], points: Tensor) -> Tensor:
-    return torch.stack([log + own.log_prob(points) for log, own in parts]).logsumexp(dim=0)
+    return torch.stack([log + part.log_prob(points) for log, part in parts]).logsumexp(dim=0)
 
 
 def _mixture(parts: list[tuple[float, Density]]) -> Mixture:
     logs = torch.tensor([log for log, _ in parts], dtype=torch.float64)
     weights: list[float] = listed(torch.softmax(logs, dim=0).clamp_min(LEAST_WEIGHT))
-    own = [part for _, part in parts]
-    return mixture_of(list(zip(weights, own, strict=True)))
+    densities = [part for _, part in parts]
+    return mixture_of(list(zip(weights, densities, strict=True)))
 
 
 def _spread(density: Density) -> Error:

@@ -49,15 +49,15 @@ def shortest_intervals(density: Density, mass: float) -> Array:
     Raises `OrbiflowError` for several columns, other spaces, and a mass below 0.001 or above 0.999999.
     """
     mass = as_number(mass, "mass", *MASSES)
-    own = density.cumulative()
+    cumulative = density.cumulative()
     torus = check_torus(density.space, "intervals")
-    (axis,), start = torus.axes, own.start
+    (axis,), start = torus.axes, cumulative.start
     period = axis.period
     even = torch.linspace(0, 1, PIECES + 1, dtype=torch.float64)
     even = even if period else even[1:-1]  # where log densities are minus infinity
     # more of them where the mass is, as a bump may be narrower than a piece
     levels = torch.cat([torch.logspace(-7, -4, TAILS, dtype=torch.float64), even[1:-1]])
-    quantiles = np.interp(torch.cat([levels, 1 - levels]), own.below, own.ends)
+    quantiles = np.interp(torch.cat([levels, 1 - levels]), cumulative.below, cumulative.ends)
     turns: Tensor = unique(torch.cat([even, torch.tensor(quantiles)]))
 
     def logs(at: Tensor) -> Tensor:
@@ -68,12 +68,12 @@ def shortest_intervals(density: Density, mass: float) -> Array:
         sides = np.array([[(1 - mass) / 2, (1 + mass) / 2]])
         return _written(axis.first_turn, start + sides, period)
     order = between.argsort(descending=True)
-    held = own.masses(turns).diff()[order].cumsum(0)
+    held = cumulative.masses(turns).diff()[order].cumsum(0)
     place, last, reach = int(torch.searchsorted(held, mass)), len(order) - 1, NEAR
 
     def excess(level: float) -> float:
         low, high = torch.tensor(_above(level, turns, heights, logs, bool(period))).mT
-        shares = own.masses(high % 1) + high.floor() - own.masses(low)
+        shares = cumulative.masses(high % 1) + high.floor() - cumulative.masses(low)
         return float(shares.sum()) - mass
 
     every = torch.cat([heights, between])
@@ -111,10 +111,10 @@ def _above(
         middle = (low + high) / 2
         later = (logs(middle) >= level) != rising
         low, high = torch.where(later, middle, low), torch.where(later, high, middle)
-    found = ((low + high) / 2).numpy()
+    edges = ((low + high) / 2).numpy()
     if bool(above[0]):
-        found = np.append(found[1:], found[:1] + 1)  # an arc over the start
-    return found.reshape(-1, 2)
+        edges = np.append(edges[1:], edges[:1] + 1)  # an arc over the start
+    return edges.reshape(-1, 2)
 
 
 def _written(first: float, arcs: Array, period: float) -> Array:

@@ -77,7 +77,7 @@ def trend(
     if of == along:
         raise OrbiflowError("a trend is of one column along another one")
     turns = torus.axes[along].turns(torch.tensor(values))[:, None]
-    own, alone = torus.of_axes([of]), turns.new_full((len(turns), torus.dim), torch.nan)
+    alone_space, alone = torus.of_axes([of]), turns.new_full((len(turns), torus.dim), torch.nan)
     alone[:, along] = turns[:, 0]
     logs = at_observed(density, alone, measure="natural")
     middles = cells()
@@ -86,8 +86,11 @@ def trend(
         both = torch.cat(
             [middles.repeat(len(part), 1), part.repeat_interleave(len(middles), 0)], dim=1
         )
-        found = density.log_marginal(both, [of, along]).reshape(-1, len(middles))
-        rows += [_about_mean(own, weights, masses) for weights in torch.softmax(found, dim=1)]
+        marginal_logs = density.log_marginal(both, [of, along]).reshape(-1, len(middles))
+        rows += [
+            _about_mean(alone_space, weights, masses)
+            for weights in torch.softmax(marginal_logs, dim=1)
+        ]
         tick(len(rows) / len(turns))
     return _of_rows(values, rows, masses, logs.numpy())
 

@@ -62,8 +62,8 @@ def nodes_of(
         chosen = torch.nonzero(number == k)[:, 0]
         size = [min(int(s), MAX_NODES_ALONE) for s in size]
         fits = len(size) == 1 or math.prod(size) <= MAX_NODES
-        own = kappa[chosen][:, hidden]
-        rule = _trapezoidal(own, reach[chosen], size) if fits else _sobol(own, seed)
+        sharpness = kappa[chosen][:, hidden]
+        rule = _trapezoidal(sharpness, reach[chosen], size) if fits else _sobol(sharpness, seed)
         yield chosen, rule[0], dict(zip(hidden, rule[1], strict=True))
 
 
@@ -93,9 +93,9 @@ def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor
     shape = (len(kappa), *sizes)
 
     def spread(value: Tensor, i: int) -> Tensor:
-        own = [1] * len(sizes)
-        own[i] = sizes[i]
-        return value.reshape(len(kappa), *own).expand(shape).flatten(1)
+        axes_shape = [1] * len(sizes)
+        axes_shape[i] = sizes[i]
+        return value.reshape(len(kappa), *axes_shape).expand(shape).flatten(1)
 
     total = torch.stack([spread(value, i) for i, value in enumerate(logs)]).sum(dim=0)
     return total, [spread(value, i) for i, value in enumerate(offsets)]
@@ -168,8 +168,10 @@ def chain_tables(
     walks: list[_Walk] = []
     for k, order in enumerate(listed(orders)):
         last = max(order.index(axis) for axis in split.observed)
-        own = number == k
-        walks.append(_Walk(order[: last + 1], split, logs[own], means[own], kappa[own]))
+        of_order = number == k
+        walks.append(
+            _Walk(order[: last + 1], split, logs[of_order], means[of_order], kappa[of_order])
+        )
     top = max(float(walk.likely.max()) for walk in walks)
     tables: dict[tuple[int, ...], Tensor] = {}
     for walk, more in zip(walks, _more_nodes(walks, top), strict=True):
@@ -211,7 +213,7 @@ class _Walk:
         self.logs, self.means, self.kappa = logs, means, kappa
         d = split.dim
         self.hidden = [axis for axis in order if axis not in split.observed]
-        given = dict(zip(split.given, split.values, strict=True))
+        fixed = dict(zip(split.given, split.values, strict=True))
         self.middle = means[:, :, 0].clone()
         # (C, d, d): of each angle, from each
         noise = torch.diag_embed(kappa.clamp_min(1e-12).rsqrt())
@@ -230,8 +232,8 @@ class _Walk:
             self.reach[:, axis] = (
                 REACH_DEVIATIONS * noise[:, axis].square().sum(dim=1).sqrt() + bend[:, axis]
             )
-            if axis in given:
-                at = torch.tensor(2 * math.pi * given[axis], dtype=torch.float64)
+            if axis in fixed:
+                at = torch.tensor(2 * math.pi * fixed[axis], dtype=torch.float64)
                 rough = (
                     noise[:, axis].square().sum(dim=1)
                     + bend[:, axis].square()
@@ -245,8 +247,8 @@ class _Walk:
         for axis in split.observed:
             slopes = torch.hypot(means[:, axis, 1 : 1 + d], means[:, axis, 1 + d :])
             sharp += kappa[:, axis, None] * slopes.square()
-            own = slopes.index_fill(1, torch.tensor(axis), 1.0)[:, list(split.kept)]
-            joint += kappa[:, axis] * own.prod(dim=1)
+            slants = slopes.index_fill(1, torch.tensor(axis), 1.0)[:, list(split.kept)]
+            joint += kappa[:, axis] * slants.prod(dim=1)
         apart = sharp[:, list(split.kept)]
         # kernels along the axes stand for a slanted bump only if they are narrower than its narrow side
         both = apart.prod(dim=1).sqrt().clamp_min(1e-12)  # 0 where both angles are even
@@ -305,7 +307,7 @@ class _Walk:
         self, rows: Tensor, angles: list[Tensor], top: float, rule: _Rule, shape: tuple[int, ...]
     ) -> Tensor:
         """Return the densities (C, A) or (C, A, B), relative to exp(top), of components at angles."""
-        kept, given = self.split.kept, dict(zip(self.split.given, self.split.values, strict=True))
+        kept, fixed = self.split.kept, dict(zip(self.split.given, self.split.values, strict=True))
         first_last = sorted(kept, key=self.order.index)
         total = (self.logs[rows] - top)[:, None, None, None]
         # sines and cosines over components, nodes and grids
@@ -324,8 +326,8 @@ class _Walk:
                 mean_sine = (-lean.square().sum(dim=0) / 2).exp()
                 seen[axis] = mean_sine * at.sin(), mean_sine * at.cos()
                 continue
-            if axis in given:
-                at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
+            if axis in fixed:
+                at = torch.full((1, 1, 1, 1), 2 * math.pi * fixed[axis], dtype=torch.float64)
             else:
                 at = angles[kept.index(axis)][:, None, :, None]
             if axis == first_last[-1]:
@@ -356,10 +358,10 @@ class _Walk:
 
         And how far it leans (H, ...) with what is left about nodes.
         """
-        own = self.means[rows, axis][:, :, None, None, None]
-        mean, lean = own[:, 0], own.new_zeros(len(self.hidden), 1, 1, 1, 1)
+        regression = self.means[rows, axis][:, :, None, None, None]
+        mean, lean = regression[:, 0], regression.new_zeros(len(self.hidden), 1, 1, 1, 1)
         for j, (sin, cos) in seen.items():
-            along, across = own[:, 1 + j], own[:, 1 + self.split.dim + j]
+            along, across = regression[:, 1 + j], regression[:, 1 + self.split.dim + j]
             mean = mean + along * sin + across * cos
             if j in near:
                 slope = along * cos - across * sin
@@ -384,19 +386,19 @@ def _observe(near: _Near, off: Tensor, kappa: Tensor, lean: Tensor) -> None:
     wider = 1 + kappa * lean.square().sum(dim=0)
     off = (torch.remainder(off + math.pi, 2 * math.pi) - math.pi) * kappa / wider
     less = kappa / (wider + wider.sqrt())
-    for axis, (own, shift) in near.items():
-        told = (own * lean).sum(dim=0)
-        near[axis] = own - less * told * lean, shift + told * off
+    for axis, (lean_of_axis, shift) in near.items():
+        common = (lean_of_axis * lean).sum(dim=0)
+        near[axis] = lean_of_axis - less * common * lean, shift + common * off
 
 
 class _Rule:
     """Nodes of hidden angles: even ones of a single angle, quasi-random ones of several."""
 
     def __init__(self, hidden: int, level: int, step: int, *, early: bool) -> None:
-        own = 1 + level + step
+        stage = 1 + level + step
         # of angles after those kept, it would have to be known at each point of the grid
         self.left = NOISE_LEFT[level + max(step, 0)] if early and hidden > 1 else 0.0
-        self.count = (1, NODES_ALONE * 2**level, NODES_OF_SEVERAL[own])[min(hidden, 2)]
+        self.count = (1, NODES_ALONE * 2**level, NODES_OF_SEVERAL[stage])[min(hidden, 2)]
         self.tables = _quasi_random(hidden, self.count, level) if hidden > 1 else []
 
     def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
@@ -422,4 +424,4 @@ def _quasi_random(hidden: int, count: int, seed: int) -> list[Tensor]:
     with torch.inference_mode(False):
         even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=seed)
         nodes = even.draw(count, dtype=torch.float64)
-        return [quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT]
+        return [quantiles(SHARPNESS, shares) * SHARPNESS.sqrt()[:, None] for shares in nodes.mT]

@@ -45,15 +45,15 @@ class ChainFits:
         self._linear[d] = -concentrations.sum(dim=1)
         self._bent: list[tuple[Tensor, Tensor]] = []
         for place, axis in enumerate(order.mT):
-            own, kappa = means[every, axis], concentrations[every, axis]
-            if bool(own[:, 1:].any()) or (regressed and place):
+            regression, kappa = means[every, axis], concentrations[every, axis]
+            if bool(regression[:, 1:].any()) or (regressed and place):
                 rows = torch.zeros_like(self._linear)
-                rows[d:] = -own.mT
+                rows[d:] = -regression.mT
                 rows[axis, every] = 1
                 self._bent.append((rows, kappa))
             else:
-                self._linear[1 + d + axis, every] = kappa * own[:, 0].sin()
-                self._linear[1 + 2 * d + axis, every] = kappa * own[:, 0].cos()
+                self._linear[1 + d + axis, every] = kappa * regression[:, 0].sin()
+                self._linear[1 + 2 * d + axis, every] = kappa * regression[:, 0].cos()
 
     def at(self, seen: Tensor) -> tuple[Tensor, list[Tensor]]:
         """Return sums (N, K) of kappa (cos - 1) over the angles, and residuals that are regressed.
@@ -61,11 +61,11 @@ class ChainFits:
         `seen` (N, 1 + 3 d) are `seen_angles`. Residuals (N, K) are one table for each place in the
         chains at which means are not constant.
         """
-        found = seen @ self._linear
+        fit = seen @ self._linear
         residuals = [seen @ rows for rows, _ in self._bent]
         for residual, (_, kappa) in zip(residuals, self._bent, strict=True):
-            found = torch.addcmul(found, residual.cos(), kappa)
-        return found, residuals
+            fit = torch.addcmul(fit, residual.cos(), kappa)
+        return fit, residuals
 
 
 def seen_angles(angle: Tensor) -> Tensor:
@@ -106,10 +106,10 @@ class ChainSum:
         wide, middle, narrow = at_scales(fit)
         total = wide @ self._peaks[0] + middle @ self._peaks[1] + narrow @ self._peaks[2]
         least = math.exp(FAINTEST_LOG[total.dtype] + FELT_LOG_RATIO) * self._peaks.sum()
-        found = total.clamp_min(least).log() + self._top
+        logs_of_sums = total.clamp_min(least).log() + self._top
         faint = (total <= least).nonzero()[:, 0]
         if len(faint):
             scales = fit.new_tensor(SCALES)[:, None]
             logs = (fit[faint, None] / scales + self._log_peaks).flatten(1)
-            found = found.index_put((faint,), logs.logsumexp(dim=1))
-        return found
+            logs_of_sums = logs_of_sums.index_put((faint,), logs.logsumexp(dim=1))
+        return logs_of_sums

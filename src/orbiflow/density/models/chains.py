@@ -73,8 +73,8 @@ class VonMisesChains(Density, kind="chains"):
         if not space.is_torus:
             raise OrbiflowError(f"von Mises chains need a torus, got the {space.name}")
         d = space.dim
-        given = zip(self.stored, (log_weights, means, concentrations), strict=False)
-        log_weights, means, concentrations = (as_tensor(value, name) for name, value in given)
+        named = zip(self.stored, (log_weights, means, concentrations), strict=False)
+        log_weights, means, concentrations = (as_tensor(value, name) for name, value in named)
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
         if order is None:
             order = torch.arange(d, device=concentrations.device).repeat(count, 1)
@@ -102,8 +102,8 @@ class VonMisesChains(Density, kind="chains"):
         # log weights less log normalising constants, per unit of the cube: (L, K)
         scaled = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
         peaks = self.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)
-        own = ChainSum(ChainFits(means, kappa, self.order), peaks.to(points))
-        return in_blocks(own.log, points, BLOCK_POINTS)
+        chain_sum = ChainSum(ChainFits(means, kappa, self.order), peaks.to(points))
+        return in_blocks(chain_sum.log, points, BLOCK_POINTS)
 
     def residuals(self, points: Tensor) -> Tensor:
         """Return angles less their regressions, in radians (N, K, d), for points (N, d)."""
@@ -113,25 +113,25 @@ class VonMisesChains(Density, kind="chains"):
         return mean.reshape(len(points), *self.concentrations.shape).neg_().add_(angle[:, None])
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
-        own = self.to("cpu")
-        weights = own.log_weights.exp().flatten()
+        chains = self.to("cpu")
+        weights = chains.log_weights.exp().flatten()
         chosen = torch.multinomial(weights, count, replacement=True, generator=generator)
-        return self.space.project(own._walk(chosen, {}, generator)[0])
+        return self.space.project(chains._walk(chosen, {}, generator)[0])
 
     def draw_given(
         self, count: int, given: Mapping[int, float], generator: torch.Generator
     ) -> tuple[Tensor, Tensor]:
         """Choose components by what they make of the given angles in a few draws each."""
-        own = self.to("cpu")
-        logs = own.log_weights.flatten()
+        chains = self.to("cpu")
+        logs = chains.log_weights.flatten()
         every = torch.arange(len(logs)).repeat_interleave(PILOT_DRAWS)
-        pilots = own._walk(every, given, generator)[1].reshape(-1, PILOT_DRAWS)
+        pilots = chains._walk(every, given, generator)[1].reshape(-1, PILOT_DRAWS)
         likely = logs + log_sum_exp(pilots) - math.log(PILOT_DRAWS)
         proposed = shares_of(
             torch.logaddexp(likely, logs + log_sum_exp(likely) + math.log(SHARE_BY_WEIGHT))
         )
         chosen = torch.multinomial(proposed, count, replacement=True, generator=generator)
-        points, weights = own._walk(chosen, given, generator)
+        points, weights = chains._walk(chosen, given, generator)
         return self.space.project(points), weights + (logs - proposed.log())[chosen]
 
     def _walk(
@@ -143,13 +143,15 @@ class VonMisesChains(Density, kind="chains"):
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
         noise = torch.tensor(rng.vonmises(0.0, kappa.numpy()))
         angle, rows = torch.zeros(noise.shape, dtype=torch.float64), torch.arange(len(noise))
-        known = angle.new_full((self.space.dim,), math.nan)
-        known[list(given)] = 2 * math.pi * torch.tensor([*given.values()], dtype=torch.float64)
+        fixed_angles = angle.new_full((self.space.dim,), math.nan)
+        fixed_angles[list(given)] = (
+            2 * math.pi * torch.tensor([*given.values()], dtype=torch.float64)
+        )
         logs = angle.new_zeros(len(angle))
         for now in self.order[component].mT:
             mean = (waves(angle) * self.means[component, now]).sum(dim=-1)
-            fixed, sharp = ~known[now].isnan(), kappa[rows, now]
-            off = (known[now] - mean).nan_to_num()
+            fixed, sharp = ~fixed_angles[now].isnan(), kappa[rows, now]
+            off = (fixed_angles[now] - mean).nan_to_num()
             logs += torch.where(fixed, sharp * (off.cos() - 1) - special.i0e(sharp).log(), 0.0)
             angle[rows, now] = torch.where(fixed, mean + off, mean + noise[rows, now])
         return angle / (2 * math.pi), logs
@@ -160,10 +162,10 @@ class VonMisesChains(Density, kind="chains"):
         logs = (weights.double() / weights.sum()).log()
         return cls(
             components[0].space,
-            torch.cat([own.log_weights + log for own, log in zip(components, logs, strict=True)]),
-            torch.cat([own.means for own in components]),
-            torch.cat([own.concentrations for own in components]),
-            torch.cat([own.order for own in components]),
+            torch.cat([part.log_weights + log for part, log in zip(components, logs, strict=True)]),
+            torch.cat([part.means for part in components]),
+            torch.cat([part.concentrations for part in components]),
+            torch.cat([part.order for part in components]),
         )
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
@@ -172,7 +174,9 @@ class VonMisesChains(Density, kind="chains"):
     def terms_at(self, axes: list[int]) -> int | None:
         count = 0
         for which, order in _by_order(self, axes):
-            hidden, seen = ([i for i in order if (i in axes) == known] for known in (False, True))
+            hidden, seen = (
+                [i for i in order if (i in axes) == is_seen] for is_seen in (False, True)
+            )
             means, kappa = _at_scales(self, which)
             if not hidden:
                 count += len(kappa)
@@ -186,13 +190,13 @@ class VonMisesChains(Density, kind="chains"):
     def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep the chains in which all that is given comes first and all that is hidden last."""
         place = self.order.argsort(dim=1)
-        kept, given = list(split.kept), list(split.given)
+        kept, fixed = list(split.kept), list(split.given)
         hidden = [axis for axis in range(split.dim) if axis not in split.observed]
         closed = torch.ones(len(self.order), dtype=torch.bool)
         first = place[:, kept].amin(dim=1)
         last = place[:, list(split.observed)].amax(dim=1)
-        if given:
-            closed &= place[:, given].amax(dim=1) < first
+        if fixed:
+            closed &= place[:, fixed].amax(dim=1) < first
         if hidden:
             closed &= place[:, hidden].amin(dim=1) > last
         parts: list[Weighted] = []
@@ -206,8 +210,8 @@ class VonMisesChains(Density, kind="chains"):
     ) -> list[Weighted]:
         start = level * SHIFT_PER_LEVEL % 1
         log_scale, tables = chain_tables(self, split, level, start, tick)
-        found = (lattice_kernels(table, space, start) for table in tables)
-        return [(log_scale + log, kernels) for log, kernels in found]
+        parts = (lattice_kernels(table, space, start) for table in tables)
+        return [(log_scale + log, kernels) for log, kernels in parts]
 
     def _some(self, chosen: Tensor) -> list[tuple[float, VonMisesChains]]:
         """Return the chains of a mask (K,), with the logarithm of their weight, if they have any."""
@@ -223,15 +227,15 @@ class VonMisesChains(Density, kind="chains"):
 
         Their constants are moved and their weights changed by what is given.
         """
-        kept, given, d = list(split.kept), list(split.given), split.dim
+        kept, fixed, d = list(split.kept), list(split.given), split.dim
         logs, means, evidence = self.log_weights, self.means, 0.0
         constant = means[:, :, 0]
-        if given:
+        if fixed:
             angle = torch.zeros(1, d, dtype=torch.float64)
-            angle[0, given] = 2 * math.pi * torch.tensor(split.values, dtype=torch.float64)
-            constant = means @ _known_part(angle, given)[0]
-            residual = angle[0, given] - constant[:, given]
-            kappa = self.concentrations[:, given, None] / torch.tensor(SCALES)
+            angle[0, fixed] = 2 * math.pi * torch.tensor(split.values, dtype=torch.float64)
+            constant = means @ _known_part(angle, fixed)[0]
+            residual = angle[0, fixed] - constant[:, fixed]
+            kappa = self.concentrations[:, fixed, None] / torch.tensor(SCALES)
             logs = logs + (kappa * (residual.cos() - 1)[..., None] - special.i0e(kappa).log()).sum(
                 dim=1
             )
@@ -327,14 +331,14 @@ def _ordered_at(
     means, kappa = _at_scales(chains, which)
     constant = chains.log_weights[which].flatten()
     constant = constant - special.i0e(kappa[:, seen]).log().sum(dim=1)
-    found = angle.new_empty(len(angle), len(means))
+    logs_of_components = angle.new_empty(len(angle), len(means))
     for chosen, logs, offsets in nodes_of(means, kappa, hidden, seen, seed):
         parts = [
             _walked(part, means[chosen], kappa[chosen], order, logs, offsets)
             for part in torch.split(angle, max(1, BLOCK_ENTRIES // logs.numel()))
         ]
-        found[:, chosen] = torch.cat(parts) + constant[chosen]
-    return found
+        logs_of_components[:, chosen] = torch.cat(parts) + constant[chosen]
+    return logs_of_components
 
 
 def _walked(
@@ -347,13 +351,13 @@ def _walked(
 ) -> Tensor:
     """Return logs (N, C) of the observed angles' factors without constants, summed over the nodes."""
     d = angle.shape[1]
-    known = _known_part(angle, [axis for axis in order if axis not in offsets])
-    known = (known @ means.flatten(0, 1).mT).reshape(len(angle), len(means), d)
-    plain = torch.zeros_like(known[..., 0])  # what does not depend on the hidden angles
+    known_means = _known_part(angle, [axis for axis in order if axis not in offsets])
+    known_means = (known_means @ means.flatten(0, 1).mT).reshape(len(angle), len(means), d)
+    plain = torch.zeros_like(known_means[..., 0])  # what does not depend on the hidden angles
     bent: Tensor | None = None
     before: list[tuple[int, Tensor, Tensor]] = []
     for axis in order:
-        mean = known[..., axis]
+        mean = known_means[..., axis]
         if before:
             mean = mean[..., None]
             for j, sin, cos in before:

@@ -83,9 +83,9 @@ def concentration_for(mean: Tensor, below: Tensor, width: int) -> Tensor:
     """
     kappa = mean * (width - mean**2) / (below * (1 + mean))
     for _ in range(STEPS):
-        found = moments(kappa, width)
-        short = torch.where(mean < 0.5, mean - found.mean, found.below - below)
-        kappa = kappa + short / found.along
+        moments_now = moments(kappa, width)
+        short = torch.where(mean < 0.5, mean - moments_now.mean, moments_now.below - below)
+        kappa = kappa + short / moments_now.along
     return kappa
 
 
@@ -101,14 +101,14 @@ def _debye(order: float, p: Tensor) -> tuple[Tensor, Tensor]:
 @cache
 def _debye_factors(order: float) -> tuple[float, ...]:
     """Return the coefficients of that sum, the highest power first (DLMF 10.41.9)."""
-    one = [Fraction(1)]
-    found = [Fraction(0)] * (3 * TERMS + 1)
+    polynomial = [Fraction(1)]
+    total = [Fraction(0)] * (3 * TERMS + 1)
     for k in range(TERMS + 1):
-        for power, factor in enumerate(one):
-            found[power] += factor / Fraction(order) ** k
-        after = [Fraction(0)] * (len(one) + 3)
-        for power, factor in enumerate(one):
+        for power, factor in enumerate(polynomial):
+            total[power] += factor / Fraction(order) ** k
+        after = [Fraction(0)] * (len(polynomial) + 3)
+        for power, factor in enumerate(polynomial):
             after[power + 1] += factor * (Fraction(power, 2) + Fraction(1, 8 * (power + 1)))
             after[power + 3] -= factor * (Fraction(power, 2) + Fraction(5, 8 * (power + 3)))
-        one = after
-    return tuple(float(factor) for factor in reversed(found))
+        polynomial = after
+    return tuple(float(factor) for factor in reversed(total))

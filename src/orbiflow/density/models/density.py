@@ -88,9 +88,9 @@ class Density(WithFigures):
         cls.kind = kind
         if not kind:
             return
-        known = KINDS.setdefault(kind, cls)
-        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
-            raise OrbiflowError(f"the kind {kind!r} is taken by {known.__name__}: choose another")
+        holder = KINDS.setdefault(kind, cls)
+        if (holder.__module__, holder.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise OrbiflowError(f"the kind {kind!r} is taken by {holder.__name__}: choose another")
         KINDS[kind] = cls
 
     def __init__(self, space: Space) -> None:
@@ -235,13 +235,13 @@ class Density(WithFigures):
         cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
     ) -> Self:
         """Make the density that `header` and `tensors` describe."""
-        given = {name: tensors[name] for name in cls.stored if name in tensors}
-        if len(given) < len(cls.stored) or not all(t.is_floating_point() for t in given.values()):
+        stored = {name: tensors[name] for name in cls.stored if name in tensors}
+        if len(stored) < len(cls.stored) or not all(t.is_floating_point() for t in stored.values()):
             raise OrbiflowError(f"tensors are missing or no floats: wanted {', '.join(cls.stored)}")
-        made = cls(space, *given.values())
-        own = made.header()
-        if any(header.get(name) != value for name, value in own.items()):
-            raise OrbiflowError(f"its tensors are those of {own}, its header says otherwise")
+        made = cls(space, *stored.values())
+        again = made.header()
+        if any(header.get(name) != value for name, value in again.items()):
+            raise OrbiflowError(f"its tensors are those of {again}, its header says otherwise")
         return made
 
     # What follows is the same for all densities.
@@ -276,19 +276,19 @@ class Density(WithFigures):
                 finite, or an unknown measure.
         """
         points = self._here(value)
-        own = points.to(self.dtype)
-        if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK_POINTS:
-            return self._log_prob(own, measure).to(points.dtype)
+        cast_points = points.to(self.dtype)
+        if torch.is_grad_enabled() or cast_points[..., 0].numel() <= BLOCK_POINTS:
+            return self._log_prob(cast_points, measure).to(points.dtype)
 
         @torch.no_grad()
         def evaluate(block: Tensor, _tell: Tell) -> Tensor:
             return self._log_prob(block, measure)
 
-        blocks = torch.split(own.reshape(-1, own.shape[-1]), BLOCK_POINTS)
+        blocks = torch.split(cast_points.reshape(-1, cast_points.shape[-1]), BLOCK_POINTS)
         with SideBySide() as beside:
             results = [beside.begin(partial(evaluate, block)) for block in blocks]
             values = torch.cat([result() for result in results])
-        return values.reshape(own.shape[:-1]).to(points.dtype)
+        return values.reshape(cast_points.shape[:-1]).to(points.dtype)
 
     def _log_prob(self, points: Tensor, measure: str) -> Tensor:
         check_measure(measure)
@@ -339,8 +339,8 @@ class Density(WithFigures):
         new = copy.copy(self)
         for name, value in vars(self).items():
             is_density = isinstance(value, Density)
-            own = value.to(device, dtype) if is_density else moved(value, device, dtype)
-            setattr(new, name, own)
+            copied = value.to(device, dtype) if is_density else moved(value, device, dtype)
+            setattr(new, name, copied)
         if dtype is not None:
             new._dtype = dtype
         return new

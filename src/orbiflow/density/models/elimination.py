@@ -46,7 +46,7 @@ Grids = Mapping[int, Tensor]
 
 def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | None:
     """Return grids that resolve all factors, each time finer; None if a product would be too large."""
-    given = dict(zip(split.given, split.values, strict=True))
+    fixed = dict(zip(split.given, split.values, strict=True))
     wanted = dict.fromkeys((factor.axes[-1] for factor in factors), 1.0)
     for axes, chains in factors:
         d = len(axes)
@@ -62,13 +62,13 @@ def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | No
     for axis, kappa in wanted.items():
         step = KERNEL_STEP if axis in split.kept else STEP_DEVIATIONS
         fine = GRID_FINENESS[level] * 2 * math.pi * math.sqrt(kappa) / step
-        sizes[axis] = 1 if axis in given else 2 * math.ceil(fine / 2)
+        sizes[axis] = 1 if axis in fixed else 2 * math.ceil(fine / 2)
     tables = [tuple(axis for axis in axes if sizes[axis] > 1) for axes, _ in factors]
     if elimination_order(tables, sizes, split.kept)[1] > MOST_ENTRIES:
         return None
     return {
-        axis: torch.tensor([given[axis]], dtype=torch.float64)
-        if axis in given
+        axis: torch.tensor([fixed[axis]], dtype=torch.float64)
+        if axis in fixed
         else torch.arange(size, dtype=torch.float64) / size
         for axis, size in sizes.items()
     }
@@ -89,15 +89,15 @@ def eliminated(
         step = KERNEL_STEP if axes[-1] in kept else STEP_DEVIATIONS
         sharpest = sharpest_on(sizes[axes[-1]], step) if axes[-1] in sizes else math.inf
         log, table = conditional_table(chains, [grids[axis] for axis in axes], sharpest, tick)
-        own = tuple(axis for axis in axes if axis in sizes)
-        left.append((own, table.reshape([sizes[axis] for axis in own])))
+        free_axes = tuple(axis for axis in axes if axis in sizes)
+        left.append((free_axes, table.reshape([sizes[axis] for axis in free_axes])))
         log_scale += log
     for axis in elimination_order([axes for axes, _ in left], sizes, kept)[0]:
-        touched = [one for one in left if axis in one[0]]
+        touched = [entry for entry in left if axis in entry[0]]
         axes, table = _product(touched, sizes, [axis])
         top = float(table.max())
         log_scale += math.log(top) - math.log(sizes[axis])
-        left = [one for one in left if axis not in one[0]] + [(axes, table / top)]
+        left = [entry for entry in left if axis not in entry[0]] + [(axes, table / top)]
         tick()
     axes, table = _product(left, sizes, [])
     table = table.permute([axes.index(axis) for axis in kept])
@@ -116,7 +116,9 @@ def elimination_order(
     while hidden:
         cliques = {axis: frozenset[int]().union(*(t for t in left if axis in t)) for axis in hidden}
         axis = min(sorted(hidden), key=lambda one: _entries(cliques[one], sizes))
-        terms, result = (_entries(own, sizes) for own in (cliques[axis], cliques[axis] - {axis}))
+        terms, result = (
+            _entries(clique, sizes) for clique in (cliques[axis], cliques[axis] - {axis})
+        )
         paired = sum(axis in table for table in left) < 3
         most = max(most, result, terms // MAX_PAIRED_RATIO if paired else terms)
         left = [t for t in left if axis not in t] + [cliques[axis] - {axis}]
@@ -135,8 +137,8 @@ def _product(
     """Return the product of tables of some axes each, summed over axes."""
     tables = sorted(tables, key=lambda one: one[1].numel())
     letter = {axis: chr(ord("a") + k) for k, axis in enumerate(sizes)}
-    axes = tuple(sorted({axis for own, _ in tables for axis in own} - set(over)))
-    terms = ",".join("".join(letter[axis] for axis in own) for own, _ in tables)
+    axes = tuple(sorted({axis for table_axes, _ in tables for axis in table_axes} - set(over)))
+    terms = ",".join("".join(letter[axis] for axis in table_axes) for table_axes, _ in tables)
     target = "".join(letter[axis] for axis in axes)
     return axes, torch.einsum(f"{terms}->{target}", *(table for _, table in tables))
 
@@ -149,15 +151,17 @@ def conditional_table(
     It is relative to its largest value, whose logarithm comes first. Bumps sharper than the
     concentration `sharpest` are as wide as that, with the same mass.
     """
-    parents, own = lines[:-1], 2 * math.pi * lines[-1]
+    parents, angles = lines[:-1], 2 * math.pi * lines[-1]
     rows = (
-        torch.cartesian_prod(*parents).reshape(-1, len(parents)) if parents else own.new_zeros(1, 0)
+        torch.cartesian_prod(*parents).reshape(-1, len(parents))
+        if parents
+        else angles.new_zeros(1, 0)
     )
-    kappa = (chains.concentrations[:, -1, None] / own.new_tensor(SCALES)).flatten()
+    kappa = (chains.concentrations[:, -1, None] / angles.new_tensor(SCALES)).flatten()
     kappa = kappa.clamp_max(sharpest)
     peaks = -special.i0e(kappa).log()
-    images = torch.stack([own.cos(), own.sin(), torch.ones_like(own)])
-    found = own.new_zeros(len(rows), len(own))
+    images = torch.stack([angles.cos(), angles.sin(), torch.ones_like(angles)])
+    table = angles.new_zeros(len(rows), len(angles))
     log_scale = float(peaks.max())
     for start in range(0, len(rows), BLOCK_ROWS):
         tick()
@@ -169,10 +173,10 @@ def conditional_table(
         top = logs[row, part] + peaks[part] - log_scale - kappa[part]
         angle, sharp = mean[row, part // len(SCALES)], kappa[part]
         bumps = torch.stack([sharp * angle.cos(), sharp * angle.sin(), top], dim=1) * LOG2_E
-        for some in torch.split(torch.arange(len(row)), max(1, BLOCK_ENTRIES // len(own))):
+        for some in torch.split(torch.arange(len(row)), max(1, BLOCK_ENTRIES // len(angles))):
             values = (bumps[some] @ images).clamp_min_(FAINT_LOG * LOG2_E).exp2_()
-            found.index_add_(0, start + row[some], values)
-    return log_scale, found
+            table.index_add_(0, start + row[some], values)
+    return log_scale, table
 
 
 def _given_parents(chains: VonMisesChains, parents: Tensor) -> tuple[Tensor, Tensor]:

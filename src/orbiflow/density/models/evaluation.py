@@ -45,9 +45,9 @@ def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Arra
     for block in torch.split(points, GRADIENT_BLOCK):
         with torch.enable_grad():
             at = block.detach().clone().requires_grad_()
-            found = density.log_prob(at, measure="natural")
-            (slope,) = torch.autograd.grad(found.sum(), at)
-        values.append(found.detach().double())
+            logs = density.log_prob(at, measure="natural")
+            (slope,) = torch.autograd.grad(logs.sum(), at)
+        values.append(logs.detach().double())
         slopes.append(slope.double())
     if not values:
         return np.zeros(0), np.zeros(np.shape(data))

@@ -163,9 +163,9 @@ class WithFigures(Distribution):
 
     def _slopes(self, points: Tensor) -> tuple[Tensor, Tensor]:
         with torch.enable_grad():
-            own = points.detach().clone().requires_grad_()
-            values = self.log_prob(own, measure="natural")
-            (slopes,) = torch.autograd.grad(values.sum(), own)
+            at = points.detach().clone().requires_grad_()
+            values = self.log_prob(at, measure="natural")
+            (slopes,) = torch.autograd.grad(values.sum(), at)
         return values.detach(), slopes.nan_to_num()
 
     @torch.no_grad()
@@ -177,8 +177,8 @@ class WithFigures(Distribution):
 
         Raises `OrbiflowError` if there are several columns: take a marginal density.
         """
-        points, own = self._only(value), self.cumulative()
-        return own.masses((points[..., 0].double() - own.start) % 1)
+        points, cumulative = self._only(value), self.cumulative()
+        return cumulative.masses((points[..., 0].double() - cumulative.start) % 1)
 
     @torch.no_grad()
     def icdf(self, value: Tensor) -> Tensor:
@@ -189,14 +189,16 @@ class WithFigures(Distribution):
         masses = as_tensor(value, "masses").double()
         if not bool(((masses >= 0) & (masses <= 1)).all()):
             raise OrbiflowError("masses are from 0 to 1")
-        own = self.cumulative()
-        high_end = torch.searchsorted(own.below, masses.contiguous()).clamp(1, len(own.ends) - 1)
-        low, high = own.ends[high_end - 1].clone(), own.ends[high_end].clone()
+        cells = self.cumulative()
+        high_end = torch.searchsorted(cells.below, masses.contiguous()).clamp(
+            1, len(cells.ends) - 1
+        )
+        low, high = cells.ends[high_end - 1].clone(), cells.ends[high_end].clone()
         for _ in range(40):
             middle = (low + high) / 2
-            less = own.masses(middle) < masses
+            less = cells.masses(middle) < masses
             low, high = torch.where(less, middle, low), torch.where(less, high, middle)
-        return (((low + high) / 2 + own.start) % 1)[..., None]
+        return (((low + high) / 2 + cells.start) % 1)[..., None]
 
     def _only(self, value: Any) -> Tensor:
         points = as_tensor(value, "points")
@@ -243,8 +245,8 @@ class WithFigures(Distribution):
         self, count: int = DRAWS, *, measure: str = CHART, generator: torch.Generator | None = None
     ) -> Tensor:
         """Return -E[log p] in nats, as `estimated_entropy` does, without its error."""
-        found = self.estimated_entropy(count, measure=measure, generator=generator)
-        return torch.tensor(found.value, dtype=torch.float64)
+        estimate = self.estimated_entropy(count, measure=measure, generator=generator)
+        return torch.tensor(estimate.value, dtype=torch.float64)
 
     @torch.no_grad()
     def estimated_entropy(
@@ -274,10 +276,10 @@ class WithFigures(Distribution):
             raise OrbiflowError(f"densities on {here} and {there} cannot be compared")
         draws = self._draws(as_whole(count, "count", 2), generator)
         at = draws if here == there else there.to_chart(here.from_chart(draws))
-        own, others = (
-            one.log_prob(x, measure="natural") for one, x in ((self, draws), (other, at))
+        logs, others = (
+            density.log_prob(x, measure="natural") for density, x in ((self, draws), (other, at))
         )
-        return _estimate(own - others)
+        return _estimate(logs - others)
 
 
 def _same_columns(one: Space, other: Space) -> bool:

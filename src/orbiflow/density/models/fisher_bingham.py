@@ -81,8 +81,8 @@ def _saddle(values: Array, vector: Array) -> tuple[float, float]:
 
     most = (len(values) + float(np.linalg.norm(vector))) / 2
     low = 0.5 - 1e-12
-    found: Any = brentq(excess, low, most * (1 + 1e-9), rtol=1e-12)
-    return top, float(found)
+    root: Any = brentq(excess, low, most * (1 + 1e-9), rtol=1e-12)
+    return top, float(root)
 
 
 def _parabola(gaps: Array, vector: Array, distance: float) -> tuple[float, float]:
@@ -174,14 +174,14 @@ class FisherBingham(Density, kind="fisher-bingham"):
         nearest = _nearest_envelope(mean, kappa, matrix) if kappa > 0 else 1.0
         steep = kappa / (2 * nearest)
         values, axes = np.linalg.eigh(matrix + steep * np.outer(mean, mean))
-        found: list[Array] = []
+        accepted: list[Array] = []
         for _ in range(MOST_TRIES):
-            left = count - sum(map(len, found))
+            left = count - sum(map(len, accepted))
             if left <= 0:
-                return self.space.from_features(torch.tensor(np.concatenate(found)[:count]))
+                return self.space.from_features(torch.tensor(np.concatenate(accepted)[:count]))
             tried = _bingham(values.max() - values, 2 * left + 16, rng) @ axes.T
             odds = -steep * (tried @ mean - nearest) ** 2
-            found.append(tried[np.log(rng.uniform(size=len(tried))) < odds])
+            accepted.append(tried[np.log(rng.uniform(size=len(tried))) < odds])
         raise OrbiflowError("no samples were accepted: the density's parameters are too large")
 
 
@@ -193,8 +193,8 @@ def _nearest_envelope(mean: Array, kappa: float, matrix: Array) -> float:
         values = np.linalg.eigvalsh(matrix + kappa / (2 * nearest) * np.outer(mean, mean))
         return float(log_fisher_bingham(torch.tensor(values), none)) + kappa * nearest / 2
 
-    found: Any = minimize_scalar(mass, bounds=(1e-3, 1.0), method="bounded")
-    return float(found.x)
+    minimum: Any = minimize_scalar(mass, bounds=(1e-3, 1.0), method="bounded")
+    return float(minimum.x)
 
 
 def _bingham(below: Array, tries: int, rng: np.random.Generator) -> Array:
@@ -204,8 +204,8 @@ def _bingham(below: Array, tries: int, rng: np.random.Generator) -> Array:
     def excess(b: float) -> float:
         return float((1 / (b + 2 * below)).sum()) - 1
 
-    found: Any = brentq(excess, 1 - 1e-12, width + 1e-9)
-    b = float(found)
+    root: Any = brentq(excess, 1 - 1e-12, width + 1e-9)
+    b = float(root)
     scale = 1 + 2 * below / b
     tried = central_gaussian(scale**-0.5, tries, rng)
     odds = width / 2 * np.log(tried**2 @ scale) - tried**2 @ below
@@ -232,13 +232,13 @@ class AngularCentralGaussian(Density, kind="angular-central-gaussian"):
 
     def __init__(self, space: Space, matrix: Tensor) -> None:
         super().__init__(space)
-        given = _symmetric(as_tensor(matrix, "matrix").detach().double(), space)
-        values, axes = linalg.eigh(given.cpu())
+        covariance = _symmetric(as_tensor(matrix, "matrix").detach().double(), space)
+        values, axes = linalg.eigh(covariance.cpu())
         if not bool((values > 0).all()):
             raise OrbiflowError("the matrix must be positive definite")
-        self.matrix = given
-        self._inverse = ((axes / values) @ axes.mT).to(given)
-        width = len(given)
+        self.matrix = covariance
+        self._inverse = ((axes / values) @ axes.mT).to(covariance)
+        width = len(covariance)
         log_area = math.log(2) + width / 2 * math.log(math.pi) - math.lgamma(width / 2)
         self._log_top = math.log(images_of(space)) - log_area - float(values.log().sum()) / 2
 

@@ -182,8 +182,8 @@ class FlowDensity(Density, kind="flow"):
         }
 
     def tensors(self) -> dict[str, Tensor]:
-        own = {f"flow.{name}": tensor for name, tensor in self.flow.state_dict().items()}
-        return own | density_parts(self.base, "base", "base.")[1]
+        named = {f"flow.{name}": tensor for name, tensor in self.flow.state_dict().items()}
+        return named | density_parts(self.base, "base", "base.")[1]
 
     @classmethod
     def from_header(
@@ -209,8 +209,8 @@ class UniformDensity(Density, kind="uniform"):
 
     @property
     def log_floor(self) -> float:
-        round_parts = (own for own in self.space.parts or (self.space,) if own.is_round)
-        return -sum(math.log(own.volume) for own in round_parts)
+        round_parts = (part for part in self.space.parts or (self.space,) if part.is_round)
+        return -sum(math.log(part.volume) for part in round_parts)
 
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         del beside
@@ -227,8 +227,8 @@ class UniformDensity(Density, kind="uniform"):
         return UniformDensity(self.space.of_axes(axes)).log_chart(points.double())
 
     def restricted(self, split: Split, space: Space) -> Restriction:
-        given = 0.0
+        evidence = 0.0
         if split.given and self.space.parts:
             at = torch.tensor([split.values], dtype=torch.float64)
-            given = float(self.log_marginal(at, list(split.given)))
-        return Restriction([(given, UniformDensity(space))], [])
+            evidence = float(self.log_marginal(at, list(split.given)))
+        return Restriction([(evidence, UniformDensity(space))], [])

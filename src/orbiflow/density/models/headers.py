@@ -67,10 +67,10 @@ def density_parts(
             f"one of the kinds {', '.join(sorted(KINDS))}, or give the class a kind, "
             f'class {type(density).__name__}(Density, kind="...")'
         )
-    own = density.space
-    if space is not None and space != own:
+    there = density.space
+    if space is not None and space != there:
         raise OrbiflowError(
-            f"the {name} is on {own!r}, the density on {space!r}: make both on one space"
+            f"the {name} is on {there!r}, the density on {space!r}: make both on one space"
         )
     tensors = {prefix + key: tensor for key, tensor in density.tensors().items()}
     names = ("error", "largest_error")

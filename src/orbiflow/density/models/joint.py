@@ -42,11 +42,11 @@ class JointDensity(ConditionalPart):
 
     @torch.no_grad()
     def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
-        d, found = self.space.dim, list[Tensor]()
-        known = torch.cat([points, covariate_turns(x, self.number)], dim=1)
-        for some in torch.split(known, BLOCK_ROWS):
-            found.append(self.density.log_prob(some) - log_of_covariates(self.density, some, d))
-        return torch.cat(found)
+        d, logs = self.space.dim, list[Tensor]()
+        both = torch.cat([points, covariate_turns(x, self.number)], dim=1)
+        for some in torch.split(both, BLOCK_ROWS):
+            logs.append(self.density.log_prob(some) - log_of_covariates(self.density, some, d))
+        return torch.cat(logs)
 
     @torch.no_grad()
     def at(self, x: Tensor) -> Density:
@@ -56,11 +56,11 @@ class JointDensity(ConditionalPart):
             d + len(values), tuple(range(d)), tuple(range(d, d + len(values))), (*values,)
         )
         closed, left = self.density.restricted(split, self.space)
-        others = [(log, PartialDensity(own, how)) for log, own, how in left]
-        parts = [*closed, *((log + own.log_given, own) for log, own in others)]
+        others = [(log, PartialDensity(part, how)) for log, part, how in left]
+        parts = [*closed, *((log + part.log_given, part) for log, part in others)]
         top = max(log for log, _ in parts)
-        weighted = [(math.exp(log - top), own) for log, own in parts]
-        return mixture_of([(weight, own) for weight, own in weighted if weight > 0])
+        weighted = [(math.exp(log - top), part) for log, part in parts]
+        return mixture_of([(weight, part) for weight, part in weighted if weight > 0])
 
     def header(self) -> dict[str, Any]:
         return {"density": density_parts(self.density, "joint density")[0]}
@@ -94,14 +94,14 @@ def joint_torus(space: Torus, covariates: int) -> Torus:
 
 def covariate_turns(x: Tensor, number: Tensor) -> Tensor:
     """Return where real and cyclic covariates are on circles, in turns (N, c), by features (N, m)."""
-    found: list[Tensor] = []
-    for own in range(int(number.max()) + 1):
-        some = x[:, number == own]
+    columns: list[Tensor] = []
+    for covariate in range(int(number.max()) + 1):
+        some = x[:, number == covariate]
         if some.shape[1] == 2:
-            found.append(torch.atan2(some[:, 1], some[:, 0]) / (2 * math.pi) % 1)
+            columns.append(torch.atan2(some[:, 1], some[:, 0]) / (2 * math.pi) % 1)
         else:
-            found.append(turns_at(some[:, 0] / SPREAD))
-    return torch.stack(found, dim=1)
+            columns.append(turns_at(some[:, 0] / SPREAD))
+    return torch.stack(columns, dim=1)
 
 
 def log_of_covariates(density: Density, points: Tensor, dim: int) -> Tensor:

@@ -52,8 +52,8 @@ class AdaptiveKernels(Density, kind="kernels"):
         self, space: Space, centers: Tensor, concentrations: Tensor, weights: Tensor
     ) -> None:
         super().__init__(space)
-        given = zip(self.stored, (centers, concentrations, weights), strict=True)
-        centers, concentrations, weights = (as_tensor(value, name) for name, value in given)
+        named = zip(self.stored, (centers, concentrations, weights), strict=True)
+        centers, concentrations, weights = (as_tensor(value, name) for name, value in named)
         width = len(space.spheres)
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
         count = len(centers) if centers.dim() else 0
@@ -119,10 +119,10 @@ class AdaptiveKernels(Density, kind="kernels"):
         proportions = weights.double() / weights.sum()
         return cls(
             components[0].space,
-            torch.cat([one.centers for one in components]),
-            torch.cat([one.concentrations for one in components]),
+            torch.cat([part.centers for part in components]),
+            torch.cat([part.concentrations for part in components]),
             torch.cat(
-                [share * one.weights for share, one in zip(proportions, components, strict=True)]
+                [share * part.weights for share, part in zip(proportions, components, strict=True)]
             ),
         )
 
@@ -144,14 +144,16 @@ class AdaptiveKernels(Density, kind="kernels"):
 
         A kernel weighs as much more as it has the given values more likely.
         """
-        kept, given, some = list(split.kept), list(split.given), self.space.factors_of(split.kept)
+        kept, fixed, some = list(split.kept), list(split.given), self.space.factors_of(split.kept)
         weights, evidence = self.weights, 0.0
-        if given:
+        if fixed:
             at = torch.tensor([split.values], dtype=torch.float64)
-            logs = self.log_each(at, given)[0] + weights.log()
+            logs = self.log_each(at, fixed)[0] + weights.log()
             evidence, weights = float(log_sum_exp(logs)), shares_of(logs)
-        own = AdaptiveKernels(space, self.centers[:, kept], self.concentrations[:, some], weights)
-        return Restriction([(evidence, own)], [])
+        kernels = AdaptiveKernels(
+            space, self.centers[:, kept], self.concentrations[:, some], weights
+        )
+        return Restriction([(evidence, kernels)], [])
 
     def log_each(self, points: Tensor, axes: list[int]) -> Tensor:
         """Return the log density (N, K) of each kernel of some angles, at points (N, len(axes))."""
@@ -196,8 +198,8 @@ def kernel_peaks(space: Space, kappa: Tensor) -> Tensor:
     """Return logarithms (N,) of the largest values of kernels of concentrations (N, F)."""
     if space.parts:
         widths = [len(part.spheres) for part in space.parts]
-        own = zip(space.parts, torch.split(kappa, widths, dim=1), strict=True)
-        return torch.stack([kernel_peaks(part, some) for part, some in own]).sum(dim=0)
+        factors = zip(space.parts, torch.split(kappa, widths, dim=1), strict=True)
+        return torch.stack([kernel_peaks(part, some) for part, some in factors]).sum(dim=0)
     if space.is_round:
         return -moments(kappa[:, 0], space.dim + 1).log_mass
     return -(special.i0e(kappa) * space.sides.to(kappa)).log().sum(dim=1)
@@ -209,7 +211,7 @@ def drawn_about(space: Space, centers: Tensor, kappa: Tensor, rng: np.random.Gen
         widths = [len(part.spheres) for part in space.parts]
         places = torch.split(centers, [part.chart_dim for part in space.parts], dim=1)
         every = zip(space.parts, places, torch.split(kappa, widths, dim=1), strict=True)
-        return torch.cat([drawn_about(*one, rng) for one in every], dim=1)
+        return torch.cat([drawn_about(*factor, rng) for factor in every], dim=1)
     if space.is_round:
         vectors = _von_mises_fisher(space.features(centers)[0].numpy(), kappa[:, 0].numpy(), rng)
         return space.from_features(torch.tensor(vectors))
@@ -247,15 +249,15 @@ def _wood(kappa: Array, dim: int, rng: np.random.Generator) -> Array:
     # how far the best cosine is below 1, without which all digits would be lost
     gap = 2 * slope / (1 + slope)
     best, most = 1 - gap, dim * np.log(gap * (2 - gap))
-    found, left = np.zeros_like(kappa), np.arange(len(kappa))
+    below_cosines, left = np.zeros_like(kappa), np.arange(len(kappa))
     while len(left):
         z, b = rng.beta(dim / 2, dim / 2, size=len(left)), slope[left]
         below = 2 * b * z / (1 - (1 - b) * z)
         odds = kappa[left] * (gap[left] - below)
         odds += dim * np.log(gap[left] + best[left] * below) - most[left]
-        found[left] = below
+        below_cosines[left] = below
         left = left[odds < np.log(rng.uniform(size=len(left)))]
-    return found
+    return below_cosines
 
 
 KERNEL_STEP = 0.65
@@ -272,9 +274,9 @@ def kernels_for(
     density: Density, split: Split, space: Space, level: int, tick: Callable[[], None]
 ) -> list[Weighted]:
     """Return kernels as `Density.approximated` does, if need be through marginals on a grid."""
-    known = density.approximated(split, space, level, tick)
-    if known is not None:
-        return known
+    kernels_of_density = density.approximated(split, space, level, tick)
+    if kernels_of_density is not None:
+        return kernels_of_density
     count = FIRST_GRID[space.dim] * 2**level
     line = torch.arange(count, dtype=torch.float64) / count
     grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
@@ -321,7 +323,7 @@ def lattice_kernels(
     kept = order[ordered.cumsum(0) >= DROPPED_WEIGHT].sort().values
     grid = torch.cartesian_prod(*lines).reshape(-1, space.dim)[kept]
     concentrations = torch.tensor(kappas, dtype=torch.float64).expand(len(kept), -1)
-    own = AdaptiveKernels(
+    kernels = AdaptiveKernels(
         space, (grid + start) % 1, concentrations, weights[kept] / weights[kept].sum()
     )
-    return math.log(float(values.mean())), own
+    return math.log(float(values.mean())), kernels

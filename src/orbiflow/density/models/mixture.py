@@ -40,8 +40,8 @@ class Mixture(Density, kind="mixture"):
     def __init__(self, components: Sequence[Density], weights: Any) -> None:
         if not components:
             raise OrbiflowError("components must be one density or more")
-        for one in components:
-            as_instance(one, Density, "each of the components")
+        for component in components:
+            as_instance(component, Density, "each of the components")
         super().__init__(components[0].space)
         self.components = tuple(components)
         weights = as_tensor(weights, "weights").detach().double().cpu()
@@ -59,74 +59,77 @@ class Mixture(Density, kind="mixture"):
     @property
     def dtype(self) -> torch.dtype:
         """The coarsest dtype of the components."""
-        return min((one.dtype for one in self.components), key=lambda t: torch.finfo(t).bits)
+        return min((part.dtype for part in self.components), key=lambda t: torch.finfo(t).bits)
 
     @property
     def device(self) -> torch.device | None:
         """The device of the components; None if they work anywhere."""
-        return next((one.device for one in self.components if one.device is not None), None)
+        return next((part.device for part in self.components if part.device is not None), None)
 
     @property
     def weight_of_kind(self) -> dict[str, float]:
         """The weight of each kind of component."""
-        found: dict[str, float] = {}
-        for one, weight in zip(self.components, listed(self.weights), strict=True):
-            name = one.kind or type(one).__name__
-            found[name] = found.get(name, 0.0) + weight
-        return found
+        weights: dict[str, float] = {}
+        for component, weight in zip(self.components, listed(self.weights), strict=True):
+            name = component.kind or type(component).__name__
+            weights[name] = weights.get(name, 0.0) + weight
+        return weights
 
     @property
     def has_fine_detail(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Whether a component has."""
-        return any(one.has_fine_detail for one in self.components)
+        return any(component.has_fine_detail for component in self.components)
 
     @property
     def log_floor(self) -> float:
-        floors = [log + one.log_floor for log, one in self._weighted()]
+        floors = [log + component.log_floor for log, component in self._weighted()]
         return torch.tensor(floors, dtype=torch.float64).logsumexp(0).item()
 
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         floor = float(torch.logaddexp(*torch.tensor([self.log_floor, beside], dtype=torch.float64)))
         return _log_sum(
-            [own.log_density(points, floor - log) + log for log, own in self._weighted()]
+            [
+                component.log_density(points, floor - log) + log
+                for log, component in self._weighted()
+            ]
         )
 
     def parts(self) -> Iterator[tuple[float, Density]]:
-        for weight, own in zip(listed(self.weights), self.components, strict=True):
-            yield from ((weight * share, part) for share, part in own.parts())
+        for weight, component in zip(listed(self.weights), self.components, strict=True):
+            yield from ((weight * share, part) for share, part in component.parts())
 
     def averaged_over(self, pixel: Pixel) -> Self:
-        return self._with(own.averaged_over(pixel) for own in self.components)
+        return self._with(component.averaged_over(pixel) for component in self.components)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         chosen = torch.multinomial(self.weights, count, replacement=True, generator=generator)
         counts: list[int] = listed(torch.bincount(chosen, minlength=len(self.components)))
         drawn = torch.empty(count, self.space.chart_dim, dtype=self.dtype, device=self.device)
-        for index, (number, own) in enumerate(zip(counts, self.components, strict=True)):
+        for index, (number, component) in enumerate(zip(counts, self.components, strict=True)):
             if number:
                 at = torch.nonzero(chosen == index)[:, 0].to(drawn.device)
-                drawn = drawn.index_put((at,), own.draw(number, generator).to(drawn))
+                drawn = drawn.index_put((at,), component.draw(number, generator).to(drawn))
         return drawn
 
     def mass(self, resolution: int = 64) -> float:
         """Return the integral over the square: only that of a flow may be off 1."""
         pairs = zip(listed(self.weights), self.components, strict=True)
-        return 1 + sum(weight * (own.mass(resolution) - 1) for weight, own in pairs)
+        return 1 + sum(weight * (component.mass(resolution) - 1) for weight, component in pairs)
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        table = [own.log_marginal(points, axes, seed) + log for log, own in self._weighted()]
+        table = [part.log_marginal(points, axes, seed) + log for log, part in self._weighted()]
         return torch.stack(table).logsumexp(dim=0)
 
     def restricted(self, split: Split, space: Space) -> Restriction:
-        found = Restriction([], [])
-        for log, own in self._weighted():
-            closed, left = own.restricted(split, space)
-            found.closed.extend((log + more, density) for more, density in closed)
-            found.left.extend((log + more, part, own_split) for more, part, own_split in left)
-        return found
+        whole = Restriction([], [])
+        for log, component in self._weighted():
+            closed, left = component.restricted(split, space)
+            whole.closed.extend((log + more, density) for more, density in closed)
+            whole.left.extend((log + more, part, own_split) for more, part, own_split in left)
+        return whole
 
     def to(self, *wanted: Any) -> Self:
-        return self._with(own.to(*wanted) for own in self.components)
+        return self._with(component.to(*wanted) for component in self.components)
 
     def _with(self, components: Iterable[Density]) -> Self:
         new = copy.copy(self)
@@ -134,15 +137,17 @@ class Mixture(Density, kind="mixture"):
         return new
 
     def header(self) -> dict[str, Any]:
-        named = ((own, own.article or own.kind or type(own).__name__) for own in self.components)
-        parts = [density_parts(own, name, space=self.space) for own, name in named]
+        named = (
+            (part, part.article or part.kind or type(part).__name__) for part in self.components
+        )
+        parts = [density_parts(part, name, space=self.space) for part, name in named]
         return {"components": [header for header, _ in parts]}
 
     def tensors(self) -> dict[str, Tensor]:
-        found = {"weights": self.weights}
-        for number, own in enumerate(self.components):
-            found |= density_parts(own, "component", f"{number}.")[1]
-        return found
+        named = {"weights": self.weights}
+        for number, component in enumerate(self.components):
+            named |= density_parts(component, "component", f"{number}.")[1]
+        return named
 
     @classmethod
     def from_header(
@@ -152,8 +157,8 @@ class Mixture(Density, kind="mixture"):
         if not is_list(headers) or not 1 <= len(headers) <= MOST_COMPONENTS:
             raise OrbiflowError("no components, or too many")
         components = [
-            density_from(space, own, within(tensors, f"{number}."))
-            for number, own in enumerate(headers)
+            density_from(space, entry, within(tensors, f"{number}."))
+            for number, entry in enumerate(headers)
         ]
         return cls(components, tensors["weights"])
 
@@ -174,19 +179,19 @@ def mixture_of(weighted: Sequence[tuple[float, Density]]) -> Mixture:
     groups: dict[type[Density], list[tuple[float, Density]]] = {}
     for weight, density in weighted:
         groups.setdefault(type(density), []).append((weight, density))
-    found: list[tuple[float, Density]] = []
+    parts: list[tuple[float, Density]] = []
     for kind, group in groups.items():
         weights = torch.tensor([weight for weight, _ in group], dtype=torch.float64)
         joined = kind.joined([density for _, density in group], weights)
-        found += group if joined is None else [(float(weights.sum()), joined)]
-    weights = torch.tensor([weight for weight, _ in found], dtype=torch.float64)
-    return Mixture([density for _, density in found], weights / weights.sum())
+        parts += group if joined is None else [(float(weights.sum()), joined)]
+    weights = torch.tensor([weight for weight, _ in parts], dtype=torch.float64)
+    return Mixture([density for _, density in parts], weights / weights.sum())
 
 
 def _log_sum(logs: list[Tensor]) -> Tensor:
     total = logs[0]
-    for one in logs[1:]:
-        total = torch.logaddexp(total, one)
+    for more in logs[1:]:
+        total = torch.logaddexp(total, more)
     return total
 
 
@@ -233,9 +238,9 @@ class PartialDensity(Density, kind="partial"):
         )
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        given = points.new_tensor(self.split.values).expand(len(points), -1)
+        values_given = points.new_tensor(self.split.values).expand(len(points), -1)
         observed = [*(self.split.kept[axis] for axis in axes), *self.split.given]
-        values = self.whole.log_marginal(torch.cat([points, given], dim=1), observed, seed)
+        values = self.whole.log_marginal(torch.cat([points, values_given], dim=1), observed, seed)
         return values - self.log_given
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
@@ -257,13 +262,13 @@ class PartialDensity(Density, kind="partial"):
 
     def _pool(self, size: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """Return draws (size, d) of all angles, and weights (size,) of sum 1."""
-        given = dict(zip(self.split.given, self.split.values, strict=True))
-        points, logs = self.whole.draw_given(size, given, generator)
+        fixed = dict(zip(self.split.given, self.split.values, strict=True))
+        points, logs = self.whole.draw_given(size, fixed, generator)
         return points, torch.softmax(logs, dim=0)
 
     def restricted(self, split: Split, space: Space) -> Restriction:
-        own = self._split_of(split)
-        closed, left = self.whole.restricted(own, space)
+        split_of_whole = self._split_of(split)
+        closed, left = self.whole.restricted(split_of_whole, space)
         return Restriction(
             [(log - self.log_given, part) for log, part in closed],
             [(log - self.log_given, part, how) for log, part, how in left],
@@ -272,8 +277,8 @@ class PartialDensity(Density, kind="partial"):
     def approximated(
         self, split: Split, space: Space, level: int, tick: Callable[[], None]
     ) -> list[Weighted] | None:
-        found = self.whole.approximated(self._split_of(split), space, level, tick)
-        return found and [(log - self.log_given, part) for log, part in found]
+        kernels = self.whole.approximated(self._split_of(split), space, level, tick)
+        return kernels and [(log - self.log_given, part) for log, part in kernels]
 
     def _split_of(self, split: Split) -> Split:
         """Return how the whole's angles are split, if those kept here are split again."""
@@ -291,13 +296,13 @@ class PartialDensity(Density, kind="partial"):
         return new
 
     def header(self) -> dict[str, Any]:
-        kept, given = list(self.split.kept), list(self.split.given)
+        kept, fixed = list(self.split.kept), list(self.split.given)
         whole = density_parts(self.whole, "whole")[0]
         axes = self.whole.space.settings().get("axes")
-        own: dict[str, Any] = {} if axes is None else {"axes": axes}
+        space: dict[str, Any] = {} if axes is None else {"axes": axes}
         if self.whole.space.parts:
-            own = {"space": self.whole.space.settings()}
-        return {"dim": self.split.dim, "kept": kept, "given": given, "whole": whole, **own}
+            space = {"space": self.whole.space.settings()}
+        return {"dim": self.split.dim, "kept": kept, "given": fixed, "whole": whole, **space}
 
     def tensors(self) -> dict[str, Tensor]:
         values = torch.tensor(self.split.values, dtype=torch.float64)
@@ -307,16 +312,16 @@ class PartialDensity(Density, kind="partial"):
     def from_header(
         cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
     ) -> Self:
-        dim, kept, given = (header.get(name) for name in ("dim", "kept", "given"))
+        dim, kept, fixed = (header.get(name) for name in ("dim", "kept", "given"))
         values: list[float] = listed(tensors["values"].double())
-        axes = [*kept, *given] if is_list(kept) and is_list(given) else []
+        axes = [*kept, *fixed] if is_list(kept) and is_list(fixed) else []
         if not (
             type(dim) is int
             and all(type(axis) is int and 0 <= axis < dim for axis in axes)
             and len(set(axes)) == len(axes) == space.chart_dim + len(values)
             and all(map(math.isfinite, values))
         ):
-            raise OrbiflowError(f"parts {kept!r} and {given!r} of {dim!r} angles")
+            raise OrbiflowError(f"parts {kept!r} and {fixed!r} of {dim!r} angles")
         unit, lines = str(space.settings().get("unit")), header.get("axes")
         whole_space: Space = Torus(dim if lines is None else lines, unit=unit)
         if "space" in header:

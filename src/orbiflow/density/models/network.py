@@ -111,22 +111,22 @@ class VonMisesNetwork(Density, kind="network"):
         points = torch.zeros(count, self.space.dim, dtype=torch.float64)
         means, sharp, logs = points.clone(), points.clone(), points.new_zeros(count)
         for axes, chains in self.factors:
-            own = chains.to("cpu")
+            factor = chains.to("cpu")
             if axes[-1] in given:
                 points[:, axes[-1]] = given[axes[-1]]
                 logs += in_blocks(
-                    partial(log_conditional, own), points[:, list(axes)], BLOCK_POINTS
+                    partial(log_conditional, factor), points[:, list(axes)], BLOCK_POINTS
                 )
                 continue
             angle = 2 * math.pi * points[:, list(axes)]
             chosen = [angle.new_zeros(0).long()]
             for block in torch.split(points[:, list(axes)], BLOCK_POINTS):
-                shares = shares_of(_log_parents(own, block))
+                shares = shares_of(_log_parents(factor, block))
                 chosen.append(torch.multinomial(shares, 1, generator=generator)[:, 0])
             part = torch.cat(chosen)
             component, scale = part // len(SCALES), part % len(SCALES)
-            mean = (waves(angle) * own.means[component, -1]).sum(dim=1)
-            kappa = own.concentrations[component, -1] / torch.tensor(SCALES)[scale]
+            mean = (waves(angle) * factor.means[component, -1]).sum(dim=1)
+            kappa = factor.concentrations[component, -1] / torch.tensor(SCALES)[scale]
             drawn = mean + torch.tensor(rng.vonmises(0.0, kappa.numpy()))
             points[:, axes[-1]] = drawn / (2 * math.pi)
             means[:, axes[-1]], sharp[:, axes[-1]] = mean / (2 * math.pi), kappa
@@ -157,23 +157,23 @@ class VonMisesNetwork(Density, kind="network"):
         An angle is its mean given its parents and noise, of which the kernel is a part: all of it if no
         other angle depends on it. The draw keeps the rest, so that the spread is right.
         """
-        given = dict(zip(split.given, split.values, strict=True))
+        fixed = dict(zip(split.given, split.values, strict=True))
         generator = torch.Generator().manual_seed(level)
         parts: list[_Draws] = []
         for _ in range(4**level):
             tick()
-            parts.append(self._drawn(DRAWS, given, generator))
+            parts.append(self._drawn(DRAWS, fixed, generator))
         drawn = _Draws(*(torch.cat(column) for column in zip(*parts, strict=True)))
         parents = {axis for axes, _ in factors for axis in axes[:-1]}
         share = torch.tensor(
             [BANDWIDTH if axis in parents else 1.0 for axis in split.kept]
         ).double()
-        points, means, sharp = (own[:, list(split.kept)] for own in drawn[:3])
+        points, means, sharp = (column[:, list(split.kept)] for column in drawn[:3])
         noise = (points - means + 0.5) % 1 - 0.5
         centers = means + (1 - share**2).sqrt() * noise
         sharp = sharp.clamp_min(MIN_CONCENTRATION) / share**2
-        own = AdaptiveKernels(space, centers % 1, sharp, shares_of(drawn.logs))
-        return float(log_sum_exp(drawn.logs)) - math.log(len(points)), own
+        kernels = AdaptiveKernels(space, centers % 1, sharp, shares_of(drawn.logs))
+        return float(log_sum_exp(drawn.logs)) - math.log(len(points)), kernels
 
     @property
     def device(self) -> torch.device | None:
@@ -196,23 +196,23 @@ class VonMisesNetwork(Density, kind="network"):
         if not len(points):
             return points.new_zeros(0)
         factors = self._leading_to(axes)
-        hidden = [own[-1] for own, _ in factors if own[-1] not in axes]
+        hidden = [factor_axes[-1] for factor_axes, _ in factors if factor_axes[-1] not in axes]
         count = DRAWS if hidden else 1
         draws = torch.quasirandom.SobolEngine(
             max(1, 2 * len(hidden)), scramble=True, seed=seed
         ).draw(count, dtype=torch.float64)
         even = {axis: draws[:, 2 * k : 2 * k + 2] for k, axis in enumerate(hidden)}
         same: list[bool] = listed((points == points[0]).all(dim=0))
-        known = {axis: points[:1, k, None] for k, axis in enumerate(axes) if same[k]}
+        same_angles = {axis: points[:1, k, None] for k, axis in enumerate(axes) if same[k]}
         # what does not depend on the points is worked on once
-        given = dict[int, Callable[[Tensor], Tensor]]()
-        total, left = _taken(factors, known, even, given)
-        found: list[Tensor] = []
+        densities = dict[int, Callable[[Tensor], Tensor]]()
+        total, left = _taken(factors, same_angles, even, densities)
+        logs_of_blocks: list[Tensor] = []
         for block in torch.split(points, AT_ONCE // count):
             at = {axis: block[:, k, None] for k, axis in enumerate(axes) if not same[k]}
-            logs = total + _taken(left, {**known, **at}, even, given)[0]
-            found.append(log_sum_exp(logs.expand(len(block), count)) - math.log(count))
-        return torch.cat(found)
+            logs = total + _taken(left, {**same_angles, **at}, even, densities)[0]
+            logs_of_blocks.append(log_sum_exp(logs.expand(len(block), count)) - math.log(count))
+        return torch.cat(logs_of_blocks)
 
     def terms_at(self, axes: list[int]) -> int | None:
         factors = self._leading_to(axes)
@@ -223,12 +223,12 @@ class VonMisesNetwork(Density, kind="network"):
     def _leading_to(self, observed: list[int]) -> list[Factor]:
         """Return the factors of the observed angles, and of all from which arrows lead to them."""
         wanted = set(observed)
-        found: list[Factor] = []
+        leading: list[Factor] = []
         for factor in reversed(self.factors):
             if factor.axes[-1] in wanted:
                 wanted |= set(factor.axes)
-                found.append(factor)
-        return found[::-1]
+                leading.append(factor)
+        return leading[::-1]
 
     def header(self) -> dict[str, Any]:
         return {
@@ -251,13 +251,13 @@ class VonMisesNetwork(Density, kind="network"):
         if not is_list(stored) or len(stored) != space.dim or not all(map(is_object, stored)):
             raise OrbiflowError(f"a network of {space.dim} angles needs a factor for each")
         factors: list[Factor] = []
-        for own in stored:
-            axes: Any = own.get("axes")
+        for entry in stored:
+            axes: Any = entry.get("axes")
             are_axes = is_list(axes) and all(type(a) is int and 0 <= a < space.dim for a in axes)
             if not are_axes or not 0 < len(axes) <= space.dim:
                 raise OrbiflowError(f"a factor of the angles {axes!r}")
             below = within(tensors, f"{axes[-1]}.")
-            chains = VonMisesChains.from_header(Torus(len(axes)), own, below)
+            chains = VonMisesChains.from_header(Torus(len(axes)), entry, below)
             factors.append(Factor(tuple(axes), chains))
         return cls(space, factors)
 
@@ -279,8 +279,8 @@ class _Draws(NamedTuple):
 
 def log_conditional(chains: VonMisesChains, points: Tensor) -> Tensor:
     """Return log densities (N,) of the last angle given those before it, at points (N, d) of all."""
-    before, own = _terms(chains, points)
-    return log_sum_exp((before + own).flatten(1)) - log_sum_exp(before.flatten(1))
+    before, child = _terms(chains, points)
+    return log_sum_exp((before + child).flatten(1)) - log_sum_exp(before.flatten(1))
 
 
 def _terms(chains: VonMisesChains, points: Tensor) -> tuple[Tensor, Tensor]:
@@ -302,14 +302,16 @@ def _log_parents(chains: VonMisesChains, points: Tensor) -> Tensor:
 def averaged_networks(networks: Sequence[VonMisesNetwork]) -> VonMisesNetwork:
     """Return the network whose factors are the means of those of networks with the same arrows."""
     first = networks[0]
-    if len({tuple(axes for axes, _ in one.factors) for one in networks}) > 1:
+    if len({tuple(axes for axes, _ in network.factors) for network in networks}) > 1:
         raise OrbiflowError("networks with other arrows have no common mean")
     even = torch.ones(len(networks), dtype=torch.float64)
-    columns = zip(*(one.factors for one in networks), strict=True)
+    columns = zip(*(network.factors for network in networks), strict=True)
     return VonMisesNetwork(
         first.space,
         [
-            Factor(column[0].axes, VonMisesChains.joined([own.chains for own in column], even))
+            Factor(
+                column[0].axes, VonMisesChains.joined([factor.chains for factor in column], even)
+            )
             for column in columns
         ],
     )
@@ -328,10 +330,12 @@ def _given_parents(
     means = (wave @ chains.means[:, -1].mT).repeat_interleave(len(SCALES), dim=1)
 
     def log_prob(angle: Tensor) -> Tensor:
-        own, place = unique(angle[:, 0], return_inverse=True)  # equal ones are evaluated once
-        rows = torch.split(2 * math.pi * own[:, None, None], max(1, BLOCK_ENTRIES // logs.numel()))
-        found = [log_sum_exp((r - means).cos_().sub_(1).mul_(kappa).add_(logs)) for r in rows]
-        return torch.cat(found)[place]
+        distinct, place = unique(angle[:, 0], return_inverse=True)  # equal ones are evaluated once
+        rows = torch.split(
+            2 * math.pi * distinct[:, None, None], max(1, BLOCK_ENTRIES // logs.numel())
+        )
+        values = [log_sum_exp((r - means).cos_().sub_(1).mul_(kappa).add_(logs)) for r in rows]
+        return torch.cat(values)[place]
 
     return log_prob
 
@@ -369,10 +373,10 @@ def _along(
     function: Callable[[Tensor], Tensor], axes: tuple[int, ...], at: dict[int, Tensor]
 ) -> Tensor:
     """Return a function of points (R, len(axes)) at angles whose shapes broadcast, in their shape."""
-    own = broadcast(*[at[axis] for axis in axes])
-    rows = torch.stack(own, dim=-1).flatten(0, 1)
+    angles = broadcast(*[at[axis] for axis in axes])
+    rows = torch.stack(angles, dim=-1).flatten(0, 1)
     value = torch.cat([function(block) for block in torch.split(rows, BLOCK_ROWS)])
-    return value.reshape(*own[0].shape, *value.shape[1:])
+    return value.reshape(*angles[0].shape, *value.shape[1:])
 
 
 def _drawn_at(

@@ -58,12 +58,14 @@ class NeuralMixture(ConditionalPart):
         first, first_bias, second, second_bias, last, last_bias = self.layers
         hidden = silu(x @ first + first_bias)
         hidden = silu(hidden @ second + second_bias)
-        found = torch.unflatten(hidden @ last + last_bias, -1, (-1, outputs_per_kernel(self.space)))
+        outputs = torch.unflatten(
+            hidden @ last + last_bias, -1, (-1, outputs_per_kernel(self.space))
+        )
         width = len(self.space.spheres)
-        centers, kappa = found[..., : -width - 1], found[..., -width - 1 : -1]
+        centers, kappa = outputs[..., : -width - 1], outputs[..., -width - 1 : -1]
         low, high = (math.log(kappa) for kappa in KAPPAS)
         kappa = (math.log(FIRST_KAPPA) + kappa).clamp(low, high).exp()
-        return _on_spheres(self.space, centers), kappa, torch.log_softmax(found[..., -1], dim=-1)
+        return _on_spheres(self.space, centers), kappa, torch.log_softmax(outputs[..., -1], dim=-1)
 
     def logs(self, features: Tensor, x: Tensor) -> Tensor:
         """Return log densities (F, N) as kernels have them.
@@ -79,17 +81,17 @@ class NeuralMixture(ConditionalPart):
 
     @torch.no_grad()
     def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
-        found: list[Tensor] = []
-        for some, own in zip(
+        logs_of_blocks: list[Tensor] = []
+        for some, features in zip(
             torch.split(points, BLOCK_ROWS), torch.split(x, BLOCK_ROWS), strict=True
         ):
-            logs = self.logs(self.space.features(some)[:, None], own[None])
-            found.append(logs.logsumexp(dim=0) - math.log(len(logs)))
-        return on_chart(self.space, points, torch.cat(found))
+            logs = self.logs(self.space.features(some)[:, None], features[None])
+            logs_of_blocks.append(logs.logsumexp(dim=0) - math.log(len(logs)))
+        return on_chart(self.space, points, torch.cat(logs_of_blocks))
 
     @torch.no_grad()
     def at(self, x: Tensor) -> AdaptiveKernels:
-        centers, kappa, weights = (own[:, 0] for own in self.kernels(x[None, None]))
+        centers, kappa, weights = (tensor[:, 0] for tensor in self.kernels(x[None, None]))
         points = self.space.lifted(centers.flatten(0, 1))
         shares = torch.softmax(weights.flatten(), dim=0)
         return AdaptiveKernels(self.space, points, kappa.flatten(0, 1), shares)
@@ -102,7 +104,7 @@ class NeuralMixture(ConditionalPart):
 
     def alone(self, first: int, count: int = 1) -> NeuralMixture:
         """Return some of the F mixtures."""
-        return NeuralMixture(self.space, [own[first : first + count] for own in self.layers])
+        return NeuralMixture(self.space, [layer[first : first + count] for layer in self.layers])
 
     def tensors(self) -> dict[str, Tensor]:
         return dict(zip(LAYERS, self.layers, strict=True))
@@ -132,8 +134,8 @@ def outputs_per_kernel(space: Space) -> int:
 def _on_spheres(space: Space, vectors: Tensor) -> Tensor:
     """Return features (..., p) of the points in the directions of vectors, sphere by sphere."""
     table = by_sphere(vectors, len(space.spheres))
-    own = torch.tensor(space.spheres)
+    dims = torch.tensor(space.spheres)
     if len(set(space.spheres)) > 1:  # smaller spheres have fewer coordinates
-        table = table * (torch.arange(table.shape[-2])[:, None] <= own)
+        table = table * (torch.arange(table.shape[-2])[:, None] <= dims)
     squares = (table * table).sum(dim=-2, keepdim=True)  # torch's norms are ten times slower
     return (table * (squares + LEAST_SQUARE).rsqrt()).flatten(-2)

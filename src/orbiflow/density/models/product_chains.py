@@ -72,8 +72,10 @@ class ProductChains(Density, kind="product-chains"):
                 f"such chains are for spaces beside at most {MOST_BESIDE} columns, not the {space.name}"
             )
         self.base, self.beside = space.base, space.beside
-        given = (weights, centers, sharpness, slopes, concentrations)
-        tensors = [as_tensor(t, n).double() for n, t in zip(self.stored, given, strict=True)]
+        tensors_given = (weights, centers, sharpness, slopes, concentrations)
+        tensors = [
+            as_tensor(t, n).double() for n, t in zip(self.stored, tensors_given, strict=True)
+        ]
         count, k = len(tensors[0]) if tensors[0].dim() else 0, space.beside.dim
         width = (1 + self.base.spheres[0]) * len(self.base.spheres)
         shapes = ((count,), (count, k), (count, k), (count, 1 + 2 * k, width))
@@ -99,8 +101,8 @@ class ProductChains(Density, kind="product-chains"):
 
     def log_each(self, points: Tensor) -> Tensor:
         """Return the log density (N, K) of each component with its weight, as `log_density` has it."""
-        own, more = self._split(points)
-        return self._log_base(own, more) + self._log_beside(more) + self.weights.log()
+        places, more = self._split(points)
+        return self._log_base(places, more) + self._log_beside(more) + self.weights.log()
 
     def _split(self, points: Tensor) -> tuple[Tensor, Tensor]:
         return points[..., : self.base.chart_dim], points[..., self.base.chart_dim :]
@@ -115,8 +117,8 @@ class ProductChains(Density, kind="product-chains"):
 
     def means(self, turns: Tensor) -> Tensor:
         """Return the features (N, K, p, F) of the middles on the base at other columns (N, k)."""
-        found = torch.einsum("nl,klm->nkm", waves(2 * math.pi * turns), self.slopes)
-        return _directions(found, len(self.base.spheres))
+        sums = torch.einsum("nl,klm->nkm", waves(2 * math.pi * turns), self.slopes)
+        return _directions(sums, len(self.base.spheres))
 
     def _log_base(self, own: Tensor, turns: Tensor) -> Tensor:
         return self._images(self.base.features(own), turns)[0].logsumexp(dim=0)
@@ -152,8 +154,8 @@ class ProductChains(Density, kind="product-chains"):
         turns = self.centers[chosen] + noise / (2 * math.pi)
         for axis, value in given.items():
             turns[:, axis] = value
-        own = torch.einsum("nl,nlm->nm", waves(2 * math.pi * turns), self.slopes[chosen])
-        middle = _directions(own, len(self.base.spheres))
+        sums = torch.einsum("nl,nlm->nm", waves(2 * math.pi * turns), self.slopes[chosen])
+        middle = _directions(sums, len(self.base.spheres))
         places = self.base.lifted(middle.flatten(1))
         drawn = drawn_about(self.base, places, self.concentrations[chosen], rng)
         return torch.cat([drawn, self.beside.project(turns)], dim=1)
@@ -169,10 +171,10 @@ class ProductChains(Density, kind="product-chains"):
         logs = points.new_zeros(count)
         if len(lines) < len(given):  # the point of the base: weighed by how likely it is there
             points[:, :chart] = points.new_tensor([given[axis] for axis in range(chart)])
-            own, turns = self._split(points)
-            table = self._log_base(own, turns) + self._log_beside(turns) + self.weights.log()
+            places, turns = self._split(points)
+            table = self._log_base(places, turns) + self._log_beside(turns) + self.weights.log()
             logs = log_sum_exp(table) - log_sum_exp(self._log_beside(turns) + self.weights.log())
-            logs += self.base.log_kernel_factor(own, CHART)
+            logs += self.base.log_kernel_factor(places, CHART)
         if lines:
             at = points[:1, [chart + axis for axis in lines]]
             logs += log_sum_exp(self._log_beside(at, [*lines]) + self.weights.log())
@@ -182,9 +184,11 @@ class ProductChains(Density, kind="product-chains"):
     def joined(cls, components: Sequence[Any], weights: Tensor) -> Self:
         """Return all chains of several densities on one space, in proportions (P,)."""
         shares = weights.double() / weights.sum()
-        tensors = [torch.cat([getattr(own, name) for own in components]) for name in cls.stored[1:]]
-        own = [share * one.weights for share, one in zip(shares, components, strict=True)]
-        return cls(components[0].space, torch.cat(own), *tensors)
+        tensors = [
+            torch.cat([getattr(part, name) for part in components]) for name in cls.stored[1:]
+        ]
+        of_each = [share * part.weights for share, part in zip(shares, components, strict=True)]
+        return cls(components[0].space, torch.cat(of_each), *tensors)
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         del seed
@@ -200,21 +204,21 @@ class ProductChains(Density, kind="product-chains"):
         if any(axis < chart for axis in split.given):
             return Restriction([], [(0.0, self, split)])
         kept = [axis - chart for axis in split.kept if axis >= chart]
-        known = [axis - chart for axis in split.given]
+        fixed = [axis - chart for axis in split.given]
         weights, log = self.weights, 0.0
         turns = torch.tensor([split.values], dtype=torch.float64)
-        if known:
-            logs = (self._log_beside(turns, known) + weights.log())[0]
+        if fixed:
+            logs = (self._log_beside(turns, fixed) + weights.log())[0]
             log, weights = float(log_sum_exp(logs)), shares_of(logs)
         if min(split.kept) >= chart:  # the other columns alone
-            own = (self.centers[:, kept], self.sharpness[:, kept], weights)
-            return Restriction([(log, AdaptiveKernels(space, *own))], [])
-        constant = self.slopes[:, :1] + self._part_of(known, turns.expand(len(weights), 1, -1))
-        hidden = [k for k in range(self.beside.dim) if k not in kept and k not in known]
+            kernels = (self.centers[:, kept], self.sharpness[:, kept], weights)
+            return Restriction([(log, AdaptiveKernels(space, *kernels))], [])
+        constant = self.slopes[:, :1] + self._part_of(fixed, turns.expand(len(weights), 1, -1))
+        hidden = [k for k in range(self.beside.dim) if k not in kept and k not in fixed]
         every = torch.arange(len(weights))
         if hidden:
             places, shares = self._nodes(hidden)
-            every = every.repeat_interleave(torch.tensor([len(own) for own in shares]))
+            every = every.repeat_interleave(torch.tensor([len(kernels) for kernels in shares]))
             weights = weights[every] * torch.cat(shares)
             at = torch.cat(places)[:, None]
             constant = constant[every] + self._part_of(hidden, at, every)
@@ -243,10 +247,10 @@ class ProductChains(Density, kind="product-chains"):
         masses: list[Tensor] = []
         reach = (WINDOW / self.sharpness.sqrt() / (2 * math.pi)).clamp_max(0.5)
         counts = torch.stack([self._count(k, reach[:, k]) for k in hidden], dim=1)
-        for number, own in enumerate(counts):
-            size = (MOST_NODES / float(own.prod())) ** (1 / len(hidden))
+        for number, count_of_columns in enumerate(counts):
+            size = (MOST_NODES / float(count_of_columns.prod())) ** (1 / len(hidden))
             lines: list[Tensor] = []
-            for k, count in zip(hidden, listed(own), strict=True):
+            for k, count in zip(hidden, listed(count_of_columns), strict=True):
                 n = max(2, math.ceil(min(1.0, size) * count))
                 even = (torch.arange(n, dtype=torch.float64) + 0.5) / n - 0.5
                 lines.append(self.centers[number, k] + 2 * reach[number, k] * even)
@@ -271,5 +275,5 @@ class ProductChains(Density, kind="product-chains"):
 
 def _directions(sums: Tensor, spheres: int) -> Tensor:
     """Return unit vectors (..., p, F) of sums (..., m) on each sphere."""
-    found = by_sphere(sums, spheres)
-    return found / linalg.vector_norm(found, dim=-2, keepdim=True).clamp_min(1e-300)
+    vectors = by_sphere(sums, spheres)
+    return vectors / linalg.vector_norm(vectors, dim=-2, keepdim=True).clamp_min(1e-300)

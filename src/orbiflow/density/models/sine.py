@@ -68,11 +68,11 @@ class VonMisesSine(Density, kind="von-mises-sine"):
 
     def __init__(self, space: Space, means: Tensor, shape: Tensor) -> None:
         super().__init__(space)
-        given = [as_tensor(means, "means").detach(), as_tensor(shape, "shape").detach()]
-        self.means, self.shape = (one.double() for one in given)
+        parameters = [as_tensor(means, "means").detach(), as_tensor(shape, "shape").detach()]
+        self.means, self.shape = (parameter.double() for parameter in parameters)
         if not space.is_of_angles or space.dim != 2:
             raise OrbiflowError("a density with sines is for a torus of two angles")
-        finite = all(bool(one.isfinite().all()) for one in (self.means, self.shape))
+        finite = all(bool(parameter.isfinite().all()) for parameter in (self.means, self.shape))
         if self.means.shape != (2,) or self.shape.shape != (3,) or not finite:
             raise OrbiflowError(
                 "a density with sines has two finite means and three shape parameters"
@@ -107,11 +107,11 @@ class VonMisesSine(Density, kind="von-mises-sine"):
         """Keep an angle's von Mises density where the other is given."""
         if not split.given or len(split.kept) != 1:
             return Restriction([], [(0.0, self, split)])
-        (kept,), (given,) = split.kept, split.given
+        (kept,), (fixed,) = split.kept, split.given
         at = torch.tensor([split.values], dtype=torch.float64)
-        center, kappa = self._given(kept, 2 * math.pi * (at[:, 0] - self.means[given]))
-        own = AdaptiveKernels(space, space.project(center), kappa, torch.ones(1))
-        return Restriction([(float(self.log_marginal(at, [given])), own)], [])
+        center, kappa = self._given(kept, 2 * math.pi * (at[:, 0] - self.means[fixed]))
+        kernel = AdaptiveKernels(space, space.project(center), kappa, torch.ones(1))
+        return Restriction([(float(self.log_marginal(at, [fixed])), kernel)], [])
 
     def _given(self, kept: int, angle: Tensor) -> tuple[Tensor, Tensor]:
         """Return the mean (N, 1) in turns and concentration (N, 1) of one angle, given the other."""
@@ -134,16 +134,16 @@ class VonMisesSine(Density, kind="von-mises-sine"):
         In a cell the sine's square and the cosine are between their values at its ends.
         """
         ends = torch.linspace(0, 2 * math.pi, CELLS + 1, dtype=torch.float64)
-        own, other, depends = self.shape.cpu()
+        first, other, depends = self.shape.cpu()
         sines, cosines = ends.sin().abs(), other * ends.cos()
-        highest = _log_over_first(own, depends, torch.maximum(sines[1:], sines[:-1]))
+        highest = _log_over_first(first, depends, torch.maximum(sines[1:], sines[:-1]))
         tops = (highest + torch.maximum(cosines[1:], cosines[:-1])).numpy()
         shares = np.exp(tops - tops.max())
-        found: list[Array] = []
-        while (left := count - sum(map(len, found))) > 0:
+        accepted: list[Array] = []
+        while (left := count - sum(map(len, accepted))) > 0:
             cells = rng.choice(CELLS, 2 * left + 16, p=shares / shares.sum())
             tried = 2 * np.pi * (cells + rng.uniform(size=len(cells))) / CELLS
             at = torch.tensor(tried)
-            logs = (_log_over_first(own, depends, at.sin()) + other * at.cos()).numpy()
-            found.append(tried[np.log(rng.uniform(size=len(tried))) < logs - tops[cells]])
-        return np.concatenate(found)[:count]
+            logs = (_log_over_first(first, depends, at.sin()) + other * at.cos()).numpy()
+            accepted.append(tried[np.log(rng.uniform(size=len(tried))) < logs - tops[cells]])
+        return np.concatenate(accepted)[:count]

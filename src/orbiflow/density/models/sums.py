@@ -126,12 +126,12 @@ class Terms(NamedTuple):
             values.append(total.log2() + high)
             if slope:
                 slopes.append(rows @ table.mT / total)
-        found = torch.cat(values).div_(LOG2_E).add_(top)
+        logs = torch.cat(values).div_(LOG2_E).add_(top)
         if not slope:
-            return found, None
+            return logs, None
         linear, square = torch.split(torch.cat(slopes, dim=1), [len(middle), self.factors])
         repeated = square.repeat(len(middle) // self.factors, 1)
-        return found, linear + 2 * repeated * offset
+        return logs, linear + 2 * repeated * offset
 
     def sharp(self, radius: Tensor) -> Tensor:
         """Return which terms (K,) are too sharp for `log_sum` at this distance (F,) from its middle."""
@@ -179,13 +179,13 @@ class Terms(NamedTuple):
 
         Exponents are linear in offsets and their squares.
         """
-        own, half = self.centers - middle[:, None], self.kappa / 2
-        bias = self.peaks - (half * lengths2(own, self.factors)).sum(dim=0)
+        offsets_of_centers, half = self.centers - middle[:, None], self.kappa / 2
+        bias = self.peaks - (half * lengths2(offsets_of_centers, self.factors)).sum(dim=0)
         repeated = self.kappa.repeat(len(middle) // self.factors, 1)
         offset = features - middle[:, None]
         seen = torch.cat([offset, lengths2(offset, self.factors)])
         parts = torch.split(seen, max(1, BLOCK_ENTRIES // self.size), dim=1)
-        return torch.cat([repeated * own, -half]), bias, offset, parts
+        return torch.cat([repeated * offsets_of_centers, -half]), bias, offset, parts
 
 
 def lengths2(offset: Tensor, factors: int) -> Tensor:
@@ -246,8 +246,8 @@ class _NearLogSum(torch.autograd.Function):
         # second derivatives were asked for: let autograd have them
         view: Tensor = features.view_as(features)
         plain = ctx.terms.plain_log_sum(view)
-        (found,) = torch.autograd.grad(plain, view, gradients[0], create_graph=True)
-        return found, None, None
+        (second,) = torch.autograd.grad(plain, view, gradients[0], create_graph=True)
+        return second, None, None
 
 
 class FeatureBox:
@@ -301,13 +301,13 @@ class _Walk:
 
         `idle` is how many times in a row hardly any term has been left out.
         """
-        tile, count, given = FeatureBox(features, terms.factors), len(at), terms.size
+        tile, count, before = FeatureBox(features, terms.factors), len(at), terms.size
         least, largest = tile.bounds(terms)
         bottom = float(np.logaddexp(self.floor, float(log_sum_exp(least))))
-        far = largest < bottom + LOG_TOLERANCE - math.log(given)
+        far = largest < bottom + LOG_TOLERANCE - math.log(before)
         if bool(far.any()):
             terms = terms.only(~far)
-        idle = 0 if terms.size < LESS_SHARE * given else idle + 1
+        idle = 0 if terms.size < LESS_SHARE * before else idle + 1
         if count > FEW_POINTS and count * terms.size > FEW_PAIRS and idle <= MAX_IDLE_HALVINGS:
             # halves across the longest side; a gather is four times as fast as an index
             along = features[int(tile.sides.argmax())].numpy()

@@ -28,17 +28,17 @@ def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
     """
     device: torch.device | None = None
     dtype: torch.dtype | None = None
-    for one in wanted:
-        if isinstance(one, torch.dtype):
-            dtype = one
-        elif isinstance(one, Tensor):
-            device, dtype = one.device, one.dtype
-        elif one is not None:
+    for place in wanted:
+        if isinstance(place, torch.dtype):
+            dtype = place
+        elif isinstance(place, Tensor):
+            device, dtype = place.device, place.dtype
+        elif place is not None:
             try:
-                device = torch.device(one)
+                device = torch.device(place)
             except (RuntimeError, TypeError) as error:
                 raise OrbiflowError(
-                    f"expected a device or a dtype, such as 'cuda' or torch.float32, got {one!r}"
+                    f"expected a device or a dtype, such as 'cuda' or torch.float32, got {place!r}"
                 ) from error
     if dtype is not None and not dtype.is_floating_point:
         raise OrbiflowError(f"a density is evaluated in floating-point numbers, not in {dtype}")

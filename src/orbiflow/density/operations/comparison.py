@@ -83,8 +83,10 @@ def compare(
             )
             notes += _notes_on_known_rows(name, model, rows.values)
         assert rows is not None
-        found = comparing.compare_scores(scores, settings, groups=rows.labels, weights=rows.weights)
-    return _shown(replace(found, notes=(*notes, *found.notes)), out, on_event, cancel)
+        answer = comparing.compare_scores(
+            scores, settings, groups=rows.labels, weights=rows.weights
+        )
+    return _shown(replace(answer, notes=(*notes, *answer.notes)), out, on_event, cancel)
 
 
 @runtime.operation("density compare-data")
@@ -109,8 +111,8 @@ def compare_data(
     samples, space = _samples(data, None, where, table, out, on_event)
     progress = runtime.progress_events(on_event, cancel)
     with runtime.one_thread():
-        found = comparing.compare_samples(samples, space, settings, progress=progress)
-    return _shown(found, out, on_event, cancel)
+        answer = comparing.compare_samples(samples, space, settings, progress=progress)
+    return _shown(answer, out, on_event, cancel)
 
 
 @runtime.operation("density test")
@@ -138,8 +140,8 @@ def sample_tests(
         raise SettingError("{by} divides the rows of one {data}: give one table, or leave it out")
     samples, space = _samples(data, by, where, table, out, on_event)
     with runtime.one_thread():
-        found = comparing.named_tests(samples, space, settings)
-    return _shown(found, out, on_event, cancel)
+        answer = comparing.named_tests(samples, space, settings)
+    return _shown(answer, out, on_event, cancel)
 
 
 def _shown(
@@ -167,9 +169,9 @@ def _samples(
         raise SettingError("{data} names one file twice: give two data sets")
     if out is not None:
         runtime.check_output_file(out, *data)
-    given = () if by is None else (by,)
+    side = () if by is None else (by,)
     samples = {
-        name: tables.read_rows(path, table, tell, where=where, given=given)
+        name: tables.read_rows(path, table, tell, where=where, given=side)
         for name, path in zip(_names(data), data, strict=True)
     }
     first = next(iter(samples.values()))
@@ -220,17 +222,17 @@ def _notes_on_known_rows(name: str, model: SavedDensity, values: Array) -> list[
             "is one"
         ]
     sketch = runtime.from_json(comparing.RowSketch, model.extra["fitted_rows"], "fitted_rows")
-    known, looked_up = sketch.known(model.density.space, values)
+    count, looked_up = sketch.known(model.density.space, values)
     note = (
-        f"{known} of {looked_up} rows that were looked up equal one that {name} was fitted to: "
+        f"{count} of {looked_up} rows that were looked up equal one that {name} was fitted to: "
         "repeated values, or the same rows"
     )
-    if looked_up >= MIN_LOOKED_UP and known >= FITTED_SHARE * looked_up:
+    if looked_up >= MIN_LOOKED_UP and count >= FITTED_SHARE * looked_up:
         note = (
-            f"WARNING: {name} seems to have been fitted to these rows ({known} of {looked_up} that "
+            f"WARNING: {name} seems to have been fitted to these rows ({count} of {looked_up} that "
             "were looked up): a model's score at rows that it has seen says little; compare at others"
         )
-    return [note] if known else []
+    return [note] if count else []
 
 
 def _names(paths: Sequence[Path]) -> list[str]:

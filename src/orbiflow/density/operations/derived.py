@@ -84,14 +84,14 @@ class Partial:
                 names, axes = self._chosen(numbers)
                 whole = inference.marginal(density, axes)
             return self._write(whole, list(names), {"given": dict(saved.at)})
-        given = saved.axes([name for name, _ in pairs], tell)
-        values = [(axis, value) for axis, (_, value) in zip(given, pairs, strict=True)]
+        fixed = saved.axes([name for name, _ in pairs], tell)
+        values = [(axis, value) for axis, (_, value) in zip(fixed, pairs, strict=True)]
         conditions = {names[axis]: value for axis, value in values}
         chart = inference.given_named(density.space, values, names)
-        numbers = [axis for axis in range(len(names)) if axis not in given]
+        numbers = [axis for axis in range(len(names)) if axis not in fixed]
         if columns is not None:
             numbers = saved.axes(columns, tell)
-            if both := [names[axis] for axis in numbers if axis in given]:
+            if both := [names[axis] for axis in numbers if axis in fixed]:
                 raise SettingError(
                     literal(repr(both[0]))
                     + " is both among {columns} and {at}; name it in one of them"

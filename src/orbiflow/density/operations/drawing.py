@@ -67,8 +67,8 @@ def plot(
     if data is not None:
         points = saved.rows(data, table, on_event).values
 
-    told = runtime.progress_events(on_event, cancel)
-    plotted = pictures.plot_density(saved.density, out, settings, data=points, told=told)
+    progress = runtime.progress_events(on_event, cancel)
+    plotted = pictures.plot_density(saved.density, out, settings, data=points, told=progress)
     captions = plotted.captions if single or settings.sheet.printed else ()
     for path in plotted.files:
         on_event(runtime.Written(path))
@@ -131,17 +131,17 @@ def region(
         levels = regions.DensityLevels(
             density, samples=samples, seed=settings.seed, smooth=settings.smooth
         )
-        found = [levels.highest(mass) for mass in settings.masses]
-        found += [levels.above(level) for level in settings.level or ()]
-        shown: Sequence[DensityRegion] = found
+        thresholds = [levels.highest(mass) for mass in settings.masses]
+        thresholds += [levels.above(level) for level in settings.level or ()]
+        shown: Sequence[DensityRegion] = thresholds
         if space.is_surface:
             shown = regions.outlines(
-                levels, found, budget=settings.budget, seed=settings.seed, min_mass=settings.min_mass,
-                told=lambda share, what: progress(0.1 + 0.9 * share, what),
+                levels, thresholds, budget=settings.budget, seed=settings.seed,
+                min_mass=settings.min_mass, told=lambda share, what: progress(0.1 + 0.9 * share, what),
             )  # fmt: skip
     answer = regions.DensityRegions.of(shown, samples, settings.seed)
     runtime.emit(answer, on_event, cancel, out)
-    return runtime.Outcome({"file": str(out), "regions": runtime.to_json(found)})
+    return runtime.Outcome({"file": str(out), "regions": runtime.to_json(thresholds)})
 
 
 def _require_format(out: Path, kind: str, space: Space) -> None:

@@ -65,15 +65,15 @@ def fit(
     begin = time.perf_counter()
     _check(density, reading)
     with runtime.one_thread():
-        asked = _asked_columns(given, reading)
+        covariates = _asked_columns(given, reading)
         rows = tables.read_rows(
-            data, reading, on_event, where=density, given=[str(name) for name in asked]
+            data, reading, on_event, where=density, given=[str(name) for name in covariates]
         )
         values = rows.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
         on_event(runtime.Note(f"columns: {rows.declaration}"))
-        roles = _given_roles(rows, asked, density.unit, on_event) if given else None
+        roles = _given_roles(rows, covariates, density.unit, on_event) if given else None
         estimator = fit_rows(rows, density, reading, on_event, cancel, roles)
         document = _document(
             estimator, rows, {**density.values(), **reading.values()}, density.seed
@@ -135,8 +135,8 @@ def _given_roles(
 def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> str | Space:
     """Return the space of columns, if settings tell it, otherwise its name: data tell the rest."""
     if (form := where.rotation_form(names)) is not None:
-        own = {"symmetry": where.crystal, "specimen": where.specimen, "passive": where.passive}
-        return spaces.make_space(where.space, form=form, unit=unit or "radians", **own)
+        options = {"symmetry": where.crystal, "specimen": where.specimen, "passive": where.passive}
+        return spaces.make_space(where.space, form=form, unit=unit or "radians", **options)
     if not where.cell:
         return where.space
     return spaces.make_space(where.space, cell=where.cell, fractional=where.fractional)
@@ -144,8 +144,8 @@ def space_of(where: SpaceSettings, names: Sequence[str], unit: str | None) -> st
 
 def columns_of(where: SpaceSettings, rows: TableRows, seed: int = 0) -> spaces.DataColumns:
     """Return what settings and names say of the space of a table's rows."""
-    own = rows.own_names
-    return spaces.DataColumns(space_of(where, own, rows.unit), seed=seed)
+    names = rows.own_names
+    return spaces.DataColumns(space_of(where, names, rows.unit), seed=seed)
 
 
 def fit_rows(
@@ -162,16 +162,16 @@ def fit_rows(
     """
     from orbiflow.density.estimator import DensityEstimator
 
-    own: dict[str, Any] = {
+    parameters: dict[str, Any] = {
         name: getattr(density, name)
         for name in (entry.name for entry in fields_of(DensitySettings))
         if name in density.fields_given
     }
-    own |= {"space": columns_of(density, rows).space, "missing": reading.kept_missing}
+    parameters |= {"space": columns_of(density, rows).space, "missing": reading.kept_missing}
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # notes say the same
-        return DensityEstimator(**own).fit(rows, given=given, progress=progress)
+        return DensityEstimator(**parameters).fit(rows, given=given, progress=progress)
 
 
 def _check(density: FitSettings, reading: RowSettings) -> None:
@@ -273,10 +273,10 @@ def batch(
         match: Only files whose names fit a pattern, such as "*.csv".
     """
     _check(density, reading)
-    given = {**density.to_json(), **reading.to_json(), "picture": True}
+    arguments = {**density.to_json(), **reading.to_json(), "picture": True}
 
     def call_of(name: str, _results: str) -> runtime.Call:
-        return runtime.find("density fit").call({**given, "data": name, "out": "out"})
+        return runtime.find("density fit").call({**arguments, "data": name, "out": "out"})
 
     sheet = ContactSheet(DENSITIES, f"Densities of {folder.name or 'a folder'}")
     return run_files(folder, out, sheet, call_of, match, work, on_event, cancel)

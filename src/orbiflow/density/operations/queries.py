@@ -169,12 +169,12 @@ def score_given(
     """Return log densities (N,) of rows, each where its covariates are, as `score_rows`."""
     from orbiflow.density import inference
 
-    given = density.given
-    assert given is not None
-    cells = dict(zip(given.covariates.names, rows.given.values(), strict=True))
+    conditional_density = density.given
+    assert conditional_density is not None
+    cells = dict(zip(conditional_density.covariates.names, rows.given.values(), strict=True))
     try:
-        x = given.covariates.features(cells)
-        doubts = given.covariates.doubts(cells)
+        x = conditional_density.covariates.features(cells)
+        doubts = conditional_density.covariates.doubts(cells)
     except OrbiflowError as error:
         text = f"{rows.source.where}{error}; leave such rows out, or score without what is given"
         raise InputFileError(text) from error
@@ -183,7 +183,7 @@ def score_given(
     points = inference.chart_of_rows(density.space, rows.values, may_lack=False)
 
     def score_block(some: slice) -> Tensor:
-        return given.log_prob(points[some], x[some], measure=settings.measure)
+        return conditional_density.log_prob(points[some], x[some], measure=settings.measure)
 
     logs = _in_blocks(score_block, len(points), BLOCK_GIVEN, progress)
     mean = mean_of_whole(logs, rows.weights, rows.whole)

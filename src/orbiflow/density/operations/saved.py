@@ -62,17 +62,21 @@ class SavedDensity:
 
     def split(self, texts: Sequence[str], tell: Sink) -> tuple[SavedDensity, list[str]]:
         """Return the density where covariates are as texts say, and the texts of other columns."""
-        given = self.density.given
-        names = [] if given is None else [name.casefold() for name in given.covariates.names]
+        conditional = self.density.given
+        names = (
+            []
+            if conditional is None
+            else [name.casefold() for name in conditional.covariates.names]
+        )
         pairs = [pair for text in texts if (pair := pair_of(text))[0].casefold() in names]
         others = [text for text in texts if pair_of(text)[0].casefold() not in names]
-        if given is None or not pairs:
+        if conditional is None or not pairs:
             return self, others
-        cells = values_of(given, pairs)
-        for doubt in given.covariates.doubts(cells):
+        cells = values_of(conditional, pairs)
+        for doubt in conditional.covariates.doubts(cells):
             tell(Note(f"WARNING: {doubt}"))
         at = {name: cell[0].item() for name, cell in cells.items()}
-        return replace(self, density=given.at(cells), at=at), others
+        return replace(self, density=conditional.at(cells), at=at), others
 
     def rows(
         self, path: Path, reading: tables.TableSettings, tell: Sink, given: Sequence[str] = ()
@@ -123,14 +127,14 @@ class SavedDensity:
         Raises `SettingError` if some of them are, and others are not, and for other roles than the
         fit's.
         """
-        given = self.density.given
+        conditional = self.density.given
         fitted: dict[str, Covariate] = {}
-        if given is not None:
-            fitted = {column.name.casefold(): column for column in given.covariates.columns}
+        if conditional is not None:
+            fitted = {column.name.casefold(): column for column in conditional.covariates.columns}
         roles = {str(name).casefold(): role for name, role in data.asked_roles(declared).items()}
-        if given is None or not roles.keys() & fitted.keys():
+        if conditional is None or not roles.keys() & fitted.keys():
             return []
-        names = given.covariates.names
+        names = conditional.covariates.names
         if roles.keys() != fitted.keys():
             raise SettingError(
                 "{given} must name all covariates of the fit, " + literal(", ".join(names))

@@ -79,11 +79,11 @@ def trend(
     with runtime.one_thread():
         progress = runtime.progress_events(on_event, cancel)
         saved = SavedDensity.read(model)
-        given = saved.density.given
-        names = [] if given is None else given.covariates.names
+        conditional = saved.density.given
+        names = [] if conditional is None else conditional.covariates.names
         name = next((name for name in names if name.casefold() == along.casefold()), None)
-        if given is not None and name is not None:
-            drawn = _along_covariate(given, saved, of, name, settings, progress, on_event)
+        if conditional is not None and name is not None:
+            drawn = _along_covariate(conditional, saved, of, name, settings, progress, on_event)
         elif settings.at:
             raise SettingError("{at} is for trends along a covariate of the fit; leave it out")
         else:
@@ -148,12 +148,12 @@ def _along_column(
     called = names[first], names[second]
     density, first, second = inference.pair_alone(saved.density, first, second, len(names))
     at = _values(density, second, settings)
-    found = inference.trend(
+    column_trend = inference.trend(
         density, first, second, at, levels=settings.levels,
         tick=lambda share: progress(0.9 * share, "finding conditional densities"),
     )  # fmt: skip
     space = inference.check_torus(density.space, "trends").of_axes([first, second])
-    return TrendAnswer({"": found}, called, space)
+    return TrendAnswer({"": column_trend}, called, space)
 
 
 def _along_covariate(
@@ -210,15 +210,15 @@ def _others(
     if along.casefold() in said:
         raise SettingError("{at} and {along} " + literal(f"both name {along!r}"))
     apart, beside, panels = [along], "", ("",)
-    for own in density.covariates.columns:
-        if own.name == along or own.name.casefold() in said:
+    for column in density.covariates.columns:
+        if column.name == along or column.name.casefold() in said:
             continue
-        if own.line is not None:
-            pairs.append((own.name, f"{own.line.middle:.6g}"))
-            tell(runtime.Note(f"{own.name} is held at its median, {own.line.middle:.6g}"))
-        elif own.words and not beside and len(own.words) <= MOST_PANELS:
-            beside, panels = own.name, own.words
-            apart.append(own.name)
+        if column.line is not None:
+            pairs.append((column.name, f"{column.line.middle:.6g}"))
+            tell(runtime.Note(f"{column.name} is held at its median, {column.line.middle:.6g}"))
+        elif column.words and not beside and len(column.words) <= MOST_PANELS:
+            beside, panels = column.name, column.words
+            apart.append(column.name)
     cells = values_of(density, pairs, apart)
     return {name: cell[0] for name, cell in cells.items()}, beside, panels
 

@@ -79,8 +79,8 @@ def read_coastlines(path: Path) -> list[Array]:
             )
         with path.open("rb") as file:
             start = file.read(4096)
-    known = {b"\x00\x00\x27\x0a": "a shapefile", b"PK\x03\x04": "a zip archive"}
-    for magic, what in known.items():
+    others = {b"\x00\x00\x27\x0a": "a shapefile", b"PK\x03\x04": "a zip archive"}
+    for magic, what in others.items():
         if start.startswith(magic):
             raise InputFileError(
                 f"{path} is {what}: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson FILE.shp"

@@ -32,8 +32,8 @@ def density_at(density: Density, points: Tensor, measure: str) -> Array:
     """Return the density (N,) at chart points (N, 2), and next to them at cone points."""
     if density.space.is_round:
         points = off_cones(points)
-    own = points.to(device=density.device, dtype=density.dtype)
-    return density.log_prob(own, measure=measure).double().cpu().exp().numpy()
+    moved = points.to(device=density.device, dtype=density.dtype)
+    return density.log_prob(moved, measure=measure).double().cpu().exp().numpy()
 
 
 def density_on_grid(

@@ -163,9 +163,9 @@ class _Panels:
         x = self.left / width
         if x + step * (len(heads) - 1) + widths[-1] > 1:  # a narrow figure
             x, step = 0.4 * sheet.em / width, 0.0
-        for (text, colour), own in zip(heads, widths, strict=True):
+        for (text, colour), width_of_text in zip(heads, widths, strict=True):
             self.figure.text(x, y, text, fontsize=size, color=colour)
-            x += step or own
+            x += step or width_of_text
 
     def draw_ticks(self, axes: Axes, row: int, column: int) -> None:
         """Draw ticks of quarter turns, with texts along the left and the lower rim."""

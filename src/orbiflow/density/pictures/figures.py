@@ -134,7 +134,10 @@ def samples_picture(
     panels = {"data": data, "samples": samples}
     places = {n: ground.places(points) for n, points in panels.items() if points is not None}
     count = min(
-        [settings.samples or grounds.MAX_DOTS, *(len(own) for own in places.values() if len(own))]
+        [
+            settings.samples or grounds.MAX_DOTS,
+            *(len(rows) for rows in places.values() if len(rows)),
+        ]
     )
     colouring = ground.colouring(density, settings) if data is None else None
     bar = "from the least (dark) to the largest (light) density"
@@ -223,7 +226,7 @@ def flow_picture(
 def carried_part(density: Density) -> tuple[float, Density]:
     """Return the first part that a flow carries, with its weight; without one, the density itself."""
     return next(
-        ((weight, own) for weight, own in density.parts() if own.is_carried), (1.0, density)
+        ((weight, part) for weight, part in density.parts() if part.is_carried), (1.0, density)
     )
 
 

@@ -47,25 +47,25 @@ class View(NamedTuple):
 
     def to_chart(self, points: Tensor) -> Tensor:
         """Return points (N, d) of the window, in [0, 1]^d, as chart points."""
-        found = points + tensor(self.low, dtype=points.dtype)
+        turned = points + tensor(self.low, dtype=points.dtype)
         for axis, (least, most) in real_spans(self.space).items():
             values = least + points[:, axis] * (most - least)
-            found[:, axis] = self.space.axes[axis].turns(values)
-        return found
+            turned[:, axis] = self.space.axes[axis].turns(values)
+        return turned
 
     def places(self, points: Tensor) -> Array:
         """Return where chart points (N, d) lie in the window, in [0, 1]^d.
 
         What is beyond the window of a real column is not in [0, 1].
         """
-        own = chart_points(self.space, points)
+        canonical = chart_points(self.space, points)
         # a translation commutes with the torus' group, and is 0 elsewhere
-        found = self.space.project(own - tensor(self.low)).numpy()
+        inside = self.space.project(canonical - tensor(self.low)).numpy()
         spans = real_spans(self.space)
-        data = self.space.from_chart(own) if spans else found
+        data = self.space.from_chart(canonical) if spans else inside
         for axis, (least, most) in spans.items():
-            found[:, axis] = (data[:, axis] - least) / (most - least)
-        return found
+            inside[:, axis] = (data[:, axis] - least) / (most - least)
+        return inside
 
     @property
     def volume(self) -> float:
@@ -118,8 +118,8 @@ def view_of(
     # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
     even = np.round(24 * turns) / 24
     turns = np.where(abs(turns - even) < 1e-3, even, turns)
-    own = _own_axes(space)
-    turns[own] = first[own] + 0.5
+    fixed = _own_axes(space)
+    turns[fixed] = first[fixed] + 0.5
     return View(space, names, turns - 0.5)
 
 
@@ -159,12 +159,12 @@ def symbol(name: str) -> str:
     >>> symbol("phi"), symbol("Chi1"), symbol("chi_2"), symbol("phi angle")
     ('φ', 'χ₁', 'χ₂', 'phi angle')
     """
-    found = re.fullmatch(r"([a-z]+?)_?(\d*)", name.strip().casefold())
+    match = re.fullmatch(r"([a-z]+?)_?(\d*)", name.strip().casefold())
     try:
-        letter = unicodedata.lookup(f"GREEK SMALL LETTER {found[1]}") if found else ""
+        letter = unicodedata.lookup(f"GREEK SMALL LETTER {match[1]}") if match else ""
     except KeyError:
         return name
-    return f"{letter}{found[2].translate(SUBSCRIPTS)}" if found else name
+    return f"{letter}{match[2].translate(SUBSCRIPTS)}" if match else name
 
 
 def axis_label(view: View, column: int) -> str:

@@ -310,8 +310,8 @@ class Ground(ABC):
         shade = shading(values[pixels.within], areas, log=log)
         logs = None
         if settings.regions:
-            own = log_natural(density, values, pixels.points, settings.measure)
-            logs = pixels.table(own, math.nan)
+            naturals = log_natural(density, values, pixels.points, settings.measure)
+            logs = pixels.table(naturals, math.nan)
         note = ""
         if is_sharp(density, pixels.side):
             note = f"peaks narrower than {pixels.size} are averaged over it"
@@ -329,9 +329,9 @@ class Ground(ABC):
 
 def log_natural(density: Density, values: Array, points: Tensor, measure: str) -> Array:
     """Return logarithms (N,) in natural measure of values (N,) in another one at points (N, d)."""
-    own = np.log(np.maximum(values, 1e-300))
+    logs = np.log(np.maximum(values, 1e-300))
     if measure == "natural":
-        return own
+        return logs
     factor = density.space.log_density_factor
     shift = factor(points, "natural") - factor(points, measure)
-    return own + shift.double().cpu().numpy()
+    return logs + shift.double().cpu().numpy()

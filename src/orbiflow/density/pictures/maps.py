@@ -152,8 +152,8 @@ class Map(Ground):
             lines = "Parallels every {:g}°, meridians every {:g}°".format(*steps)
         parts.append(lines + (", and coastlines" if self.coastlines else ""))
         if dots is not None:
-            shown, known = dots
-            parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
+            shown, count = dots
+            parts.append(f"Dots are {f'{shown} of ' if shown < count else ''}{count} points")
         return frames.sentences([*parts, *notes])
 
     def _description(self) -> str:

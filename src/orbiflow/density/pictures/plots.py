@@ -171,8 +171,8 @@ class _ShownBeside:
         table = None if data is None else np.asarray(data, dtype=np.float64)
         every = range(space.chart_dim)
         base = marginal(density, every[: space.together])
-        own = settings.replace(names=names[: self.first], along=None, slices=None)
-        self.base = _Shown(base, own, None if table is None else table[:, : self.first])
+        of_base = settings.replace(names=names[: self.first], along=None, slices=None)
+        self.base = _Shown(base, of_base, None if table is None else table[:, : self.first])
         beside = marginal(density, every[space.together :])
         other = PlotSettings(**{name: getattr(settings, name) for name in FOR_COLUMNS})
         other = other.replace(names=names[self.first :])
@@ -181,14 +181,14 @@ class _ShownBeside:
 
     def makers(self) -> Mapping[str, Callable[[], Picture]]:
         """Return functions that draw the figures, by the names of their files without the ending."""
-        found = dict(self.base.makers())
+        makers = dict(self.base.makers())
         if self.space.base.dim == 2:
             ground = self.base.grounds()["density"]
-            found["series"] = partial(
+            makers["series"] = partial(
                 series_picture, self.density, self.along, self.settings, ground
             )
-        one = self.beside.makers()
-        return {**found, "beside": one.get("samples") or one["density"]}
+        others = self.beside.makers()
+        return {**makers, "beside": others.get("samples") or others["density"]}
 
 
 FOR_COLUMNS = ("format", "width", "samples", "seed")

@@ -137,7 +137,7 @@ class Azimuthal(_Centred, ABC):
         vectors = to_vectors(refined(latlon))
         above = vectors @ self.frame[2] - math.cos(math.radians(self.radius))
         inside = above >= 0
-        found: list[Array] = []
+        pieces: list[Array] = []
         ends = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
         for first, last in ends.reshape(-1, 2):
             line = [vectors[first:last]]
@@ -146,8 +146,8 @@ class Azimuthal(_Centred, ABC):
                     share = above[inner] / (above[inner] - above[outer])
                     cut = (1 - share) * vectors[inner] + share * vectors[outer]
                     line.insert(place, cut[None])
-            found.append(self._placed(np.concatenate(line)))
-        return _without_points(found)
+            pieces.append(self._placed(np.concatenate(line)))
+        return _without_points(pieces)
 
     def _placed(self, vectors: Array) -> Array:
         right, up, out = (vectors @ self.frame.T).T
@@ -242,7 +242,7 @@ class WorldMap(_Centred, ABC):
         """Return a line (M, 2) of directions in pieces (K, 2), K > 1, cut where the map is."""
         latlon = refined(latlon)
         lat, lon = latlon[:, 0], wrapped(latlon[:, 1] - self.center[1])
-        found: list[Array] = []
+        pieces: list[Array] = []
         start, head = 0, np.empty((0, 2))
         for k in np.flatnonzero(abs(np.diff(lon)) > 180):
             sign = 1.0 if lon[k] > 0 else -1.0
@@ -250,10 +250,10 @@ class WorldMap(_Centred, ABC):
             share = (sign * 180 - lon[k]) / (beyond - lon[k]) if beyond != lon[k] else 0.0
             cut = lat[k] + share * (lat[k + 1] - lat[k])
             line = np.stack([lat[start : k + 1], lon[start : k + 1]], axis=-1)
-            found.append(np.concatenate([head, line, [[cut, sign * 180]]]))
+            pieces.append(np.concatenate([head, line, [[cut, sign * 180]]]))
             start, head = k + 1, np.array([[cut, -sign * 180]])
-        found.append(np.concatenate([head, np.stack([lat[start:], lon[start:]], axis=-1)]))
-        return _without_points([self._placed(*line.T) for line in found])
+        pieces.append(np.concatenate([head, np.stack([lat[start:], lon[start:]], axis=-1)]))
+        return _without_points([self._placed(*line.T) for line in pieces])
 
     def _placed(self, lat: Array, lon: Array) -> Array:
         """Return places of longitudes from the map's own meridian, -180 and 180 at its two sides."""

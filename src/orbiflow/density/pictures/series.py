@@ -56,11 +56,11 @@ def along_of(density: Density, names: tuple[str, ...], settings: PlotSettings) -
     assert isinstance(space, ProductSpace)
     first = len(names) - space.beside.dim
     called = [name.casefold() for name in names[first:]]
-    asked = (settings.along or names[first]).casefold()
-    if asked not in called:
+    wanted = (settings.along or names[first]).casefold()
+    if wanted not in called:
         listed = literal(", ".join(names[first:]))
         raise SettingError(f"{{along}} must be a column beside the {space.base.name}: {listed}")
-    number = called.index(asked)
+    number = called.index(wanted)
     axis = space.beside.axes[number]
     period = axis.period
     values = settings.slices
@@ -136,13 +136,13 @@ class _Page:
     def __init__(
         self, sheet: Sheet, ground: Ground, count: int, caption: str, label: str, ticks: list[str]
     ) -> None:
-        own, _ = ground.panels_room(sheet)
-        self.sheet, self.gap = sheet, own.gap * sheet.em
-        self.between = sheet.em * (own.above + own.below)
-        room = own._replace(left=own.left + 0.8, above=own.above + 0.6, gap=1.6, bar=1.2)
+        panel, _ = ground.panels_room(sheet)
+        self.sheet, self.gap = sheet, panel.gap * sheet.em
+        self.between = sheet.em * (panel.above + panel.below)
+        room = panel._replace(left=panel.left + 0.8, above=panel.above + 0.6, gap=1.6, bar=1.2)
         room = frames.room_for_bar_beside(sheet, room, label, ticks)
         room = room.with_words(caption, sheet)
-        self.room, self.beside = room._replace(right=room.right + own.right), own.right
+        self.room, self.beside = room._replace(right=room.right + panel.right), panel.right
         inner = sheet.width - sheet.em * (self.room.left + self.room.right)
         most = MOST_ACROSS if ground.aspect < WIDE else 2
         self.columns = 1 if sheet.printed and sheet.width < frames.NARROW_INCHES else most

@@ -182,9 +182,9 @@ def edge_pairs(group: CrystallographicGroup) -> list[tuple[Array, Array]]:
 
 def cone_points(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]:
     """Return the corners of the square that are rotation centres, with their orders."""
-    found = symmetry_elements(group, np.full(2, 0.5), 1.0).centers
+    centers = symmetry_elements(group, np.full(2, 0.5), 1.0).centers
     corners = [(x, y) for x in (0.0, 1.0) for y in (0.0, 1.0)]
-    return [(c, sign.order) for c in corners for sign in found if np.allclose(sign.point, c)]
+    return [(c, sign.order) for c in corners for sign in centers if np.allclose(sign.point, c)]
 
 
 def _draw_edge(

@@ -50,23 +50,23 @@ def refined(
     `seeds` are points (S, 2) at which the function is known, and its values (S,) there, so that islands
     between the nodes are found.
     """
-    known, spent = np.zeros(block.values.shape, dtype=bool), 0
+    evaluated, spent = np.zeros(block.values.shape, dtype=bool), 0
 
     def evaluate(wanted: Flags) -> int:
         """Evaluate at wanted nodes that are not known, and return their number."""
-        index = np.argwhere(wanted & ~known)
+        index = np.argwhere(wanted & ~evaluated)
         if len(index):
             block.values[tuple(index.T)] = function(block.low + index * block.step)
-            known[tuple(index.T)] = True
+            evaluated[tuple(index.T)] = True
         return len(index)
 
-    spent += evaluate(~known)
+    spent += evaluate(~evaluated)
     for _ in range(doublings):
         if spent >= budget:
             break
         wanted = _missed(block, levels, seeds)
-        coarse, known = known, np.zeros(2 * np.array(known.shape) - 1, dtype=bool)
-        known[::2, ::2] = coarse
+        coarse, evaluated = evaluated, np.zeros(2 * np.array(evaluated.shape) - 1, dtype=bool)
+        evaluated[::2, ::2] = coarse
         block = Block(_doubled(block.values), block.low, block.step / 2)
         more = evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
         for _ in range(MAX_ROUNDS):
@@ -81,12 +81,12 @@ def _missed(block: Block, levels: Array, seeds: tuple[Array, Array]) -> Flags:
     """Return the cells (n, m) with a seed on the other side of a level than all their nodes."""
     points, values = seeds
     i, j = block.cells_of(points).T
-    found = np.zeros(np.array(block.values.shape) - 1, dtype=bool)
+    missed = np.zeros(np.array(block.values.shape) - 1, dtype=bool)
     for level in levels:
         least, most = _extremes(block.values >= level)
         lost = np.where(values >= level, ~most[i, j], least[i, j])
-        found[i[lost], j[lost]] = True
-    return found
+        missed[i[lost], j[lost]] = True
+    return missed
 
 
 def _mixed(values: Array, levels: Array) -> Flags:
@@ -109,11 +109,11 @@ def _corners(cells: Flags) -> Flags:
 
 def _doubled(values: Array) -> Array:
     """Return values interpolated on cells of half the size."""
-    found = np.empty(2 * np.array(values.shape) - 1)
-    found[::2, ::2] = values
-    found[1::2, ::2] = (values[1:] + values[:-1]) / 2
-    found[:, 1::2] = (found[:, 2::2] + found[:, :-2:2]) / 2
-    return found
+    finer = np.empty(2 * np.array(values.shape) - 1)
+    finer[::2, ::2] = values
+    finer[1::2, ::2] = (values[1:] + values[:-1]) / 2
+    finer[:, 1::2] = (finer[:, 2::2] + finer[:, :-2:2]) / 2
+    return finer
 
 
 CROWDED, DEPTH = 0.005, 4
@@ -151,14 +151,14 @@ def with_islands(
         return shape, 0, left
     t, lows = np.arange(PARTS + 1) / PARTS, block.low + cells * block.step
     inside = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1) * block.step
-    found = function((lows[:, None, None] + inside).reshape(-1, 2))
-    tables = found.reshape(len(cells), PARTS + 1, PARTS + 1)
-    finer = [Block(own, low, block.step / PARTS) for own, low in zip(tables, lows, strict=True)]
+    heights = function((lows[:, None, None] + inside).reshape(-1, 2))
+    tables = heights.reshape(len(cells), PARTS + 1, PARTS + 1)
+    finer = [Block(table, low, block.step / PARTS) for table, low in zip(tables, lows, strict=True)]
     drawn, _ = all_filled(finer, level, function)
-    spent = len(found)
+    spent = len(heights)
     for k, (cell, inner) in enumerate(zip(cells, finer, strict=True)):
-        own = (of == cell).all(axis=1)
-        some = points[own], values[own]
+        inside_cell = (of == cell).all(axis=1)
+        some = points[inside_cell], values[inside_cell]
         if depth and _on_wrong_side(drawn[k], some, level).sum() >= least:
             drawn[k], more, lost = with_islands(
                 drawn[k], inner, function, some, level, budget - spent, depth - 1, least
@@ -204,14 +204,14 @@ def all_filled(
     """
     rings = [_rings(block.values, level) for block in blocks]
     pairs = zip(rings, blocks, strict=True)
-    parts = [_sides(np.concatenate(own), block) for own, block in pairs if own]
+    parts = [_sides(np.concatenate(ring), block) for ring, block in pairs if ring]
     if not parts:
         return [shapely.MultiPolygon() for _ in blocks], 0.0
     vertices, inside, a, b, fa, fb = (np.concatenate(column) for column in zip(*parts, strict=True))
     vertices[inside], off = _on_level(a, b, fa, fb, level, function)
     ends = np.cumsum([len(part[0]) for part in parts])[:-1]
     moved = iter(np.split(vertices, ends))
-    return [_area(own, next(moved)) if own else shapely.MultiPolygon() for own in rings], off
+    return [_area(ring, next(moved)) if ring else shapely.MultiPolygon() for ring in rings], off
 
 
 def _rings(values: Array, level: float) -> list[Array]:
@@ -253,7 +253,7 @@ def _on_level(
     fa, fb = fa - level, fb - level
     if not len(a):
         return a, 0.0
-    off, found = np.full(len(a), np.inf), a.copy()
+    off, nearest = np.full(len(a), np.inf), a.copy()
     todo, last = np.arange(len(a)), np.zeros(len(a))
     for _ in range(MAX_STEPS):
         width = fb[todo] - fa[todo]
@@ -261,7 +261,7 @@ def _on_level(
         here = a[todo] + share[:, None] * (b[todo] - a[todo])
         f = function(here) - level
         better = abs(f) < abs(off[todo])
-        found[todo[better]], off[todo[better]] = here[better], f[better]
+        nearest[todo[better]], off[todo[better]] = here[better], f[better]
         same = (f >= 0) == (fa[todo] >= 0)
         # an end that stays twice counts half
         side = np.where(same, 1, -1)
@@ -273,4 +273,4 @@ def _on_level(
         todo = todo[abs(off[todo]) > TOLERANCE]
         if not len(todo):
             break
-    return found, float(np.sqrt(np.mean(off**2)))
+    return nearest, float(np.sqrt(np.mean(off**2)))

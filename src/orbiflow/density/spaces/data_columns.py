@@ -63,24 +63,24 @@ class DataColumns:
                 they are.
         """
         check_unit(self.name, self.unit)
-        asked, table = asked_roles(self.columns), DataTable.of(X)
-        if not table.is_named and asked and all(isinstance(key, str) for key in asked):
-            names = [str(key) for key in asked]
+        declared, table = asked_roles(self.columns), DataTable.of(X)
+        if not table.is_named and declared and all(isinstance(key, str) for key in declared):
+            names = [str(key) for key in declared]
             if len(names) != len(table.names):
                 raise SettingError(
                     f"{{columns}} must name the {len(table.names)} columns of the data, got "
                     f"{literal(', '.join(names))}"
                 )
             table = DataTable.of(X, names=names)
-        elif not table.is_named and asked and self.name == "torus":
+        elif not table.is_named and declared and self.name == "torus":
             # those of an array that are not named are angles, as all of it would be
-            roles = {found_column(table, key): role for key, role in asked.items()}
-            asked = (
+            roles = {found_column(table, key): role for key, role in declared.items()}
+            declared = (
                 {k: roles.get(k) for k in range(len(table.names))}
-                if len(roles) == len(asked)
-                else asked
+                if len(roles) == len(declared)
+                else declared
             )
-        rows = checked_rows(table, self._said(asked), given=others)
+        rows = checked_rows(table, self._said(declared), given=others)
         notes = [note for note in rows.notes if note.startswith("took")]
         for text in (*notes, *rows.doubts):
             warnings.warn(text, DataWarning, stacklevel=stacklevel)

@@ -63,13 +63,13 @@ def frame_of(group: CrystallographicGroup) -> LatticeFrame:
         for g in group.cosets
         for shift in finer.translations
     ]
-    own = [g for g in every if _keeps_axes(basis, g.linear)]
-    found = CrystallographicGroup(basis, tuple(own), group.name)
+    keeping = [g for g in every if _keeps_axes(basis, g.linear)]
+    framed = CrystallographicGroup(basis, tuple(keeping), group.name)
     for g in every:
-        if not found.contains(g):
-            images = [Isometry((s @ g).linear, finer.wrap((s @ g).translation)) for s in own]
-            found = CrystallographicGroup(basis, (*found.cosets, *images), group.name)
-    return LatticeFrame(found, len(own))
+        if not framed.contains(g):
+            images = [Isometry((s @ g).linear, finer.wrap((s @ g).translation)) for s in keeping]
+            framed = CrystallographicGroup(basis, (*framed.cosets, *images), group.name)
+    return LatticeFrame(framed, len(keeping))
 
 
 def _keeps_axes(bases: Array, linear: Array) -> NDArray[np.bool_]:

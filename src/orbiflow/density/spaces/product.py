@@ -52,8 +52,8 @@ class ProductSpace(Space):
         from_zero: Sequence[int] | None = None,
     ) -> None:
         if isinstance(base, Mapping):
-            own = dict(base)
-            base = make_space(str(own.pop("name", None)), **own)
+            options = dict(base)
+            base = make_space(str(options.pop("name", None)), **options)
         self.base = as_instance(base, Space, "base", "see `make_space`")
         if isinstance(base, Torus | ProductSpace):
             raise OrbiflowError(f"the base of a product is no {base.name}: take a torus of all")
@@ -115,10 +115,10 @@ class ProductSpace(Space):
 
     @property
     def moves(self) -> Array:
-        own, more = self.base.moves, self.beside.dim
-        found = np.zeros((len(own), len(self.spheres), len(self.spheres)))
-        found[:, :-more, :-more], found[:, -more:, -more:] = own, np.eye(more)
-        return found
+        of_base, more = self.base.moves, self.beside.dim
+        both = np.zeros((len(of_base), len(self.spheres), len(self.spheres)))
+        both[:, :-more, :-more], both[:, -more:, -more:] = of_base, np.eye(more)
+        return both
 
     def split(self, points: T) -> tuple[T, T]:
         """Return the chart points (..., d) of the base and of the other columns."""
@@ -170,19 +170,23 @@ class ProductSpace(Space):
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
         table = self.split(np.asarray(data, dtype=np.float64))
         at, slopes = self.split(points), self.split(gradient)
-        found = [own.data_gradient(table[k], at[k], slopes[k]) for k, own in enumerate(self.parts)]
-        return np.concatenate(found, axis=-1)
+        columns = [
+            part.data_gradient(table[k], at[k], slopes[k]) for k, part in enumerate(self.parts)
+        ]
+        return np.concatenate(columns, axis=-1)
 
     def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         first, second = self.split(self._checked(points))
         images = self.base.features(first, which)
         rest = self.beside.features(second).expand(len(images), -1, -1)
         both = [
-            by_sphere(own, len(part.spheres))
-            for own, part in zip((images, rest), self.parts, strict=True)
+            by_sphere(table, len(part.spheres))
+            for table, part in zip((images, rest), self.parts, strict=True)
         ]
-        most = max(own.shape[-2] for own in both)
-        padded = [torch.nn.functional.pad(own, (0, 0, 0, most - own.shape[-2])) for own in both]
+        most = max(table.shape[-2] for table in both)
+        padded = [
+            torch.nn.functional.pad(table, (0, 0, 0, most - table.shape[-2])) for table in both
+        ]
         return torch.cat(padded, dim=-1).flatten(-2)
 
     @property
@@ -193,16 +197,16 @@ class ProductSpace(Space):
         table = by_sphere(features, len(self.spheres))
         first, second = self.split(table)
         places = (
-            part.lifted(own[..., : 1 + part.spheres[0], :].flatten(-2))
-            for part, own in zip(self.parts, (first, second), strict=True)
+            part.lifted(table_of_part[..., : 1 + part.spheres[0], :].flatten(-2))
+            for part, table_of_part in zip(self.parts, (first, second), strict=True)
         )
         return torch.cat(list(places), dim=-1)
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
-        return torch.cat([own.uniform(count, generator) for own in self.parts], dim=-1)
+        return torch.cat([part.uniform(count, generator) for part in self.parts], dim=-1)
 
     def step_angle(self, step: float) -> float:
-        return min(own.step_angle(step) for own in self.parts)
+        return min(part.step_angle(step) for part in self.parts)
 
     @property
     def together(self) -> int:
@@ -210,23 +214,23 @@ class ProductSpace(Space):
 
     def of_axes(self, axes: Sequence[int]) -> Space:
         chart = self.base.chart_dim
-        own = [axis for axis in axes if axis < chart]
-        if own and list(axes[:chart]) != list(range(chart)):
+        of_base = [axis for axis in axes if axis < chart]
+        if of_base and list(axes[:chart]) != list(range(chart)):
             raise OrbiflowError(
                 f"the columns of the {self.base.name} have a meaning together alone: name all, or none"
             )
         others = [axis - chart for axis in axes if axis >= chart]
         if not others:
             return self.base
-        if not own:
+        if not of_base:
             return self.beside.of_axes(others)
         kept = [self.beside.axes[axis] for axis in others]
         return ProductSpace(self.base, kept)
 
     def factors_of(self, axes: Sequence[int]) -> list[int]:
         shift = len(self.base.spheres) - self.base.chart_dim
-        own = list(range(len(self.base.spheres))) if min(axes) < self.base.chart_dim else []
-        return [*own, *(axis + shift for axis in axes if axis >= self.base.chart_dim)]
+        of_base = list(range(len(self.base.spheres))) if min(axes) < self.base.chart_dim else []
+        return [*of_base, *(axis + shift for axis in axes if axis >= self.base.chart_dim)]
 
     def settings(self) -> dict[str, Any]:
         base = {"name": self.base.name, **self.base.settings()}

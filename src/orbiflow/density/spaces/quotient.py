@@ -143,8 +143,8 @@ class QuotientSpace(Space):
         return self.project(self.cover(data))
 
     def from_chart(self, points: Tensor) -> Array:
-        own: Array = self.project(points).detach().double().cpu().numpy()
-        data = cast(Array, np.linalg.solve(self._to_chart, own.T))
+        canonical: Array = self.project(points).detach().double().cpu().numpy()
+        data = cast(Array, np.linalg.solve(self._to_chart, canonical.T))
         return data.T
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
@@ -152,8 +152,8 @@ class QuotientSpace(Space):
         return gradient.numpy() @ self._to_chart
 
     def settings(self) -> dict[str, Any]:
-        found: dict[str, Any] = {"group": {**group_header(self._given), "name": self._given.name}}
-        return found if self._vectors is None else {**found, "fractional": self._vectors.tolist()}
+        header: dict[str, Any] = {"group": {**group_header(self._given), "name": self._given.name}}
+        return header if self._vectors is None else {**header, "fractional": self._vectors.tolist()}
 
     def warn_of_fractions(self, data: Array, *, stacklevel: int = 2) -> None:
         """Warn if points (N, d) seem to be fractions of the cell and the space takes lengths."""
@@ -175,8 +175,8 @@ class QuotientSpace(Space):
 def _cell_vectors(group: CrystallographicGroup, cell: ArrayLike | None) -> Array:
     """Return the vectors (d, d), as columns, of the conventional cell of a group given by its name."""
     if np.ndim(cast(Any, cell)) == 2 or group.dim != 2:
-        own = np.asarray(cell, dtype=np.float64)
-        return own if own.ndim == 2 else cell_lattice(own)
+        numbers = np.asarray(cell, dtype=np.float64)
+        return numbers if numbers.ndim == 2 else cell_lattice(numbers)
     a, b, *angle = np.asarray(cell, dtype=np.float64)
     if not angle and np.allclose(group.lattice[:, 0], [a, 0.0]):
         return group.lattice  # of a hexagonal plane: its angle may be left out

@@ -172,28 +172,30 @@ class RotationSpace(UnitVectorSpace):
 
     def from_chart(self, points: Tensor) -> Array:
         quaternions = self._signed(super().from_chart(points).reshape(-1, 4))
-        found = Rotation.from_quat(quaternions)
+        rotations = Rotation.from_quat(quaternions)
         if self.form in ("quaternion", "scalar-first"):
-            return np.roll(found.as_quat(), self._first, axis=1)
+            return np.roll(rotations.as_quat(), self._first, axis=1)
         if self.form == "matrix":
-            return found.as_matrix().reshape(-1, 9)
+            return rotations.as_matrix().reshape(-1, 9)
         if self.form == "rodrigues":
-            upper = found.as_quat(canonical=True)
+            upper = rotations.as_quat(canonical=True)
             return upper[:, :3] / np.maximum(upper[:, 3:], LEAST_SCALAR)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of gimbal lock, where one angle is free
             euler = self.form in EULER
-            own: Array = found.as_euler(cast(Any, self.form)) if euler else found.as_rotvec()
-        own = own * (self.period / (2 * math.pi))
+            angles: Array = (
+                rotations.as_euler(cast(Any, self.form)) if euler else rotations.as_rotvec()
+            )
+        angles = angles * (self.period / (2 * math.pi))
         # Bunge's angles are from 0 on
-        return np.where(own < 0, own + self.period, own) if self.form == "ZXZ" else own
+        return np.where(angles < 0, angles + self.period, angles) if self.form == "ZXZ" else angles
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
         """Return gradients (N, 4) at unit quaternions, tangent to their sphere."""
         if np.shape(data)[1] != 4:
             raise OrbiflowError("gradients of rotations need unit quaternions: convert the rows")
-        own = super().data_gradient(data, points, gradient)
-        return np.roll(self._signed(own), self._first, axis=1)
+        slopes = super().data_gradient(data, points, gradient)
+        return np.roll(self._signed(slopes), self._first, axis=1)
 
     def misorientations(self, points: Tensor, reference: Tensor) -> Tensor:
         """Return the angles (N,) in radians between orientations (N, 4) and one (4,).
@@ -210,8 +212,8 @@ class RotationSpace(UnitVectorSpace):
         return 2 * math.pi * step / self.period
 
     def settings(self) -> dict[str, Any]:
-        own = {"form": self.form, "unit": self.angle_unit, "symmetry": self.symmetry}
-        return {**own, "specimen": self.specimen, "passive": self.passive}
+        options = {"form": self.form, "unit": self.angle_unit, "symmetry": self.symmetry}
+        return {**options, "specimen": self.specimen, "passive": self.passive}
 
 
 def _products(crystal: Rotation, specimen: Rotation) -> Array:

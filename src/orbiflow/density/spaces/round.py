@@ -65,9 +65,9 @@ TINY = 1e-36
 
 def to_sphere(points: Tensor, power: int) -> Tensor:
     """Return the unit vectors (..., 3) of points (..., 2) of the plane."""
-    one, _, three, _ = thetas(_wrapped(points))
-    below, above = (_square(own) ** power for own in (one, three))
-    product = three * one.conj()
+    first, _, three, _ = thetas(_wrapped(points))
+    below, above = (_square(theta) ** power for theta in (first, three))
+    product = three * first.conj()
     for _ in range(power // 2):
         product = product * product
     size = below + above
@@ -82,10 +82,10 @@ def log_area(points: Tensor, power: int) -> Tensor:
     (|theta_1|^(2 power) + |theta_3|^(2 power))^2: from the derivative
     (theta_3/theta_1)' = -theta_3(0)^2 theta_2 theta_4 / theta_1^2 (DLMF 20.7(ii), 22.13).
     """
-    one, two, three, four = (_square(own).clamp_min(TINY) for own in thetas(_wrapped(points)))
+    first, two, three, four = (_square(theta).clamp_min(TINY) for theta in thetas(_wrapped(points)))
     constant = 2 * math.log(power * math.pi * NULL3**2)
-    size = one**power + three**power
-    return constant + (power - 1) * (one * three).log() + (two * four / (size * size)).log()
+    size = first**power + three**power
+    return constant + (power - 1) * (first * three).log() + (two * four / (size * size)).log()
 
 
 def from_sphere(vectors: Array, power: int) -> Array:
@@ -109,8 +109,8 @@ def from_sphere(vectors: Array, power: int) -> Array:
     first = a - b + 0j
     # on the cut both sides are the same point of the space; SciPy needs to know which
     first = np.where((first.imag == 0) & (first.real < 0), first + 1e-300j, first)
-    found = np.sqrt(2 * b) * elliprf(first, a + 0j, a + b + 0j) / K
-    return np.stack([found.real, found.imag], axis=-1)
+    plane = np.sqrt(2 * b) * elliprf(first, a + 0j, a + b + 0j) / K
+    return np.stack([plane.real, plane.imag], axis=-1)
 
 
 def _wrapped(points: Tensor) -> Tensor:
@@ -291,14 +291,17 @@ class RoundSpace(Space):
         vectors = to_vectors(data)
         with torch.enable_grad():
             at = points.detach().clone().requires_grad_()
-            found = self.unit_vectors(at)
-            rows = [torch.autograd.grad(own.sum(), at, retain_graph=True)[0] for own in found.mT]
+            vector = self.unit_vectors(at)
+            rows = [
+                torch.autograd.grad(coordinate.sum(), at, retain_graph=True)[0]
+                for coordinate in vector.mT
+            ]
         # conformal: the transpose over the squared scale is the inverse
         jacobian = torch.stack(rows, dim=1)
         scale = (jacobian**2).sum(dim=(1, 2)) / 2
         slope = (torch.einsum("nkd,nd->nk", jacobian, gradient) / scale[:, None]).numpy()
         # the chart may have the other end of an axis
-        slope *= np.sign((vectors * found.detach().numpy()).sum(axis=1, keepdims=True))
+        slope *= np.sign((vectors * vector.detach().numpy()).sum(axis=1, keepdims=True))
         if np.shape(data)[1] == 3:
             return slope
         lat, lon = np.radians(np.asarray(data, dtype=np.float64).T)
@@ -328,8 +331,8 @@ class RoundSpace(Space):
         return to_sphere(cones, self.power).numpy() @ self.rotation
 
     def settings(self) -> dict[str, Any]:
-        own = {"from_zero": True} if self.from_zero else {}
-        return {"form": self.form, "rotation": self.rotation.tolist(), **own}
+        options = {"from_zero": True} if self.from_zero else {}
+        return {"form": self.form, "rotation": self.rotation.tolist(), **options}
 
     def _representatives(self, vectors: Array) -> Array:
         return vectors

@@ -100,10 +100,10 @@ class Space(ABC):
         super().__init_subclass__(**options)
         if not isinstance(cls.__dict__.get("name"), str):
             return
-        known = SPACE_CLASSES.setdefault(cls.name, cls)
-        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+        holder = SPACE_CLASSES.setdefault(cls.name, cls)
+        if (holder.__module__, holder.__qualname__) != (cls.__module__, cls.__qualname__):
             raise OrbiflowError(
-                f"the space {cls.name!r} is a {known.__name__}: choose another name"
+                f"the space {cls.name!r} is a {holder.__name__}: choose another name"
             )
         SPACE_CLASSES[cls.name] = cls
 
@@ -262,17 +262,17 @@ class Space(ABC):
 
     def displacement(self, start: Tensor, end: Tensor) -> Tensor:
         """Return the shortest flat displacement (..., d) from `start` to an image of `end`."""
-        found: tuple[Tensor, Tensor] | None = None
+        nearest: tuple[Tensor, Tensor] | None = None
         for move in self._moves(start, self.project(end)):
             square = (move**2).sum(dim=-1)
-            if found is None:
-                found = move, square
+            if nearest is None:
+                nearest = move, square
                 continue
-            nearer = square < found[1]
-            best = torch.where(nearer[..., None], move, found[0])
-            found = best, torch.minimum(square, found[1])
-        assert found is not None
-        return found[0]
+            nearer = square < nearest[1]
+            best = torch.where(nearer[..., None], move, nearest[0])
+            nearest = best, torch.minimum(square, nearest[1])
+        assert nearest is not None
+        return nearest[0]
 
     def _moves(self, start: Tensor, end: Tensor) -> Iterator[Tensor]:
         """Yield displacements (..., d) to images of `end`, the shortest one among them."""
@@ -343,8 +343,8 @@ class Space(ABC):
         """How the images that kernels have permute these spheres: (E, F, F)."""
         if self.is_round:
             return np.ones((self.kernel_images, 1, 1))
-        own, frame = self.frame.own, self.frame.group
-        return np.abs(frame.inverse_lattice @ frame.linear_parts[:own] @ frame.lattice).round()
+        count, frame = self.frame.own, self.frame.group
+        return np.abs(frame.inverse_lattice @ frame.linear_parts[:count] @ frame.lattice).round()
 
     @property
     def kernel_images(self) -> int:
@@ -405,7 +405,7 @@ class Space(ABC):
             return NotImplemented
         if self.parts:
             return self.parts == other.parts
-        here, there = ({**own.settings(), "from_zero": None} for own in (self, other))
+        here, there = ({**space.settings(), "from_zero": None} for space in (self, other))
         return (
             type(other) is type(self)
             and here == there

@@ -78,8 +78,8 @@ class UnitVectorSpace(Space):
         return points / linalg.vector_norm(points, dim=-1, keepdim=True)
 
     def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
-        own = self._unit(points)
-        return torch.stack([own @ element.mT for element in self.elements.to(own)[which]])
+        unit = self._unit(points)
+        return torch.stack([unit @ element.mT for element in self.elements.to(unit)[which]])
 
     @property
     def kernel_images(self) -> int:

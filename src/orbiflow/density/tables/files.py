@@ -193,7 +193,7 @@ class ParquetColumns(Sequence[NDArray[Any]]):
         # Parquet has categories of words alone, pandas notes others
         noted: Any = self.schema.pandas_metadata or {"columns": ()}
         words = {
-            own["field_name"] for own in noted["columns"] if own["pandas_type"] == "categorical"
+            note["field_name"] for note in noted["columns"] if note["pandas_type"] == "categorical"
         }
         tests = kinds.is_integer, kinds.is_floating, kinds.is_decimal
         pairs = enumerate(zip(self.schema.names, self.schema.types, strict=True))

@@ -39,11 +39,11 @@ def table_overview(table: DataTable, most: int) -> dict[str, Any]:
         values = table.numbers(k)
         if (rows := np.flatnonzero(np.isinf(values))).size:
             raise TableError(f"{table.place(int(rows[0]))} of {table.names[k]!r} is infinite")
-        known = values[np.isfinite(values)]
-        ends = (float(known.min()), float(known.max())) if len(known) else (None, None)
+        finite = values[np.isfinite(values)]
+        ends = (float(finite.min()), float(finite.max())) if len(finite) else (None, None)
         role = proposed_role(table.names[k], values)
         columns.append(
-            {"name": table.names[k], "role": role, "missing": len(values) - len(known)}
+            {"name": table.names[k], "role": role, "missing": len(values) - len(finite)}
             | {"low": ends[0], "high": ends[1]}
         )
     return {"columns": columns, "guess": _guess(columns)}
@@ -53,18 +53,18 @@ def _guess(columns: list[dict[str, Any]]) -> dict[str, Any]:
     """Return where the rows may live."""
     names = [column["name"] for column in columns]
     angles = [c["name"] for c in columns if c["role"].startswith("angle")]
-    for space, own, why in (
+    for space, names_of_space, why in (
         ("sphere", names, "these columns say a direction"),
         ("klein-bottle", angles, "so small picture patches lie on the Klein bottle"),
     ):
         try:
-            found = chosen_arrangement(space, own)
+            way = chosen_arrangement(space, names_of_space)
         except SettingError:  # several may be meant
             continue
-        if found is None or (space == "klein-bottle" and len(own) > 2):
+        if way is None or (space == "klein-bottle" and len(names_of_space) > 2):
             continue
-        taken = [own[k] for k in found.columns]
-        if space == "sphere" and (found.is_axial or AXES & set(words_of(" ".join(taken)))):
+        taken = [names_of_space[k] for k in way.columns]
+        if space == "sphere" and (way.is_axial or AXES & set(words_of(" ".join(taken)))):
             space, why = "projective-plane", "a line has two ends, which mean the same"
         return {"space": space, "columns": taken, "why": why}
     if angles:

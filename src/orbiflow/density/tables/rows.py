@@ -56,25 +56,25 @@ def read_rows(
     table = read_table(
         path, has_header=settings.header, decimal=settings.decimal, codes=settings.missing_codes
     )
-    asked = asked_roles(settings.columns)
+    declared = asked_roles(settings.columns)
     may_lack = isinstance(settings, RowSettings) and settings.missing == "marginalise"
     drops = settings.drop_missing or (
         isinstance(settings, RowSettings) and settings.missing == "drop"
     )
     missing = "drop" if drops else "keep" if may_lack else "refuse"
     try:
-        named = {found_column(table, key) for key in asked}
+        named = {found_column(table, key) for key in declared}
         columns = {name: found_column(table, name) for name in conditions_of(settings.where)}
         apart = [name for name, column in columns.items() if column not in named]
         if where is None:
-            said = replace(fitted or Declaration("torus"), asked=asked)
+            said = replace(fitted or Declaration("torus"), asked=declared)
             others = {found_column(table, name) for name in (*given, *apart)}
             chosen = choose(table, said, others)
             rows = rows_of(table, chosen, missing=missing, where=settings.where, given=given)
         else:
             widths = None if where.width is None else (where.width,)
             rows = checked_rows(
-                table, Declaration(where.space, asked, where.unit, widths, where.rotation_form),
+                table, Declaration(where.space, declared, where.unit, widths, where.rotation_form),
                 given=given, apart=apart, missing=missing, where=settings.where,
             )  # fmt: skip
     except SettingError as error:

@@ -87,13 +87,13 @@ class SpaceSettings(Settings, group="Density"):
 
     def _check_rotations(self) -> None:
         """Check that what is of rotations is asked of rotations, and that there are such symmetries."""
-        asked = {name: getattr(self, name) for name in ("crystal", "specimen", "form", "passive")}
-        given = [name for name, value in asked.items() if value]
-        if not given:
+        options = {name: getattr(self, name) for name in ("crystal", "specimen", "form", "passive")}
+        chosen = [name for name, value in options.items() if value]
+        if not chosen:
             return
         if self.space not in ROTATIONS:
             raise SettingError(
-                f"{{{given[0]}}} is for rotations, not for the {literal(self.space)}: take {{space}} "
+                f"{{{chosen[0]}}} is for rotations, not for the {literal(self.space)}: take {{space}} "
                 "rotation-space"
             )
         if self.crystal is not None and self.space != ROTATIONS[0]:
@@ -102,9 +102,9 @@ class SpaceSettings(Settings, group="Density"):
             )
         from orbiflow.density.spaces import make_space
 
-        own = {"symmetry": self.crystal, "specimen": self.specimen, "passive": self.passive}
+        symmetry = {"symmetry": self.crystal, "specimen": self.specimen, "passive": self.passive}
         try:
-            make_space(self.space, form=self.form or "quaternion", **own)
+            make_space(self.space, form=self.form or "quaternion", **symmetry)
         except SettingError as error:
             raise SettingError(error.template.replace("{symmetry}", "{crystal}")) from error
 

@@ -233,8 +233,8 @@ def read_text(
             break
     if not head:
         raise InputFileError(f"{path}: only comments and blank lines; export it again")
-    found = SEPARATOR.fullmatch(comments[0][1].strip()) if comments else None
-    delimiter = found[1] if found else delimiter_of([line for _, line in head], mark)
+    separator = SEPARATOR.fullmatch(comments[0][1].strip()) if comments else None
+    delimiter = separator[1] if separator else delimiter_of([line for _, line in head], mark)
     if delimiter == mark or not delimiter.isascii():
         raise InputFileError(
             f"{path}: line 1 says that {delimiter!r} separates cells, which it cannot where decimals "
@@ -361,7 +361,7 @@ def append_to_text(table: DataTable, columns: dict[str, Array], rows: NDArray[np
         elif not is_comment:
             if (row := place.pop(number, None)) is None:
                 raise changed
-            cells = [f"{own[row]:.10g}".replace(".", decimal) for own in columns.values()]
+            cells = [f"{column[row]:.10g}".replace(".", decimal) for column in columns.values()]
             cells = [f'"{cell}"' if decimal == end else cell for cell in cells]
         out += f"{end.join([line, *cells])}\n".encode()
     if place:
