@@ -190,7 +190,7 @@ def test_twice(tmp_path: Path, orbiflow: Any) -> None:
     data, out = table_of(tmp_path, 40, protein=[f"p{k // 4}" for k in range(40)]), tmp_path / "out"
     command = ("density", "cv", data, "--out", out, "--columns", "protein=group", *QUICK)
     first = orbiflow.done(*command)
-    names(first.out, "folds/mixture-1-01", 40, 10, "mixture", "uniform", out / "index.html")
+    names(first.out, "folds/mixture-1-01", 40, 10, "mixture", "uniform", out / "cv.csv")
     done = {path: path.stat().st_mtime_ns for path in out.glob("folds/**/*")}
     second = orbiflow.done(*command)
     names(second.out, "mixture", "uniform")

@@ -73,16 +73,6 @@ def test_a_cell_reaches_the_folds(tmp_path: Path) -> None:
     assert any("no cell was given" in text for text in told)
 
 
-@given(st.floats(-1e6, 1e6), st.floats(0, 1e4) | st.floats(0, 1e-12))
-def test_ticks_are_apart_however_near_the_values(low: float, span: float) -> None:
-    drawn = overview.strips([("a", (low, low + span), ())], "nats")
-    assert drawn is not None
-    places = [place for place, _ in drawn["ticks"]]
-    assert len(places) > 1
-    assert np.all(np.diff(places) > 1)
-    assert all(math.isfinite(dot) for dot in drawn["strips"][0]["dots"])
-
-
 def test_each_row_is_scored_by_a_fit_to_the_other_folds(here: Here, tmp_path: Path) -> None:
     call = call_of(table_of(tmp_path))
     summary, events = run_call(call)
@@ -107,9 +97,6 @@ def test_each_row_is_scored_by_a_fit_to_the_other_folds(here: Here, tmp_path: Pa
     assert {(row["rows"], row["fitted"]) for row in table} == {("16", "32")}
     told = [event.name for event in events if isinstance(event, ItemDone)]
     assert told == [row["folder"] for row in table]
-    page = (call.flat["out"] / "index.html").read_text()
-    assert page.count("<svg") == 2
-    assert report_of(call)["comparison"]["verdict"] in page
 
 
 @given(st.integers(0, 2**31), st.integers(1, 2**31))
@@ -178,7 +165,6 @@ def test_stopping_keeps_what_was_finished(here: Here, tmp_path: Path) -> None:
     assert report_of(call)["comparison"]["rows"] == 16
     assert report_of(call)["comparison"]["notes"][0] == "16 of 48 rows so far: fits are missing"
     assert report_of(call)["fits"] == {"all": 6, "done": 3, "failed": 0, "left": 3}
-    assert "3 of 6 fits still to do" in (call.flat["out"] / "index.html").read_text()
     here.done.clear()
     summary, _ = run_call(call)
     assert here.done == ALL[3:]
@@ -283,7 +269,6 @@ def test_a_fold_that_fails_is_said_and_can_be_tried_again(here: Here, tmp_path: 
     assert not (call.flat["out"] / "rows.csv").exists()
     reasons = {row["error"] for row in lines_of(call.flat["out"] / "cv.csv")}
     assert reasons == {"a density needs at least 10 different points, got 6 among 6"}
-    assert "Without a result" in (call.flat["out"] / "index.html").read_text()
     assert any("no comparison: " in event.text for event in events if isinstance(event, Note))
     here.done.clear()
     run_call(call)

@@ -42,9 +42,8 @@ def cross_validate_table(
 
     Fits to all folds but one, for each in turn, here or on a Dask cluster, and scores the one held out,
     beside other settings at the same folds. Writes cv.csv, a line for each fold; rows.csv, the table
-    with the log densities of each row; report.json, the comparison; and index.html, a page to look at.
-    If it is interrupted, run the same command again to resume. The exit status is 1 if a fold has no
-    result.
+    with the log densities of each row; and report.json, the comparison. If it is interrupted, run the
+    same command again to resume. The exit status is 1 if a fold has no result.
 
     Args:
         data: CSV, TSV, NPY or Parquet.

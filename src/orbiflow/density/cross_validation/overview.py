@@ -1,9 +1,8 @@
-"""The work of a cross-validation, and its files: folds, rows, the comparison, the page."""
+"""The work of a cross-validation, and its files: folds, rows, the comparison."""
 
 from __future__ import annotations
 
 import json
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,9 +13,8 @@ import numpy as np
 
 from orbiflow import __version__, batch, runtime
 from orbiflow.arrays import Array
-from orbiflow.batch import Entry
 from orbiflow.density.comparing import ModelComparison
-from orbiflow.density.cross_validation.settings import UNIFORM, CrossValidation, written_files
+from orbiflow.density.cross_validation.settings import CrossValidation, written_files
 from orbiflow.density.cross_validation.splits import (
     Fit,
     HeldOut,
@@ -28,12 +26,10 @@ from orbiflow.density.cross_validation.splits import (
     splits_of,
 )
 from orbiflow.density.inference import uniform_logs
-from orbiflow.density.pictures import space_title
 from orbiflow.density.tables import append_columns
-from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
 
-TABLE, ROWS, REPORT, PAGE = "cv.csv", "rows.csv", "report.json", "index.html"
+TABLE, ROWS, REPORT = "cv.csv", "rows.csv", "report.json"
 FIGURES = ("rows", "fitted", "log_likelihood")
 
 
@@ -60,19 +56,15 @@ class CvOverview:
         *,
         last: bool,
     ) -> Mapping[str, bytes | None]:
-        """Return `cv.csv` and `index.html`; with the last ones `rows.csv` and `report.json`."""
+        """Return `cv.csv`; at the end `rows.csv` and `report.json`, too."""
         by_key = {entry.file: entry for entry in entries}
         done = [(fit, by_key[fit.key]) for fit in self.fits if fit.key in by_key]
-        found = held_out(self.asked.out, by_key, self.fits, self.splits, self.asked.names)
+        files: dict[str, bytes | None] = {TABLE: _table(done)}
         if last:
-            self.comparison = compared(self.asked, found, self.splits[0])
-        elif not isinstance(self.comparison, str):
-            self.comparison = "fits are missing"
-        page = cv_page(self.asked, self.splits, found, self.comparison, done, waiting)
-        files: dict[str, bytes | None] = {TABLE: _table(done), PAGE: page}
-        if last:
-            files[ROWS] = self._rows(found)
-            files[REPORT] = self._report(found, done, waiting)
+            scores = held_out(self.asked.out, by_key, self.fits, self.splits, self.asked.names)
+            self.comparison = compared(self.asked, scores, self.splits[0])
+            files[ROWS] = self._rows(scores)
+            files[REPORT] = self._report(scores, done, waiting)
         return files
 
     def _rows(self, found: HeldOut) -> bytes | None:
@@ -180,7 +172,7 @@ def run(
     begin = time.perf_counter()
     out = asked.out
     runtime.check_outside_runs(out, asked.data)
-    files = {"table": TABLE, "rows": ROWS, "report": REPORT, "page": PAGE}
+    files = {"table": TABLE, "rows": ROWS, "report": REPORT}
     for name in files.values():
         runtime.check_inputs_kept(out / name, asked.data)
     with runtime.one_thread():
@@ -204,7 +196,7 @@ def run(
         "comparison": None if failed else runtime.to_json(comparison),
         "seconds": time.perf_counter() - begin,
     }
-    return counts.outcome(len(fits), out / TABLE, out / PAGE, summary, tell)
+    return counts.outcome(len(fits), out / TABLE, out / REPORT, summary, tell)
 
 
 def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
@@ -243,142 +235,3 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     }
     call = runtime.find("density fold").call({k: v for k, v in arguments.items() if v is not None})
     return batch.Item(fit.key, fit.name, call, split.read)
-
-
-MOST_LISTED = 200
-"""Folds of the table on the page; all are in cv.csv."""
-
-FoldMeans = Sequence[tuple[int, int, Array]]
-"""Split and fold, from 1, and the means (S,) of the rows that every setting has scored."""
-
-
-def cv_page(
-    asked: CrossValidation,
-    splits: Sequence[Split],
-    found: HeldOut,
-    comparison: ModelComparison | str,
-    done: Sequence[tuple[Fit, Entry]],
-    waiting: int,
-) -> bytes:
-    """Return the page as UTF-8, to be written beside the folders."""
-    rows = splits[0].rows
-    folds = found.fold_means(splits)
-    seconds = {(fit.split, fit.fold, fit.setting): entry.seconds for fit, entry in done}
-    first = next(iter(asked.settings))
-    made = None if isinstance(comparison, str) else comparison
-    scores, differences = _pictures(found, made, folds)
-    text = rendered(
-        "orbiflow.density.cross_validation",
-        "page.html",
-        title=f"Cross-validation of {asked.data.name}",
-        asked=asked,
-        rows=rows,
-        place=space_title(rows.space),
-        groups=None if rows.labels is None else len(np.unique(rows.labels)),
-        uniform=float(uniform_logs(rows.space, rows.values).mean()),
-        made=made,
-        why=comparison,
-        waiting=waiting,
-        fits=waiting + len(done),
-        scores=scores,
-        differences=differences,
-        folds=[
-            {
-                "label": f"{split}.{fold}" if asked.cv.times > 1 else str(fold),
-                "folder": Fit(split, fold, first, None).name,
-                "count": int((splits[split - 1].fold == fold).sum()),
-                "means": mean,
-                "seconds": [seconds.get((split, fold, name)) for name in asked.settings],
-            }
-            for split, fold, mean in folds[:MOST_LISTED]
-        ],
-        more=max(0, len(folds) - MOST_LISTED),
-        heads=["fold", "rows", *found.settings, *(f"{name}, s" for name in asked.settings)],
-        failed=[(fit, entry) for fit, entry in done if entry.state != "done"],
-        signed=_signed,
-    )
-    return text.encode("utf-8", "replace")
-
-
-def _signed(value: float, sign: str = "-") -> str:
-    """Return a figure, whose sign is no minus if it is rounded to 0.
-
-    >>> _signed(-1e-9, "+"), _signed(-0.5)
-    ('+0.0000', '−0.5000')
-    """
-    return f"{value:{sign}z.4f}".replace("-", "\N{MINUS SIGN}")
-
-
-Strip = tuple[str, Sequence[float], tuple[float, ...]]
-"""A name, dots for the folds, and the mean of all rows with its interval, if these are known."""
-
-
-def _pictures(
-    found: HeldOut, made: ModelComparison | None, folds: FoldMeans
-) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    """Return pictures of the mean log densities, and of the differences between settings."""
-    if not folds:
-        return None, None
-    dots = {name: [float(mean[k]) for *_, mean in folds] for k, name in enumerate(found.settings)}
-    left_out = UNIFORM if len(dots) > 2 else None  # it is far off, and in the table
-    of_all = made.scores if made else ()
-    known = {one.name: (one.mean, one.mean - one.error, one.mean + one.error) for one in of_all}
-    scores = [(name, own, known.get(name, ())) for name, own in dots.items() if name != left_out]
-    differences: list[Strip] = []
-    for d in made.differences if made else ():
-        if left_out not in (d.first, d.second):
-            apart = [a - b for a, b in zip(dots[d.first], dots[d.second], strict=True)]
-            differences.append((f"{d.first} − {d.second}", apart, (d.mean, d.low, d.high)))
-    label = "difference of a fold, nats a row"
-    return (
-        strips(scores, "mean log density of a fold, nats"),
-        strips(differences, label, zero=True) if differences else None,
-    )
-
-
-WIDTH, NAMES, MARGIN, STEP = 720, 300, 36, 34
-"""Pixels: of the picture, of names at its left at most, of the free right margin, of a strip."""
-
-LETTER_PX = 7.6
-"""Largest width of a letter of a name, in pixels."""
-
-
-def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[str, Any] | None:
-    """Return what the template draws and where, in pixels; None if there is nothing to draw."""
-    from matplotlib.ticker import MaxNLocator
-
-    values = [v for _, dots, known in lines for v in (*dots, *known) if math.isfinite(v)]
-    values += [0.0] if zero else []
-    if not values:
-        return None
-    low, high = min(values), max(values)
-    size = max(abs(high), 1.0)
-    spread = high - low if high - low > 1e-9 * size else 1e-3 * size  # equal but for rounding
-    ticks = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, low + spread)
-    low, high = min(ticks[0], low), max(ticks[-1], high)
-    names = min(NAMES, 30 + LETTER_PX * max(len(name) for name, *_ in lines))
-    room = int((names - 20) / LETTER_PX)
-    decimals = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
-
-    def place(value: float) -> float:
-        return names + (WIDTH - names - MARGIN) * (value - low) / (high - low)
-
-    return {
-        "width": WIDTH,
-        "names": names,
-        "middle": (names + WIDTH - MARGIN) / 2,
-        "foot": STEP * len(lines) + 8,
-        "label": label,
-        "said": f"{label}: {', '.join(name for name, *_ in lines)}",
-        "ticks": [(place(t), f"{t:.{decimals}f}".replace("-", "\N{MINUS SIGN}")) for t in ticks],
-        "zero": place(0.0) if zero else None,
-        "strips": [
-            {
-                "name": name if len(name) <= room else name[: room - 1] + "…",
-                "y": 4 + STEP * (k + 0.5),
-                "dots": [place(dot) for dot in dots if math.isfinite(dot)],
-                "known": [place(value) for value in known],
-            }
-            for k, (name, dots, known) in enumerate(lines)
-        ],
-    }
