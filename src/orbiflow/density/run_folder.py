@@ -9,9 +9,6 @@ from typing import Any
 
 from orbiflow.runtime import Note, ResultFolder, Sink, Written, write_atomic
 
-SAMPLES = "samples.csv"
-"""Samples beside the density that they are of."""
-
 
 def written_files(folder: Path) -> set[str]:
     """Return the names of the files that a fit wrote into a folder, and of pictures of its model."""
@@ -26,7 +23,8 @@ def written_files(folder: Path) -> set[str]:
 
     from orbiflow.density.pictures import MODEL, PICTURES, REPORT, TABLE, THUMBNAIL
 
-    samples = {SAMPLES} if "samples" in document else set[str]()
+    # of earlier versions
+    samples = {"samples.csv"} if "samples" in document else set[str]()
     before = {"conditional.safetensors"} if "given" in document else set[str]()
     return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES, *samples, *before}
 

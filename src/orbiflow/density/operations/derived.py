@@ -21,7 +21,7 @@ from orbiflow.density import inference, pictures, tables
 from orbiflow.density.models import Density, Mixture, density_to_bytes
 from orbiflow.density.operations.saved import SavedDensity, number_of, pair_of
 from orbiflow.density.regions import size_unit
-from orbiflow.density.run_folder import SAMPLES, write_files, written_files
+from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.spaces import Torus
 from orbiflow.errors import SettingError, literal
 
@@ -46,7 +46,7 @@ class Partial:
     Args:
         saved: The density.
         out: The folder.
-        settings: How well the density is found, and what is written of it.
+        settings: How well the density is found.
         tell: Hears of the work.
         cancel: Stops it.
     """
@@ -128,20 +128,10 @@ class Partial:
         named = {"space": {"name": space.name, **space.settings()}, "columns": names}
         errors = {"error": density.error, "largest_error": density.largest_error}
         document = {**named, "report": errors, **origin, "model": str(self.saved.path)}
-        if self.settings.sample is not None:
-            document["samples"] = self.settings.sample
         files: dict[str, str | bytes] = {
             pictures.MODEL: density_to_bytes(density, columns=names),
             pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),
         }
-        if self.settings.sample is not None:
-            self.progress(SHARE_BEFORE_FILES, "drawing samples")
-            drawn = density.sample(
-                (self.settings.sample,), torch.Generator().manual_seed(self.settings.seed)
-            )
-            files[SAMPLES] = tables.to_csv(names, space.from_chart(drawn))
-            for text in _sample_notes(density):
-                self.tell(runtime.Note(text))
         self.progress(0.8, "drawing")
         if space.dim in TABLE_ROWS and isinstance(space, Torus):
             files[pictures.TABLE] = tables.to_csv((*names, "density"), _table(density, space))
@@ -167,19 +157,6 @@ def evidence_of(density: Density, given: dict[int, float]) -> float:
     at = [[given.get(axis, math.nan) for axis in range(density.space.chart_dim)]]
     points = torch.tensor(at, dtype=torch.float64)
     return float(inference.log_prob_observed(density, points, measure="uniform"))
-
-
-def _sample_notes(density: Mixture) -> list[str]:
-    """Return of what is drawn with weights how many draws count, in words."""
-    notes: list[str] = []
-    for component, weight in zip(density.components, density.weights.tolist(), strict=True):
-        share = component.effective_share()
-        if share < 1:
-            notes.append(
-                f"{100 * weight:.1f}% of the samples are chosen among weighed draws, of which "
-                f"{100 * share:.2g}% count (effective sample size)"
-            )
-    return notes
 
 
 def _words(density: Density, names: list[str], out: Path) -> str:

@@ -312,23 +312,29 @@ def sample(
         generator = torch.Generator().manual_seed(settings.seed)
         data = saved.density.space.from_chart(saved.density.sample((settings.count,), generator))
     cancel.check()
+    notes = _weighed_notes(saved.density)
     words = f"{settings.count} samples written to {out}"
-    write_file(out, tables.to_csv(saved.columns, data), on_event, words)
+    write_file(out, tables.to_csv(saved.columns, data), on_event, *notes, words)
     return runtime.Outcome({"file": str(out), "rows": settings.count})
 
 
+def _weighed_notes(density: models.Density) -> list[str]:
+    """Return of what is drawn with weights how many draws count, in words."""
+    shares = [(weight, part.effective_share()) for weight, part in density.parts()]
+    return [
+        f"{100 * weight:.1f}% of the samples are chosen among weighed draws, of which "
+        f"{100 * share:.2g}% count (effective sample size)"
+        for weight, share in shares
+        if share < 1
+    ]
+
+
 class PartialSettings(Settings, group="Densities of some angles"):
-    """How well they are found, and what is written of them."""
+    """How well they are found."""
 
     accuracy: Annotated[float, Range(1e-6, 0.5)] = 0.01
     """Error of the log density that is asked for, in nats (root mean square). What has a closed form is
     exact; the rest takes some seconds at 0.01, and up to a minute at 0.001."""
-
-    sample: Annotated[int | None, Range(1, 1_000_000), DefaultText("none")] = None
-    """Number of samples to write as samples.csv, in the units of the data."""
-
-    seed: Annotated[int, Range(-(2**63), 2**64 - 1), Needs("sample")] = 0
-    """Seed of the samples."""
 
 
 @runtime.operation("density marginal")
