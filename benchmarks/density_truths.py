@@ -29,6 +29,7 @@ from orbiflow.density import (
     DensityEstimator,
     Mixture,
     QuotientSpace,
+    RotationSpace,
     Space,
     UniformDensity,
     make_space,
@@ -333,8 +334,8 @@ SPHERES: dict[str, Callable[[], Known]] = {
         for dim in DIMENSIONS
     },
     **{
-        f"{name}{end}": lambda name=name, make=make: on(make_space(name), make)
-        for name in ("rotation-space", "hexagonal-orientations", "cubic-orientations")
+        f"{name}{end}": lambda crystal=crystal, make=make: on(RotationSpace(symmetry=crystal), make)
+        for name, crystal in (("rotations", None), ("hexagonal", "622"), ("cubic", "432"))
         for end, make in (("", clusters), ("-fibre", fibre))
     },
 }

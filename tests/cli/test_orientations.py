@@ -14,8 +14,9 @@ def test_angles_beyond_a_turn_mark_points_without_an_orientation(tmp_path, orbif
     angles = np.random.default_rng(0).uniform(0.02, 1.4, (60, 3)).round(5)
     angles[:7] = 12.56637
     np.savetxt(tmp_path / "a.csv", angles, delimiter=",", header="phi1,Phi,phi2", comments="")
-    how = ("--space", "cubic-orientations", "--components", "kernels", "--unit", "radians")
+    how = ("--space", "rotation-space", "--crystal", "432", "--unit", "radians")
     fit = ("density", "fit", tmp_path / "a.csv", *how, "-o", tmp_path / "m")
+    fit = (*fit, "--components", "kernels")
     done = orbiflow.refused(*fit)
     names(done.err, "line 2", "--missing-codes 12.56637", "--drop-missing")
     done = orbiflow.done(*fit, "--missing-codes", "12.56637", "--drop-missing")
@@ -24,7 +25,6 @@ def test_angles_beyond_a_turn_mark_points_without_an_orientation(tmp_path, orbif
 
 WRONG = {
     ("torus", "--crystal", "432"): "--crystal torus",
-    ("cubic-orientations", "--crystal", "622"): "cubic-orientations",
     ("rotation-space", "--specimen", "cube"): "--specimen 432",
     ("rotation-space", "--form", "matrix"): "--form matrix 9 3",
 }

@@ -58,12 +58,12 @@ def test_rotations_are_read_by_the_names_of_their_numbers(names: str, right: str
 @pytest.mark.parametrize("names", ["phi2,Phi,phi1", "φ2,Φ,φ1", "euler3,euler1,euler2"])
 def test_euler_angles_are_read_by_name(names: str) -> None:
     columns = names.split(",")
-    found = chosen_arrangement("cubic-orientations", columns)
+    found = chosen_arrangement("rotation-space", columns)
     assert found is not None
     ends = [columns[k][-1] for k in found.columns]
     assert (ends[0], ends[2]) in (("1", "2"), ("1", "3"))
     with refused("Bunge's", "angles", kind=SettingError):
-        check_columns("cubic-orientations", columns)
+        check_columns("rotation-space", columns)
 
 
 MUST_BE_CONVERTED = {
@@ -96,7 +96,7 @@ def test_several_pairs_are_asked_about() -> None:
         ("sphere", "x,y,z"), ("sphere", "a,b"), ("sphere", "column1,column2"), ("torus", "lon,lat"),
         ("sphere", "lat,lon"), ("rotation-space", "a,b,c,d"), ("rotation-space", "q1,q2,q3,q4"),
         ("klein-bottle", "theta,phi"), ("p4m", "x,y"), ("hypersphere", "x2,x1,x3"),
-        ("cubic-orientations", "phi1,Phi,phi2"), ("sphere", "late,lone"), ("sphere", "dec,temperature"),
+        ("rotation-space", "phi1,Phi,phi2"), ("sphere", "late,lone"), ("sphere", "dec,temperature"),
     ],
 )  # fmt: skip
 def test_good_orders_pass(space: str, names: str) -> None:

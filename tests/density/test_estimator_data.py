@@ -96,7 +96,7 @@ ORDERS = {
     ("sphere", "lon,lat"): "lat,lon",
     ("sphere", "z,y,x"): "x,y,z",
     ("rotation-space", "q0,q1,q2,q3"): "q1,q2,q3,q0",
-    ("cubic-orientations", "phi2,Phi,phi1"): "phi1,Phi,phi2",
+    ("rotation-space", "phi2,Phi,phi1"): "phi1,Phi,phi2",
     ("klein-bottle", "phi,theta"): "theta,phi",
 }
 
@@ -107,7 +107,7 @@ def test_names_say_the_order(space: str, names: str) -> None:
     values /= np.linalg.norm(values, axis=1, keepdims=True)
     if names.count(",") == 1 and space != "klein-bottle":
         values *= 60  # degrees that are no radians
-    unit = "radians" if space in ("cubic-orientations", "klein-bottle") else None
+    unit = "radians" if "phi" in names else None
     right, mixed = ORDERS[space, names], frame(values, names)
     ordered = mixed[right.split(",")]
     with warned(*right.split(","), kind=DataWarning):

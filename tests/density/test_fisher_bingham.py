@@ -197,4 +197,4 @@ def test_refusals() -> None:
     with refused("spaces"):
         FisherBingham(make_space("torus"), torch.zeros(3), torch.zeros(3, 3))
     with refused("spaces"):
-        AngularCentralGaussian(make_space("cubic-orientations"), torch.eye(4))
+        AngularCentralGaussian(make_space("rotation-space", symmetry="O"), torch.eye(4))

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from orbiflow.density import (
     AdaptiveKernels,
-    CubicOrientations,
     DensityEstimator,
     RotationSpace,
     summarize_orientations,
@@ -217,9 +216,8 @@ OPEN = {
 def test_names_that_leave_it_open_are_refused(names: str) -> None:
     values = Rotation.random(30, random_state=0).as_quat()[:, : names.count(",") + 1]
     frame = pandas.DataFrame(values, columns=names.split(","))
-    for space in ("rotation-space", "cubic-orientations"):
-        with refused(*OPEN[names].split(), kind=SettingError):
-            DensityEstimator(space).fit(frame)
+    with refused(*OPEN[names].split(), kind=SettingError):
+        DensityEstimator("rotation-space").fit(frame)
 
 
 def test_a_space_of_another_form_than_the_names_is_refused() -> None:
@@ -227,7 +225,7 @@ def test_a_space_of_another_form_than_the_names_is_refused() -> None:
         np.random.default_rng(0).normal(0, 0.1, (40, 3)), columns=["rx", "ry", "rz"]
     )
     with refused("form", "ZXZ", kind=SettingError):
-        DensityEstimator(CubicOrientations(form="bunge")).fit(frame)
+        DensityEstimator(RotationSpace(form="bunge")).fit(frame)
     turns = Rotation.random(40, random_state=0).as_quat()
     frame = pandas.DataFrame(turns, columns=["x", "y", "z", "w"])
     with refused("form", "scalar-first", kind=SettingError):

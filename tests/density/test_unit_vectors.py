@@ -19,7 +19,6 @@ from scipy.stats import kstest
 from density.blends import kernels_of, random_kernels
 from orbiflow.density import (
     AdaptiveKernels,
-    CubicOrientations,
     DensityEstimator,
     Hypersphere,
     ProjectivePlane,
@@ -46,7 +45,7 @@ from strategies import seeds
 SPACES: tuple[UnitVectorSpace, ...] = (
     Hypersphere(1), Hypersphere(2), Hypersphere(3), Hypersphere(9), ProjectiveSpace(1),
     ProjectiveSpace(4), RotationSpace(), RotationSpace(form="ZXZ", unit="degrees", symmetry="D6"),
-    CubicOrientations(form="vector"),
+    RotationSpace(form="vector", symmetry="O"),
 )  # fmt: skip
 every = pytest.mark.parametrize("space", SPACES, ids=repr)
 spaces = st.sampled_from(SPACES)
@@ -272,9 +271,7 @@ REFUSED = {
     "1 latitude longitude": lambda: Hypersphere(1).to_chart([[31.1, 35.5]]),
     "row 1 matrix": lambda: RotationSpace().to_chart([[1.0] * 9]),
     "row 1 turn radians": lambda: RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
-    "turn degrees": lambda: CubicOrientations(form="ZXZ", unit="degrees").to_chart(
-        [[400.0, 0.0, 0.0]]
-    ),
+    "turn degrees": lambda: RotationSpace(form="ZXZ", unit="degrees").to_chart([[400.0, 0.0, 0.0]]),
     "gradients quaternions": lambda: DensityEstimator.fitted(
         kernels(RotationSpace(), 0)
     ).score_gradient(quarter),

@@ -80,8 +80,6 @@ from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
 from .spaces.product import ProductSpace as ProductSpace
 from .spaces.quotient import QuotientSpace as QuotientSpace
-from .spaces.rotations import CubicOrientations as CubicOrientations
-from .spaces.rotations import HexagonalOrientations as HexagonalOrientations
 from .spaces.rotations import RotationSpace as RotationSpace
 from .spaces.round import ProjectivePlane as ProjectivePlane
 from .spaces.round import RoundSpace as RoundSpace

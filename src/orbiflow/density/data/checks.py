@@ -291,7 +291,7 @@ def check_values(
     for column in coordinates:
         if is_angular(space, len(coordinates), form):
             check_turn(column, TURNS[unit or "radians"], "angle", are_new=are_new)
-        elif space not in (*VECTORS, *ROTATIONS):  # points of a quotient
+        elif space not in (*VECTORS, ROTATIONS):  # points of a quotient
             refuse_codes(column, column.known)
     return doubts
 

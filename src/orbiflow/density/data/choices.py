@@ -20,7 +20,7 @@ Roles = tuple[Role | None, ...]
 """What columns are; None is a coordinate of the space."""
 
 WIDTHS = {
-    "klein-bottle": (2,), **dict.fromkeys(DIRECTIONS, (2, 3)), **dict.fromkeys(ROTATIONS, (3, 4, 9)),
+    "klein-bottle": (2,), **dict.fromkeys(DIRECTIONS, (2, 3)), ROTATIONS: (3, 4, 9),
 }  # fmt: skip
 """The numbers of columns that spaces take."""
 

@@ -121,7 +121,7 @@ def arrangements(space: str, names: Sequence[str], width: int | None = None) -> 
     """
     if space in DIRECTIONS:
         kinds = (PLACES, _lettered("xyz", "unit vectors"))
-    elif space in ROTATIONS:
+    elif space == ROTATIONS:
         vector = _lettered("xyz", "a rotation vector", "vector")
         kinds = (EULER, RODRIGUES, QUATERNIONS, MATRICES, vector)
     elif space == "klein-bottle":

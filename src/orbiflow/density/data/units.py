@@ -15,8 +15,7 @@ TURN_TOLERANCE = 1e-4
 """Share by which rounding may take an angle beyond a turn: 6.2832 is 2 pi."""
 
 DIRECTIONS = ("sphere", "projective-plane")
-CRYSTALS = ("cubic-orientations", "hexagonal-orientations")
-ROTATIONS = ("rotation-space", *CRYSTALS)
+ROTATIONS = "rotation-space"
 ANGULAR = ("torus", "klein-bottle")
 VECTORS = (*DIRECTIONS, "hypersphere", "projective-space")
 
@@ -79,7 +78,7 @@ def is_angular(space: str, columns: int, form: str | None = None) -> bool:
 
     `form` says how rotations are written: Rodrigues' vectors are no angles.
     """
-    return space in ANGULAR or (space in ROTATIONS and columns == 3 and form != "rodrigues")
+    return space in ANGULAR or (space == ROTATIONS and columns == 3 and form != "rodrigues")
 
 
 def check_unit(space: str, unit: str | None) -> None:
@@ -93,7 +92,7 @@ degrees; convert them, or give unit vectors x,y,z
     """
     if unit is not None and unit not in get_args(Unit):
         raise SettingError(f"{{unit}} must be degrees, radians or turns, got {literal(repr(unit))}")
-    if unit is not None and space not in (*ANGULAR, *ROTATIONS, *VECTORS):
+    if unit is not None and space not in (*ANGULAR, ROTATIONS, *VECTORS):
         raise SettingError(
             "{unit} applies only to angles: points of a quotient are in that of its cell; leave it out"
         )

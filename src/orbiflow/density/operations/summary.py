@@ -74,9 +74,9 @@ def summary(
 
 def _check(where: SpaceSettings, reading: RowSettings, picture: Path | None) -> None:
     """Refuse what has no summary before the table is read."""
-    if where.space not in ("torus", "sphere", "projective-plane", *ROTATIONS):
+    if where.space not in ("torus", "sphere", "projective-plane", ROTATIONS):
         raise SettingError(
-            f"{{space}} must be torus, sphere, projective-plane, {', '.join(ROTATIONS)}: summaries are "
+            f"{{space}} must be torus, sphere, projective-plane, {ROTATIONS}: summaries are "
             f"of angles, directions, axes and orientations; got {literal(repr(where.space))}"
         )
     if where.space != "torus":
@@ -94,7 +94,7 @@ def _summarised(rows: TableRows, where: SpaceSettings, level: float) -> Summary:
     how: dict[str, Any] = {"weights": rows.weights, "groups": rows.labels, "level": level}
     about: dict[str, Any] = {"space": where.space, "unit": unit, "level": level}
     about |= {"declaration": rows.declaration, "data": rows}
-    if where.space in ROTATIONS:
+    if where.space == ROTATIONS:
         space: Any = space_of(where, rows.columns, unit)
         entry = orientations.summarize_orientations(space, values, **how)
         return Summary(**about, orientations=(entry,))

@@ -15,8 +15,6 @@ from .point_groups import rotation_group_name as rotation_group_name
 from .point_groups import rotations_of as rotations_of
 from .product import ProductSpace as ProductSpace
 from .quotient import QuotientSpace as QuotientSpace
-from .rotations import CubicOrientations as CubicOrientations
-from .rotations import HexagonalOrientations as HexagonalOrientations
 from .rotations import RotationSpace as RotationSpace
 from .round import ProjectivePlane as ProjectivePlane
 from .round import RoundSpace as RoundSpace

@@ -107,7 +107,7 @@ class DataColumns:
         """Return how rotations are written in columns of these names, or numbers."""
         if isinstance(self.space, Space):
             return self.space.form_in(names)
-        return rotation_form(self.name, names, len(names)) if self.name in ROTATIONS else None
+        return rotation_form(self.name, names, len(names)) if self.name == ROTATIONS else None
 
     def of(self, rows: TableRows) -> Space:
         """Return the space of rows that `read` has checked, or that were read from a file."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from typing import Any, ClassVar, Self, cast
+from typing import Any, Self, cast
 
 import numpy as np
 import torch
@@ -74,8 +74,6 @@ class RotationSpace(UnitVectorSpace):
     """
 
     name = "rotation-space"
-    crystal: ClassVar[str] = "C1"
-    of_three: ClassVar[str] = "vector"
 
     def __init__(
         self,
@@ -89,7 +87,7 @@ class RotationSpace(UnitVectorSpace):
         form = "ZXZ" if form == "bunge" else form
         self.form = as_choice(form, tuple(dict.fromkeys((*FORMS, *EULER))), "form")
         self.period, self.angle_unit, self.passive = whole_turn(unit), unit, passive
-        self.symmetry = rotation_group_name(symmetry or self.crystal)
+        self.symmetry = rotation_group_name(symmetry or "C1")
         self.specimen = rotation_group_name(specimen or "C1", "specimen")
         if passive and form == "ZXZ":
             raise SettingError(
@@ -124,7 +122,7 @@ class RotationSpace(UnitVectorSpace):
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del seed
-        return cls(form={3: cls.of_three, 9: "matrix"}.get(data.shape[1], "quaternion"), unit=unit)
+        return cls(form={3: "vector", 9: "matrix"}.get(data.shape[1], "quaternion"), unit=unit)
 
     def form_of(self, width: int) -> str:
         """Return the form of data of so many columns."""
@@ -239,15 +237,3 @@ def _from_matrices(table: Array) -> Rotation:
         lambda row: f"{table[row].round(4).tolist()} is no rotation matrix, row by row",
     )
     return Rotation.from_matrix(matrices)
-
-
-class CubicOrientations(RotationSpace):
-    """Orientations of cubic crystals (432); three columns are Bunge's Euler angles phi1, Phi, phi2."""
-
-    name, crystal, of_three = "cubic-orientations", "O", "ZXZ"
-
-
-class HexagonalOrientations(RotationSpace):
-    """Orientations of hexagonal crystals (622), otherwise as of cubic ones."""
-
-    name, crystal, of_three = "hexagonal-orientations", "D6", "ZXZ"

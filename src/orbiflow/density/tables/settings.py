@@ -27,7 +27,7 @@ OTHER_FORMATS = frozenset((
 SpaceName = Literal[
     "torus", "sphere", "klein-bottle", "projective-plane",
     "hypersphere", "projective-space",
-    "rotation-space", "cubic-orientations", "hexagonal-orientations",
+    "rotation-space",
 ]  # fmt: skip
 SPACES: tuple[str, ...] = get_args(SpaceName)
 
@@ -42,9 +42,9 @@ class SpaceSettings(Settings, group="Density"):
 
     space: str
     """Where the data live: torus, sphere, klein-bottle or projective-plane; unit vectors of any
-    dimension on a hypersphere or in a projective-space; a rotation-space, cubic-orientations or
-    hexagonal-orientations; or a group whose quotient it is: a plane group such as p4m, a flat manifold
-    such as hantzsche-wendt, or a space group such as "P 21 21 21"."""
+    dimension on a hypersphere or in a projective-space; a rotation-space; or a group whose quotient it
+    is: a plane group such as p4m, a flat manifold such as hantzsche-wendt, or a space group such as
+    "P 21 21 21"."""
 
     cell: Annotated[
         tuple[float, ...] | None, DefaultText("lengths about 1 that suit the group")
@@ -61,7 +61,7 @@ class SpaceSettings(Settings, group="Density"):
     """Unit of angles whose columns name none. On the sphere, degrees says that small ones are no
     radians."""
 
-    crystal: Annotated[str | None, DefaultText("that of the space, or none")] = None
+    crystal: Annotated[str | None, DefaultText("none")] = None
     """Symmetry of the crystals whose orientations a rotation-space has: a point group or Laue class
     such as 432, m-3m or 6/mmm, or a system such as cubic. Of a group with reflections, the rotations of
     its Laue class count."""
@@ -91,14 +91,10 @@ class SpaceSettings(Settings, group="Density"):
         chosen = [name for name, value in options.items() if value]
         if not chosen:
             return
-        if self.space not in ROTATIONS:
+        if self.space != ROTATIONS:
             raise SettingError(
                 f"{{{chosen[0]}}} is for rotations, not for the {literal(self.space)}: take {{space}} "
                 "rotation-space"
-            )
-        if self.crystal is not None and self.space != ROTATIONS[0]:
-            raise SettingError(
-                f"{{crystal}} is for the rotation-space: the {self.space} have a symmetry of their own"
             )
         from orbiflow.density.spaces import make_space
 
@@ -113,11 +109,12 @@ class SpaceSettings(Settings, group="Density"):
 
         Three columns without names are Bunge's angles if there are crystals, else a vector.
         """
-        if self.space not in ROTATIONS:
+        if self.space != ROTATIONS:
             return None
         width, form = len(names), "ZXZ" if self.form == "bunge" else self.form
-        crystals = self.space != ROTATIONS[0] or self.crystal is not None
-        default = {3: "ZXZ" if crystals else "vector", 9: "matrix"}.get(width, "quaternion")
+        default = {3: "vector" if self.crystal is None else "ZXZ", 9: "matrix"}.get(
+            width, "quaternion"
+        )
         return rotation_form(self.space, names, width, form) or default
 
     @property
