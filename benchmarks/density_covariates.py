@@ -247,7 +247,7 @@ def compare(names: list[str], device: str) -> None:
         second = f"{without:7.4f} | {linear:10.4f} {times[1]:7.1f} | {theirs:6.3f} {times[2]:7.1f}"
         print(f"{first} {second} | {truth}", flush=True)
         assert fit.report_.given is not None
-        for words in fit.report_.given.lines(()):
+        for words in fit.report_.given.words():
             print(f"    {words}", flush=True)
 
 

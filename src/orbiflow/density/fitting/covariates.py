@@ -7,27 +7,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arrays import Array
-from orbiflow.density.data import alongside, group_numbers, words_of_cells
+from orbiflow.density.data import alongside, group_numbers
 from orbiflow.density.fitting.automatic import ChosenFit, fit_chosen, fit_in_folds
 from orbiflow.density.fitting.circular_regression import fit_regression
 from orbiflow.density.fitting.conditional_kernels import fit_kernels
 from orbiflow.density.fitting.held_out import Folds, folds_of, sparse_weights, stacked
 from orbiflow.density.fitting.joint import for_conditionals
 from orbiflow.density.fitting.neural_mixture import fit_networks
-from orbiflow.density.fitting.report import (
-    FitReport,
-    GivenReport,
-    PartEvidence,
-    Progress,
-    WordEvidence,
-    silent,
-)
+from orbiflow.density.fitting.report import FitReport, GivenReport, PartEvidence, Progress, silent
 from orbiflow.density.fitting.rows import Rows, gain_of, weighed
 from orbiflow.density.fitting.settings import DensitySettings
 from orbiflow.density.models import (
@@ -79,12 +70,6 @@ class _Task:
     def rows(self) -> Rows:
         """All rows."""
         return self.folds.rows
-
-    @property
-    def numbers(self) -> Tensor:
-        """The places (N,) of the rows before."""
-        assert self.rows.numbers is not None
-        return self.rows.numbers
 
     def where(self, fold: int) -> Tensor:
         """Return the numbers of the rows of a fold."""
@@ -183,7 +168,6 @@ def fit_conditional(
             PartEvidence(kind, share, *gain_of(scores, logs[0], counts))
             for kind, share, scores in zip(fits, listed(shares), logs, strict=True)
         ),
-        _by_word(density, cells, task.numbers[held].numpy(), (both - logs[0]).numpy()),
         tuple(untried),
     )
     return replace(pooled.report, given=report)
@@ -325,27 +309,3 @@ def _joint(task: _Task) -> ChosenFit:
     assert folds is not None
     evidence = for_conditionals(evidence, folds, space.dim)
     return replace(fit, density=evidence.assembled(), evidence=evidence)
-
-
-def _by_word(
-    density: ConditionalDensity, cells: Mapping[str, Values], held: NDArray[Any], gains: Array
-) -> dict[str, tuple[WordEvidence, ...]]:
-    """Return what each word is worth, by gains (n,) of rows held out; `held` are their places."""
-    evidence: dict[str, tuple[WordEvidence, ...]] = {}
-    for column in density.covariates.columns:
-        if not column.words:
-            continue
-        texts = words_of_cells(cells[column.name])
-        means = np.zeros((len(column.words), 0))
-        if len(cells) == 1 and density.space.is_of_angles:
-            turns = density.mean_directions({column.name: np.array(column.words)})
-            means = density.space.from_chart(turns)
-        entries: list[WordEvidence] = []
-        for word, mean in zip(column.words, means.tolist(), strict=True):
-            some = gains[texts[held] == word]
-            gain = float(some.mean()) if len(some) else None
-            error = float(some.std(ddof=1) / np.sqrt(len(some))) if len(some) > 1 else None
-            count = int((texts == word).sum())
-            entries.append(WordEvidence(word, count, gain, error, tuple(mean)))
-        evidence[column.name] = tuple(entries)
-    return evidence

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +18,7 @@ from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Event, Table
+from orbiflow.runtime import Event
 from orbiflow.settings import as_instance, as_points
 
 MASS_TOLERANCE = 1e-3
@@ -87,26 +87,6 @@ class PartEvidence:
 
 
 @dataclass(frozen=True)
-class WordEvidence:
-    """What covariates are worth where a column says one word.
-
-    - `rows`: All rows of the word.
-    - `gain`, `error`: As of `GivenReport`, at those held out; None where there are none, or only one.
-    - `mean`: The mean of each column of the data there, of angles that know of nothing else.
-    """
-
-    word: str
-    rows: int
-    gain: float | None
-    error: float | None
-    mean: tuple[float, ...] = ()
-
-
-MOST_WORDS_SHOWN = 60
-"""The most words in a table."""
-
-
-@dataclass(frozen=True)
 class GivenReport:
     """How the density where covariates are known was chosen.
 
@@ -115,7 +95,6 @@ class GivenReport:
     - `gain`, `error`: Mean nats by which they are likelier where the covariates are known than by the
       density of all rows, with the standard error.
     - `parts`: What it is made of, and what was tried.
-    - `words`: What each word is worth, by the name of its column.
     - `untried`: The kinds of parts that were left out to save time.
     """
 
@@ -124,13 +103,10 @@ class GivenReport:
     gain: float
     error: float
     parts: tuple[PartEvidence, ...]
-    words: dict[str, tuple[WordEvidence, ...]]
     untried: tuple[str, ...] = ()
 
-    def lines(self, columns: Sequence[str]) -> Iterator[str | Event]:
-        """Yield tables of words and lines of text; `columns` are the names of the data's."""
-        for name, entries in self.words.items():
-            yield _word_table(name, columns, entries)
+    def words(self) -> Iterator[str]:
+        """Yield what was found, in lines of text."""
         yield (
             f"{self.rows} rows held out are {self.gain:.4f} ± {self.error:.4f} nats likelier where the "
             "covariates are known"
@@ -140,27 +116,6 @@ class GivenReport:
             yield "the covariates say nothing about the data that is no accident of few rows"
         if self.untried:
             yield f"effort fast: {' and '.join(self.untried)} not tried"
-
-
-def _word_table(name: str, columns: Sequence[str], entries: Sequence[WordEvidence]) -> Table:
-    """Return what came of each word, a line for each."""
-
-    def shown(value: float | None) -> str:
-        return "-" if value is None else f"{value:.3f}"
-
-    rows = [
-        (
-            entry.word,
-            str(entry.rows),
-            shown(entry.gain),
-            shown(entry.error),
-            *(f"{value:.3g}" for value in entry.mean),
-        )
-        for entry in entries[:MOST_WORDS_SHOWN]
-    ]
-    means = [f"mean {column}" for column in columns] if entries[0].mean else []
-    heads = (name, "rows", "nats", "error", *means)
-    return Table(f"Rows held out where {name} is known", heads, tuple(rows))
 
 
 @dataclass(frozen=True)
@@ -207,10 +162,10 @@ class FitReport:
     given: GivenReport | None = None
     notes: tuple[str, ...] = field(default=())
 
-    def words(self, columns: Sequence[str] = ()) -> Iterator[str | Event]:
-        """Yield what the user is told: tables, and lines of text; `columns` are the data's names."""
+    def words(self) -> Iterator[str | Event]:
+        """Yield what the user is told: tables, and lines of text."""
         if self.given is not None:
-            yield from self.given.lines(columns)
+            yield from self.given.words()
         if self.parametric is not None:
             yield from self.parametric.words()
         yield from self.notes

@@ -91,7 +91,7 @@ def fit(
         if picture:
             files[pictures.THUMBNAIL] = pictures.density_thumbnail(estimator.density_, values)
     write_files(folder, files, on_event)
-    for line in (*estimator.report_.words(rows.columns), *_words(document, len(values), out)):
+    for line in (*estimator.report_.words(), *_words(document, len(values), out)):
         on_event(runtime.Note(line) if isinstance(line, str) else line)
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
     summary |= {"folder": str(out), "rows": len(values)}
