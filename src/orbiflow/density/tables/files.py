@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import io
-import math
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain, count
@@ -122,49 +121,26 @@ def kind_of_file(path: Path) -> str:
 
 
 def _read_npy(path: Path, codes: Sequence[str]) -> DataTable:
-    """Return the table in an `.npy` file, whose header is checked before anything is read."""
-    shape, dtype = _npy_header(path)
-    fields = dtype.names
-    width = shape[1] if fields is None else len(fields)
-    check_size(path, shape[0], width)
-    names = fields or tuple(numbered(width))
+    """Return the table in an `.npy` file, of which no more is read than there is."""
     try:
-        data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
-        parts = [np.array(data[name] if fields else data[:, i]) for i, name in enumerate(names)]
-    except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
-        raise _damaged(path, exc) from exc
-    if not len(parts) or not len(parts[0]):
-        raise InputFileError(f"{path}: holds no rows of numbers; export it again")
-    where, is_array = f"{path}: ", fields is None
-    return DataTable(names, not is_array, parts, where, path, is_array, codes=tuple(codes))
-
-
-def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
-    """Return shape and dtype, once they are known to be a table's and to fit into the file."""
-    form = np.lib.format
-    try:
-        with path.open("rb") as file:
-            version = form.read_magic(file)
-            read = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}[version]
-            shape, _, dtype = read(file, max_header_size=MAX_NPY_HEADER)
-            left = path.stat().st_size - file.tell()
+        with np.errstate(over="ignore"):  # of shapes that no file has
+            data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
     except Exception as exc:  # numpy's parser of headers raises many types
         raise _damaged(path, exc) from exc
-    if dtype.hasobject:
+    fields = data.dtype.names
+    if data.ndim != (2 if fields is None else 1):
         raise InputFileError(
-            f"{path}: holds Python objects, which are never read; save the array as float64"
+            f"{path}: an array of shape {short(str(data.shape))} and type {short(str(data.dtype))}; "
+            "save one of shape (N, k), or (N,) with named fields"
         )
-    if len(shape) != (1 if dtype.names is not None else 2) or min(shape) < 0:
-        raise InputFileError(
-            f"{path}: an array of shape {short(str(shape))} and type {short(str(dtype))}; save "
-            "one of shape (N, k), or (N,) with named fields"
-        )
-    if math.prod(shape) * dtype.itemsize > left:
-        raise InputFileError(
-            f"{path}: its header promises {math.prod(shape) * dtype.itemsize} bytes of numbers and "
-            f"{left} follow; the file is cut short or damaged: save it again"
-        )
-    return shape, dtype
+    names = fields or tuple(numbered(data.shape[1]))
+    check_size(path, len(data), len(names))
+    if not data.size:
+        raise InputFileError(f"{path}: holds no rows of numbers; export it again")
+    parts = [np.array(data[name] if fields else data[:, i]) for i, name in enumerate(names)]
+    return DataTable(
+        names, fields is not None, parts, f"{path}: ", path, fields is None, codes=tuple(codes)
+    )
 
 
 @contextmanager
