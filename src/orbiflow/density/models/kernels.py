@@ -23,9 +23,6 @@ from orbiflow.typed_torch import fft, special
 MOST_KERNELS = 1_000_000
 """The most kernels that a file may hold."""
 
-BLOCK_ENTRIES = 250_000
-"""Entries of the table of points against kernels worked on at a time."""
-
 MAX_CONCENTRATION = 1e16
 """The largest concentration whose kernels keep seven digits: a deviation of 1e-8 radians, 6 cm on the
 earth."""
@@ -128,16 +125,9 @@ class AdaptiveKernels(Density, kind="kernels"):
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         del seed
-        if self.space.parts:
-            points, axes = in_order(points, axes)
-            split = Split(self.space.chart_dim, tuple(axes))
-            return self.restricted(split, self.space.of_axes(axes)).closed[0][1].log_chart(points)
-        logs = self.weights.log()
-        block = max(1, BLOCK_ENTRIES // len(self.weights))
-        parts = [
-            log_sum_exp(self.log_each(part, axes) + logs) for part in torch.split(points, block)
-        ]
-        return torch.cat(parts)
+        points, axes = in_order(points.double(), axes)
+        split = Split(self.space.chart_dim, tuple(axes))
+        return self.restricted(split, self.space.of_axes(axes)).closed[0][1].log_chart(points)
 
     def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep the kernels' own marginals.
@@ -156,26 +146,13 @@ class AdaptiveKernels(Density, kind="kernels"):
         return Restriction([(evidence, kernels)], [])
 
     def log_each(self, points: Tensor, axes: list[int]) -> Tensor:
-        """Return the log density (N, K) of each kernel of some angles, at points (N, len(axes))."""
-        if self.space.parts:
-            return self._each_on(self.space.of_axes(axes), points, axes)
-        kappa = self.concentrations[:, axes]
-        angle, center = math.pi * points.double(), math.pi * self.centers[:, axes]
-        found = -special.i0e(kappa).log().sum(dim=1).expand(len(points), -1)
-        for own, middle, sharp in zip(angle.mT, center.mT, kappa.mT, strict=True):
-            # 1 - cos would lose all digits of narrow kernels
-            sine = (own[:, None] - middle).sin_()
-            found = torch.addcmul(found, sine * sharp, sine, value=-2)
-        return found
-
-    def _each_on(self, space: Space, points: Tensor, axes: list[int]) -> Tensor:
-        """Return what `log_each` does where some coordinates of a product have a space of their own."""
-        kappa = self.concentrations[:, self.space.factors_of(axes)]
+        """Return log densities (N, K) of kernels of some coordinates, at points (N, a) of these."""
+        space, kappa = self.space.of_axes(axes), self.concentrations[:, self.space.factors_of(axes)]
         centers = space.features(self.centers[:, axes], slice(space.kernel_images))
         features = centers.flatten(0, 1).mT.contiguous()
         terms = _terms(space, features, kappa, torch.ones_like(self.weights))
-        images = space.features(points, slice(None, None, space.kernel_images))
-        logs = torch.stack([terms.each(own.mT) for own in images])
+        images = space.features(points.double(), slice(None, None, space.kernel_images))
+        logs = torch.stack([terms.each(image.mT) for image in images])
         logs = by_sphere(logs, len(kappa)).logsumexp(dim=(0, 2))
         return logs + space.log_kernel_factor(points, CHART)[:, None]
 
