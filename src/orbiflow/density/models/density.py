@@ -171,10 +171,19 @@ class Density(WithFigures):
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         """Return log densities (N,) of some angles alone, at points (N, len(axes)) of these in turns.
 
-        `seed` is that of quasi-random nodes, if there are any.
+        `seed` is that of quasi-random nodes, if there are any. Default: what is `restricted`, where
+        that has a closed form.
         """
-        del points, axes, seed
-        raise OrbiflowError(f"a {type(self).__name__} cannot be integrated over some of its angles")
+        del seed
+        order = sorted(range(len(axes)), key=axes.__getitem__)
+        points, kept = points[:, order].double(), [axes[k] for k in order]
+        split = Split(self.space.chart_dim, tuple(kept))
+        closed, left = self.restricted(split, self.space.of_axes(kept))
+        if left:
+            raise OrbiflowError(
+                f"a {type(self).__name__} cannot be integrated over some of its angles"
+            )
+        return torch.stack([log + part.log_chart(points) for log, part in closed]).logsumexp(dim=0)
 
     def terms_at(self, axes: list[int]) -> int | None:
         """Return how many terms `log_marginal` of some angles takes at a point.
@@ -380,12 +389,6 @@ class Split:
     def observed(self) -> tuple[int, ...]:
         """The angles kept, then those given."""
         return (*self.kept, *self.given)
-
-
-def in_order(points: Tensor, axes: Sequence[int]) -> tuple[Tensor, list[int]]:
-    """Return points (N, a) of some coordinates, and the numbers of these, in increasing order."""
-    order = sorted(range(len(axes)), key=axes.__getitem__)
-    return points[:, order], [axes[k] for k in order]
 
 
 Weighted = tuple[float, Density]

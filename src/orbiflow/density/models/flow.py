@@ -10,7 +10,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.density import Density, Restriction, Split, in_order
+from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.headers import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
@@ -218,13 +218,6 @@ class UniformDensity(Density, kind="uniform"):
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         return self.space.uniform(count, generator)
-
-    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        del seed
-        if not self.space.parts:
-            return torch.zeros(len(points), dtype=torch.float64)
-        points, axes = in_order(points, axes)
-        return UniformDensity(self.space.of_axes(axes)).log_chart(points.double())
 
     def restricted(self, split: Split, space: Space) -> Restriction:
         evidence = 0.0

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models.concentrations import moments
-from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted, in_order
+from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
 from orbiflow.density.spaces import CHART, Space, by_sphere
 from orbiflow.errors import OrbiflowError
@@ -122,12 +122,6 @@ class AdaptiveKernels(Density, kind="kernels"):
                 [share * part.weights for share, part in zip(proportions, components, strict=True)]
             ),
         )
-
-    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        del seed
-        points, axes = in_order(points.double(), axes)
-        split = Split(self.space.chart_dim, tuple(axes))
-        return self.restricted(split, self.space.of_axes(axes)).closed[0][1].log_chart(points)
 
     def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep the kernels' own marginals.

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.chains import waves
-from orbiflow.density.models.density import Density, Restriction, Split, in_order
+from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.kernels import AdaptiveKernels, drawn_about, kernel_peaks
 from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks
@@ -189,14 +189,6 @@ class ProductChains(Density, kind="product-chains"):
         ]
         of_each = [share * part.weights for share, part in zip(shares, components, strict=True)]
         return cls(components[0].space, torch.cat(of_each), *tensors)
-
-    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        del seed
-        points, axes = in_order(points, axes)
-        if len(axes) == self.space.chart_dim:
-            return self.log_chart(points)
-        split = Split(self.space.chart_dim, tuple(axes))
-        return self.restricted(split, self.space.of_axes(axes)).closed[0][1].log_chart(points)
 
     def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep components, hidden columns at nodes; none if a point of the base is given."""
