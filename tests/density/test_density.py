@@ -68,20 +68,6 @@ def test_the_mass_tells_what_the_integrator_lost(space, seed: int) -> None:
 
 
 @every
-@settings(max_examples=3)
-@given(seed=seeds)
-def test_log_prob_is_invariant_under_the_group(space, seed: int) -> None:
-    density, points = make(space, seed), square(seed)
-    shift = np.random.default_rng(seed).integers(-2, 3, (space.group.order, 1, 2))
-    images = space.group.images(points) + torch.tensor(shift @ space.group.lattice.T)
-    for measure in ("square", "natural"):
-        spread = density.log_prob(images, measure=measure) - density.log_prob(
-            points, measure=measure
-        )
-        assert float(spread.detach().abs().max()) < 1e-8
-
-
-@every
 def test_samples_follow_the_density(space) -> None:
     density = make(space, 7, base=bump, strength=0.12)
     count, cells = 12_000, 6

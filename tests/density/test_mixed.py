@@ -73,27 +73,6 @@ def test_a_conditional_is_a_ratio(fit: DensityEstimator) -> None:
     assert mean == pytest.approx(1.5 + 0.02 * np.cos(np.radians(40)), abs=0.003)
 
 
-def test_samples_follow_the_density(fit: DensityEstimator) -> None:
-    drawn = fit.sample(3000, random_state=1)
-    alone = fit.marginal(1)
-    grid = np.linspace(1.40, 1.60, 2001)
-    mass = np.exp(alone.score_samples(grid[:, None])) * (grid[1] - grid[0])
-    share = np.interp(np.sort(drawn[:, 1]), grid, np.cumsum(mass))
-    even = (np.arange(3000) + 0.5) / 3000
-    assert np.abs(share - even).max() < 0.03
-    assert (np.abs(drawn[:, 0]) <= 180).all()
-
-
-def test_gradients_are_per_unit_of_each_column(fit: DensityEstimator) -> None:
-    rows = data_of(5, seed=3)[:, :2]
-    slopes = fit.score_gradient(rows)
-    for column, step in enumerate((1e-3, 1e-7)):
-        move = np.zeros(2)
-        move[column] = step
-        rise = (fit.score_samples(rows + move) - fit.score_samples(rows - move)) / (2 * step)
-        np.testing.assert_allclose(slopes[:, column], rise, rtol=1e-4, atol=1e-4 / step**0.5)
-
-
 def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     data = np.column_stack([rng.vonmises(0, 2, (300, 4)), rng.normal(size=300)])

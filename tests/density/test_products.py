@@ -103,42 +103,6 @@ def test_a_conditional_is_the_ratio_of_joint_and_marginal(name: str, seed: int) 
             assert part.score_samples(row[None, at])[0] == pytest.approx(expected, abs=1e-7)
 
 
-@given(names, seeds)
-def test_samples_have_the_moments_of_the_density(name: str, seed: int) -> None:
-    mixture, _ = random_kernels(name, seed, 3)
-    drawn = DensityEstimator.fitted(mixture).sample(4000, random_state=0)
-    alone = DensityEstimator.fitted(mixture).marginal("beside2")
-    hours = np.linspace(0, 24, 1201)
-    mass = np.exp(alone.score_samples(hours[:, None]))
-    below = np.concatenate([[0.0], np.cumsum((mass[1:] + mass[:-1]) / 2) * (hours[1] - hours[0])])
-    assert below[-1] == pytest.approx(1, abs=1e-4)
-    share = np.interp(np.sort(drawn[:, -1]), hours, below)
-    assert np.abs(share - (np.arange(4000) + 0.5) / 4000).max() < 0.04
-
-
-@given(names, seeds)
-def test_gradients_are_those_of_differences(name: str, seed: int) -> None:
-    mixture, points = random_kernels(name, seed)
-    space = mixture.space
-    estimator, rows = DensityEstimator.fitted(mixture), space.from_chart(points[:3])
-    slopes = estimator.score_gradient(rows)
-    for column in (-1, -2):
-        move = np.zeros(rows.shape[1])
-        move[column] = 1e-5
-        rise = estimator.score_samples(rows + move) - estimator.score_samples(rows - move)
-        np.testing.assert_allclose(slopes[:, column], rise / 2e-5, rtol=1e-4, atol=1e-5)
-
-
-def test_a_file_gives_the_same_density_back(tmp_path: Path) -> None:
-    for name in BASES:
-        mixture, points = random_kernels(name, 5)
-        path = tmp_path / f"{name}.safetensors"
-        path.write_bytes(density_to_bytes(mixture))
-        again, _ = read_density(path)
-        assert again.space == mixture.space
-        assert torch.equal(again.log_prob(points), mixture.log_prob(points))
-
-
 def place_and_season(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Directions that go with the day, a depth that goes with the height; and their log density."""
     rng = np.random.default_rng(seed)

@@ -1,0 +1,177 @@
+"""What holds of densities on every space: invariant, normalised, sampled, differentiable, saved."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from torch import Tensor
+
+from density.blends import bump, flow_of, random_kernels
+from orbiflow.density import (
+    MEASURES,
+    Density,
+    FlowDensity,
+    Mixture,
+    ProductSpace,
+    Space,
+    Torus,
+    UniformDensity,
+    density_to_bytes,
+    log_density_gradient,
+    make_space,
+    read_density,
+)
+from orbiflow.density.models import flow_obstacle
+from orbiflow.density.spaces import RoundSpace, UnitVectorSpace
+from orbiflow.flows import Flow
+from orbiflow.symmetry import rotation_matrix, wallpaper_group
+from strategies import central_difference, random_field, seeds
+
+TURN = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+BESIDE = [(3.0, 2.0), 24.0]
+SPACES: dict[str, Space] = {
+    "angle": Torus(1),
+    "angles in degrees": Torus(2, unit="degrees"),
+    "angles in turns": Torus(3, unit="turns"),
+    "an angle, a length, hours": Torus([None, *BESIDE], unit="degrees"),
+    "latitude and longitude": make_space("sphere", rotation=TURN),
+    "directions": make_space("sphere", form="vector", rotation=TURN),
+    "bottle": make_space("klein-bottle", unit="turns"),
+    "axes": make_space("projective-plane", rotation=TURN),
+    "axes as vectors": make_space("projective-plane", form="vector"),
+    "circle": make_space("hypersphere", dim=1),
+    "hypersphere": make_space("hypersphere", dim=9),
+    "lines": make_space("projective-space", dim=4),
+    "rotations": make_space("rotation-space"),
+    "orientations": make_space("rotation-space", symmetry="O", specimen="222"),
+    "turned pattern": make_space(
+        "quotient", group=wallpaper_group("cm").conjugate(2.5 * rotation_matrix(0.4), [0.3, 0.7])
+    ),
+    **{name: make_space(name) for name in ("p3", "p4g", "tricosm", "second-amphicosm")},
+    "directions and times": ProductSpace(make_space("sphere", form="vector"), BESIDE),
+    "bottle and times": ProductSpace(make_space("klein-bottle", unit="degrees"), BESIDE),
+    "orientations and times": ProductSpace(make_space("rotation-space", symmetry="222"), BESIDE),
+    "pattern and times": ProductSpace(make_space("p4"), BESIDE),
+}
+names = st.sampled_from(sorted(SPACES))
+
+
+def density_on(space: Space, seed: int) -> Density:
+    """Kernels, a uniform part and, where there may be one, a flow of waves."""
+    kernels = random_kernels(np.random.default_rng(seed), space, 5, 1.0, 9.0)
+    parts: list[Density] = [kernels, UniformDensity(space)]
+    if not flow_obstacle(space) and space.dim < 4:
+        # a spline's divergence has kinks, where numerical derivatives are off
+        field = random_field(space.group, 2, seed % 2**31, rms=0.05)
+        parts.append(FlowDensity(space, Flow(field, steps=4, warn=False), bump(space)))
+    return Mixture(parts, [0.6, 0.2, 0.2] if len(parts) == 3 else [0.8, 0.2])
+
+
+def images_of(space: Space, points: Tensor, rng: np.random.Generator) -> Tensor:
+    """Points (E, N, d) that are the same as these (N, d), by each element of the group."""
+    if isinstance(space, ProductSpace):
+        base, rest = space.split(points)
+        images = images_of(space.base, base, rng)
+        steps = torch.tensor(rng.integers(-3, 4, (len(images), 1, rest.shape[-1])))
+        return torch.cat([images, rest + steps], dim=-1)
+    if isinstance(space, UnitVectorSpace):
+        return points @ space.elements.mT
+    steps = rng.integers(-3, 4, (space.group.order, 1, space.dim)) @ space.group.lattice.T
+    return space.group.images(points) + torch.tensor(steps)
+
+
+@given(name=names, seed=seeds)
+@settings(max_examples=30)
+def test_images_are_one_point(name: str, seed: int) -> None:
+    space = SPACES[name]
+    points = space.uniform(20, torch.Generator().manual_seed(seed))
+    images = images_of(space, points, np.random.default_rng(seed))
+    projected = space.project(images)
+    assert torch.allclose(space.project(projected), projected, atol=1e-9)
+    with torch.no_grad():
+        found = density_on(space, seed).log_prob(torch.cat([images, projected]))
+    torch.testing.assert_close(found, found[:1].expand_as(found), rtol=0, atol=1e-8)
+    data = space.from_chart(points)
+    again = space.features(space.to_chart(data)), space.features(points)[:1]
+    assert float((again[0] - again[1]).abs().amax(dim=-1).amin(dim=0).max()) < 1e-7
+
+
+@pytest.mark.parametrize("name", SPACES)
+@torch.no_grad()
+def test_samples_follow_a_density_that_integrates_to_one(name: str) -> None:
+    space, source, count = SPACES[name], torch.Generator().manual_seed(0), 20_000
+    density, other = density_on(space, 7), random_kernels(np.random.default_rng(1), space, 3)
+    even, drawn = space.uniform(count, source), density.sample((count,), source)
+    assert torch.allclose(space.project(drawn), drawn, atol=1e-9)
+
+    def mean(values: Tensor) -> tuple[float, float]:
+        return float(values.mean()), 5 * float(values.std()) / count**0.5
+
+    value, wave = (
+        lambda at, own=own: own.log_prob(at, measure="uniform").exp() for own in (density, other)
+    )
+    for values in (value(even), wave(even), 1 / value(drawn)):
+        found, error = mean(values)
+        assert found == pytest.approx(1, abs=error)
+    (found, error), (expected, more) = mean(wave(drawn)), mean(wave(even) * value(even))
+    assert found == pytest.approx(expected, abs=error + more)
+
+
+@given(name=names, seed=seeds)
+@settings(max_examples=30)
+def test_gradients_are_slopes_in_the_data(name: str, seed: int) -> None:
+    space = SPACES[name]
+    density, rng = density_on(space, seed), np.random.default_rng(seed)
+    data = space.from_chart(space.uniform(9, torch.Generator().manual_seed(seed)))
+    base = space.base if isinstance(space, ProductSpace) else space
+    own = slice(data.shape[1] - space.dim + base.dim)
+    if isinstance(base, RoundSpace):  # next to a cone point the chart's own digits are few
+        vectors = base.vectors(base.to_chart(data[:, own]))
+        data = data[abs(vectors @ base.cone_vectors().T).max(axis=1) < 0.999]
+    values, slopes = log_density_gradient(density, data)
+    step = 1e-6 * np.ptp(data, axis=0) * rng.normal(size=data.shape)
+    if isinstance(base, UnitVectorSpace) or base.settings().get("form") == "vector":
+        along = (step[:, own] * data[:, own]).sum(axis=1, keepdims=True)
+        step[:, own] -= along * data[:, own]
+        assert (slopes[:, own] * data[:, own]).sum(axis=1) == pytest.approx(0, abs=1e-9)
+    ahead, behind = (log_density_gradient(density, data + s)[0] for s in (step, -step))
+    np.testing.assert_allclose((slopes * step).sum(axis=1), (ahead - behind) / 2, atol=1e-9)
+    at = space.to_chart(data)
+    logs = density.log_prob(at, measure="natural").detach().numpy()
+    np.testing.assert_allclose(values, logs, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["angles in degrees", "directions", "bottle", "axes"])
+@settings(max_examples=3)
+@given(seed=seeds, measure=st.sampled_from(MEASURES))
+def test_gradients_in_points_and_parameters(name: str, seed: int, measure: str) -> None:
+    density = density_on(SPACES[name], seed)
+    # off edges and cone points, where the projection has its seams
+    points = 0.1 + 0.8 * torch.rand(20, 2, dtype=torch.float64)
+    points.requires_grad_()
+    found, *slopes = torch.autograd.grad(
+        density.log_prob(points, measure=measure).sum(),
+        [points, *flow_of(density).flow.parameters()],
+    )
+    with torch.no_grad():
+        expected = central_difference(
+            lambda p: density.log_prob(p, measure=measure)[..., None], points.detach()
+        )[..., 0, :]
+    assert torch.allclose(found, expected, rtol=1e-5, atol=1e-5)
+    assert all(bool(slope.abs().max() > 0) for slope in slopes)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_a_file_gives_the_same_density_back(name: str, tmp_path: Path) -> None:
+    space, path = SPACES[name], tmp_path / "density.safetensors"
+    density = density_on(space, 3)
+    path.write_bytes(density_to_bytes(density))
+    again, _ = read_density(path)
+    points = space.uniform(20, torch.Generator().manual_seed(0))
+    assert again.space == space
+    assert all(again.space != other for key, other in SPACES.items() if key != name)
+    with torch.no_grad():
+        assert torch.equal(again.log_prob(points), density.log_prob(points))
