@@ -61,8 +61,8 @@ def claim(shape: str, descr: str = "'<f8'") -> bytes:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (npy(np.array([[{}, 1]], dtype=object), allow_pickle=True), "Python objects"),
-        (claim("(1,)", "[('a', '|O')]"), "Python objects"), (npy(np.array([1.0, 2])), "(2,)"),
+        (npy(np.array([[{}, 1]], dtype=object), allow_pickle=True), "Python"),
+        (claim("(1,)", "[('a', '|O')]"), "Python"), (npy(np.array([1.0, 2])), "(2,)"),
         (npy(np.zeros((2, 2, 2))), "shape"),
         (npy(np.zeros((0, 2))), "rows"), (npy(np.zeros((2, 0))), "rows"),
         (npy(np.array([["a", "b"]])), "column1 text"),
