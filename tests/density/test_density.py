@@ -1,5 +1,7 @@
 """Density: normalised, invariant, continuous over the seams, sampled as it says."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import scipy.stats
@@ -14,6 +16,7 @@ from orbiflow.density import (
     FlowDensity,
     KleinBottle,
     ProjectivePlane,
+    Space,
     Sphere,
     Torus,
     UniformDensity,
@@ -28,7 +31,14 @@ every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def make(space, seed: int = 0, *, base=UniformDensity, segments: int = 2, strength: float = 0.1):
+def make(
+    space,
+    seed: int = 0,
+    *,
+    base: Callable[[Space], Density] = UniformDensity,
+    segments: int = 2,
+    strength: float = 0.1,
+):
     fields = []
     for k in range(segments):
         field = FourierField(space.group, 3, smoothness=1.0)
