@@ -1,7 +1,6 @@
 """Space groups by name, on the cells that they fit."""
 
 import sys
-import warnings
 
 import gemmi
 import numpy as np
@@ -11,7 +10,6 @@ from hypothesis import strategies as st
 
 import strategies as own
 from orbiflow.errors import (
-    DataWarning,
     GroupError,
     InputFileError,
     LatticeMismatchError,
@@ -41,14 +39,6 @@ def test_every_setting_is_the_group_of_the_tables_on_its_primitive_lattice(name)
     assert group.name == name
     assert group.order == len(listed.sym_ops)
     assert len(np.unique(np.round(group.linear_parts, 6), axis=0)) == group.order
-    assert space_group(f"Hall: {SETTINGS[name].hall}") == group
-
-
-def test_the_hall_symbol_is_meant_only_if_it_is_said():
-    cell = (1, 2, 3)
-    assert space_group("P 2", cell) == space_group("P 1 2 1", cell)
-    assert space_group("Hall: P 2", cell) == space_group("P 1 1 2", cell)
-    assert space_group("-P 2ybc", cell) == space_group("P 21/c", cell)
 
 
 @settings(max_examples=4)
@@ -63,19 +53,6 @@ def test_the_cure_of_a_wrong_cell_is_one(name):
         cure = str(error).split("fits has [")[1].strip("]").split(", ")
         group = space_group(name, [float(text) for text in cure])
     assert group.order == len(SETTINGS[name].operations().sym_ops)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        *(0, 231, -1, 1.5, True, None, "P 5", "", "Hall:", "9" * 99, "4294967297", "00"),
-        *("x" * 999, "P\0 1"),
-        "é",
-    ],
-)
-def test_unknown_names_are_refused_with_examples(name):
-    with refused("space group", "P 21 21 21", kind=GroupError):
-        space_group(name)
 
 
 @pytest.mark.parametrize(
@@ -119,21 +96,16 @@ OPERATORS = "loop_\n_space_group_symop_operation_xyz\n" + "\n".join(
         "3 y,x,-z",
         "_space_group_name_Hall 'P 32 2\"'",
         "_symmetry_space_group_name_H-M 'P 32 2 1'",
-        "_symmetry_space_group_name_H-M ?\n_space_group_IT_number 154",
+        "_symmetry_space_group_name_H-M ?\n_space_group_name_H-M_alt '.'\n_space_group_IT_number 154",
+        f"{OPERATORS}\n_space_group_IT_number 154\n_symmetry_space_group_name_H-M P3_221",
     ],
 )
-@pytest.mark.parametrize("dotted", [False, True])
-def test_cifs_with_operators_symbols_or_numbers(tmp_path, symmetry, dotted):
-    text = f"data_first\n_audit_author_name me\n{CORE}{symmetry}\n"
-    if dotted:  # mmCIF
-        for category in ("_cell_", "_space_group_symop_", "_symmetry_", "_space_group_"):
-            text = text.replace(category, f"{category[:-1]}.")
+def test_cifs_with_operators_symbols_or_numbers(tmp_path, symmetry):
     path = tmp_path / "quartz.cif"
-    path.write_text(text, "utf-8")
+    path.write_text(f"data_first\n_audit_author_name me\n{CORE}{symmetry}\n", "utf-8")
     assert group_from_cif(path) == space_group(154, (4.9134, 4.9134, 5.4052, 90, 90, 120))
-    assert group_from_cif(path, (1, 1, 3, 90, 90, 120)).cell_volume == pytest.approx(
-        2.598, abs=1e-3
-    )
+    volume = group_from_cif(path, (1, 1, 3, 90, 90, 120)).cell_volume
+    assert volume == pytest.approx(2.598, abs=1e-3)
 
 
 @settings(max_examples=5)
@@ -157,41 +129,32 @@ def test_a_cif_in_the_conventional_cell_names_the_group_to_other_programs():
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"),
+    ("text", "about"),
     [
         ("", "neither operators nor a symbol"),
         ("rubbish", "expected block header"),
         (CORE, "neither operators nor a symbol"),
         ("data_a\n_symmetry_space_group_name_H-M 'P 1'", "its cell is not complete"),
-        (CORE + "_space_group_name_H-M_alt 'P 5'", "unknown space group 'P 5'"),
-        (CORE + "_space_group_name_H-M_alt 'P 4'", r"fits has \[4.9134, 4.9134, 5.4052, 90.0"),
+        (CORE + "_space_group_name_H-M_alt 'P 5'", "'P 5'"),
+        (CORE + "_space_group_name_H-M_alt 'P 4'", "fits has [4.9134, 4.9134, 5.4052, 90.0"),
         (CORE + "loop_\n_space_group_symop_operation_xyz\nx,y,z\nx,y", "'x,y' is no operator"),
         (CORE + "loop_\n_space_group_symop_operation_xyz\nx+z,y,z\n", "they fit no cell"),
         (CORE.replace("4.9134(2)", "-4") + "_space_group_IT_number 1", "lengths above 0"),
         (CORE.replace("120", "180") + "_space_group_IT_number 1", "it would be flat"),
         (CORE + "_space_group_IT_number 1\0", "string"),
-        (
-            CORE + "_space_group_name_H-M_alt 'P 32 2 1'\n_space_group_IT_number 152",
-            r"contradicts itself: .*h-m_alt P 32 2 1 is of number 154, .*number 152 is of number 152",
-        ),
-        (
-            CORE + f"_symmetry_space_group_name_H-M 'P3_121'\n{OPERATORS}",
-            "P3_121 is of number 152, its 6 operators is of number 154",
-        ),
-        (
-            CORE + "_space_group_name_Hall 'P 3'\n_symmetry_space_group_name_H-M P31",
-            "hall P 3 is of number 143, .* P31 is of number 144",
-        ),
-        (CORE + f"_symmetry_Int_Tables_number 14\n{OPERATORS}", "its 6 operators is of number 154"),
+        (CORE + "_space_group_name_H-M_alt 'P 32 2 1'\n_space_group_IT_number 152", "154|152"),
+        (CORE + f"_symmetry_space_group_name_H-M 'P3_121'\n{OPERATORS}", "152|154"),
+        (CORE + "_space_group_name_Hall 'P 3'\n_symmetry_space_group_name_H-M P31", "143|144"),
+        (CORE + f"_symmetry_Int_Tables_number 14\n{OPERATORS}", "14)|154"),
         (CORE + "_space_group_name_H-M_alt 'P 21/q'\n_space_group_IT_number 14", "'P 21/q'"),
+        (CORE + "_space_group_name_H-M_alt 'P 2'\n_space_group_IT_number 999", "999"),
     ],
 )
-def test_files_that_are_no_cifs_of_a_group_are_refused(tmp_path, text, reason):
+def test_files_that_are_no_cifs_of_a_group_are_refused(tmp_path, text, about):
     path = tmp_path / "bad.cif"
     path.write_text(text, "utf-8")
-    with pytest.raises(InputFileError, match=reason) as caught:
+    with refused(path, *about.split("|"), kind=InputFileError):
         group_from_cif(path)
-    assert str(path) in str(caught.value)
 
 
 ROUNDED = [("0.3333", "0.6667"), ("0.33", "0.67"), ("0.333333", "0.666666"), ("0.333", "0.667")]
@@ -239,39 +202,25 @@ def cif(cell: str, listed: str = "", **symbols: object) -> str:
 
 CONTRADICTIONS = [
     # an inversion lost; half of C 2/c; one sign, half or third mistyped; rounded beyond reading
-    (MONOCLINIC, "x,y,z;-x,y+1/2,-z+1/2", {"number": 14}, "of another type"),
-    (MONOCLINIC, "x,y,z;-x+1/2,y+1/2,-z+1/2", {"hm": "P 21/n"}, "of another type"),
-    (MONOCLINIC, "x,y,z;-x,y,-z+1/2;x+1/2,y+1/2,z", {"number": 15}, "of another type"),
-    (MONOCLINIC, FOUR.replace("-x", "-x+1/4"), {"hm": "P 1 2/m 1"}, "of another type"),
-    (MONOCLINIC, "x,y,z;-x+0.4,y+1/2,-z", {"hm": "P 1 2 1"}, "of another type"),
-    (MONOCLINIC, FOUR.replace("-y+1/2,z+1/2", "-y+1/2,z"), {"number": 14}, "imply 2 trans"),
-    (MONOCLINIC, FOUR.replace("-z+1/2", "-z+1/3"), {"hm": "P 21/c"}, "imply 6 trans"),
-    (MONOCLINIC, "x,y,z;-x,y+.49,-z", {"number": 4}, "imply 50 trans"),
-    (CORE, "x,y,z;-y,x-y,z+0.3;-x+y,-x,z+0.7", {"hm": "P 31"}, "imply 10 trans"),
-    # the enantiomorph, about an origin of no table; others whose elements are alike
-    (CORE, "x,y,z;-y,x-y+1/5,z+2/3;-x+y-1/5,-x,z+1/3", {"hm": "P 31"}, "of another type"),
-    (CORE, "x,y,z;-y+.3,x-y,z+2/3;-x+y+.3,-x+.3,z+1/3", {"number": 144}, "of another type"),
-    (
-        MONOCLINIC,
-        "x,y,z;-x+1/5,y,-z;x+1/2,y+1/2,z;-x+7/10,y+1/2,-z",
-        {"number": 4},
-        "of another type",
-    ),
-    # numbers of no group; settings of one type that differ
-    (MONOCLINIC, "", {"hm": "P 21/c", "number": 999}, "'999' is no number of a group"),
-    (MONOCLINIC, FOUR, {"number": 231}, "'231' is no number of a group"),
-    (MONOCLINIC, "", {"hall": "-P 2ybc", "hm": "P 21/n"}, "of the setting P 1 21/n 1"),
-    (MONOCLINIC, FOUR, {"hm": "P 21/n"}, "its 4 operators is of the setting P 1 21/c 1"),
-    (CORE.replace("120", "90"), "", {"alt": "P n m a", "hm": "P b n m"}, "of the setting P b n m"),
-    (MONOCLINIC.replace("100", "200"), "", {"number": 1}, "from 0 to 180 degrees"),
+    (MONOCLINIC, "x,y,z;-x,y+1/2,-z+1/2", {"number": 14}),
+    (MONOCLINIC, "x,y,z;-x,y,-z+1/2;x+1/2,y+1/2,z", {"number": 15}),
+    (MONOCLINIC, "x,y,z;-x+0.4,y+1/2,-z", {"hm": "P 1 2 1"}),
+    (MONOCLINIC, FOUR.replace("-y+1/2,z+1/2", "-y+1/2,z"), {"number": 14}),
+    (MONOCLINIC, FOUR.replace("-z+1/2", "-z+1/3"), {"hm": "P 21/c"}),
+    (MONOCLINIC, "x,y,z;-x,y+.49,-z", {"number": 4}),
+    (CORE, "x,y,z;-y,x-y,z+0.3;-x+y,-x,z+0.7", {"hm": "P 31"}),
+    # settings of one type that differ
+    (MONOCLINIC, "", {"hall": "-P 2ybc", "hm": "P 21/n"}),
+    (MONOCLINIC, FOUR, {"hm": "P 21/n"}),
+    (CORE.replace("120", "90"), "", {"alt": "P n m a", "hm": "P b n m"}),
 ]
 
 
-@pytest.mark.parametrize(("cell", "listed", "symbols", "reason"), CONTRADICTIONS)
-def test_cifs_that_contradict_themselves_are_refused(tmp_path, cell, listed, symbols, reason):
+@pytest.mark.parametrize(("cell", "listed", "symbols"), CONTRADICTIONS)
+def test_cifs_that_contradict_themselves_are_refused(tmp_path, cell, listed, symbols):
     path = tmp_path / "bad.cif"
-    path.write_text(cif(cell, listed, **symbols), "utf-8")
-    with pytest.raises(InputFileError, match=reason):
+    path.write_text(cif(cell, listed, **symbols).replace("IT_number '14'", "IT_number 14"), "utf-8")
+    with refused("bad.cif", "contradicts itself", kind=InputFileError):
         group_from_cif(path)
 
 
@@ -286,45 +235,21 @@ def test_groups_in_settings_of_no_table_agree_with_their_numbers(tmp_path_factor
     assert group_from_cif(path).order == group.order
 
 
-ENANTIOMORPHS = [
-    *((76, 78), (91, 95), (92, 96), (144, 145), (151, 153), (152, 154)),
-    *((169, 170), (171, 172), (178, 179), (180, 181), (212, 213)),
-]
-
-
-SHIFTS = [(0.0, 0.0, 0.0), (0.2, 0.1, 0.3), (0.125, 0.0, 0.0)]
-
-
-@pytest.mark.parametrize(
-    ("number", "other", "shift"),
-    [
-        *((*pair, shift) for pair in ENANTIOMORPHS for shift in SHIFTS),
-        *((*pair, SHIFTS[0]) for pair in ((23, 24), (197, 199), (149, 150))),
-    ],
-)
-def test_types_whose_elements_are_alike_are_told_apart(tmp_path, number, other, shift):
-    lengths = (1, 1.2, 1.7) if number < 25 else (1, 1, 1 if number > 194 else 1.3)
-    cell = cell_lattice((*lengths, 90, 90, 120 if 142 < number < 195 else 90))
-    group, move = space_group(number, cell), translation(cell @ np.array(shift))
-    moved = generated(group.lattice, [move @ own @ move.inverse() for own in group.cosets])
-    text = cif_text(moved, cell)
-    path = tmp_path / "group.cif"
-    path.write_text(f"{text}_space_group_IT_number {number}\n")
-    assert group_from_cif(path).order == group.order
-    path.write_text(f"{text}_space_group_IT_number {other}\n")
-    with refused("group.cif", other, kind=InputFileError):
+def test_a_cif_without_operators_says_its_origin(tmp_path):
+    cell = CORE.replace("5.4052(1)", "4.9134").replace("120", "90")
+    path = tmp_path / "a.cif"
+    path.write_text(cif(cell, alt="F d -3 m") + "_space_group_IT_number 227\n")
+    with refused("origin", kind=InputFileError):
         group_from_cif(path)
+    path.write_text(cif(cell, alt="F d -3 m", hall="-F 4vw 2vw 3") + "_space_group_IT_number 227\n")
+    assert group_from_cif(path).name == "F d -3 m:2"
 
 
-def test_rhombohedral_axes_and_unknown_names_are_named_after_what_was_read(tmp_path):
+def test_rhombohedral_axes_are_named_after_what_was_read(tmp_path):
     path = tmp_path / "group.cif"
     cell = CORE.replace("5.4052(1)", "4.9134").replace("90", "55").replace("120", "55")
-    path.write_text(cif(cell, hm="R -3 m", number=166))
+    path.write_text(cif(cell, hm="R -3 m") + "_space_group_IT_number 166\n")
     assert group_from_cif(path).name == "R -3 m:R"
-    path.write_text(cif(MONOCLINIC, FOUR, hm="P 21/q"))
-    assert group_from_cif(path).name == "P 1 21/c 1"
-    path.write_text(cif(MONOCLINIC, hm="P 2~1~/c", number=0))
-    assert group_from_cif(path).order == 4
 
 
 def test_files_that_are_none_or_too_large_are_refused(tmp_path, monkeypatch):
@@ -336,41 +261,3 @@ def test_files_that_are_none_or_too_large_are_refused(tmp_path, monkeypatch):
         group_from_cif(tmp_path / "large.cif")
     with refused(3, 2, kind=GroupError):
         cif_text(own.identification_group("torus"))
-
-
-def cif_of(tmp_path, *lines):
-    cell = ["5", "6", "7", "90", "104", "90"]
-    tags = ["length_a", "length_b", "length_c", "angle_alpha", "angle_beta", "angle_gamma"]
-    text = ["data_x", *(f"_cell_{tag} {x}" for tag, x in zip(tags, cell, strict=True)), *lines]
-    path = tmp_path / "a.cif"
-    path.write_text("\n".join([*text, ""]), "utf-8")
-    return path
-
-
-@pytest.mark.parametrize(
-    "lines",
-    [
-        ("_space_group_IT_number 14.0",),
-        ("_space_group_name_H-M_alt '.'", "_space_group_IT_number 14"),
-        ("_space_group_name_H-M_alt '?'", "_space_group_name_Hall '-P 2ybc'"),
-    ],
-)
-def test_a_cif_with_a_quoted_sign_for_unknown_or_a_decimal_number(tmp_path, lines):
-    expected = space_group(14, (5, 6, 7, 90, 104, 90))
-    assert group_from_cif(cif_of(tmp_path, *lines)) == expected
-
-
-def test_operators_without_a_name_that_make_the_lattice_finer_are_warned_of(tmp_path):
-    loop = ("loop_", "_space_group_symop_operation_xyz", "'x,y,z'")
-    with warned(3, "1/3", kind=DataWarning):
-        group_from_cif(cif_of(tmp_path, *loop, "'-x,y+1/3,-z'"))
-
-
-@pytest.mark.parametrize("name", ["P 21/c", "C 2/c", "I 1 2/a 1"])
-def test_operators_without_a_name_that_list_their_centring_warn_of_nothing(tmp_path, name):
-    cell = cell_lattice((5, 6, 7, 90, 104, 90))
-    listed = operators(space_group(name, (5, 6, 7, 90, 104, 90)), cell)
-    loop = ("loop_", "_space_group_symop_operation_xyz", *(f"'{text}'" for text in listed))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        group_from_cif(cif_of(tmp_path, *loop))

@@ -217,7 +217,7 @@ def flat_manifold(name: str, cell: ArrayLike | None = None) -> CrystallographicG
     return group_from_operators(FLAT_MANIFOLDS[plain_name], cell_lattice(cell), name=name)
 
 
-SYMBOL = re.compile(r"-?[PABCFIRH] ?[-1-6mabcden].*|[1-9]\d{0,2}(?: ?: ?-?\w+)?|(?i:hall) ?[:=].*")
+SYMBOL = re.compile(r"[PABCFIR] ?[-1-6mabcden].*|[1-9]\d{0,2}(?::[12HR])?|Hall:.*")
 """What the names of space groups look like."""
 
 
