@@ -77,6 +77,7 @@ def test_decimal_commas(separator: str, header: str) -> None:
         ("x,y\n0,0\n1,0\nnan,1\n", "line 4|nan,1|finite"),
         ("row,col\n0,0\n1,0\n1,1\n", "line 1|row,col"),
         ("part,x,y\n" + "".join(f"{k // 3},{k % 3},{k * k}\n" for k in range(6)), "part|2 values"),
+        ("x,y,k\n" + points([[*at, k] for k in "ab" for at in SHAPE], ","), "'k'|2 values"),
         (">\n0 0\n1 0\n0 1\n>\n3 3\n", "line 1|'>'"),
         ("lon,lat\n178,-6\n179.2,-5.9\n-179.6,-6.1\n179.1,-8\n", "date line"),
     ],
@@ -84,6 +85,15 @@ def test_decimal_commas(separator: str, header: str) -> None:
 def test_tables_that_are_no_outline_are_refused(text: str, about: str) -> None:
     with refused(*about.split("|"), kind=InputFileError):
         read(text, "a.csv")
+
+
+@pytest.mark.parametrize("column", ["id", "", "part", "z", "name"])
+def test_other_columns_stay_unread(column: str) -> None:
+    values = {"id": range(4), "part": [1] * 4, "z": [0.5, 1, 2, 1.5]}.get(column, "abcd")
+    rows = [[value, *at] for value, at in zip(values, SHAPE, strict=True)]
+    reading = read(f"{column},x,y\n" + points(rows, ","), "a.csv")
+    assert reading.outline.tolist() == SHAPE
+    assert len(reading.notes) == 1
 
 
 def polygon(*rings: Any) -> dict[str, Any]:
@@ -132,6 +142,9 @@ def test_how_much_wider_degrees_of_longitude_are_is_said() -> None:
     [
         ({"type": "Topology", "objects": {}, "arcs": []}, "GeoJSON"),
         ({"rings": [SHAPE]}, "'rings'|GeoJSON"),
+        ({"annotations": [{"segmentation": [[0, 1, 2]]}]}, "'annotations'|mask"),
+        ([SHAPE, SHAPE], "vertex 0"),
+        ([{"x": 1, "y": 2}, {"x": 1}], "vertex 0"),
         ({"type": "Point", "coordinates": [0, 0]}, "Point|no polygon"),
         ({"type": "FeatureCollection", "features": []}, "no polygon"),
         ({"type": "FeatureCollection"}, "GeoJSON"),
