@@ -89,7 +89,7 @@ def create_app(
         store.close()
 
     topics = (density_routes, solid_routes, project_routes, mask_routes, offers, shape_routes)
-    every = [*routes, *(own for topic in topics for own in topic.routes)]
+    every = [*routes, *(route for topic in topics for route in topic.routes)]
     pages, scripts = (
         GZipMiddleware(
             StaticFiles(directory=folder, html=folder is STATIC)
@@ -128,8 +128,8 @@ async def about(here: Studio) -> dict[str, Any]:
             for name, title in ANIMALS.items()
         ],
         "palettes": [
-            {"name": name, **own._asdict(), "shades": _shades(own)}
-            for name, own in PALETTES.items()
+            {"name": name, **palette._asdict(), "shades": _shades(palette)}
+            for name, palette in PALETTES.items()
         ],
         "efforts": ["fast", "normal"],
     }
@@ -151,8 +151,8 @@ async def animal(file: str) -> FileResponse:
 async def schema(name: str) -> dict[str, Any]:
     """Return the settings of a task."""
     kind = kind_of_work(name)
-    found = own_schema(find(kind.makes or kind.work))
-    return {**found, "x-presets": presets(kind.makes) if kind.makes else {}}
+    document = own_schema(find(kind.makes or kind.work))
+    return {**document, "x-presets": presets(kind.makes) if kind.makes else {}}
 
 
 async def _error_answer(_request: Request, error: Exception) -> JSONResponse:

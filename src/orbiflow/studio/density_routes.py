@@ -60,9 +60,9 @@ async def density(project: str, here: Studio) -> dict[str, Any]:
     if (home / TABLE).is_file():
         table = json.loads((home / TABLE).read_text())
     with suppress(OrbiflowError):
-        own = fit_folder(home)
-        view = json.loads((own / VIEW).read_text())
-        fit = {"number": int(own.name), **view, **_report(own)}
+        folder = fit_folder(home)
+        view = json.loads((folder / VIEW).read_text())
+        fit = {"number": int(folder.name), **view, **_report(folder)}
     titles = [{"name": name, "title": t, "about": about} for name, (t, about) in EXAMPLES.items()]
     return {"table": table, "fit": fit, "examples": titles}
 
@@ -111,14 +111,14 @@ def _home(here: Studio, project: str) -> Path:
 async def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[str, Any]:
     """Forget what was made of an earlier table, and look at this one."""
     await run_in_threadpool(here.queue.forget, project, *TASKS)
-    home, own = here.store.home(project), here.store.project(project)
+    home, facts = here.store.home(project), here.store.project(project)
     for old in (home / TABLE, *(home / f"table{ending}" for ending in ENDINGS)):
         if old != file:
             old.unlink(missing_ok=True)
     shutil.rmtree(home / "fits", ignore_errors=True)
     changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
-    before = Path(own["input"]["name"]).stem if own["input"] else name
-    if own["name"] in (*USUAL_NAMES, before):
+    before = Path(facts["input"]["name"]).stem if facts["input"] else name
+    if facts["name"] in (*USUAL_NAMES, before):
         changes["name"] = Path(name).stem
     here.store.change(project, **changes)
     return await here.submit(project, "density table", {})

@@ -84,8 +84,8 @@ def density(
         raise SettingError("this table was not read; upload another one")
     folder = make_folder(job.project / "fits" / str(job.task))
     data = table_file(job.project)
-    asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
-    call = find("density fit").call(asked)
+    options = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
+    call = find("density fit").call(options)
     fit_events = as_part(on_event, 0.0, FIT_SHARE)
     call.operation.function(**call.arguments, on_event=fit_events, cancel=cancel)
     cancel.check()
@@ -113,8 +113,8 @@ def _view(folder: Path, data: Path, on_event: Sink) -> dict[str, Any]:
     fitted, names = saved.density, saved.columns
     space = fitted.space
     on_event(Progress(0.0, "drawing"))
-    asked = TableSettings(drop_missing=True)
-    rows = saved.rows(data, asked, ignore).values
+    options = TableSettings(drop_missing=True)
+    rows = saved.rows(data, options, ignore).values
     points = space.to_chart(rows)
     if space.is_planar:
         surface = surface_data(
@@ -156,9 +156,9 @@ def density_map(
 
     from orbiflow.density import flat_data
 
-    found = flat_data(_model(folder), axes)
+    flat = flat_data(_model(folder), axes)
     cancel.check()
-    write_json(map_file(folder, axes), found)
+    write_json(map_file(folder, axes), flat)
     return Outcome({"fit": fit, "axes": list(axes)})
 
 
@@ -183,14 +183,14 @@ class TakeChoice(Settings, group="Take away"):
     def call(self, model: Path, data: Path, columns: list[str], out: Path) -> Call:
         """Return the call that writes samples, figures or regions into a folder."""
         if self.what == "samples":
-            given: dict[str, Any] = {"out": out / "samples.csv", "count": self.count}
+            options: dict[str, Any] = {"out": out / "samples.csv", "count": self.count}
         elif self.what == "regions":
-            given = {"out": out / "regions.json", "mass": self.mass}
+            options = {"out": out / "regions.json", "mass": self.mass}
         else:
-            given = {"out": out, "format": self.format, "data": data, "columns": columns}
-            given |= {"drop_missing": True, "dots": True}
+            options = {"out": out, "format": self.format, "data": data, "columns": columns}
+            options |= {"drop_missing": True, "dots": True}
         name = {"samples": "sample", "regions": "region", "figures": "plot"}[self.what]
-        return find(f"density {name}").call({**given, "model": model})
+        return find(f"density {name}").call({**options, "model": model})
 
 
 @operation("studio density take")
@@ -222,10 +222,10 @@ def _model(folder: Path) -> Density:
 
 def table_file(home: Path) -> Path:
     """Return the table of a project, as it was uploaded."""
-    found = [path for ending in ENDINGS if (path := home / f"table{ending}").is_file()]
-    if not found:
+    files = [path for ending in ENDINGS if (path := home / f"table{ending}").is_file()]
+    if not files:
         raise OrbiflowError("there is no table in this project; upload one")
-    return found[0]
+    return files[0]
 
 
 def ending_of(name: str) -> str:

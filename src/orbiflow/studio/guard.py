@@ -125,8 +125,8 @@ class Guard:
             *request.query_params.getlist("token"),
             request.cookies.get(COOKIE, ""),
         ]
-        own = self.token.encode()
-        if own and not any(secrets.compare_digest(one.encode(), own) for one in brought):
+        token = self.token.encode()
+        if token and not any(secrets.compare_digest(word.encode(), token) for word in brought):
             raise Refused(401, "open the address that the studio printed, with its token")
 
     async def _with_body(self, request: Request, receive: Receive, send: Send) -> None:

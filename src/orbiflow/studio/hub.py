@@ -92,7 +92,7 @@ class Hub:
     def _fresh(self, project: str, after: int) -> list[tuple[int, str, Any]]:
         with self.store.still():
             whole = self.store.project(project)
-            found: list[tuple[int, str, Any]] = []
+            fresh: list[tuple[int, str, Any]] = []
             for event in self.store.events(project, after):
                 kind, subject, data = event["kind"], event["subject"], event["data"]
                 if kind == "task":
@@ -101,8 +101,8 @@ class Hub:
                     data = self.store.card(project, int(subject))
                 elif kind in ("silhouette", "project"):
                     data = shown_project(self.store, whole, kind)
-                found.append((event["id"], kind, data))
-        return found
+                fresh.append((event["id"], kind, data))
+        return fresh
 
 
 def _event(number: int, kind: str, data: Any) -> bytes:

@@ -40,11 +40,11 @@ class TaskKind:
             if taken := [name for name in place if name in settings]:
                 raise SettingError(f"the studio itself sets {taken[0]}; leave it out")
             return find(self.work).call({**place, **settings})
-        own = {name: settings[name] for name in TAKE_SETTINGS if name in settings}
-        rest = {name: value for name, value in settings.items() if name not in own}
+        take_settings = {name: settings[name] for name in TAKE_SETTINGS if name in settings}
+        rest = {name: value for name, value in settings.items() if name not in take_settings}
         making_call(self.makes, rest, Path("tile"))
         return find(self.work).call(
-            {**place, **own, "makes": self.makes, "settings": json.dumps(rest)}
+            {**place, **take_settings, "makes": self.makes, "settings": json.dumps(rest)}
         )
 
 
@@ -99,13 +99,13 @@ def own_fields(operation: Operation) -> list[Field]:
 
 def _needed(entry: Field) -> dict[str, list[Any]]:
     """Return the values that other settings must have where one applies, by their names."""
-    found: dict[str, list[Any]] = {}
+    needed: dict[str, list[Any]] = {}
     for rule in entry.rules:
         if isinstance(rule, OnlyWith):
-            found |= {name: list(values) for name, values in rule.others.items()}
+            needed |= {name: list(values) for name, values in rule.others.items()}
         elif isinstance(rule, NotWith):
-            found |= {name: [None, False] for name in rule.others}
-    return found
+            needed |= {name: [None, False] for name in rule.others}
+    return needed
 
 
 def own_schema(operation: Operation) -> dict[str, Any]:
@@ -137,14 +137,14 @@ def presets(makes: str) -> dict[str, dict[str, dict[str, Any]]]:
         flat = making_call(makes, given, Path("tile")).flat
         return {entry.name: entry.kind.plain(flat[entry.name]) for entry in fields}
 
-    usual, found = values(), dict[str, dict[str, dict[str, Any]]]()
+    usual, changes = values(), dict[str, dict[str, dict[str, Any]]]()
     for entry in fields:
         for choice in entry.kind.choices:
             with suppress(SettingError):  # goes only with others
-                own = values(**{entry.name: choice}) | {entry.name: usual[entry.name]}
-                changed = {name: value for name, value in own.items() if value != usual[name]}
-                found.setdefault(entry.name, {})[choice] = changed
-    return found
+                chosen = values(**{entry.name: choice}) | {entry.name: usual[entry.name]}
+                changed = {name: value for name, value in chosen.items() if value != usual[name]}
+                changes.setdefault(entry.name, {})[choice] = changed
+    return changes
 
 
 def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: Any) -> Call:
@@ -153,9 +153,9 @@ def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: 
     Raises `SettingError` for a setting that the studio does not take, or a value that is not allowed.
     """
     made = find(makes)
-    known = {entry.name for entry in own_fields(made)}
-    if strange := [name for name in settings if name not in known]:
-        names = literal(", ".join(sorted(known)))
+    allowed = {entry.name for entry in own_fields(made)}
+    if strange := [name for name in settings if name not in allowed]:
+        names = literal(", ".join(sorted(allowed)))
         raise SettingError(f"{makes} takes {names} here, not {literal(strange[0])}")
     try:
         return made.call({"result": result, **settings, **files})
@@ -191,17 +191,17 @@ def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str
 
     What is drawn is named where it is not what the purpose usually has: cat-laser-jigsaw-60mm.svg.
     """
-    own = making_call(makes, settings, result).arguments["settings"]
+    chosen = making_call(makes, settings, result).arguments["settings"]
 
     def cut() -> str | None:
-        given = {"purpose": own.purpose} if own.purpose else {}
-        usual = making_call(makes, given, result).arguments["settings"].cut
-        return None if own.cut == usual else "filled" if own.cut == "none" else own.cut
+        purpose = {"purpose": chosen.purpose} if chosen.purpose else {}
+        usual = making_call(makes, purpose, result).arguments["settings"].cut
+        return None if chosen.cut == usual else "filled" if chosen.cut == "none" else chosen.cut
 
     more = {
-        "export": lambda: [own.purpose, cut(), f"{own.tile_size:g}mm"],
+        "export": lambda: [chosen.purpose, cut(), f"{chosen.tile_size:g}mm"],
         "art": lambda: ["picture"],
-        "solid": lambda: [own.kind],
-        "build": lambda: [own.kind],
+        "solid": lambda: [chosen.kind],
+        "build": lambda: [chosen.kind],
     }.get(makes, list)()
-    return f"{'-'.join([plain_letters(called, 'tile'), *filter(None, more)])}.{own.file_format}"
+    return f"{'-'.join([plain_letters(called, 'tile'), *filter(None, more)])}.{chosen.file_format}"

@@ -31,19 +31,19 @@ def cannot(project: str, tile: int, here: Studio) -> dict[str, list[dict[str, An
         from orbiflow.tiles import read_result, why_not_in
 
         try:
-            own = read_result(tile_folder(home, number))
+            candidate = read_result(tile_folder(home, number))
         except OrbiflowError as error:  # it has just been removed
             return str(error)
-        if len(own.figures) > 1 and makes == "solid":
+        if len(candidate.figures) > 1 and makes == "solid":
             return "a ball is made of a tile of one figure"
-        return why_not_in(own, world)
+        return why_not_in(candidate, world)
 
-    found: dict[str, list[dict[str, Any]]] = {}
+    refused: dict[str, list[dict[str, Any]]] = {}
     for world, choices in WORLDS.items():
         for makes, (setting, values) in choices.items():
             if why := why_not(tile, world, makes):
                 able = (card["id"] for card in others if not why_not(card["id"], world, makes))
-                found.setdefault(makes, []).append(
+                refused.setdefault(makes, []).append(
                     {"setting": setting, "values": values, "why": why, "instead": next(able, None)}
                 )
-    return found
+    return refused

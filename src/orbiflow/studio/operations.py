@@ -60,14 +60,14 @@ def _serve(
     cancel.check()
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{settings.port}/" + (f"?token={token}" if token else "")
-    own = _listening(settings.host, settings.port)
+    listener = _listening(settings.host, settings.port)
     store = Store(folder)
     app = create_app(store, WorkQueue(store), port=settings.port, token=token)
     on_event(Note(f"the studio is at {address} and keeps its projects in {folder}; Ctrl-C ends it"))
     if settings.browser:
         threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-    with own, suppress(KeyboardInterrupt):
-        serve(app, own)
+    with listener, suppress(KeyboardInterrupt):
+        serve(app, listener)
 
 
 def _listening(host: str, port: int) -> socket.socket:

@@ -40,22 +40,22 @@ def in_class(tile: EscherTile, name: str, told: Callable[[float], None]) -> Esch
     if len(tile.figures) > 1:
         raise OrbiflowError("two figures lie as they were found; search for other pairs")
     kind, ring = isohedral_class(name), tile.tile.polygon
-    found = escherize_class(
+    likest = escherize_class(
         Target.from_polygon(ring),
         kind,
         LikenessSearch.for_effort("fast"),
         progress=lambda share, _: told(SEARCHED * share),
     )
-    if isinstance(found, ClassFailure):
-        raise CertificationError(f"no tile that lies so is like this one: {found.reason}")
-    bending, frame = found.bending, found.frame
+    if isinstance(likest, ClassFailure):
+        raise CertificationError(f"no tile that lies so is like this one: {likest.reason}")
+    bending, frame = likest.bending, likest.frame
     assert bending is not None  # a search for likeness bends
     assert frame is not None
-    rest = frame.to_input(bending.inverse(frame.to_normal(found.tile.polygon)))
-    before, after = _side_by_side(ring, found.tile.polygon, rest)
+    rest = frame.to_input(bending.inverse(frame.to_normal(likest.tile.polygon)))
+    before, after = _side_by_side(ring, likest.tile.polygon, rest)
     return moved_figure(
         tile,
-        found.tile,
+        likest.tile,
         lambda share: before + share * (after - before),
         COMPARED_POINTS,
         lambda share: told(SEARCHED + (1 - SEARCHED) * share),
@@ -75,8 +75,8 @@ def _side_by_side(old: Array, new: Array, rest: Array) -> tuple[Array, Array]:
     first = int(np.argmin(places))
     new, places = np.roll(new, -first, axis=0), np.maximum.accumulate(np.roll(places, -first))
     goals = arc_lengths(new)
-    known = np.append(places, places[0] + lengths[-1])
-    apart = abs(lengths[:-1, None] - known).min(axis=1) > SAME_POINT_SHARE * lengths[-1]
+    corners = np.append(places, places[0] + lengths[-1])
+    apart = abs(lengths[:-1, None] - corners).min(axis=1) > SAME_POINT_SHARE * lengths[-1]
     both = np.unique(np.concatenate([places, lengths[:-1][apart]]))
     turns = np.where(both < places[0], lengths[-1], 0.0)
-    return points_along(old, both), points_along(new, np.interp(both + turns, known, goals))
+    return points_along(old, both), points_along(new, np.interp(both + turns, corners, goals))

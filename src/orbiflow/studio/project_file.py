@@ -98,14 +98,14 @@ def open_project(path: str | Path) -> StudioProject:
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         document = unpack(as_path(path, "the project's file"), home)
-        found = read_tiles(home, document)
+        tiles = read_tiles(home, document)
         target, second = read_pictures(home, document)
         return StudioProject(
             str(document["name"]),
             target,
             second,
-            tuple(tile for tile, _, _ in found),
-            tuple((number, parent) for _, number, parent in found),
+            tuple(tile for tile, _, _ in tiles),
+            tuple((number, parent) for _, number, parent in tiles),
             document,
         )
 
@@ -170,8 +170,8 @@ def reading_of(document: Mapping[str, Any], number: int = 0) -> tuple[str, Readi
 
     about = document.get("second") if number else document
     about = about if is_object(about) else {}
-    given, reading = about.get("input"), about.get("reading", {})
-    called = given.get("name") if is_object(given) else None
+    uploaded, reading = about.get("input"), about.get("reading", {})
+    called = uploaded.get("name") if is_object(uploaded) else None
     reading = reading if is_object(reading) else {}
     return str(called or "picture")[:80], ReadingSettings(**reading)
 
@@ -197,7 +197,7 @@ def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile
     """Return the certified tiles in an unpacked project, each with its number and its parent's."""
     from orbiflow.tiles import read_result
 
-    found: list[tuple[EscherTile, int, int | None]] = []
+    tiles: list[tuple[EscherTile, int, int | None]] = []
     for entry in document["tiles"][:PLACES]:
         number = entry.get("id") if is_object(entry) else None
         if type(number) is not int or not (home / "tiles" / str(number) / "result.json").is_file():
@@ -206,8 +206,8 @@ def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile
         tile.require_certified(otherwise="so the project cannot be opened; save it again")
         tile = _with_maps(tile)  # their files may go
         parent = entry.get("parent")
-        found.append((tile, number, parent if type(parent) is int else None))
-    return found
+        tiles.append((tile, number, parent if type(parent) is int else None))
+    return tiles
 
 
 def ancestors(number: int, parents: Mapping[int, int | None]) -> list[int]:
@@ -216,12 +216,12 @@ def ancestors(number: int, parents: Mapping[int, int | None]) -> list[int]:
     >>> ancestors(3, {1: None, 2: 1, 3: 2, 4: 77})
     [2, 1]
     """
-    found: list[int] = []
+    chain: list[int] = []
     parent = parents.get(number)
-    while parent is not None and parent in parents and parent not in (number, *found):
-        found.append(parent)
+    while parent is not None and parent in parents and parent not in (number, *chain):
+        chain.append(parent)
         parent = parents.get(parent)
-    return found
+    return chain
 
 
 def outdated_tiles(document: Mapping[str, Any]) -> set[int]:

@@ -59,15 +59,15 @@ async def projects(here: Studio) -> list[dict[str, Any]]:
 @routes("POST", "/projects")
 async def create(request: Request, here: Studio) -> dict[str, Any]:
     """Make a project."""
-    given = await body_object(request)
-    kind = given.get("kind", "tile")
+    body = await body_object(request)
+    kind = body.get("kind", "tile")
     if not isinstance(kind, str) or kind not in NAMES:
         raise OrbiflowError(f"a project is of kind {', '.join(NAMES)}")
     who, *packages = NEEDS.get(kind, ("",))
     with naming_extras(who):
         for package in packages:
             await run_in_threadpool(import_module, package)
-    name = plain_name(given.get("name"), NAMES[kind])
+    name = plain_name(body.get("name"), NAMES[kind])
     made = here.store.create(kind, name, here.limits.projects)
     return shown_project(here.store, here.store.project(made))
 
@@ -107,29 +107,29 @@ async def _opened(here: Studio, write: Callable[[Path], Awaitable[Any]]) -> dict
 @routes("GET", "/projects/{project}/tiles/{tile}/link")
 def link(project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Return the text by which a link opens a tile in any studio."""
-    own = here.store.project(project)
+    record = here.store.project(project)
     result = tile_folder(here.store.home(project), tile)
-    return {"text": link_text(result, own["name"], (own["view"] or {}).get("look"))}
+    return {"text": link_text(result, record["name"], (record["view"] or {}).get("look"))}
 
 
 @routes("GET", "/projects/{project}/file")
 def file(project: str, here: Studio) -> FileResponse:
     """Save a project as a file."""
     with here.store.still():
-        own, cards = here.store.project(project), here.store.cards(project)
-    if own["kind"] != "tile":
+        record, cards = here.store.project(project), here.store.cards(project)
+    if record["kind"] != "tile":
         raise OrbiflowError("only projects of tiles are saved as a file; take the model away")
     names = ("name", "kind", "view", "reading", "input", "second")
     tiles = [
-        {"id": card["id"], "parent": card["parent"], "outdated": is_outdated(card, own)}
+        {"id": card["id"], "parent": card["parent"], "outdated": is_outdated(card, record)}
         for card in cards
     ]
     out = here.store.home(project) / f".{secrets.token_hex(4)}.tmp"
-    document = {**{name: own[name] for name in names}, "tiles": tiles}
+    document = {**{name: record[name] for name in names}, "tiles": tiles}
     write_project(here.store.home(project), document, out)
     return FileResponse(
         out,
-        filename=f"{own['name']}{ENDING}",
+        filename=f"{record['name']}{ENDING}",
         media_type="application/zip",
         background=BackgroundTask(out.unlink, missing_ok=True),
     )
@@ -145,14 +145,14 @@ async def get(project: str, here: Studio) -> dict[str, Any]:
 @routes("PATCH", "/projects/{project}")
 async def patch(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Change a project's name, or parts of what its pages remember."""
-    given, own = await body_object(request), here.store.project(project)
+    body, record = await body_object(request), here.store.project(project)
     changes: dict[str, Any] = {"changed_by": request.headers.get("x-orbiflow-client", "")[:80]}
-    if "name" in given:
-        changes["name"] = plain_name(given["name"], own["name"])
-    if "view" in given:
-        if not is_object(given["view"]):
+    if "name" in body:
+        changes["name"] = plain_name(body["name"], record["name"])
+    if "view" in body:
+        if not is_object(body["view"]):
             raise OrbiflowError("view must be a JSON object")
-        changes["view"] = {**own["view"], **given["view"]}
+        changes["view"] = {**record["view"], **body["view"]}
         if len(json.dumps(changes["view"])) > MAX_VIEW:
             raise Refused(413, "this project remembers too much already; undo some drawing")
     here.store.change(project, **changes)
@@ -171,8 +171,8 @@ async def delete(project: str, here: Studio) -> dict[str, Any]:
 @routes("POST", "/projects/{project}/tasks")
 async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Give a project work."""
-    given = await body_object(request)
-    operation, settings = given.get("operation"), given.get("settings", {})
+    body = await body_object(request)
+    operation, settings = body.get("operation"), body.get("settings", {})
     if not isinstance(operation, str) or not is_object(settings):
         raise OrbiflowError("a task has an operation and settings")
     settings = with_what_is_drawn(here, project, settings)
@@ -231,22 +231,22 @@ async def animal(request: Request, project: str, here: Studio, number: int = 0) 
     """Take one of the bundled animals."""
     name = str((await body_object(request)).get("name"))
     end = end_of(here, project, number)
-    own = animal_file(name)
-    file = here.store.home(project) / f"input{end}{own.suffix}"
-    file.write_bytes(own.read_bytes())
-    return await _new_input(here, project, f"{ANIMALS[name]}{own.suffix}", file, number)
+    picture = animal_file(name)
+    file = here.store.home(project) / f"input{end}{picture.suffix}"
+    file.write_bytes(picture.read_bytes())
+    return await _new_input(here, project, f"{ANIMALS[name]}{picture.suffix}", file, number)
 
 
 @routes("POST", "/projects/{project}/second")
 async def same_again(project: str, here: Studio) -> dict[str, Any]:
     """Take the first picture as the second one, too, with what was painted over it."""
-    own, home = here.store.project(project), here.store.home(project)
-    if own["input"] is None:
+    record, home = here.store.project(project), here.store.home(project)
+    if record["input"] is None:
         raise OrbiflowError("there is no picture yet; choose one first")
-    copy = home / f"input{OF_PICTURE[1]}.{own['input']['type']}"
+    copy = home / f"input{OF_PICTURE[1]}.{record['input']['type']}"
     shutil.copyfile(next(home.glob("input.*")), copy)
-    name = own["input"]["name"]
-    return await _new_input(here, project, name, copy, 1, reading=own["reading"], masks=MASKS)
+    name = record["input"]["name"]
+    return await _new_input(here, project, name, copy, 1, reading=record["reading"], masks=MASKS)
 
 
 @routes("DELETE", "/projects/{project}/second")
@@ -301,13 +301,13 @@ async def _new_input(
 async def read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
     """Read a picture anew, as it and its settings are now."""
     whole = here.store.project(project)
-    own = whole["second"] if number else whole
-    if own is None or own["input"] is None:
+    record = whole["second"] if number else whole
+    if record is None or record["input"] is None:
         raise OrbiflowError("there is no picture yet; choose one first")
     await run_in_threadpool(here.queue.forget, project, READS[number], state="waiting")
-    called = own["input"]["name"]
+    called = record["input"]["name"]
     return await here.submit(
-        project, READS[number], {"called": called, "number": number, **own["reading"]}
+        project, READS[number], {"called": called, "number": number, **record["reading"]}
     )
 
 
@@ -315,8 +315,8 @@ async def read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
 async def reading(request: Request, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Read a picture anew, with other settings."""
     end_of(here, project, number)
-    given = {k: v for k, v in (await body_object(request)).items() if v is not None}
-    here.store.change(project, "silhouette", number, reading=ReadingSettings(**given).to_json())
+    settings = {k: v for k, v in (await body_object(request)).items() if v is not None}
+    here.store.change(project, "silhouette", number, reading=ReadingSettings(**settings).to_json())
     return await read_anew(here, project, number)
 
 
@@ -325,8 +325,8 @@ def get_picture(project: str, picture: str, here: Studio) -> Response:
     """Return a backdrop, or what was painted over it."""
     here.store.project(project)
     file = here.store.home(project) / f"{picture}.png"
-    known = {f"{name}{end}" for end in OF_PICTURE for name in (*MASKS, "backdrop")}
-    if picture not in known:
+    pictures = {f"{name}{end}" for end in OF_PICTURE for name in (*MASKS, "backdrop")}
+    if picture not in pictures:
         raise Refused(404, "there is no such picture (any more)")
     return whole(file, "image/png")
 
@@ -334,10 +334,10 @@ def get_picture(project: str, picture: str, here: Studio) -> Response:
 def stage_of(here: Studio, project: str, tile: int) -> Path:
     """Return the folder of a tile's last stage."""
     here.store.card(project, tile)
-    found = best_stage(here.store.home(project), tile)
-    if found is None:
+    stage = best_stage(here.store.home(project), tile)
+    if stage is None:
         raise Refused(404, "there is no such tile (any more); choose another one")
-    return found
+    return stage
 
 
 @routes("GET", "/projects/{project}/tiles/{tile}")
@@ -372,9 +372,9 @@ async def by_hand(
     """Make a tile of one that was pulled, or is laid in another class, and return its card."""
     if way not in ("pull", "class"):
         raise Refused(404, "there is nothing here; go back to the start page")
-    given = await body_object(request)
+    body = await body_object(request)
     stage_of(here, project, tile)
-    task = await here.done(project, way, {**given, "tile": tile})
+    task = await here.done(project, way, {**body, "tile": tile})
     if task["state"] != "done":
         raise OrbiflowError(task["error"] or "the change was cancelled; pull again")
     return here.store.card(project, tile_number(task["id"], 0))
@@ -383,17 +383,17 @@ async def by_hand(
 @routes("POST", "/projects/{project}/tiles/{tile}/preview")
 async def live_preview(request: Request, project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Draw what a take-away of a tile would be, in place of one that is still being drawn."""
-    given = await body_object(request)
-    operation, settings = str(given.get("operation")), given.get("settings", {})
+    body = await body_object(request)
+    operation, settings = str(body.get("operation")), body.get("settings", {})
     if operation not in ("export", "art", "solid", "animate") or not is_object(settings):
         raise OrbiflowError("a preview has an operation that makes something, and settings")
     stage_of(here, project, tile)
     kind = kind_of_work(operation)
     call = kind.call(here.store.home(project), 1, with_what_is_drawn(here, project, settings))
     flat = {name: call.flat[name] for name in ("makes", "settings", "picture", "drawing")}
-    if given.get("instead"):
+    if body.get("instead"):
         await run_in_threadpool(here.queue.forget, project, "preview")
-    size = {"side": given["side"]} if "side" in given else {}
+    size = {"side": body["side"]} if "side" in body else {}
     task = await here.done(project, "preview", {**flat, **size, "tile": tile})
     here.store.delete_task(task["id"])
     # of one that was ended there may be something left
@@ -407,11 +407,11 @@ def check_painted(here: Studio, project: str) -> None:
     """Refuse a search, before it begins, that what is painted over a picture would end."""
     from orbiflow.studio.silhouette_file import why_not_painted
 
-    own = here.store.project(project)
+    record = here.store.project(project)
     for number in range(len(OF_PICTURE)):
         for mask in MASKS:
             if why := why_not_painted(here.store.home(project), mask, number):
-                raise OrbiflowError(own_names(why, own))
+                raise OrbiflowError(own_names(why, record))
 
 
 def with_what_is_drawn(here: Studio, project: str, settings: dict[str, Any]) -> dict[str, Any]:
@@ -425,11 +425,11 @@ def with_what_is_drawn(here: Studio, project: str, settings: dict[str, Any]) -> 
 
 def _made(here: Studio, task: int, name: str) -> Path:
     """Return a file that a task has made."""
-    own = here.store.task(task)
-    result = own["result"] or {}
+    record = here.store.task(task)
+    result = record["result"] or {}
     names = [file["name"] for file in result.get("files", ())]
     names += [PREVIEW] * bool(result.get("preview"))
-    file = export_folder(here.store.home(own["project"]), task) / name
+    file = export_folder(here.store.home(record["project"]), task) / name
     if name not in names or not file.is_file():
         raise Refused(404, "there is no such file (any more); make it again")
     return file

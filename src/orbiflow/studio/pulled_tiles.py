@@ -85,8 +85,8 @@ class PullSpace:
         self._path = slice(free, free + 2 * (len(self.points) - len(ring)))
         self.start = np.insert(self.outline.start, free, self.points[len(ring) :].ravel())
         self.matrix = np.zeros((2 * len(self.points), len(self.start)))
-        own = np.delete(np.arange(len(self.start)), self._path)
-        self.matrix[: len(matrix), own] = matrix
+        columns = np.delete(np.arange(len(self.start)), self._path)
+        self.matrix[: len(matrix), columns] = matrix
         self.matrix[len(matrix) :, self._path] = np.eye(self._path.stop - free)
 
     @property
@@ -110,8 +110,8 @@ def _divided_rings(
     points, near = outline, SAME_POINT_DISTANCE * float(np.ptp(outline, axis=0).max())
     rings, kept = list[Integers](), list[Integers]()
     for figure in figures:
-        found: Any = KDTree(points).query(figure)
-        inner, numbers = found[0] > near, found[1]
+        nearest: Any = KDTree(points).query(figure)
+        inner, numbers = nearest[0] > near, nearest[1]
         numbers[inner] = len(points) + np.arange(inner.sum())
         points = np.concatenate([points, figure[inner]])
         ring, places = list[int](), list[int]()
@@ -128,10 +128,10 @@ def _between(outline: Array, start: int, end: int, near: float) -> list[int]:
     count = len(outline)
     if max(start, end) >= count:
         return []
-    found = np.arange(start + 1, start + (end - start) % count) % count
+    between = np.arange(start + 1, start + (end - start) % count) % count
     side = shapely.LineString(outline[[start, end]])
-    on_side = shapely.distance(shapely.points(outline[found]), side) < near
-    return found.tolist() if on_side.all() else []
+    on_side = shapely.distance(shapely.points(outline[between]), side) < near
+    return between.tolist() if on_side.all() else []
 
 
 def space_json(tile: EscherTile) -> dict[str, Any]:
@@ -167,19 +167,19 @@ def _body(space: PullSpace) -> dict[str, Any]:
         spacing = BODY_SPACING * ring_length(polygon) / len(ring)
         mesh = triangulate(orient(polygon, counter_clockwise=True), spacing)
         # in one that is turned the vertices are in reverse, from the same first one
-        own = ring if signed_area(polygon) > 0 else np.roll(ring[::-1], 1)
+        sides_ring = ring if signed_area(polygon) > 0 else np.roll(ring[::-1], 1)
         on_sides, inside = np.split(mesh.points[mesh.size :], [len(mesh.sides)])
         # the numbers of these points among all that are tied, and among all that are free
         kinds = np.repeat([0, 1, 2], [mesh.size, len(on_sides), len(inside)])
         numbers = np.concatenate(
             [
-                own,
+                sides_ring,
                 sum(map(len, tied)) + np.arange(len(on_sides)),
                 sum(map(len, free)) + np.arange(len(inside)),
             ]
         )
         triangles.append(np.stack([kinds, numbers])[:, mesh.triangles])
-        sides.append(np.stack([own, np.roll(own, -1)], axis=1)[mesh.sides])
+        sides.append(np.stack([sides_ring, np.roll(sides_ring, -1)], axis=1)[mesh.sides])
         shares.append(mesh.shares)
         tied.append(on_sides)
         free.append(inside)
@@ -225,29 +225,29 @@ def pulled(
             "the parameters of a pulled tile are not of this one, which may have become better "
             "meanwhile; pull again"
         )
-    given = as_array(parameters, "the parameters of a pulled tile", space.start.shape)
-    _check(space, given)
-    whole, points = space.tile(given), space.polygon(given)
+    values = as_array(parameters, "the parameters of a pulled tile", space.start.shape)
+    _check(space, values)
+    whole, points = space.tile(values), space.polygon(values)
 
     def on_the_way(share: float) -> Array:
-        return space.polygon(space.start + share * (given - space.start))
+        return space.polygon(space.start + share * (values - space.start))
 
-    move = _inner_move(space, given, inside) if len(inside) else None
+    move = _inner_move(space, values, inside) if len(inside) else None
 
     if len(tile.figures) == 1:
-        found = moved_figure(tile, whole, on_the_way, COMPARED_POINTS, told, move)
+        changed = moved_figure(tile, whole, on_the_way, COMPARED_POINTS, told, move)
     else:
         parts = list[Any]()
         for part, ring, kept in zip(tile.figures, space.rings, space.kept, strict=True):
             back, before = part.place.inverse, part.figure
             corners = tuple(kept[list(before.tile.corners)].tolist())
-            own = Tile(back(points[ring]), whole.group.conjugate(*back), corners=corners)
+            piece = Tile(back(points[ring]), whole.group.conjugate(*back), corners=corners)
             count = COMPARED_POINTS // len(tile.figures)
             way = partial(_own_ring, on_the_way, ring, back)
             inner = None if move is None else partial(_moved_in, part.place, move)
-            figure = moved_figure(before, own, way, count, told, inner)
+            figure = moved_figure(before, piece, way, count, told, inner)
             parts.append(part._replace(figure=figure))
-        found = EscherTile(
+        changed = EscherTile(
             whole,
             name=tile.name,
             y_down=tile.y_down,
@@ -256,11 +256,11 @@ def pulled(
             notes=(PULLED,),
             division=tuple(parts),
         )
-        if all(part.figure.rating for part in found.figures):
-            found = replace(found, rating=Rating.of_likeness(found.score))
-    if not found.certificate.valid:
-        raise CertificationError("; ".join(found.certificate.reasons))
-    return found
+        if all(part.figure.rating for part in changed.figures):
+            changed = replace(changed, rating=Rating.of_likeness(changed.score))
+    if not changed.certificate.valid:
+        raise CertificationError("; ".join(changed.certificate.reasons))
+    return changed
 
 
 def _check(space: PullSpace, parameters: Array) -> None:
@@ -350,7 +350,7 @@ def moved_figure(
     It is compared with its silhouette at so many points; `note` says what was done by hand.
     """
     likeness = Likeness(min_neck=before.likeness.min_neck, thinnest=narrowest_neck(tile.polygon))
-    found = EscherTile(
+    moved = EscherTile(
         tile,
         name=before.name,
         y_down=before.y_down,
@@ -360,29 +360,29 @@ def moved_figure(
     )
     source = (before.silhouette or {}).get("source", NO_PICTURE)
     if before.bending is None and source == NO_PICTURE:
-        return found  # nothing lies on it
+        return moved  # nothing lies on it
     if before.bending is None:
         from orbiflow.tiles import with_map  # which needs torch
 
         before = with_map(before)
     bending, frame = before.bending, before.frame
     if bending is None or frame is None:
-        return found.changed(no_map=before.no_map or "its run left no map")
+        return moved.changed(no_map=before.no_map or "its run left no map")
     try:
         bending = _carried(bending, frame, way, told, move)
     except OrbiflowError as error:
-        return found.changed(map_source=TileMap(frame=frame), no_map=str(error))
+        return moved.changed(map_source=TileMap(frame=frame), no_map=str(error))
     rest, images = _outlines(bending, count)
     cost = before.likeness.fidelity.cost if before.likeness.fidelity else 0.0
     kept = fidelity(complex_points(rest), complex_points(images), cost)
-    found = found.changed(
+    moved = moved.changed(
         map_source=TileMap(frame=frame, bending=bending),
         search=SearchFacts(objective="likeness"),
         likeness=replace(
             likeness, fidelity=kept, rest=frame.to_input(rest), bent=frame.to_input(images)
         ),
     )
-    return replace(found, rating=Rating.of_likeness(found.score))
+    return replace(moved, rating=Rating.of_likeness(moved.score))
 
 
 def _outlines(bending: Bending, count: int) -> tuple[Array, Array]:

@@ -49,19 +49,19 @@ def _endpoint(answer: Callable[..., Any]) -> Callable[[Request], Any]:
     kinds = get_type_hints(answer)
     kinds.pop("return", None)
     defaults = {
-        name: own.default
-        for name, own in inspect.signature(answer).parameters.items()
-        if own.default is not own.empty
+        name: parameter.default
+        for name, parameter in inspect.signature(answer).parameters.items()
+        if parameter.default is not parameter.empty
     }
 
     async def endpoint(request: Request) -> Response:
         named = {**defaults, **request.query_params, **request.path_params}
-        given = {name: _value(kind, name, named, request) for name, kind in kinds.items()}
+        arguments = {name: _value(kind, name, named, request) for name, kind in kinds.items()}
         if inspect.iscoroutinefunction(answer):
-            found = await answer(**given)
+            reply = await answer(**arguments)
         else:
-            found = await run_in_threadpool(answer, **given)
-        return found if isinstance(found, Response) else JSONResponse(found)
+            reply = await run_in_threadpool(answer, **arguments)
+        return reply if isinstance(reply, Response) else JSONResponse(reply)
 
     return endpoint
 
@@ -121,12 +121,12 @@ def whole(file: Path, kind: str = "application/json", **headers: str) -> Respons
 async def body_object(request: Request) -> dict[str, Any]:
     """Return the JSON object that a request brings."""
     try:
-        found = json.loads(await request.body() or b"{}")
+        body = json.loads(await request.body() or b"{}")
     except (ValueError, RecursionError):
         raise Refused(400, "the request is no JSON; reload the page") from None
-    if not is_object(found):
+    if not is_object(body):
         raise Refused(400, "the request is no JSON object; reload the page")
-    return found
+    return body
 
 
 async def save_body(request: Request, file: Path) -> None:

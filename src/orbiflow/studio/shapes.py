@@ -36,12 +36,12 @@ def shape_tile(kind: IsohedralClass) -> EscherTile:
 
     Straight ones would not show how the copies lie: many templates are the same hexagon.
     """
-    given = Tile(kind.template(), kind.group(), kind.name)
-    scale = SIZE / float(np.sqrt(abs(given.signed_area)))
-    given = given.transformed(scale * np.eye(2), np.zeros(2))
-    plain = EscherTile(given, name=kind.name)
-    space = TileVariations(divided_tile(given, POINTS))
-    x, y = (space.first.polygon - given.center).T * 2 * np.pi / (WAVE * SIZE)
+    template = Tile(kind.template(), kind.group(), kind.name)
+    scale = SIZE / float(np.sqrt(abs(template.signed_area)))
+    template = template.transformed(scale * np.eye(2), np.zeros(2))
+    plain = EscherTile(template, name=kind.name)
+    space = TileVariations(divided_tile(template, POINTS))
+    x, y = (space.first.polygon - template.center).T * 2 * np.pi / (WAVE * SIZE)
     waves = SIZE * np.stack(
         [np.sin(y + 0.7) + np.sin(x + y), np.cos(x - 0.4) - np.sin(x - y)], axis=1
     )
@@ -51,9 +51,9 @@ def shape_tile(kind: IsohedralClass) -> EscherTile:
         outline = shapely.Polygon(bent.polygon)
         # vertices that slide along a mirror may pass each other: rounding must not decide
         if outline.is_valid and shapely.minimum_clearance(outline) >= CLEARANCE * SIZE:
-            found = EscherTile(bent, name=kind.name)
-            if found.certificate.valid:
-                return found
+            curved = EscherTile(bent, name=kind.name)
+            if curved.certificate.valid:
+                return curved
     return plain
 
 

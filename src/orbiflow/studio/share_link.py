@@ -51,16 +51,18 @@ def link_text(result: Path, name: str, look: Any) -> str:
         InputFileError: If the tile has too many points for a link.
     """
     document = json.loads((result / "result.json").read_text("utf-8"))
-    entry = {key: own for key, own in document["tiles"][0].items() if key in ENTRY}
-    parts = [{k: v for k, v in own.items() if k not in MEASURES} for own in entry.get("parts", ())]
-    told = {
+    entry = {key: value for key, value in document["tiles"][0].items() if key in ENTRY}
+    parts = [
+        {k: v for k, v in part.items() if k not in MEASURES} for part in entry.get("parts", ())
+    ]
+    content = {
         "schema": document["schema_version"],
         "name": name[:MAX_NAME],
         "y_down": bool(document["input"]["y_down"]),
-        "look": {key: own for key, own in (look or {}).items() if key in LOOK},
+        "look": {key: value for key, value in (look or {}).items() if key in LOOK},
         "tile": _short({**entry, "parts": parts} if parts else entry),
     }
-    plain = json.dumps(told, allow_nan=False, separators=(",", ":")).encode()
+    plain = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
     text = base64.urlsafe_b64encode(zlib.compress(plain, 9)).decode().rstrip("=")
     if len(text) > MAX_TEXT:
         raise InputFileError("the tile has too many points for a link; save the project instead")
@@ -70,7 +72,7 @@ def link_text(result: Path, name: str, look: Any) -> str:
 def _short(value: Any) -> Any:
     """Return JSON whose lists of points have no more digits than are needed."""
     if isinstance(value, dict):
-        return {key: own if key == "group" else _short(own) for key, own in value.items()}
+        return {key: item if key == "group" else _short(item) for key, item in value.items()}
     if isinstance(value, list) and value and isinstance(value[0], list):
         import numpy as np
 
@@ -92,21 +94,23 @@ def write_linked(text: str, out: Path) -> None:
         packed = base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True)
         unpacker = zlib.decompressobj()
         plain = unpacker.decompress(packed, MAX_UNPACKED)
-        told = json.loads(plain)
+        content = json.loads(plain)
     except (binascii.Error, zlib.error, ValueError, RecursionError) as error:
         raise InputFileError(DAMAGED) from error
-    if not unpacker.eof or not is_object(told) or not is_object(told.get("tile")):
+    if not unpacker.eof or not is_object(content) or not is_object(content.get("tile")):
         raise InputFileError(DAMAGED)
-    look, name = told.get("look"), told.get("name")
+    look, name = content.get("look"), content.get("name")
     view = (
-        {"look": {key: own for key, own in look.items() if key in LOOK}} if is_object(look) else {}
+        {"look": {key: value for key, value in look.items() if key in LOOK}}
+        if is_object(look)
+        else {}
     )
     name = name[:MAX_NAME] if isinstance(name, str) and name.strip() else "Shared tile"
     project = {"format": FORMAT, "name": name, "kind": "tile", "view": view, "tiles": [{"id": 1}]}
     result = {
-        "schema_version": told.get("schema"),
-        "input": {"source": NO_PICTURE, "y_down": bool(told.get("y_down"))},
-        "tiles": [{key: own for key, own in told["tile"].items() if key in ENTRY}],
+        "schema_version": content.get("schema"),
+        "input": {"source": NO_PICTURE, "y_down": bool(content.get("y_down"))},
+        "tiles": [{key: value for key, value in content["tile"].items() if key in ENTRY}],
     }
     with zipfile.ZipFile(out, "w") as archive:
         archive.writestr(PROJECT, json.dumps(project))

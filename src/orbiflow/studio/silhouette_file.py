@@ -44,10 +44,10 @@ PAPER, INK = (255, 255, 255), (70, 78, 92)
 
 def input_file(home: Path, number: int = 0) -> Path:
     """Return the file that was uploaded as the first or second picture."""
-    found = next(home.glob(f"input{OF_PICTURE[number]}.*"), None)
-    if found is None:
+    file = next(home.glob(f"input{OF_PICTURE[number]}.*"), None)
+    if file is None:
         raise InputFileError("there is no picture yet; choose one first")
-    return found
+    return file
 
 
 def has_second(home: Path) -> bool:
@@ -174,20 +174,20 @@ def _mended(target: Target, file: Path, size: tuple[int, int]) -> Target:
     painted, _ = open_image(FileContent(file.read_bytes(), "the corrections"))
     painted = painted.convert("RGBA").resize(size, Image.Resampling.NEAREST)
     level, _, _, opacity = (np.asarray(band) > 127 for band in painted.split())
-    own = _drawn(target, size, "L", 255, 0)
-    mask = (np.asarray(own) > 127) & ~(opacity & ~level) | (opacity & level)
+    drawn = _drawn(target, size, "L", 255, 0)
+    mask = (np.asarray(drawn) > 127) & ~(opacity & ~level) | (opacity & level)
     mask = np.pad(mask, 1)  # the shape may touch the picture's edge
     if not mask.any():
         raise InputFileError("nothing of the picture is left; paint some of it back")
-    found = Target.from_mask(mask, source=target.source)
+    mended = Target.from_mask(mask, source=target.source)
 
     def placed(points: Any) -> Any:
         return target.covered.at((np.asarray(points) - 1) / size)
 
     kept = [note for note in target.notes if not note.startswith(ABOUT_PARTS)]
-    notes = (*kept, *(note for note in found.notes if note.startswith(ABOUT_PARTS)))
-    seen = None if found.seen is None else shapely.transform(found.seen, placed)
-    return replace(target, outline=placed(found.outline), notes=notes, seen=seen)
+    notes = (*kept, *(note for note in mended.notes if note.startswith(ABOUT_PARTS)))
+    seen = None if mended.seen is None else shapely.transform(mended.seen, placed)
+    return replace(target, outline=placed(mended.outline), notes=notes, seen=seen)
 
 
 def _is_coloured(picture: Image.Image, ring: Any, read: Any) -> bool:

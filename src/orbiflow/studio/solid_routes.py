@@ -79,11 +79,11 @@ async def figure(project: str, here: Studio) -> FileResponse:
 async def file(project: str, tile: int, name: str, here: Studio) -> FileResponse:
     """Give a file of a solid to keep: its sheet, or its page."""
     _home(here, project)
-    found = stage_of(here, project, tile) / SAVED / name
+    path = stage_of(here, project, tile) / SAVED / name
     if name not in FILES:
         raise Refused(404, f"there is no such file; there are {', '.join(FILES)}")
-    own = plain_letters(here.store.project(project)["name"], "solid")
-    return FileResponse(found, filename=f"{own}-{name}", headers=SANDBOX)
+    called = plain_letters(here.store.project(project)["name"], "solid")
+    return FileResponse(path, filename=f"{called}-{name}", headers=SANDBOX)
 
 
 def _home(here: Studio, project: str) -> Path:

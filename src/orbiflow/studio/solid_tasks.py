@@ -70,7 +70,7 @@ def mesh(
     file = mesh_file(job.project)
     on_event(Progress(0.1, "reading the mesh"))
     try:
-        found, notes, _ = read_mesh(file)
+        body, notes, _ = read_mesh(file)
     except OrbiflowError as error:
         text = str(error).replace(str(file), called)
         for pattern, words in PLAIN_WORDS.items():
@@ -79,21 +79,21 @@ def mesh(
     cancel.check()
     on_event(Progress(0.7, "drawing it"))
     up = usual_up(file)
-    corners = found.corners[..., [0, 2, 1]] * (1, -1, 1) if up == "y" else found.corners
+    corners = body.corners[..., [0, 2, 1]] * (1, -1, 1) if up == "y" else body.corners
     write_atomic(job.project / BACKDROP, png_bytes(solid_picture([corners], (600, 450))))
-    write_json(job.project / FIGURE, figure_data(found))
-    low, high = found.points.min(axis=0).tolist(), found.points.max(axis=0).tolist()
+    write_json(job.project / FIGURE, figure_data(body))
+    low, high = body.points.min(axis=0).tolist(), body.points.max(axis=0).tolist()
     view = {
         "called": called,
         "notes": notes,
-        "triangles": len(found.faces),
+        "triangles": len(body.faces),
         "low": low,
         "high": high,
-        "usual_size": usual_size(found),
+        "usual_size": usual_size(body),
         "up": up,
     }
     write_json(job.project / MESH, view)
-    return Outcome({"triangles": len(found.faces)})
+    return Outcome({"triangles": len(body.faces)})
 
 
 @operation("studio fill", keeps_partial=True, starts_processes=True)
@@ -107,8 +107,8 @@ def fill(
     """Search for solids that look like a project's mesh and fill space; write each that is found."""
     from orbiflow.solids import fill, read_mesh
 
-    known = mesh_view(job.project)
-    if known is None:
+    view = mesh_view(job.project)
+    if view is None:
         raise OrbiflowError("this mesh was not read; bring another one")
     announce_tiles(job, on_event)
     numbers: dict[int, int] = {}
@@ -117,25 +117,25 @@ def fill(
         numbers[id(solid)] = put_solid(job, solid, on_event)
 
     read = read_mesh(mesh_file(job.project))
-    found = fill(
+    solids = fill(
         read.mesh,
-        settings.replace(up=settings.up or known["up"], workers=cores()),
-        name=Path(known["called"]).stem,
+        settings.replace(up=settings.up or view["up"], workers=cores()),
+        name=Path(view["called"]).stem,
         painting=read.painting,
         on_solid=keep,
         on_event=as_part(on_event),
         cancel=cancel,
     )
-    gone = sorted(set(tiles_of(job)) - {numbers[id(solid)] for solid in found})
+    gone = sorted(set(tiles_of(job)) - {numbers[id(solid)] for solid in solids})
     for number in gone:
         shutil.rmtree(job.project / "tiles" / str(number), ignore_errors=True)
-    if found:
-        best = tile_folder(job.project, numbers[id(found[0])])
+    if solids:
+        best = tile_folder(job.project, numbers[id(solids[0])])
         write_atomic(job.project / BACKDROP, (best / THUMB).read_bytes())
     else:
         on_event(Note("no solid was found that is one piece and fills space"))
-    state = "cancelled" if cancel.cancelled else "done" if found else "nothing found"
-    return Outcome({"solids": len(found), "gone": gone}, state)
+    state = "cancelled" if cancel.cancelled else "done" if solids else "nothing found"
+    return Outcome({"solids": len(solids), "gone": gone}, state)
 
 
 def put_solid(job: Job, solid: EscherSolid, on_event: Sink) -> int:
@@ -206,10 +206,10 @@ def film(
 
 def mesh_file(home: Path) -> Path:
     """Return the mesh of a project, as it was uploaded."""
-    found = [path for ending in ENDINGS if (path := home / f"mesh{ending}").is_file()]
-    if not found:
+    files = [path for ending in ENDINGS if (path := home / f"mesh{ending}").is_file()]
+    if not files:
         raise OrbiflowError("there is no mesh in this project; bring one")
-    return found[0]
+    return files[0]
 
 
 def mesh_view(home: Path) -> dict[str, Any] | None:

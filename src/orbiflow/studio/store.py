@@ -120,15 +120,15 @@ class Store:
 
     def _rows(self, query: str, *values: Any) -> list[dict[str, Any]]:
         with self._lock, suppress(OverflowError):  # no number of anything is that large
-            found = self._data.execute(query, values).fetchall()
-            return [_plain(row) for row in found]
+            rows = self._data.execute(query, values).fetchall()
+            return [_plain(row) for row in rows]
         return []
 
     def _row(self, query: str, *values: Any, what: str) -> dict[str, Any]:
-        found = self._rows(query, *values)
-        if not found:
+        rows = self._rows(query, *values)
+        if not rows:
             raise Missing(f"there is no such {what} (any more); go back to the list of projects")
-        return found[0]
+        return rows[0]
 
     def _record(self, project: str, kind: str, subject: Any = "", data: Any = None) -> None:
         self._data.execute(
@@ -169,11 +169,11 @@ class Store:
         There is a second picture when its `input` is set.
         """
         with self._changing(project):
-            own = self.project(project)
+            record = self.project(project)
             if number:
-                if own["second"] is None and "input" not in changes:
+                if record["second"] is None and "input" not in changes:
                     raise Missing("there is no second picture (any more); add one first")
-                changes = {"second": {**(own["second"] or {}), **changes}}
+                changes = {"second": {**(record["second"] or {}), **changes}}
             self._update("projects", project, {**changes, "changed": time.time()})
             self._record(project, kind)
 
@@ -314,7 +314,7 @@ class Store:
 
 def _plain(row: sqlite3.Row) -> dict[str, Any]:
     """Return a row with what is JSON read."""
-    found = dict(row)
-    for name in (JSON | {"data"}) & set(found):
-        found[name] = None if found[name] is None else json.loads(found[name])
-    return found
+    record = dict(row)
+    for name in (JSON | {"data"}) & set(record):
+        record[name] = None if record[name] is None else json.loads(record[name])
+    return record

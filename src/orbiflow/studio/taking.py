@@ -55,20 +55,22 @@ def with_drawing(
     except (ValueError, RecursionError):
         raise OrbiflowError("the drawing is no JSON; reload the page") from None
     drawings = [parts, parts.get("second")] if is_object(parts) else []
-    if not any(is_object(own) and (own.get("strokes") or own.get("eyes")) for own in drawings):
+    if not any(
+        is_object(layer) and (layer.get("strokes") or layer.get("eyes")) for layer in drawings
+    ):
         return result, files, settings
-    given = read_result(result)
-    tile, scratch = with_any_map(given), make_folder(scratch)
-    if tile is not given:
+    source = read_result(result)
+    tile, scratch = with_any_map(source), make_folder(scratch)
+    if tile is not source:
         result = save_tiles([tile], scratch / "tile")
-    for number, (own, part) in enumerate(zip(drawings, tile.figures, strict=False)):
+    for number, (layer, part) in enumerate(zip(drawings, tile.figures, strict=False)):
         end, prefix = OF_PICTURE[number], PREFIXES[number]
         under: Path | None = files.get(f"{prefix}picture")
         if settings.get("world") and settings.get("format") == "html":
             under = None  # a page to turn shows lines, but no pixels
         elif under is not None and under.suffix not in PICTURE_ENDINGS:
             under = under.with_name(f"backdrop{end}.png")
-        made = drawing_settings(own, part.figure, scratch, under, f"drawing{end}")
+        made = drawing_settings(layer, part.figure, scratch, under, f"drawing{end}")
         if made["picture"] is not None:
             files = {**files, f"{prefix}picture": made["picture"]}
         if made["eyes"]:
@@ -130,12 +132,12 @@ def preview(
 
 def _small_pictures(home: Path, result: Path) -> dict[str, Any]:
     """Return the pictures of `_pictures`, those of pixels as the page shows them, which are smaller."""
-    found = _pictures(home, result)
+    pictures = _pictures(home, result)
     for end, prefix in zip(OF_PICTURE, PREFIXES, strict=True):
-        small, own = home / f"backdrop{end}.png", found.get(f"{prefix}picture")
-        if own is not None and own.suffix in PICTURE_ENDINGS and small.exists():
-            found[f"{prefix}picture"] = small
-    return found
+        small, uploaded = home / f"backdrop{end}.png", pictures.get(f"{prefix}picture")
+        if uploaded is not None and uploaded.suffix in PICTURE_ENDINGS and small.exists():
+            pictures[f"{prefix}picture"] = small
+    return pictures
 
 
 def _drawn(call: Call, folder: Path, side: float, hear: Sink, cancel: Cancel) -> bytes:
@@ -237,12 +239,12 @@ def _pictures(home: Path, result: Path) -> dict[str, Any]:
     from orbiflow.studio.silhouette_file import input_file
     from orbiflow.tiles import read_result
 
-    found: dict[str, Any] = {}
+    pictures: dict[str, Any] = {}
     for prefix, end, _ in zip(PREFIXES, OF_PICTURE, read_result(result).figures, strict=False):
         for file in home.glob(f"input{end}.*"):
             if file.suffix in (*PICTURE_ENDINGS, ".svg"):
-                found[f"{prefix}picture"] = file
-    return found or {"picture": input_file(home)}
+                pictures[f"{prefix}picture"] = file
+    return pictures or {"picture": input_file(home)}
 
 
 def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:

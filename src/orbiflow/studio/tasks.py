@@ -139,7 +139,7 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
         raise OrbiflowError(
             "two pictures are searched for tiles that look alike; choose “Looks alike”"
         )
-    one, two = (load_target(job.project, number) for number in (0, 1))
+    first, second = (load_target(job.project, number) for number in (0, 1))
     settings = _search_settings(job.project, choice).replace(workers=cores())
     announce_tiles(job, on_event)
     shown: dict[str, list[int]] = {stage: [] for stage in STAGES}
@@ -150,14 +150,16 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
         shown[stage].append(number)
         put_tile(job.project, number, stage, tile, on_event, origin)
 
-    result = escherize(one, settings, second=two, on_tile=show, on_event=on_event, cancel=cancel)
-    found = {"tiles": len(result.tiles)}
+    result = escherize(
+        first, settings, second=second, on_tile=show, on_event=on_event, cancel=cancel
+    )
+    summary = {"tiles": len(result.tiles)}
     if result.interrupted:
-        return Outcome(found, "cancelled")
+        return Outcome(summary, "cancelled")
     gone = sorted(set(tiles_of(job)) - set(shown[STAGES[-1]]))
     for number in gone:
         shutil.rmtree(job.project / "tiles" / str(number), ignore_errors=True)
-    return Outcome({**found, "gone": gone}, "done" if result.tiles else "nothing found")
+    return Outcome({**summary, "gone": gone}, "done" if result.tiles else "nothing found")
 
 
 def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
@@ -184,15 +186,15 @@ def _classes_like(project: Path, number: int) -> tuple[str, ...]:
     """Return the class of a tile, and those of the nine with the same group."""
     from orbiflow.tiles import CLASSES, isohedral_class, read_result
 
-    own = read_result(tile_folder(project, number)).isohedral_class
-    group = isohedral_class(own).group().name
+    its_class = read_result(tile_folder(project, number)).isohedral_class
+    group = isohedral_class(its_class).group().name
     near = [name for name in CLASSES if isohedral_class(name).group().name == group]
-    return tuple(dict.fromkeys([own, *near]))
+    return tuple(dict.fromkeys([its_class, *near]))
 
 
 def _is_done(job: Job, place: int) -> bool:
-    found = best_stage(job.project, tile_number(job.task, place * PER_CLASS))
-    return found is not None and found.name == STAGES[-1]
+    stage = best_stage(job.project, tile_number(job.task, place * PER_CLASS))
+    return stage is not None and stage.name == STAGES[-1]
 
 
 @operation("studio open")
@@ -228,8 +230,8 @@ def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> O
     marks = marks_of(project) if pictures else []
     for tile, number, _ in tiles:
         cancel.check()
-        known = [numbers[own] for own in ancestors(number, parents)]
-        origin: dict[str, Any] = {"parent": known[0], "root": known[-1]} if known else {}
+        older = [numbers[ancestor] for ancestor in ancestors(number, parents)]
+        origin: dict[str, Any] = {"parent": older[0], "root": older[-1]} if older else {}
         if marks:
             old = number in outdated_tiles(document)
             origin["found_for"] = ["earlier"] if old else marks[: len(tile.figures)]
@@ -259,8 +261,8 @@ def space(job: Job, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVE
 
     del on_event
     cancel.check()
-    own = tile_folder(job.project, tile)
-    write_json(own.parent / SPACE, space_json(read_result(own)))
+    folder = tile_folder(job.project, tile)
+    write_json(folder.parent / SPACE, space_json(read_result(folder)))
     return Outcome({"tile": tile})
 
 
@@ -324,9 +326,9 @@ def _by_hand(
         on_event(Progress(share, "checking"))
 
     told(0.0)
-    found = move(read_result(tile_folder(job.project, tile)), told)
+    changed = move(read_result(tile_folder(job.project, tile)), told)
     number, stage = tile_number(job.task, 0), STAGES[-1]
-    put_tile(job.project, number, stage, found, on_event, origin_of_pulled(job.project, tile))
+    put_tile(job.project, number, stage, changed, on_event, origin_of_pulled(job.project, tile))
     if place := best_stage(job.project, number):  # at hand when it is pulled again
-        write_json(place / SPACE, space_json(found))
+        write_json(place / SPACE, space_json(changed))
     return Outcome({"tile": number})

@@ -76,14 +76,14 @@ def read_drawing(drawing: Any) -> tuple[list[Stroke], tuple[tuple[float, ...], .
     strokes, eyes = parts.get("strokes", []), parts.get("eyes", [])
     if not is_list(strokes) or not is_list(eyes):
         raise OrbiflowError("a drawing has a list of strokes and a list of eyes")
-    found = [_stroke(one) for one in strokes[: MAX_STROKES + 1]]
-    count = sum(len(one.points) + sum(map(len, one.rings)) for one in found)
-    if len(found) > MAX_STROKES or count > MAX_POINTS or len(eyes) > MAX_EYES:
+    lines = [_stroke(stroke) for stroke in strokes[: MAX_STROKES + 1]]
+    count = sum(len(stroke.points) + sum(map(len, stroke.rings)) for stroke in lines)
+    if len(lines) > MAX_STROKES or count > MAX_POINTS or len(eyes) > MAX_EYES:
         raise OrbiflowError(
             f"the drawing is too large: it may have {MAX_STROKES} lines with {MAX_POINTS} points in "
             f"all, and {MAX_EYES} eyes; rub some out"
         )
-    return found, tuple(tuple(as_array(eye, "an eye", (3,)).tolist()) for eye in eyes)
+    return lines, tuple(tuple(as_array(eye, "an eye", (3,)).tolist()) for eye in eyes)
 
 
 def _stroke(given: Any) -> Stroke:
@@ -136,9 +136,9 @@ def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
             inside = Image.new("1", layer.size)
             for ring in stroke.rings:
                 places = (covered.shares(ring) * layer.size).ravel().tolist()
-                one = Image.new("1", layer.size)
-                ImageDraw.Draw(one).polygon(places, fill=1)
-                inside = ImageChops.logical_xor(inside, one)
+                area = Image.new("1", layer.size)
+                ImageDraw.Draw(area).polygon(places, fill=1)
+                inside = ImageChops.logical_xor(inside, area)
             layer.paste((*rgb(stroke.colour), 255), mask=inside)
             continue
         points = covered.shares(stroke.points) * layer.size

@@ -42,10 +42,10 @@ def tile_folder(home: Path, number: int) -> Path:
 
     Raises `OrbiflowError` if there is none.
     """
-    found = best_stage(home, number)
-    if found is None:
+    stage = best_stage(home, number)
+    if stage is None:
         raise OrbiflowError("there is no such tile (any more); choose another one")
-    return found / SAVED
+    return stage / SAVED
 
 
 def put_tile(
@@ -81,10 +81,10 @@ def put_tile(
 
 def origin_of_pulled(home: Path, number: int) -> dict[str, Any]:
     """Return where a tile comes from that is made by hand from the one with this number."""
-    found = best_stage(home, number)
-    card = {} if found is None else json.loads((found / CARD).read_text())
-    known = {name: card[name] for name in ("found_for",) if name in card}
-    return {"parent": number, "root": card.get("root") or number, **known}
+    stage = best_stage(home, number)
+    card = {} if stage is None else json.loads((stage / CARD).read_text())
+    searched_for = {name: card[name] for name in ("found_for",) if name in card}
+    return {"parent": number, "root": card.get("root") or number, **searched_for}
 
 
 def put_stage(
@@ -111,8 +111,8 @@ def announce_tile(number: int, stage: str, on_event: Sink) -> None:
 def announce_tiles(job: Job, on_event: Sink) -> None:
     """Announce tiles that a task found before it was interrupted."""
     for number in tiles_of(job):
-        if found := best_stage(job.project, number):
-            announce_tile(number, found.name, on_event)
+        if stage := best_stage(job.project, number):
+            announce_tile(number, stage.name, on_event)
 
 
 def tiles_of(job: Job) -> list[int]:

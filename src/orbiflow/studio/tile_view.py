@@ -75,7 +75,7 @@ def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
     a direction. `notes` are sentences on how the tile was made.
     """
     figures = [part.figure for part in tile.figures]
-    said = [own for figure in figures for own in (*figure.notes, figure.no_map) if own]
+    said = [note for figure in figures for note in (*figure.notes, figure.no_map) if note]
     view = {
         **card,
         "notes": list(dict.fromkeys([*tile.notes, *said])),
@@ -83,7 +83,7 @@ def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
     }
     if len(tile.figures) == 1:
         return {**view, **figure_view(tile, 0)}
-    shown = [{**own, **figure_view(tile, k)} for k, own in enumerate(card["figures"])]
+    shown = [{**entry, **figure_view(tile, k)} for k, entry in enumerate(card["figures"])]
     return {**view, "figures": shown}
 
 
@@ -100,10 +100,10 @@ def figure_view(tile: EscherTile, number: int) -> dict[str, Any]:
     """
     figure, place = tile.figures[number]
     bending, frame = figure.bending, figure.frame
-    own = place(figure.tile.polygon).tolist()
+    outline = place(figure.tile.polygon).tolist()
     view: dict[str, Any] = {
-        "silhouette_track": own,
-        "tile_track": own,
+        "silhouette_track": outline,
+        "tile_track": outline,
         "map": None,
         "no_map": figure.no_map,
         "covered": None,
@@ -130,16 +130,16 @@ def figure_view(tile: EscherTile, number: int) -> dict[str, Any]:
 def elements_json(group: CrystallographicGroup, middle: Array) -> dict[str, Any]:
     """Return the symmetry elements of one lattice cell near `middle`."""
     ring = cell_ring(group, middle)[:-1]
-    found = symmetry_elements(group, ring.mean(axis=0))
+    elements = symmetry_elements(group, ring.mean(axis=0))
     size = float(np.sqrt(group.cell_volume))
     centres: dict[tuple[int, ...], dict[str, Any]] = {}
-    for center in found.centers:
+    for center in elements.centers:
         share = (center.point - ring[0]) @ group.inverse_lattice.T
         key = (center.order, *(np.round(share * 1e4).astype(int) % 10_000).tolist())
         centres.setdefault(key, {"order": center.order, "at": center.point.tolist()})
     lines = [
         {"at": line.point.tolist(), "along": line.direction.tolist(), "shift": shift / size}
-        for line, shift in found.lines
+        for line, shift in elements.lines
     ]
     return {
         "cell": ring.tolist(),

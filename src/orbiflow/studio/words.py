@@ -64,12 +64,12 @@ def own_names(text: str, project: Mapping[str, Any]) -> str:
     'cat.svg: no page; what you painted with “Keep its shape”: not on it'
     """
     names = {f"{name}{end}.png": words for end in OF_PICTURE for name, words in PAINTED.items()}
-    for end, given in zip(OF_PICTURE, (project, project["second"]), strict=True):
-        if given and (file := given["input"]):
-            own = file["name"]
-            names |= {f"{name}{end}.{file['type']}": own for name in ("input", "table", "mesh")}
+    for end, picture in zip(OF_PICTURE, (project, project["second"]), strict=True):
+        if picture and (file := picture["input"]):
+            called = file["name"]
+            names |= {f"{name}{end}.{file['type']}": called for name in ("input", "table", "mesh")}
     every = "|".join(map(re.escape, names))
-    return re.sub(rf"(?<![\w-])({every})", lambda found: names[found[1]], text)
+    return re.sub(rf"(?<![\w-])({every})", lambda match: names[match[1]], text)
 
 
 def plain_name(given: Any, otherwise: str) -> str:
@@ -110,8 +110,8 @@ def shown_task(store: Store, task: dict[str, Any]) -> dict[str, Any]:
 
 def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict[str, Any]:
     """Return what a browser needs of a project; of one kind of event, the part that it changed."""
-    own = project["id"]
-    home, address = store.home(own), f"/api/projects/{own}"
+    project_id = project["id"]
+    home, address = store.home(project_id), f"/api/projects/{project_id}"
 
     def url(file: str) -> str | None:
         path = home / f"{file}.png"
@@ -120,14 +120,14 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
     if kind == "project":
         return {name: project[name] for name in ("name", "view", "changed_by")}
 
-    def shown(given: dict[str, Any], number: int) -> dict[str, Any]:
-        silhouette, end = given["silhouette"], OF_PICTURE[number]
+    def shown(half: dict[str, Any], number: int) -> dict[str, Any]:
+        silhouette, end = half["silhouette"], OF_PICTURE[number]
         if silhouette is not None:
             silhouette = {**silhouette, "backdrop": url(f"backdrop{end}")}
         usual = {"threshold": None, "invert": None, "smooth": 0.0, "thicken": 0.0}
         return {
-            "input": given["input"],
-            "reading": usual | given["reading"],
+            "input": half["input"],
+            "reading": usual | half["reading"],
             "silhouette": silhouette,
             **{mask: url(f"{mask}{end}") for mask in MASKS},
         }
@@ -140,8 +140,8 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
     return {
         **{name: project[name] for name in names},
         **part,
-        "tiles": store.cards(own),
-        "tasks": [shown_task(store, task) for task in store.tasks(own)],
+        "tiles": store.cards(project_id),
+        "tasks": [shown_task(store, task) for task in store.tasks(project_id)],
         "head": store.head,
     }
 
@@ -149,9 +149,11 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
 def is_outdated(card: dict[str, Any], project: dict[str, Any]) -> bool:
     """Whether a tile was found for an outline that has been changed or removed since."""
     pictures = [project, project["second"]]
-    marks = [(own.get("silhouette") or {}).get("mark") if own else "none" for own in pictures]
+    marks = [
+        (picture.get("silhouette") or {}).get("mark") if picture else "none" for picture in pictures
+    ]
     pairs = zip(card.get("found_for", ()), marks, strict=False)
-    return any(mark and mark != own for own, mark in pairs)
+    return any(mark and mark != earlier for earlier, mark in pairs)
 
 
 def shown_summary(store: Store, summary: dict[str, Any]) -> dict[str, Any]:

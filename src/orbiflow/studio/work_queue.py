@@ -227,7 +227,7 @@ class WorkQueue:
         """Return the task whose turn it is: of the project that has least, then waited longest."""
         running = [self._lanes[task] for task in self._running]
         full = Counter(lane for _, lane, _ in running)
-        own = Counter((project, lane) for project, lane, _ in running)
+        taken = Counter((project, lane) for project, lane, _ in running)
         waiting: list[dict[str, Any]] = []
         reading: set[str] = set()  # projects whose input an older task is yet to read
         for task in self.store.undone():
@@ -239,7 +239,7 @@ class WorkQueue:
 
         def turn(task: dict[str, Any]) -> tuple[int, int, int]:
             project = task["project"]
-            return own[project, task["lane"]], self._turns.get(project, 0), task["id"]
+            return taken[project, task["lane"]], self._turns.get(project, 0), task["id"]
 
         return min(waiting, key=turn, default=None)
 
@@ -359,8 +359,8 @@ class _Recorder:
                 self.store.change(self.project, **opened)
             for number in summary.get("read", ()):
                 file = self.home / f"silhouette{OF_PICTURE[number]}.json"
-                found = json.loads(file.read_text())["shown"]
-                self.store.change(self.project, "silhouette", number, silhouette=found)
+                shown = json.loads(file.read_text())["shown"]
+                self.store.change(self.project, "silhouette", number, silhouette=shown)
         for number in summary.get("gone", ()):
             with suppress(Missing):
                 self.store.delete_tile(self.project, number)

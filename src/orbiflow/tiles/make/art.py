@@ -33,7 +33,7 @@ def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over 
     """
     settings, tile = settings or ArtSettings(), with_map(tile)
     require_figures(tile, settings, len(overs))
-    (page, told), chosen = _art_page(tile, settings), palette(settings.palette)
+    (page, note), chosen = _art_page(tile, settings), palette(settings.palette)
     density = settings.pixels * page.place.scale
     on = motifs_on(tile, settings, chosen, overs, tint=settings.tint, density=density)
     outline = settings.outline
@@ -64,7 +64,7 @@ def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over 
         notes=(
             *on.notes,
             *notes_on_dark_pictures(tile, overs, chosen),
-            *filter(None, [told]),
+            *filter(None, [note]),
             *page.palette(chosen).shortage(page.count),
         ),
     )

@@ -57,12 +57,12 @@ def arm_numbers(text: str) -> tuple[int, ...]:
 
 def _whole_numbers(text: str, counts: Sequence[int], what: str) -> tuple[int, ...]:
     try:
-        found = tuple(int(part) for part in text.split(","))
+        numbers = tuple(int(part) for part in text.split(","))
     except ValueError:
-        found = ()
-    if len(found) not in counts:
+        numbers = ()
+    if len(numbers) not in counts:
         raise OrbiflowError(f"{text!a:.60} is not {what}")
-    return found
+    return numbers
 
 
 Orders: TypeAlias = Annotated[

@@ -25,7 +25,7 @@ def in_cutting_order(scene: Scene) -> Scene:
     """
     place, layers = np.zeros(2), list[Layer]()
     for layer in scene.layers:
-        items = [own for item in layer.items for own in _single(item, layer)]
+        items = [piece for item in layer.items for piece in _single(item, layer)]
         lines = [item for item in items if isinstance(item, Curve | PathPart)]
         others = [item for item in items if not isinstance(item, Curve | PathPart)]
         ordered, place = ordered_lines(lines, place)
@@ -54,8 +54,8 @@ def ordered_lines(
 ) -> tuple[list[Curve | PathPart], Array]:
     """Return lines in their order from a place (2,) on, and where the way ends."""
     starts = [_starts(_curve(line)) for line in lines]
-    owners = np.repeat(np.arange(len(lines)), [len(own) for own in starts])
-    first = np.cumsum([0, *(len(own) for own in starts)])
+    owners = np.repeat(np.arange(len(lines)), [len(line_starts) for line_starts in starts])
+    first = np.cumsum([0, *(len(line_starts) for line_starts in starts)])
     points = np.concatenate([np.zeros((0, 2)), *starts])
     within = _containing(lines)
     waiting = np.bincount([k for around in within for k in around], minlength=len(lines))
@@ -116,18 +116,18 @@ def _turned(curve: Curve, start: int) -> Curve:
 
 def _containing(lines: Sequence[Curve | PathPart]) -> list[list[int]]:
     """Return for each line the closed lines in which it lies."""
-    found: list[list[int]] = [[] for _ in lines]
+    around: list[list[int]] = [[] for _ in lines]
     closed = [k for k, line in enumerate(lines) if isinstance(line, Curve) and line.closed]
     rings = [_curve(lines[k]).flattened(FINE) for k in closed]
     polygons = np.array([shapely.Polygon(ring) if len(ring) > 2 else None for ring in rings])
     if not len(polygons):
-        return found
+        return around
     areas = np.full(len(lines), 0.0)
     areas[closed] = shapely.area(polygons)
     points = shapely.points([_curve(line).start for line in lines])
     inner, outer = shapely.STRtree(polygons).query(points, predicate="within")
-    for one, other in zip(inner.tolist(), (closed[k] for k in outer.tolist()), strict=True):
+    for number, other in zip(inner.tolist(), (closed[k] for k in outer.tolist()), strict=True):
         # of two that cross, each may begin in the other
-        if one != other and areas[one] < areas[other]:
-            found[one].append(other)
-    return found
+        if number != other and areas[number] < areas[other]:
+            around[number].append(other)
+    return around

@@ -39,11 +39,13 @@ MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
     """Return what the settings draw on one of the tile's figures, at its place on the page in mm."""
-    settings, (given, within) = layout.settings, layout.tile.figures[number]
+    settings, (figure, within) = layout.settings, layout.tile.figures[number]
     place = layout.page.place.after(within)
     chosen = palette(settings.palette if settings.coloured else "ink")
-    own = settings.of_figure(number)
-    motif = drawn_motif(given, own, chosen, over.drawing, hairlines=not settings.coloured)
+    figure_settings = settings.of_figure(number)
+    motif = drawn_motif(
+        figure, figure_settings, chosen, over.drawing, hairlines=not settings.coloured
+    )
     rasters = ()
     if over.picture is not None:
         if settings.purpose == "plotter":
@@ -52,7 +54,7 @@ def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
                 "and strokes alone"
             )
         density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
-        rasters = (carried_picture(over.picture, given, density * place.scale),)
+        rasters = (carried_picture(over.picture, figure, density * place.scale),)
     return Motif(motif.parts, rasters).moved(*place)
 
 
@@ -72,24 +74,24 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
             styles = dict.fromkeys(styles, pen)
     motifs: dict[str, Motif] = {}
     items: dict[str, list[Uses]] = {name: [] for name in styles}
-    for kind, (own, curve) in enumerate(zip(layout.motifs, layout.outline.closed, strict=True)):
+    for kind, (drawn, curve) in enumerate(zip(layout.motifs, layout.outline.closed, strict=True)):
         area = shapely.Polygon(curve.flattened(0.01))
         if settings.coloured:
-            found = {"drawing": cut_off(own, area, whole_strokes=False)}
+            parts = {"drawing": cut_off(drawn, area, whole_strokes=False)}
         else:
             edge = max(EDGE, settings.tile_size / 60) + styles["score"].width / 2
-            found = burnt(own, area, styles, edge)
+            parts = burnt(drawn, area, styles, edge)
         tiles = [tile for tile in scene.tiles if tile.prototile == kind]
-        for name, motif in found.items():
+        for name, motif in parts.items():
             if tiles and (motif.parts or motif.rasters):
                 motifs[symbol_of(kind, name)] = motif
                 items[name].append(_uses(symbol_of(kind, name), tiles))
     ink = palette(settings.palette).outline if settings.coloured else None
     clip = settings.clip or settings.cut == "jigsaw"
     layers = [
-        Layer(name, "drawing", styles[name], tuple(own), clip, ink)
-        for name, own in items.items()
-        if own
+        Layer(name, "drawing", styles[name], tuple(uses), clip, ink)
+        for name, uses in items.items()
+        if uses
     ]
     below = tuple(layer for layer in scene.layers if layer.role == "tiles")
     above = tuple(layer for layer in scene.layers if layer.role != "tiles")

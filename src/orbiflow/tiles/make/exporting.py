@@ -71,15 +71,15 @@ def exported(
 
     `pictures` are the files of what lies over the silhouette of each of the tile's figures.
     """
-    given = as_tile(tile)
-    certificate = given.require_certified(
+    resolved = as_tile(tile)
+    certificate = resolved.require_certified(
         force=force, otherwise="so it is not exported; {force} exports it, marked so"
     )
-    placed, notes = laid_out(given, settings, pictures)
+    placed, notes = laid_out(resolved, settings, pictures)
     settings, maker = placed.settings, MAKERS[placed.settings.cut]
     sheets = _sheets(placed, maker)
-    notes = (*notes, *_colour_notes(given, settings), *sheets[0].told)
-    sheets = [_described(scene, given, settings, certificate) for scene in sheets]
+    notes = (*notes, *_colour_notes(resolved, settings), *sheets[0].told)
+    sheets = [_described(scene, resolved, settings, certificate) for scene in sheets]
     if settings.marks:
         sheets = [registered(scene) for scene in sheets]
     if settings.calibrate and (len(sheets) == 1 or not settings.on_paper):
@@ -109,28 +109,28 @@ def _sheets(placed: Layout, maker: Maker) -> list[Scene]:
 
 
 def laid_out(
-    given: EscherTile, settings: ExportSettings, pictures: Sequence[str | Path | None] = ()
+    tile: EscherTile, settings: ExportSettings, pictures: Sequence[str | Path | None] = ()
 ) -> tuple[Layout, tuple[str, ...]]:
     """Return a tile in its place with what lies on its figures, and what the user should know."""
     overs: list[Over] = []
-    require_figures(given, settings, 1 + any(pictures[1:]))
+    require_figures(tile, settings, 1 + any(pictures[1:]))
     if settings.draws or any(pictures):
-        given = with_map(given)
-        overs = read_overs(pictures, given, followed=not settings.coloured)
+        tile = with_map(tile)
+        overs = read_overs(pictures, tile, followed=not settings.coloured)
     if any(over.picture for over in overs) and settings.file_format in LINES_ALONE:
         raise OrbiflowError(
             f"{next(filter(None, pictures))}: DXF and JSON hold lines, and the picture is made of "
             "pixels; choose SVG or PDF, or give an SVG drawing of fills and strokes alone"
         )
-    placed = layout(given, settings)
+    placed = layout(tile, settings)
     offset = [note for _, note in placed.pieces] if settings.cut == "pieces" else []
     notes = (*filter(None, [placed.outline.note, *offset]), *_neck_notes(placed))
     if overs:
         motifs = tuple(drawn_on(placed, number, over) for number, over in enumerate(overs))
         placed = replace(placed, motifs=motifs, has_picture=any(pictures))
         if settings.coloured:
-            notes = (*notes_on_dark_pictures(given, overs, palette(settings.palette)), *notes)
-        carried = [note for part in given.figures for note in part.figure.notes]
+            notes = (*notes_on_dark_pictures(tile, overs, palette(settings.palette)), *notes)
+        carried = [note for part in tile.figures for note in part.figure.notes]
         notes = (*carried, *(note for over in overs for note in over.notes), *notes)
     return placed, notes
 
@@ -164,10 +164,10 @@ def _described(
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
 
 
-def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...]:
+def _colour_notes(tile: EscherTile, settings: ExportSettings) -> tuple[str, ...]:
     if settings.cut == "none" or settings.purpose == "stickers":
-        known = colouring(given.tiling)
-        return shades(palette(settings.palette), known).shortage(known.count)
+        colours = colouring(tile.tiling)
+        return shades(palette(settings.palette), colours).shortage(colours.count)
     width = settings.outline
     if width is None or width >= VISIBLE:
         return ()
@@ -175,16 +175,16 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
 
 
 def _neck_notes(placed: Layout) -> tuple[str, ...]:
-    limit, found = placed.settings.warn_neck, list[str]()
+    limit, notes = placed.settings.warn_neck, list[str]()
     for part, ring in zip(placed.tile.figures, placed.prototiles, strict=True):
         name = part.figure.name if len(placed.tile.figures) > 1 else ""
         try:
             neck = narrowest_neck(ring) if limit else None
         except OrbiflowError as error:  # a forced tile may cross itself
             whose = f"the necks of {name}" if name else "its necks"
-            found.append(f"{whose} cannot be measured: {error}")
+            notes.append(f"{whose} cannot be measured: {error}")
             continue
         if neck is not None and neck.width < limit:
             neck_there = f"a neck {place_on(ring, neck.place)} is {neck.width:.2f} mm wide"
-            found.append(f"{name or 'the tile'} is thinner than {limit:g} mm: {neck_there}")
-    return tuple(found)
+            notes.append(f"{name or 'the tile'} is thinner than {limit:g} mm: {neck_there}")
+    return tuple(notes)

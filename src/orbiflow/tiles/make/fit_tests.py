@@ -41,13 +41,13 @@ def fit_clearances(clearance: float) -> list[float]:
 
 def fit_words(clearance: float) -> str:
     """Return what the dots mean, in a sentence."""
-    *others, last = (f"{own:g}" for own in fit_clearances(clearance))
+    *others, last = (f"{gap:g}" for gap in fit_clearances(clearance))
     return f"pieces with one to five dots have clearances of {', '.join(others)} and {last} mm"
 
 
 def dice(region: BaseGeometry, number: int) -> BaseGeometry:
     """Return as many dots as a face of dice has, where a region is widest."""
-    part = max(polygons_in(region), key=lambda own: own.area, default=None)
+    part = max(polygons_in(region), key=lambda polygon: polygon.area, default=None)
     if part is None:
         raise OrbiflowError("the piece has no room for its dots; choose a larger tile size")
     line = shapely.maximum_inscribed_circle(part)
@@ -98,5 +98,5 @@ def fit_test_scene(layout: Layout) -> Scene:
         Layer("score", "mark", style._replace(stroke=BLUE), tuple(scores)),
         Layer("cut", "cut", style, tuple(cuts)),
     )
-    told = (fit_words(settings.clearance),)
-    return layout.scene(layers, (), facts={"pieces": len(cuts)}, told=told)
+    notes = (fit_words(settings.clearance),)
+    return layout.scene(layers, (), facts={"pieces": len(cuts)}, told=notes)

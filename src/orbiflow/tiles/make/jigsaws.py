@@ -56,12 +56,12 @@ def jigsaw_scenes(layout: Layout) -> list[Scene]:
         "smallest": round(min(piece.area for piece in pieces) / min(areas), 3),
     }
     tray = list(_tray(layout))
-    told = f"the jigsaw has {len(pieces)} pieces, {whole} whole tiles and "
-    told += f"{len(pieces) - whole} at the border, the smallest {facts['smallest']:.2f} of a tile"
+    note = f"the jigsaw has {len(pieces)} pieces, {whole} whole tiles and "
+    note += f"{len(pieces) - whole} at the border, the smallest {facts['smallest']:.2f} of a tile"
     if tray:
-        told += f"; the tray's two sheets are {tray[0].width:g} x {tray[0].height:g} mm"
+        note += f"; the tray's two sheets are {tray[0].width:g} x {tray[0].height:g} mm"
     layers = (cuts, border)
-    return [layout.scene(layers, layout.placed_tiles, facts=facts, told=(told,)), *tray]
+    return [layout.scene(layers, layout.placed_tiles, facts=facts, told=(note,)), *tray]
 
 
 def _faces(lines: Sequence[BaseGeometry], area: shapely.Polygon) -> list[shapely.Polygon]:
@@ -99,12 +99,12 @@ def _pieces(
         small = piece.area < LEAST_SHARE * min(tile_areas)
         return small or piece.buffer(-width / 2).is_empty
 
-    own = np.array(tile_areas)
-    pieces = [(face, bool((abs(face.area - own) < 1e-3 * own).any())) for face in faces]
+    areas = np.array(tile_areas)
+    pieces = [(face, bool((abs(face.area - areas) < 1e-3 * areas).any())) for face in faces]
     todo = [face for face, whole in pieces if not whole and poor(face)]
     while todo and len(pieces) > 1:
         crumb = min(todo, key=shapely.area)
-        pieces = [own for own in pieces if own[0] is not crumb]
+        pieces = [entry for entry in pieces if entry[0] is not crumb]
         touching = np.flatnonzero(shapely.dwithin([piece for piece, _ in pieces], crumb, GRID))
         rings = shapely.boundary([pieces[k][0] for k in touching])
         common = shapely.length(shapely.intersection(rings, crumb.boundary))
@@ -124,13 +124,13 @@ def _cuts(
 ) -> list[Curve]:
     """Return the lines between pieces, each once, as few long curves."""
     border = shapely.box(*layout.page.box).exterior.buffer(2 * GRID)
-    known, tree = list(edges), shapely.STRtree(list(edges))
+    lines, tree = list(edges), shapely.STRtree(list(edges))
 
     def curve(line: shapely.LineString) -> Curve:
         # most are whole edges, whose curve is there already
         for k in tree.query(line.interpolate(0.5, normalized=True), "dwithin", 10 * GRID).tolist():
-            if line.hausdorff_distance(known[k]) < 10 * GRID:
-                return _between(edges[known[k]], *shapely.get_coordinates(line)[[0, -1]])
+            if line.hausdorff_distance(lines[k]) < 10 * GRID:
+                return _between(edges[lines[k]], *shapely.get_coordinates(line)[[0, -1]])
         return fitted(shapely.get_coordinates(line), layout.fine)
 
     net = shapely.line_merge(shapely.union_all(shapely.boundary(pieces), grid_size=GRID))

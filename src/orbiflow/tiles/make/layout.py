@@ -64,7 +64,7 @@ class Layout:
     @property
     def prototiles(self) -> tuple[Array, ...]:
         """The polygon (N, 2) of each prototile, on the page."""
-        return tuple(own.polygon for own in self.page.tiling.prototiles)
+        return tuple(prototile.polygon for prototile in self.page.tiling.prototiles)
 
     @cached_property
     def pieces(self) -> list[tuple[Array, str]]:
@@ -103,7 +103,7 @@ def layout(given: EscherTile, settings: ExportSettings) -> Layout:
 def _require_fit(page: Page, settings: ExportSettings, strip: float) -> None:
     """Check that the page holds a whole tile."""
     (width, height), box = page.size, page.box
-    need = np.max([np.ptp(own.box, axis=0) for own in page.tiling.prototiles], axis=0)
+    need = np.max([np.ptp(prototile.box, axis=0) for prototile in page.tiling.prototiles], axis=0)
     need += 2 * bleed(settings)
     if need[0] > box.width or need[1] > box.height:
         extra = f", {strip:g} mm of it for the calibration mark" if strip else ""
@@ -117,7 +117,7 @@ def _require_fit(page: Page, settings: ExportSettings, strip: float) -> None:
 
 def _largest(tiling: Tiling, rotate: float, box: Box) -> float:
     """Return the size of the largest tile, turned by an angle in degrees, with its numbers in a box."""
-    points = np.concatenate([own.polygon for own in tiling.prototiles])
+    points = np.concatenate([prototile.polygon for prototile in tiling.prototiles])
     width, height = np.ptp(points @ rotation_matrix(-np.radians(rotate)).T, axis=0)
     room = inset(box, LABELS)
     return max(0.0, min(room.width / width, room.height / height)) * tiling_size(tiling)
@@ -125,8 +125,8 @@ def _largest(tiling: Tiling, rotate: float, box: Box) -> float:
 
 def bleed(settings: ExportSettings) -> float:
     """Return the room in mm for lines that reach beyond their tile's polygon."""
-    own = settings.deviation + (settings.outline or USUAL_WIDTH) / 2
-    return max(own, edge_margin(settings.tile_size))
+    reach = settings.deviation + (settings.outline or USUAL_WIDTH) / 2
+    return max(reach, edge_margin(settings.tile_size))
 
 
 def line_style(layout: Layout) -> Style:

@@ -53,12 +53,12 @@ class Made(Outcome):
         It holds the sheet, and in a format of pages those that come after it.
         """
         settings = self.settings
-        own: dict[str, Any] = {"tolerance": TOLERANCE}
+        options: dict[str, Any] = {"tolerance": TOLERANCE}
         if isinstance(settings, ExportSettings):
-            own = {"tolerance": settings.fine, "dxf": settings.dxf}
+            options = {"tolerance": settings.fine, "dxf": settings.dxf}
         form = format or settings.file_format
         first, *more = self.scenes[sheet : None if form in PAGED else sheet + 1]
-        return write_scene(first, form, more=more, dpi=settings.dpi, **own)
+        return write_scene(first, form, more=more, dpi=settings.dpi, **options)
 
     def image(self, sheet: int = 0) -> Image.Image:
         """Return a sheet as a picture in RGB, in the settings' resolution."""
@@ -80,7 +80,9 @@ class Made(Outcome):
             contents.append(self.content(number))
         cancel.check()
         names = sheet_names(out, len(contents))
-        files = tuple(write_atomic(name, own) for name, own in zip(names, contents, strict=True))
+        files = tuple(
+            write_atomic(name, content) for name, content in zip(names, contents, strict=True)
+        )
         return replace(self, files=files, summary=self._facts(files))
 
     def _facts(self, files: tuple[Path, ...]) -> dict[str, Any]:

@@ -121,19 +121,19 @@ def raster_starts(ring: Array, gap: float) -> list[Nesting]:
         Nesting(lattice, still[None], np.zeros((1, 2)))
         for _, lattice in raster.lattices(raster.same, 1)[:KEPT_LATTICES]
     ]
-    found = []
+    pairs = []
     for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
         place = raster.first_outside(raster.turned, angle)
         # the pair's no-fit region: like with like, and unlike either way round
         there = _shifted(raster.turned, -place)
         pair = raster.same | there | there[::-1, ::-1]
-        found += [(area, lattice, place) for area, lattice in raster.lattices(pair, 2)[:1]]
-    found.sort(key=lambda item: item[0])
+        pairs += [(area, lattice, place) for area, lattice in raster.lattices(pair, 2)[:1]]
+    pairs.sort(key=lambda item: item[0])
     turns = np.stack([still, -still])
     return single + [
         # q = c - (p - c) + w in the raster's frame, whose origin is the piece's centre c
         Nesting(lattice, turns, np.stack([np.zeros(2), 2 * center + place * raster.cell]))
-        for _, lattice, place in found[:KEPT_LATTICES]
+        for _, lattice, place in pairs[:KEPT_LATTICES]
     ]
 
 
@@ -161,9 +161,9 @@ class _Raster:
         way = np.array([np.cos(angle), np.sin(angle)])
         steps = np.round(np.arange(1, self.half + 2)[:, None] * way).astype(int)
         index = steps + (np.array(region.shape) - 1) // 2
-        known = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
-        index = np.where(known[:, None], index, 0)
-        return steps[int(np.argmin(known & region[index[:, 0], index[:, 1]]))]
+        inside = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
+        index = np.where(inside[:, None], index, 0)
+        return steps[int(np.argmin(inside & region[index[:, 0], index[:, 1]]))]
 
     def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
         """Return area and lattice, in mm, with basis vectors outside a region, the densest first.
@@ -173,7 +173,7 @@ class _Raster:
         half = (len(region) - 1) // 2
         axis = np.arange(-half, half + 1)
         grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)
-        found = []
+        lattices = []
         for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
             first = self.first_outside(region, angle)
             blocked = np.zeros_like(region)
@@ -186,9 +186,9 @@ class _Raster:
             if np.isfinite(area[place]):
                 second = grid[place]
                 lattice = np.stack([first, second], axis=1) * self.cell
-                found.append((float(area[place]) * self.cell**2, lattice))
-        found.sort(key=lambda item: item[0])
-        return found
+                lattices.append((float(area[place]) * self.cell**2, lattice))
+        lattices.sort(key=lambda item: item[0])
+        return lattices
 
 
 def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
@@ -208,26 +208,26 @@ ANGLES = 36  # angles of an arrangement that are tried on a sheet
 def dense_arrangements(tiling: Tiling, ring: Array, gap: float) -> list[Nesting]:
     """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first."""
     group = tiling.group
-    own = group.lattice, group.linear_parts, group.translations
-    shapes = tuple(part.shape for part in (*own, ring))
-    return list(_dense(shapes, tuple(part.tobytes() for part in (*own, ring)), gap))
+    arrangement = group.lattice, group.linear_parts, group.translations
+    shapes = tuple(part.shape for part in (*arrangement, ring))
+    return list(_dense(shapes, tuple(part.tobytes() for part in (*arrangement, ring)), gap))
 
 
 @lru_cache(maxsize=8)  # a preview asks again for each setting that changes
 def _dense(shapes: tuple[Any, ...], parts: tuple[bytes, ...], gap: float) -> tuple[Nesting, ...]:
-    *own, ring = (
+    *arrangement, ring = (
         np.frombuffer(part).reshape(shape) for part, shape in zip(parts, shapes, strict=True)
     )
     rng = np.random.default_rng(0)
     coarse = _simplified(ring, gap)
-    starts = [Nesting(*own), *raster_starts(coarse, gap)]
+    starts = [Nesting(*arrangement), *raster_starts(coarse, gap)]
     tight = sorted((tightened(start, coarse, gap) for start in starts), key=attrgetter("cell_area"))
-    clear = [found for found in tight if found.clear(ring, gap)]
-    improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]
+    clear = [nesting for nesting in tight if nesting.clear(ring, gap)]
+    improved = [_improved(nesting, coarse, gap, rng) for nesting in clear[:3]]
     best = sorted((*improved, *clear), key=attrgetter("cell_area"))[:KEPT]
     # the coarse ring holds the fine one, so there is a little room left
-    exact = (tightened(found, ring, gap) for found in best)
-    kept = (found for found in exact if found.clear(ring, gap))
+    exact = (tightened(nesting, ring, gap) for nesting in best)
+    kept = (nesting for nesting in exact if nesting.clear(ring, gap))
     return tuple(sorted(kept, key=attrgetter("cell_area")))
 
 
@@ -262,7 +262,7 @@ def _improved(start: Nesting, ring: Array, gap: float, rng: np.random.Generator)
 def on_sheet(arrangements: Sequence[Nesting], ring: Array, width: float, height: float) -> Uses:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top."""
     best = Uses("piece", np.eye(2)[None], np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
-    turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
+    turns = [(nesting, angle) for nesting in arrangements for angle in _angles(nesting, ring)]
     for arrangement, angle in turns:
         turned = arrangement.turned(angle)
         rings = np.einsum("aij,mj->ami", turned.linear, ring) + turned.offsets[:, None]
@@ -309,7 +309,7 @@ def _convolved(a: Array, b: Array) -> Array:
     """Return the sums (2 n - 1, 2 n - 1) of the products of two grids (n, n) at all translations."""
     size = 2 * len(a) - 1
     # scipy.signal does this, and takes half a second to import
-    found: Array = np.fft.irfft2(
+    sums: Array = np.fft.irfft2(
         np.fft.rfft2(a, (size, size)) * np.fft.rfft2(b, (size, size)), (size, size)
     )
-    return found
+    return sums

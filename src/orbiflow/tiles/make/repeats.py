@@ -16,21 +16,21 @@ from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import colouring
 
 
-def repeating_page(given: EscherTile, settings: ArtSettings, scale: float) -> tuple[Page, str]:
+def repeating_page(tile: EscherTile, settings: ArtSettings, scale: float) -> tuple[Page, str]:
     """Return the cell that repeats as a page, at about `scale` mm per unit, and what to know of it."""
-    tiling, pixels = given.tiling, settings.pixels
+    tiling, pixels = tile.tiling, settings.pixels
     lattice = tiling.group.lattice
     if settings.colour == "neighbour":  # the translations that keep the colours
         a, b, c = colouring(tiling).sublattice
         lattice = lattice @ np.array([[a, b], [0.0, c]])
-    own = {"flipped": not given.y_down, "repeat": settings.repeat or "basic"}
-    found = rectangle(lattice, scale * pixels, settings.stretch, **own)
+    how = {"flipped": not tile.y_down, "repeat": settings.repeat or "basic"}
+    cell = rectangle(lattice, scale * pixels, settings.stretch, **how)
     try:
-        check_size(found.width, found.height)
+        check_size(cell.width, cell.height)
     except OrbiflowError as error:
         raise OrbiflowError(f"the cell that repeats is too large: {error}") from error
-    linear = found.linear / pixels
-    size = found.width / pixels, found.height / pixels
+    linear = cell.linear / pixels
+    size = cell.width / pixels, cell.height / pixels
     # the nearest similarity, by the polar decomposition, and what is stretched beyond it
     left, values, right = np.linalg.svd(linear)
     similar = float(np.sqrt(values.prod())) * left @ right
@@ -40,7 +40,7 @@ def repeating_page(given: EscherTile, settings: ArtSettings, scale: float) -> tu
     page = Page(
         size, box, tiling.transformed(*place), place, colour=settings.colour, stretch=stretch
     )
-    return page, _told(found, found.width * found.height / (pixels**2 * page.tiling.tile_area))
+    return page, _told(cell, cell.width * cell.height / (pixels**2 * page.tiling.tile_area))
 
 
 def _told(found: Rectangle, tiles: float) -> str:

@@ -20,13 +20,13 @@ from orbiflow.tiles.tilings import skeleton
 
 def shared_edges(layout: Layout) -> Iterator[tuple[Curve, tuple[int, int]]]:
     """Yield the curve of each edge on the page once, and the numbers of the vertices at its ends."""
-    own, copies = layout.outline.edges, layout.page.copies
-    if own is None:
+    edges, copies = layout.outline.edges, layout.page.copies
+    if edges is None:
         raise OrbiflowError(
             "this tile's edges do not match its neighbours', so there are no shared edges to cut "
             "once; choose cut none or cut pieces"
         )
-    lines = skeleton(own, copies)
+    lines = skeleton(edges, copies)
     linear, translations = copies.group.linear_parts, copies.translations
     for copy, edge, (start, end) in zip(
         lines.copy.tolist(), lines.edge.tolist(), lines.ends.tolist(), strict=True
@@ -104,12 +104,12 @@ def trails(ends: NDArray[np.int64]) -> list[Trail]:
         arcs[start].append((number, end, True))
         arcs[end].append((number, start, False))
     used = np.zeros(len(both), dtype=bool)
-    found: list[Trail] = []
+    paths: list[Trail] = []
     for start in both[:, 0].tolist():
         circuit = _circuit(start, arcs, used)
         if circuit:
-            found += _without_joints(circuit, len(ends))
-    return found
+            paths += _without_joints(circuit, len(ends))
+    return paths
 
 
 def _joints(ends: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -38,24 +38,24 @@ DIGITS = (
 
 def template_scene(layout: Layout) -> Scene:
     """Return a scene with one tile; edges that fit together have a number, and arrows that agree."""
-    style, given = line_style(layout), layout.tile
+    style, tile = line_style(layout), layout.tile
     layers = [Layer("outline", "cut", style, layout.outline.closed)]
-    known = [part for part in given.figures if part.figure.bending is not None]
-    if known:
+    mapped = [part for part in tile.figures if part.figure.bending is not None]
+    if mapped:
         faint = tuple(
-            Curve.polyline(own.silhouette_outline, closed=True).moved(
+            Curve.polyline(figure.silhouette_outline, closed=True).moved(
                 *layout.page.place.after(place)
             )
-            for own, place in known
+            for figure, place in mapped
         )
         layers.insert(0, Layer("silhouette", "tiles", Style(FAINT), faint))
     marks = tuple(_marks(layout))
     layers.append(Layer("numbers", "mark", style._replace(width=style.width / 2), marks))
-    told = () if known else ("the template has no silhouette: no map of it is known",)
+    notes = () if mapped else ("the template has no silhouette: no map of it is known",)
     tiles = (
         PlacedTile(0, np.eye(2), np.zeros(2), prototile=k) for k in range(len(layout.prototiles))
     )
-    return layout.scene(layers, tuple(tiles), told=told)
+    return layout.scene(layers, tuple(tiles), told=notes)
 
 
 def numbered_edges(layout: Layout) -> Iterator[tuple[int, Array]]:
@@ -63,9 +63,9 @@ def numbered_edges(layout: Layout) -> Iterator[tuple[int, Array]]:
 
     An edge that is turned onto itself is two halves, which fit each other.
     """
-    own = layout.outline.edges
+    edges = layout.outline.edges
     lines = [curve.flattened(layout.fine) for curve in layout.outline.curves]
-    for number, pair in enumerate(own.identifications if own else (), 1):
+    for number, pair in enumerate(edges.identifications if edges else (), 1):
         first, second = lines[pair.first], lines[pair.second]
         if pair.folded and pair.reversed:
             whole = shapely.LineString(first)
@@ -96,7 +96,7 @@ def _place(
     line: shapely.LineString, tile: BaseGeometry, taken: list[Array]
 ) -> tuple[Array, Array, Array]:
     """Return a point on a line, the way along it, and a free place beside it, outside if possible."""
-    found: list[tuple[float, Array, Array, Array]] = []
+    places: list[tuple[float, Array, Array, Array]] = []
     for share in (0.5, 0.4, 0.6, 0.3, 0.7):
         steps = (share * line.length + step for step in (-1.0, 0.0, 1.0))
         before, at, after = shapely.get_coordinates([line.interpolate(step) for step in steps])
@@ -106,8 +106,8 @@ def _place(
             point = shapely.Point(middle)
             near = [float(np.linalg.norm(middle - other)) for other in taken]
             free = min([tile.boundary.distance(point), *near]) - INSIDE * tile.contains(point)
-            found.append((round(free, 1), at, along, middle))
-    return max(found, key=itemgetter(0))[1:]
+            places.append((round(free, 1), at, along, middle))
+    return max(places, key=itemgetter(0))[1:]
 
 
 def _turned(points: Array, at: Array, along: Array) -> Curve:
