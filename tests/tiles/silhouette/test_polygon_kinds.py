@@ -37,7 +37,8 @@ def test_a_promise_that_is_not_kept_is_refused(n: int, more: int) -> None:
 
 
 def test_a_title_may_stand_above_points_of_dat_files_alone() -> None:
-    assert read("NACA 2412\n" + points(SHAPE)).outline.tolist() == SHAPE
+    for title in ("NACA 2412", "0015"):
+        assert read(f"{title}\n" + points(SHAPE)).outline.tolist() == SHAPE
     with refused("line 1", "NACA 2412", kind=InputFileError):
         read("NACA 2412\n" + points(SHAPE), "a.csv")
 
@@ -79,7 +80,6 @@ def test_decimal_commas(separator: str, header: str) -> None:
         ("part,x,y\n" + "".join(f"{k // 3},{k % 3},{k * k}\n" for k in range(6)), "part|2 values"),
         ("x,y,k\n" + points([[*at, k] for k in "ab" for at in SHAPE], ","), "'k'|2 values"),
         (">\n0 0\n1 0\n0 1\n>\n3 3\n", "line 1|'>'"),
-        ("lon,lat\n178,-6\n179.2,-5.9\n-179.6,-6.1\n179.1,-8\n", "date line"),
     ],
 )
 def test_tables_that_are_no_outline_are_refused(text: str, about: str) -> None:
@@ -131,6 +131,17 @@ def test_the_largest_polygon_of_geojson_is_kept(case: str) -> None:
     assert note in " ".join(reading.notes)
 
 
+@pytest.mark.parametrize("start", range(5))
+def test_rings_over_the_date_line_are_joined(start: int) -> None:
+    island = [[178.0, -16], [181, -16.5], [182, -18], [179, -18.5], [177.5, -17]]
+    ring = np.roll(island, start, axis=0)
+    wrapped = [[(x + 180) % 360 - 180, y] for x, y in ring.tolist()]
+    reading = read(json.dumps(polygon(wrapped)), "a.geojson")
+    lag = np.round((reading.outline - ring)[0, 0] / 360) * 360
+    np.testing.assert_allclose(reading.outline - (lag, 0), ring, atol=1e-9)
+    assert any("longitudes jump" in note for note in reading.notes)
+
+
 def test_how_much_wider_degrees_of_longitude_are_is_said() -> None:
     reading = read(json.dumps(polygon([[x, 60 + y] for x, y in SHAPE])), "a.geojson")
     assert "at latitude 62 the shape is 2.1 times as wide" in reading.notes[-1]
@@ -151,7 +162,7 @@ def test_how_much_wider_degrees_of_longitude_are_is_said() -> None:
         ({"type": "MultiPolygon", "coordinates": [[]]}, "no polygon"),
         ({"type": "Polygon", "coordinates": [[["1", "2"], [3, 4], [5, 6]]]}, "GeoJSON"),
         (polygon([[0, 0], [4, 4], [4, 0], [0, 4]]), "crosses or touches itself"),
-        (polygon([[lon, -70 - lon % 7] for lon in range(-180, 180, 30)]), "date line"),
+        (polygon([[lon, -70 - lon % 7] for lon in range(-180, 180, 30)]), "pole"),
     ],
 )
 def test_geojson_without_an_outline_is_refused_by_its_cause(content: Any, about: str) -> None:

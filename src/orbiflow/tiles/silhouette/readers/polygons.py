@@ -90,7 +90,7 @@ def read_points(path: Source) -> Reading:
     """
     lines = _lines(path)
     first, rest = lines[0], lines[1:]
-    if re.fullmatch(r"\s*\d+\s*", first.text):
+    if re.fullmatch(r"\s*[1-9]\d*\s*", first.text):
         return _counted(path, int(first.text.strip()[:9]), first, rest)
     if len(first.values()) == 2:
         return _columns(path, lines, (0, 1), degrees=False, notes=["took y to point up"])
@@ -293,18 +293,17 @@ def read_rings(
     """Return the largest part of what rings of pairs make together, with notes.
 
     `degrees` says whether the pairs are longitudes and latitudes. Raises `InputFileError` for what is
-    no ring, and for one that crosses the date line.
+    no ring, and for one around a pole.
     """
-    if degrees and any(
-        abs(np.diff(np.asarray(ring)[:, 0], append=ring[0][0])).max() > 180 for ring in rings
-    ):
-        raise InputFileError(
-            f"{path}: longitudes jump by more than 180 degrees, as where a shape crosses the date "
-            "line; project it to a map first"
-        )
+    every_note = list(notes)
+    if degrees:
+        unwrapped = [_unwrapped(path, np.asarray(ring, dtype=float)) for ring in rings]
+        is_cut = any((new != old).any() for new, old in zip(unwrapped, rings, strict=True))
+        every_note += ["joined the shape where its longitudes jump by 360 degrees"] * is_cut
+        rings = unwrapped
     cleaned = [clean_ring(ring, str(path), InputFileError) for ring in rings]
     outline, seen = cleaned[0][0], None
-    every_note = [*notes, *(note for _, dropped in cleaned for note in dropped)]
+    every_note += [note for _, dropped in cleaned for note in dropped]
     if len(cleaned) > 1:
         parts = polygons_in(shapely.union_all([Polygon(ring) for ring, _ in cleaned]))
         seen = MultiPolygon(parts)
@@ -313,6 +312,16 @@ def read_rings(
         every_note += kept
     every_note += _widened(outline) if degrees else []
     return Reading(outline, y_down, kind, None, tuple(dict.fromkeys(every_note)), seen=seen)
+
+
+def _unwrapped(path: Source, ring: Array) -> Array:
+    """Return a ring of longitudes and latitudes (N, 2) without jumps at the date line."""
+    longitudes = np.unwrap(ring[:, 0], period=360.0)
+    if abs(longitudes[-1] - longitudes[0]) > 180:
+        raise InputFileError(
+            f"{path}: the ring goes around a pole or all around the globe: project it to a map first"
+        )
+    return np.stack([longitudes, ring[:, 1]], axis=1)
 
 
 def _widened(ring: Array) -> list[str]:
