@@ -115,14 +115,14 @@ class DaskCluster(Executor):
         finally:
             out.recall()
 
-    def _answer(self, one: _Sent, alone: bool) -> WorkerReply | None:
+    def _answer(self, sent: _Sent, alone: bool) -> WorkerReply | None:
         """The answer that came, or None for a parcel that is only suspected of killing workers."""
         from distributed import KilledWorker
 
         try:
-            result = one.result.result()
+            result = sent.result.result()
         except KilledWorker as error:
-            died = WorkerReply.died(one.parcel.key, error.allowed_failures + 1)
+            died = WorkerReply.died(sent.parcel.key, error.allowed_failures + 1)
             return died if alone else None
         except (OSError, concurrent.futures.CancelledError) as error:
             raise OrbiflowError(
@@ -134,8 +134,8 @@ class DaskCluster(Executor):
                 f"a worker of {self.address} could not begin: {type(error).__name__}: {error}; is the "
                 "same orbiflow installed there?"
             ) from error
-        one.future.release()
-        return WorkerReply.from_worker(one.parcel.key, *result)
+        sent.future.release()
+        return WorkerReply.from_worker(sent.parcel.key, *result)
 
     def _check_workers(self, client: Client) -> None:
         try:

@@ -142,7 +142,7 @@ def _files(folder: Path) -> Iterator[str]:
 
 
 def folder_names(
-    paths: Iterable[str], given: Mapping[str, str], reserved: Collection[str] = ()
+    paths: Iterable[str], kept: Mapping[str, str], reserved: Collection[str] = ()
 ) -> dict[str, str]:
     """Return a name for each path that no other has, whether capitals count or not.
 
@@ -152,7 +152,7 @@ def folder_names(
 
     Args:
         paths: Different paths.
-        given: Names of paths in an earlier batch.
+        kept: Names of paths in an earlier batch.
         reserved: Names that no path may have.
 
     >>> folder_names(["cats/tom.png", "tom.png", "tom.svg"], {})
@@ -160,9 +160,9 @@ def folder_names(
     >>> folder_names(["tom.png + kit.svg"], {})
     {'tom.png + kit.svg': 'tom-kit'}
     """
-    names = {path: given[path] for path in paths if path in given}
+    names = {path: kept[path] for path in paths if path in kept}
     # those of files that are not there now are kept for them
-    taken = {name.casefold() for name in (*given.values(), *reserved)}
+    taken = {name.casefold() for name in (*kept.values(), *reserved)}
     for path in paths:
         if path in names:
             continue

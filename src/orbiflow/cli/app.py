@@ -213,9 +213,9 @@ def _namer(operation: Operation) -> Callable[[str], str]:
     return named
 
 
-def _do(operation: Operation, given: dict[str, Any]) -> int:
+def _do(operation: Operation, values: dict[str, Any]) -> int:
     """Run an operation on the terminal and return the exit status."""
-    call = operation.call(given)
+    call = operation.call(values)
 
     from orbiflow.cli.terminal import Terminal, stopped_by_signals
 

@@ -337,18 +337,18 @@ def _files_of_run(folder: Path) -> set[str]:
     return files
 
 
-def _holds_one_run(folder: Path, known: set[str]) -> bool:
+def _holds_one_run(folder: Path, files: set[str]) -> bool:
     """Whether a folder holds nothing that the next run would refuse already."""
-    ours = {PurePosixPath(name).parts[0] for name in known} | LITTER
+    ours = {PurePosixPath(name).parts[0] for name in files} | LITTER
     try:
         return all(path.name in ours for path in folder.iterdir())
     except OSError:  # its files may be read where its names may not
         return True
 
 
-def _same(one: Path, other: Path) -> bool:
-    return _real(one) == _real(other) or (
-        one.exists() and other.exists() and one.samefile(other)  # another link, or capitals
+def _same(path: Path, other: Path) -> bool:
+    return _real(path) == _real(other) or (
+        path.exists() and other.exists() and path.samefile(other)  # another link, or capitals
     )
 
 

@@ -326,12 +326,12 @@ def kind_of(annotation: Any) -> Kind:
     return ParsedKind(marks[Parsed], kind) if Parsed in marks else kind
 
 
-def _plain_kind(annotation: Any, found: Mapping[type, Any]) -> Kind:
+def _plain_kind(annotation: Any, marks: Mapping[type, Any]) -> Kind:
     """Return the kind that a type asks for, given what is annotated, by its class."""
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
-    unit, repeated = found[Unit].name if Unit in found else "", Repeated in found
+    unit, repeated = marks[Unit].name if Unit in marks else "", Repeated in marks
     if annotation in (int, float):
-        return NumberKind(found.get(Range, ANY), unit, whole=annotation is int)
+        return NumberKind(marks.get(Range, ANY), unit, whole=annotation is int)
     simple = {str: TextKind, Path: PathKind, bool: FlagKind}
     if annotation in simple:
         return simple[annotation]()
@@ -344,7 +344,7 @@ def _plain_kind(annotation: Any, found: Mapping[type, Any]) -> Kind:
     if origin in (Union, types.UnionType) and len(arguments) == 2 and type(None) in arguments:
         (part,) = (part for part in arguments if part is not type(None))
         is_own = typing.get_origin(part) is typing.Annotated
-        kind = kind_of(part) if is_own else _plain_kind(part, found)
+        kind = kind_of(part) if is_own else _plain_kind(part, marks)
         if isinstance(kind, ListKind):  # None is for nothing
             kind = ListKind(kind.item, repeated=kind.repeated, may_be_empty=False)
         return OptionalKind(kind)

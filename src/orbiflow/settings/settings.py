@@ -349,13 +349,13 @@ class Settings:
         check_rules(entries.values(), vars(self), self.fields_given)
         self.check()
 
-    def _take(self, values: Mapping[str, Any], known: Mapping[str, Field]) -> None:
+    def _take(self, values: Mapping[str, Any], entries: Mapping[str, Field]) -> None:
         """Read values of fields, and then the texts that need another field."""
         for name, value in values.items():
-            object.__setattr__(self, name, known[name].read(value))
+            object.__setattr__(self, name, entries[name].read(value))
         for name in values:
-            if known[name].kind.needs:
-                finished = known[name].finish(getattr(self, name), vars(self))
+            if entries[name].kind.needs:
+                finished = entries[name].finish(getattr(self, name), vars(self))
                 object.__setattr__(self, name, finished)
 
     def defaults(self) -> Mapping[str, Any]:
@@ -424,23 +424,23 @@ def fields_of(cls: type[Settings]) -> tuple[Field, ...]:
     return tuple(sorted(fields, key=lambda entry: entry.of_class(HelpHeading) is not None))
 
 
-def check_names(given: Iterable[str], known: Iterable[Field], what: str) -> None:
+def check_names(names: Iterable[str], entries: Iterable[Field], what: str) -> None:
     """Raise a `SettingError` for a name that is not known, or one that is required and missing."""
-    fields = {entry.name: entry for entry in known}
-    for name in given:
+    fields = {entry.name: entry for entry in entries}
+    for name in names:
         if name not in fields:
             hint = literal(meant(name, list(fields)) or f"there are {', '.join(fields)}")
             raise SettingError(f"{literal(what)} has no setting {literal(described(name))}; {hint}")
     for name, entry in fields.items():
-        if entry.required and name not in given:
+        if entry.required and name not in names:
             raise entry.missing()
 
 
-def check_rules(fields: Iterable[Field], values: Mapping[str, Any], given: Iterable[str]) -> None:
+def check_rules(fields: Iterable[Field], values: Mapping[str, Any], named: Iterable[str]) -> None:
     """Apply the rules of all fields that were given and have an effect, up to one that is broken."""
     for entry in fields:
         value = values[entry.name]
-        if entry.name in given and (value or value != entry.default):
+        if entry.name in named and (value or value != entry.default):
             for rule in entry.rules:
                 rule.check(entry.name, values)
 

@@ -41,6 +41,6 @@ def moved_body(body: Manifold, linear: ArrayLike, shift: ArrayLike = (0.0, 0.0, 
     return body.transform(np.column_stack([np.asarray(linear, float), np.asarray(shift, float)]))
 
 
-def common_volume(one: Manifold, other: Manifold) -> float:
+def common_volume(body: Manifold, other: Manifold) -> float:
     """Return the volume that two bodies share."""
-    return abs((one ^ other).volume())
+    return abs((body ^ other).volume())

@@ -99,25 +99,25 @@ def _in_box(mesh: Mesh, points: Array, near: float) -> Integers:
     return np.flatnonzero(both[:, 0] & both[:, 1] & both[:, 2])
 
 
-def _back_to_back(one: Mesh, first: Integers, other: Mesh, second: Integers, near: float) -> Array:
+def _back_to_back(mesh: Mesh, first: Integers, other: Mesh, second: Integers, near: float) -> Array:
     """Return for pairs of faces whether they lie in one plane, with opposite normals."""
     normals, its = (
         v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-300)
-        for v in (one.face_vectors[first], other.face_vectors[second])
+        for v in (mesh.face_vectors[first], other.face_vectors[second])
     )
-    steps = other.corners[second] - one.corners[first][:, :1]
+    steps = other.corners[second] - mesh.corners[first][:, :1]
     flat = np.abs(np.einsum("nkj,nj->nk", steps, normals)).max(axis=1) < near
     return flat & (np.einsum("ij,ij->i", normals, its) < -0.99)
 
 
-def _common_areas(one: Mesh, first: Integers, other: Mesh, second: Integers) -> Array:
+def _common_areas(mesh: Mesh, first: Integers, other: Mesh, second: Integers) -> Array:
     """Return the areas that pairs of faces in one plane have in common."""
     if not len(first):
         return np.zeros(0)
-    corners, its = one.corners[first], other.corners[second]
+    corners, its = mesh.corners[first], other.corners[second]
     along = corners[:, 1] - corners[:, 0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    normals = one.face_vectors[first]
+    normals = mesh.face_vectors[first]
     across = np.cross(normals / np.linalg.norm(normals, axis=1, keepdims=True), along)
     axes = np.stack([along, across], axis=2)
     flat, its_flat = ((c - corners[:, :1]) @ axes for c in (corners, its))

@@ -212,32 +212,32 @@ def thickness(mesh: Mesh) -> Array:
 class Smoother:
     """Moves points of a matched surface to the means of their neighbours, orbit by orbit."""
 
-    def __init__(self, group: CrystallographicGroup, own: MatchedSurface) -> None:
-        edges, n = own.mesh.edges, len(own.mesh.points)
+    def __init__(self, group: CrystallographicGroup, surface: MatchedSurface) -> None:
+        edges, n = surface.mesh.edges, len(surface.mesh.points)
         beside = scipy.sparse.coo_array((np.ones(len(edges)), edges.T), (n, n)).tocsr()
         self.beside = scipy.sparse.csr_array(beside + beside.T)
         self._counts = self.beside.sum(axis=1)[:, None]
-        self._means = own.orbit_means(group)
+        self._means = surface.orbit_means(group)
 
     def moves(self, points: Array, shares: Array | float) -> Array:
         """Return moves (N, 3) of points over shares (N, 1) of the ways to their neighbours' means."""
         pull = (self.beside @ points / self._counts - points) * shares
         return (self._means @ pull.ravel()).reshape(-1, 3)
 
-    def evened(self, own: MatchedSurface, share: float) -> MatchedSurface:
+    def evened(self, surface: MatchedSurface, share: float) -> MatchedSurface:
         """Return a surface all of whose points have moved over a share of the way."""
-        return own.with_points(own.mesh.points + self.moves(own.mesh.points, share))
+        return surface.with_points(surface.mesh.points + self.moves(surface.mesh.points, share))
 
 
-def uncrossed(own: MatchedSurface, smoother: Smoother) -> MatchedSurface | None:
+def uncrossed(surface: MatchedSurface, smoother: Smoother) -> MatchedSurface | None:
     """Return a surface smoothed where triangles cross, or None if some still do."""
-    points, faces, changed = own.mesh.points, own.mesh.faces, None
+    points, faces, changed = surface.mesh.points, surface.mesh.faces, None
     bad = np.empty((0, 2), np.int64)
     for round_ in range(SMOOTHINGS):
         kept = bad if changed is None else bad[~changed[bad].any(axis=1)]
         bad = np.concatenate([kept, crossing_pairs(points, faces, changed)])
         if not len(bad):
-            return own.with_points(points)
+            return surface.with_points(points)
         if len(bad) > MOST_CROSSINGS:
             return None
         hit = np.zeros(len(points))

@@ -71,19 +71,19 @@ class PrintedParts:
         return write_stl(self.bodies(), title)
 
 
-def make(own: EscherSolid, settings: BuildSettings) -> PrintedParts:
+def make(solid: EscherSolid, settings: BuildSettings) -> PrintedParts:
     """Return what settings ask for."""
     gap, wall, floor = settings.clearance, settings.wall, settings.floor
     match settings.kind:
         case "tile":
-            return make_tile(own, clearance=gap, nozzle=settings.nozzle)
+            return make_tile(solid, clearance=gap, nozzle=settings.nozzle)
         case "stack":
-            return make_stack(own, copies=settings.copies, clearance=gap)
+            return make_stack(solid, copies=settings.copies, clearance=gap)
         case "block":
-            return make_block(own, clearance=gap, wall=wall, floor=floor)
+            return make_block(solid, clearance=gap, wall=wall, floor=floor)
         case "puzzle":
             return make_puzzle(
-                own,
+                solid,
                 copies=settings.copies,
                 clearance=gap,
                 wall=wall,
@@ -93,45 +93,47 @@ def make(own: EscherSolid, settings: BuildSettings) -> PrintedParts:
 
 
 def make_tile(
-    own: EscherSolid, *, clearance: float = CLEARANCE, nozzle: float = 0.4
+    solid: EscherSolid, *, clearance: float = CLEARANCE, nozzle: float = 0.4
 ) -> PrintedParts:
     """Return one tile, smaller all around by half of the clearance, as it is best printed.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         clearance: The gap in mm between copies.
         nozzle: The width of the printer's line in mm, for the notes.
 
     Raises `OrbiflowError` if nothing is left of it.
     """
-    mesh = _in_mm(own.tile, own)
+    mesh = _in_mm(solid.tile, solid)
     body = offset_body(mesh, -clearance / 2)
     body = _on_bed(moved_body(body, lying(mesh)))
     advice = print_advice(body, nozzle=nozzle, name="The tile")
     return PrintedParts({"tile": body}, {"tile": STACK_PALETTE.fill(0)}, notes=advice.sentences)
 
 
-def make_stack(own: EscherSolid, *, copies: int = 8, clearance: float = CLEARANCE) -> PrintedParts:
+def make_stack(
+    solid: EscherSolid, *, copies: int = 8, clearance: float = CLEARANCE
+) -> PrintedParts:
     """Return a stack of copies as they fill space, a part for each colour, standing like the figure.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         copies: How many copies.
         clearance: The gap in mm between them.
     """
-    axes = own.upright
-    stack = stack_of(own.group, own.tile, copies)
-    body = offset_body(_in_mm(own.tile, own), -clearance / 2)
-    placed = _placed(body, stack, own, axes.T)
+    axes = solid.upright
+    stack = stack_of(solid.group, solid.tile, copies)
+    body = offset_body(_in_mm(solid.tile, solid), -clearance / 2)
+    placed = _placed(body, stack, solid, axes.T)
     corner = _corner(placed)
     firsts, places, colours = dict[str, int](), dict[str, list[Array]](), dict[str, str]()
     for k, copy in enumerate(stack):
-        number = colour_number(own.group, copy)
+        number = colour_number(solid.group, copy)
         # a reflection cannot be a place in a file
         name = f"position {number + 1}{', mirrored' * copy.is_mirrored}"
         first = stack[firsts.setdefault(name, k)]
         turn = axes.T @ copy.linear @ first.linear.T @ axes
-        here, there = (own.millimetres * axes.T @ c.shift - corner for c in (copy, first))
+        here, there = (solid.millimetres * axes.T @ c.shift - corner for c in (copy, first))
         places.setdefault(name, []).append(np.column_stack([turn, here - turn @ there]))
         colours[name] = STACK_PALETTE.fill(number)
     parts = {name: placed[k].translate((-corner).tolist()) for name, k in firsts.items()}
@@ -141,7 +143,7 @@ def make_stack(own: EscherSolid, *, copies: int = 8, clearance: float = CLEARANC
 
 
 def make_block(
-    own: EscherSolid,
+    solid: EscherSolid,
     *,
     clearance: float = CLEARANCE,
     wall: float = WALL,
@@ -155,22 +157,22 @@ def make_block(
     block is opened.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         clearance: The gap in mm between block and copy.
         wall: How much wider than the copy the block is, on each side, in mm.
         floor: How thick it is below the copy, in mm.
         leaving: How copies leave a stack. Default: it is found.
     """
-    pieces = Pieces(own.group, own.tile, clearance / own.millimetres)
+    pieces = Pieces(solid.group, solid.tile, clearance / solid.millimetres)
     leaving = leaving or pieces.leaving_stack()
     turn = _upwards(leaving.direction)
-    mesh = _in_mm(own.tile, own).moved(turn)
+    mesh = _in_mm(solid.tile, solid).moved(turn)
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     top = low[2] + SOCKET * (high[2] - low[2])
     # as deep as what is cut out of it, and the floor
     deep = _box([*(low[:2] - wall), 2 * low[2] - high[2]], [*(high[:2] + wall), top])
-    larger = _coarser(offset_body(_in_mm(own.tile, own), clearance / 2))
-    cut = united(_copies_above(own, larger, turn, deep)) ^ deep
+    larger = _coarser(offset_body(_in_mm(solid.tile, solid), clearance / 2))
+    cut = united(_copies_above(solid, larger, turn, deep)) ^ deep
     bottom = cut.bounding_box()[2] - floor
     block = _box([*(low[:2] - wall), bottom], [*(high[:2] + wall), top])
     notes = list[str]()
@@ -182,7 +184,7 @@ def make_block(
         )
     remains = (block - cut).decompose()
     base = max(remains, key=lambda body: body.volume())
-    tile = moved_body(offset_body(_in_mm(own.tile, own), -clearance / 2), turn)
+    tile = moved_body(offset_body(_in_mm(solid.tile, solid), -clearance / 2), turn)
     parts = _all_on_bed({"starting block": base, "tile": tile})
     notes += print_advice(parts["starting block"], name="The starting block").sentences
     return PrintedParts(
@@ -190,22 +192,24 @@ def make_block(
     )
 
 
-def _copies_above(own: EscherSolid, body: Manifold, turn: Array, block: Manifold) -> list[Manifold]:
+def _copies_above(
+    solid: EscherSolid, body: Manifold, turn: Array, block: Manifold
+) -> list[Manifold]:
     """Return the copies of a body, itself too, that meet a block and are not below the tile."""
-    center, up = own.tile.centroid, turn[2]
-    box = np.reshape(block.bounding_box(), (2, 3)) / own.millimetres
-    radius = float(np.linalg.norm(own.tile.points - center, axis=1).max())
+    center, up = solid.tile.centroid, turn[2]
+    box = np.reshape(block.bounding_box(), (2, 3)) / solid.millimetres
+    radius = float(np.linalg.norm(solid.tile.points - center, axis=1).max())
     reach = radius + float(np.linalg.norm(box - turn @ center, axis=1).max())
     placed = [
-        moved_body(body, turn @ g.linear, own.millimetres * turn @ g.translation)
-        for g in own.group.elements_near(center, reach, source=center)
+        moved_body(body, turn @ g.linear, solid.millimetres * turn @ g.translation)
+        for g in solid.group.elements_near(center, reach, source=center)
         if (g.linear @ center + g.translation - center) @ up > -1e-6 * radius
     ]
     return [copy for copy in placed if _meet(copy, block)]
 
 
 def make_puzzle(
-    own: EscherSolid,
+    solid: EscherSolid,
     *,
     copies: int = 8,
     clearance: float = CLEARANCE,
@@ -219,33 +223,33 @@ def make_puzzle(
     copies are best drawn out of a stack.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         copies: How many pieces.
         clearance: The gap in mm between pieces, and between them and the box.
         wall, floor: The thickness in mm of the box.
         assembled: Leave the pieces in the box; else they lie beside it, each as it is best printed.
     """
-    pieces = Pieces(own.group, own.tile, clearance / own.millimetres)
-    stack = stack_of(own.group, own.tile, copies)
+    pieces = Pieces(solid.group, solid.tile, clearance / solid.millimetres)
+    stack = stack_of(solid.group, solid.tile, copies)
     assembly = pieces.assembly(stack)
     direction, notes = _box_direction(pieces, stack, assembly)
     turn = _upwards(direction)
-    mesh = _in_mm(own.tile, own)
+    mesh = _in_mm(solid.tile, solid)
     smaller = offset_body(mesh, -clearance / 2)
-    room = united(_placed(_coarser(offset_body(mesh, clearance / 2)), stack, own, turn))
+    room = united(_placed(_coarser(offset_body(mesh, clearance / 2)), stack, solid, turn))
     corners = np.array(room.bounding_box()).reshape(2, 3)
     height = BOX_HEIGHT * (corners[1, 2] - corners[0, 2])
     outer = [corners[0] - (wall, wall, floor), [*(corners[1, :2] + wall), corners[0, 2] + height]]
     box = _box(*outer) - _coarser(lifted(room, corners[1, 2] + 1.0))
     box = max(box.decompose(), key=lambda body: body.volume())
-    placed = _placed(smaller, stack, own, turn)
+    placed = _placed(smaller, stack, solid, turn)
     names = [f"piece {k}" for k in range(1, copies + 1)]
     parts = {"box": box, **dict(zip(names, placed, strict=True))}
     if not assembled:
         parts = {"box": box, **_beside(box, smaller, stack, lying(mesh), names)}
     colours = {"box": "#d9d3c7"}
     for name, copy in zip(names, stack, strict=True):
-        colours[name] = STACK_PALETTE.fill(colour_number(own.group, copy))
+        colours[name] = STACK_PALETTE.fill(colour_number(solid.group, copy))
     parts = _all_on_bed(parts)
     notes = [assembly.words, *notes, *print_advice(parts["box"], name="The box").sentences]
     return PrintedParts(parts, colours, notes=notes)
@@ -265,16 +269,17 @@ def _box_direction(
     return leaving, ["In the box not all of them go in straight from above."]
 
 
-def _in_mm(mesh: Mesh, own: EscherSolid) -> Mesh:
-    return Mesh(own.millimetres * mesh.points, mesh.faces)
+def _in_mm(mesh: Mesh, solid: EscherSolid) -> Mesh:
+    return Mesh(solid.millimetres * mesh.points, mesh.faces)
 
 
 def _placed(
-    body: Manifold, stack: Sequence[StackedCopy], own: EscherSolid, turn: Array
+    body: Manifold, stack: Sequence[StackedCopy], solid: EscherSolid, turn: Array
 ) -> list[Manifold]:
     """Return the copies of a body in mm, turned."""
     return [
-        moved_body(body, turn @ copy.linear, own.millimetres * turn @ copy.shift) for copy in stack
+        moved_body(body, turn @ copy.linear, solid.millimetres * turn @ copy.shift)
+        for copy in stack
     ]
 
 
@@ -299,9 +304,9 @@ def _box(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Manifol
     return Manifold.cube(sides.tolist()).translate(low.tolist())
 
 
-def _meet(one: Manifold, other: Manifold) -> bool:
+def _meet(body: Manifold, other: Manifold) -> bool:
     (low, high), (its_low, its_high) = (
-        np.array(body.bounding_box()).reshape(2, 3) for body in (one, other)
+        np.array(body.bounding_box()).reshape(2, 3) for body in (body, other)
     )
     return bool((low < its_high).all() and (its_low < high).all())
 

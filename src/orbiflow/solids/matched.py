@@ -36,10 +36,10 @@ class MatchedSurface:
     partners: Integers
 
     @classmethod
-    def of(cls, group: CrystallographicGroup, own: TileSurface) -> MatchedSurface:
+    def of(cls, group: CrystallographicGroup, surface: TileSurface) -> MatchedSurface:
         """Return the surface of a tile of cells of a group on its conventional lattice."""
-        shift = group.translations[own.cosets] + own.shifts @ group.lattice.T
-        return cls(own.mesh, group.linear_parts[own.cosets], shift, own.partners)
+        shift = group.translations[surface.cosets] + surface.shifts @ group.lattice.T
+        return cls(surface.mesh, group.linear_parts[surface.cosets], shift, surface.partners)
 
     @cached_property
     def edge_lengths(self) -> Array:

@@ -122,9 +122,9 @@ def _merged(points: Array, distance: float) -> tuple[Array, Integers]:
     return points[first], labels
 
 
-def _labels(one: Integers, other: Integers, count: int) -> Integers:
+def _labels(first: Integers, other: Integers, count: int) -> Integers:
     """Return which connected part each of `count` nodes is of, given the ends of their edges."""
-    graph = scipy.sparse.coo_matrix((np.ones(len(one)), (one, other)), (count, count))
+    graph = scipy.sparse.coo_matrix((np.ones(len(first)), (first, other)), (count, count))
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
 

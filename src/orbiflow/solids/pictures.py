@@ -36,22 +36,22 @@ OPENED = 0.75
 
 
 def solid_sheet(
-    own: EscherSolid, *, width: int = 1600, copies: int = 18, remark: str = ""
+    solid: EscherSolid, *, width: int = 1600, copies: int = 18, remark: str = ""
 ) -> Image.Image:
     """Return a sheet on white: the figure, its bent body, the tile from three sides, and stacks.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         width: The width in pixels; the height is 7/16 of it.
         copies: How many copies are stacked; colours tell the cosets, and copies side by side, apart.
         remark: A sentence below the stack.
     """
     side, height = round(0.1875 * width), round(0.4375 * width)
     large, row = width - 3 * side, height // 2
-    bodies = [(own.target, TARGET_COLOUR), (own.bent, BENT_COLOUR), (own.tile, TILE_COLOUR)]
+    bodies = [(solid.target, TARGET_COLOUR), (solid.bent, BENT_COLOUR), (solid.tile, TILE_COLOUR)]
     target, bent, tile = (ShadedPart.smooth(m.points, m.faces, c) for m, c in bodies)
-    stack = Stack(own, copies, STACK_FACES)
-    words = ", ".join(filter(None, [f"{copies} copies", own.group.name]))
+    stack = Stack(solid, copies, STACK_FACES)
+    words = ", ".join(filter(None, [f"{copies} copies", solid.group.name]))
     words = f"{words}. {remark}" if remark else words
     panels = [
         ([target], SIDES[0], (side, row), (0, 0), "the figure"),
@@ -66,7 +66,7 @@ def solid_sheet(
     letters = font(max(9, round(width / 110)))
     for parts, direction, size, place, words in panels:
         line = round(0.022 * width)
-        drawn = draw_solids(parts, (size[0], size[1] - line), _view(own.upright, direction))
+        drawn = draw_solids(parts, (size[0], size[1] - line), _view(solid.upright, direction))
         sheet.paste(drawn, place)
         bottom = place[0] + size[0] / 2, place[1] + size[1] - line
         ImageDraw.Draw(sheet).text(bottom, words, fill="#555555", font=letters, anchor="ma")
@@ -74,7 +74,7 @@ def solid_sheet(
 
 
 def solid_gif(
-    own: EscherSolid,
+    solid: EscherSolid,
     *,
     size: int = 480,
     frames: int = 48,
@@ -85,19 +85,19 @@ def solid_gif(
     """Return a GIF without end in which a stack turns once round, opens and closes.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         size: Width and height in pixels.
         frames, seconds: How many pictures, and how long one turn takes.
         copies: How many copies are stacked.
         progress: Told after each picture what share is done, 0 to 1.
     """
-    stack, drawn = Stack(own, copies, FILM_FACES), list[Image.Image]()
+    stack, drawn = Stack(solid, copies, FILM_FACES), list[Image.Image]()
     for k in range(frames):
         turn = 2 * np.pi * k / frames
         apart = OPENED * (0.5 - 0.5 * np.cos(turn)) ** 1.5
         cos, sin = np.cos(turn), np.sin(turn)
         x, y, z = STACK_SIDE
-        view = _view(own.upright, (cos * x - sin * y, sin * x + cos * y, z))
+        view = _view(solid.upright, (cos * x - sin * y, sin * x + cos * y, z))
         parts = stack.parts(apart)
         middle, radius = stack.ball(parts)
         view = SolidView(view.direction, view.up, middle, radius)
@@ -121,17 +121,17 @@ class Stack:
     """A stack of copies of a tile, to be drawn closed or taken apart.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         copies: How many copies.
         most_faces: The most triangles that a copy has.
     """
 
-    def __init__(self, own: EscherSolid, copies: int, most_faces: int) -> None:
-        mesh = lighter(own.tile, most_faces)
-        self.copies: list[StackedCopy] = stack_of(own.group, own.tile, copies)
-        self._centers = copy_centers(own.tile, self.copies)
+    def __init__(self, solid: EscherSolid, copies: int, most_faces: int) -> None:
+        mesh = lighter(solid.tile, most_faces)
+        self.copies: list[StackedCopy] = stack_of(solid.group, solid.tile, copies)
+        self._centers = copy_centers(solid.tile, self.copies)
         self._part = ShadedPart.smooth(mesh.points, mesh.faces, TILE_COLOUR)
-        self._colours = [copy_colour(own.group, copy) for copy in self.copies]
+        self._colours = [copy_colour(solid.group, copy) for copy in self.copies]
 
     def parts(self, apart: float) -> list[ShadedPart]:
         """Return all copies, moved apart by this share of their distances from the middle."""

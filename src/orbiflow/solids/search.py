@@ -246,8 +246,8 @@ class BentPose(NamedTuple):
 Kind = TypeVar("Kind", BentPose, EscherSolid)
 
 
-def _rank(own: BentPose | EscherSolid) -> float:
-    return -own.likeness.score
+def _rank(candidate: BentPose | EscherSolid) -> float:
+    return -candidate.likeness.score
 
 
 def _by_groups(every: Sequence[Kind]) -> list[Kind]:
@@ -277,10 +277,10 @@ def quick_bend(body: Body, pose: Pose) -> tuple[float, Pose]:
     return lost + twice + STRAIN_COST * bent_body.strain, pose
 
 
-def coverage(found: BentBody) -> tuple[float, float]:
+def coverage(bent_body: BentBody) -> tuple[float, float]:
     """Return the share of space that copies of a bent body leave uncovered, and cover twice or more."""
-    low, high = found.surface.bounds
-    lattice, counts = found.lattice, np.zeros(PROBES, dtype=int)
+    low, high = bent_body.surface.bounds
+    lattice, counts = bent_body.lattice, np.zeros(PROBES, dtype=int)
     corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
     box = np.linalg.solve(lattice, corners.T).T
     ranges = [
@@ -288,11 +288,11 @@ def coverage(found: BentBody) -> tuple[float, float]:
     ]
     cells = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
     probes = np.random.default_rng(0).uniform(size=(PROBES, 3))
-    for turn, shift in zip(found.family.turns, found.family.shifts, strict=True):
+    for turn, shift in zip(bent_body.family.turns, bent_body.family.shifts, strict=True):
         at = probes @ turn.T + shift
         images = ((at - np.floor(at) - 1)[:, None] + cells).reshape(-1, 3) @ lattice.T
         near = np.flatnonzero(((images >= low) & (images <= high)).all(axis=1))
-        inside = near[found.distance(images[near]) < 0]
+        inside = near[bent_body.distance(images[near]) < 0]
         counts += np.bincount(inside // len(cells), minlength=PROBES)
     return float((counts == 0).mean()), float(np.maximum(counts - 1, 0).mean())
 
@@ -360,14 +360,14 @@ def _closed_tile(
     return None if ball is None else tile_surface(ball, depth).mesh
 
 
-def _depth(fine: Mesh, found: BentBody, grain: float) -> Callable[[Array], Array]:
+def _depth(fine: Mesh, bent_body: BentBody, grain: float) -> Callable[[Array], Array]:
     """Return how deep points are inside a bent surface, times how much its parts matter there.
 
     So overlaps are settled at the cost of the less important side. Outside it is minus the distance,
     and gaps go to the nearest copy: with weights, parts would be claimed that nothing holds.
     """
     points, normals = surface_points(fine, grain)
-    near = cKDTree(found.surface.points).query(points, 4)[1]
-    weights = found.body.importance[near].mean(axis=1)
+    near = cKDTree(bent_body.surface.points).query(points, 4)[1]
+    weights = bent_body.body.importance[near].mean(axis=1)
     distance = SignedDistance(points, normals, grain, weights)
     return lambda x: -distance(x)

@@ -31,7 +31,7 @@ KINDS = {"target": "the figure", "bent": "bent", "tile": "the tile", "stack": "t
 
 
 def stack_page(
-    own: EscherSolid,
+    solid: EscherSolid,
     *,
     title: str = "A solid that fills space",
     caption: str = "",
@@ -45,29 +45,29 @@ def stack_page(
     that, and moves by itself only where it is asked to.
 
     Args:
-        own: A tile that fills space.
+        solid: A tile that fills space.
         title: The title.
         caption: A sentence or two below it. Default: how many copies there are, and the group.
         remark: Another sentence after it.
         copies: How many copies are stacked, a colour for each coset.
         apart: How far the slider takes copies from the middle, as a share of their distances.
     """
-    data = stack_data(own, copies=copies, apart=apart)
-    group = f" of {own.group.name}" if own.group.name else ""
+    data = stack_data(solid, copies=copies, apart=apart)
+    group = f" of {solid.group.name}" if solid.group.name else ""
     caption = caption or f"{copies} copies of one solid{group}: they fill space without gaps."
     caption = f"{caption} {remark}" if remark else caption
-    values = {"title": title, "caption": caption, "kinds": KINDS, "legend": _legend(own, copies)}
+    values = {"title": title, "caption": caption, "kinds": KINDS, "legend": _legend(solid, copies)}
     return rendered("orbiflow.solids", "stack.html", **values, data=data)
 
 
-def stack_data(own: EscherSolid, *, copies: int = 24, apart: float = 1.2) -> dict[str, Any]:
+def stack_data(solid: EscherSolid, *, copies: int = 24, apart: float = 1.2) -> dict[str, Any]:
     """Return what `stack.js` draws, as JSON has it: see `stack_page`."""
-    meshes = {"target": own.target, "bent": own.bent, "tile": own.tile}
-    stack = stack_of(own.group, own.tile, copies)
-    centers = copy_centers(own.tile, stack)
+    meshes = {"target": solid.target, "bent": solid.bent, "tile": solid.tile}
+    stack = stack_of(solid.group, solid.tile, copies)
+    centers = copy_centers(solid.tile, stack)
     away = apart * (centers - centers.mean(axis=0))
     colours = {"target": TARGET_COLOUR, "bent": BENT_COLOUR, "tile": TILE_COLOUR}
-    points = np.stack([own.tile.points @ copy.linear.T + copy.shift for copy in stack])
+    points = np.stack([solid.tile.points @ copy.linear.T + copy.shift for copy in stack])
     closed, opened = (
         float(np.linalg.norm(points + k * away[:, None] - centers.mean(axis=0), axis=2).max())
         for k in (0, 1)
@@ -76,7 +76,7 @@ def stack_data(own: EscherSolid, *, copies: int = 24, apart: float = 1.2) -> dic
     balls["stack"] = {"center": centers.mean(axis=0).tolist(), "radius": closed, "opened": opened}
     return {
         "start": START,
-        "axes": own.upright.T.tolist(),
+        "axes": solid.upright.T.tolist(),
         "meshes": {name: _packed_mesh(mesh) for name, mesh in meshes.items()},
         "colours": {name: _shares(colour) for name, colour in colours.items()},
         "balls": balls,
@@ -85,7 +85,7 @@ def stack_data(own: EscherSolid, *, copies: int = 24, apart: float = 1.2) -> dic
                 "turn": copy.linear.T.ravel().tolist(),  # column by column
                 "shift": copy.shift.tolist(),
                 "away": shift.tolist(),
-                "colour": _shares(copy_colour(own.group, copy)),
+                "colour": _shares(copy_colour(solid.group, copy)),
             }
             for copy, shift in zip(stack, away, strict=True)
         ],
@@ -105,9 +105,9 @@ def figure_data(figure: Mesh) -> dict[str, Any]:
     }
 
 
-def _legend(own: EscherSolid, copies: int) -> dict[str, str]:
+def _legend(solid: EscherSolid, copies: int) -> dict[str, str]:
     """Return what each colour stands for."""
-    group, stack = own.group, stack_of(own.group, own.tile, copies)
+    group, stack = solid.group, stack_of(solid.group, solid.tile, copies)
     numbers = sorted({colour_number(group, copy) for copy in stack})
     mirrored = {colour_number(group, copy): copy.is_mirrored for copy in stack}
     return {

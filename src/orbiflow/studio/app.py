@@ -135,9 +135,9 @@ async def about(here: Studio) -> dict[str, Any]:
     }
 
 
-def _shades(own: Palette) -> list[list[tuple[str, ...]]]:
+def _shades(palette: Palette) -> list[list[tuple[str, ...]]]:
     """Return, for each of two figures, its colours if it has 1, 2, 3 ... of them."""
-    every = [own.shaded((count, count)).colours for count in range(1, MAX_SHADES + 1)]
+    every = [palette.shaded((count, count)).colours for count in range(1, MAX_SHADES + 1)]
     return [[both[: len(both) // 2] for both in every], [both[len(both) // 2 :] for both in every]]
 
 
@@ -202,7 +202,7 @@ class Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def serve(app: Guard, own: socket.socket) -> None:
+def serve(app: Guard, listener: socket.socket) -> None:
     """Serve an application at a socket until the process is stopped."""
     config = uvicorn.Config(
         app,
@@ -214,4 +214,4 @@ def serve(app: Guard, own: socket.socket) -> None:
         limit_concurrency=MAX_CONNECTIONS,
     )
     state: Any = app.app
-    Server(config, state.state.studio.hub).run(sockets=[own])
+    Server(config, state.state.studio.hub).run(sockets=[listener])

@@ -317,16 +317,16 @@ def _carried(
 
         return carried_on(bending, before, after, inner=inner)
 
-    def follow(own: Bending, start: float, end: float, steps: int) -> Bending:
+    def follow(figure: Bending, start: float, end: float, steps: int) -> Bending:
         told(start)
         try:
             rings = (frame.to_normal(way(share)) for share in (start, end))
-            return carried_on(own, *rings, sharpenings=QUICK_SHARPENINGS)
+            return carried_on(figure, *rings, sharpenings=QUICK_SHARPENINGS)
         except OrbiflowError:
             if steps >= MOST_STEPS:
                 raise
         middle = (start + end) / 2
-        return follow(follow(own, start, middle, 2 * steps), middle, end, 2 * steps)
+        return follow(follow(figure, start, middle, 2 * steps), middle, end, 2 * steps)
 
     try:
         return follow(bending, 0.0, 1.0, 1)

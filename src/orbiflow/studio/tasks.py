@@ -285,8 +285,8 @@ def pull(
     """
     from orbiflow.studio.pulled_tiles import pulled
 
-    def move(own: EscherTile, told: Callable[[float], None]) -> EscherTile:
-        return pulled(own, parameters, told, inside)
+    def move(original: EscherTile, told: Callable[[float], None]) -> EscherTile:
+        return pulled(original, parameters, told, inside)
 
     return _by_hand(job, tile, move, on_event, cancel)
 
@@ -303,9 +303,9 @@ def lay_in_class(
     """
     from orbiflow.studio.other_classes import in_class
 
-    def move(own: EscherTile, told: Callable[[float], None]) -> EscherTile:
+    def move(original: EscherTile, told: Callable[[float], None]) -> EscherTile:
         with one_blas_thread():
-            return in_class(own, name, told)
+            return in_class(original, name, told)
 
     return _by_hand(job, tile, move, on_event, cancel)
 

@@ -86,8 +86,8 @@ def read_drawing(drawing: Any) -> tuple[list[Stroke], tuple[tuple[float, ...], .
     return lines, tuple(tuple(as_array(eye, "an eye", (3,)).tolist()) for eye in eyes)
 
 
-def _stroke(given: Any) -> Stroke:
-    stroke = given if is_object(given) else {}
+def _stroke(entry: Any) -> Stroke:
+    stroke = entry if is_object(entry) else {}
     colour, points = str(stroke.get("colour")), stroke.get("points")
     if not COLOUR.fullmatch(colour):
         raise OrbiflowError(f"the colour of a line must be like #2a9d8f, got {colour!a:.40}")

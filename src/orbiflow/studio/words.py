@@ -72,13 +72,13 @@ def own_names(text: str, project: Mapping[str, Any]) -> str:
     return re.sub(rf"(?<![\w-])({every})", lambda match: names[match[1]], text)
 
 
-def plain_name(given: Any, otherwise: str) -> str:
+def plain_name(typed: Any, otherwise: str) -> str:
     """Return a name on one line, without folders.
 
     >>> plain_name("C:\\\\cats\\\\cat.png", "picture"), plain_name("../..", "picture")
     ('cat.png', 'picture')
     """
-    text = given if isinstance(given, str) else ""
+    text = typed if isinstance(typed, str) else ""
     text = PurePosixPath(text.replace("\\", "/")).name
     name = "".join(letter for letter in text if letter.isprintable()).strip(" .")
     return name[:80] or otherwise

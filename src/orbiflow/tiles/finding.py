@@ -136,16 +136,16 @@ def _words(tile: EscherTile) -> dict[str, str]:
     }
 
 
-def _figures(tile: EscherTile, own: EscherTile) -> dict[str, str]:
+def _figures(tile: EscherTile, figure: EscherTile) -> dict[str, str]:
     """The same in figures, of one of its parts."""
-    mismatch, bent = tile.certificate.edge_mismatch, own.likeness.deformation
+    mismatch, bent = tile.certificate.edge_mismatch, figure.likeness.deformation
     return {
         "class": f"{tile.name} ({tile.group_name})",
-        **({"figure": own.name} if len(tile.figures) > 1 else {}),
-        "score": f"{own.score:.3f}",
+        **({"figure": figure.name} if len(tile.figures) > 1 else {}),
+        "score": f"{figure.score:.3f}",
         "bent": "-" if bent is None else f"{bent:.3f}",
-        "IoU": f"{own.likeness.metrics.iou:.4f}",
-        "recognised": f"{own.likeness.recognisability.score:.3f}",
+        "IoU": f"{figure.likeness.metrics.iou:.4f}",
+        "recognised": f"{figure.likeness.recognisability.score:.3f}",
         "certified": "yes" if tile.certificate.valid else "NO",
         "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
         "s": f"{tile.search.seconds:.1f}",

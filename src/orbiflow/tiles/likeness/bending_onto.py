@@ -28,7 +28,7 @@ FIRST_PLACES = 6  # the number of places that are tried for the first point
 
 
 def corresponding(
-    own: Array, other: Array, near: float = 0.4, stretch: float = 1.0, count: int = 96
+    ring: Array, other: Array, near: float = 0.4, stretch: float = 1.0, count: int = 96
 ) -> Array:
     """Return the arc lengths (n,) on a ring (M, 2) that correspond to the points of a ring (n, 2).
 
@@ -37,15 +37,15 @@ def corresponding(
     `stretch` is the cost of stretching or shrinking a step by a factor of e. `count` points are
     matched; those between follow in proportion. Lengths increase by less than a round.
     """
-    along = arc_lengths(own)
-    points = resampled(own, count)
+    along = arc_lengths(ring)
+    points = resampled(ring, count)
     places = count * PLACES_PER_POINT
     cost = _differences(points, resampled(other, places), near)
     first = int(cost.min(axis=1).argmin())
     cost = np.roll(cost, -first, axis=0)
     steps = _best_of(cost, _first_places(cost[0]), stretch)
     at = np.append(steps, steps[0] + places) / places * arc_lengths(other)[-1]
-    # the k-th matched point lies at (first + k) / count of the own length
+    # the k-th matched point lies at (first + k) / count of the length
     matched = (first + np.arange(count + 1)) / count * along[-1]
     knots = np.concatenate([matched[:-1] - along[-1], matched])
     values = np.concatenate([at[:-1] - arc_lengths(other)[-1], at])

@@ -139,15 +139,15 @@ class _Features(NamedTuple):
     after: Integers
 
 
-def _agreement(goal: _Features, own: _Features) -> Array:
+def _agreement(goal: _Features, features: _Features) -> Array:
     """Return how far each point of the target (P,) agrees with each of the tile (Q,): (P, Q), 0 to 1.
 
     A point of the tile stands for its piece of the outline, a third of the way to its neighbours,
     so that it does not matter where on an outline the first point falls.
     """
-    squared = scipy.spatial.distance.cdist(goal.lifted, own.lifted, "sqeuclidean")
-    for neighbour in (own.before, own.after):
-        third = own.lifted + (own.lifted[neighbour] - own.lifted) / 3
+    squared = scipy.spatial.distance.cdist(goal.lifted, features.lifted, "sqeuclidean")
+    for neighbour in (features.before, features.after):
+        third = features.lifted + (features.lifted[neighbour] - features.lifted) / 3
         np.minimum(
             squared, scipy.spatial.distance.cdist(goal.lifted, third, "sqeuclidean"), out=squared
         )

@@ -70,18 +70,18 @@ def artwork(tile: TileSource, settings: ArtSettings | None = None, *overs: Over 
     )
 
 
-def _art_page(given: EscherTile, settings: ArtSettings) -> tuple[Page, str]:
+def _art_page(tile: EscherTile, settings: ArtSettings) -> tuple[Page, str]:
     """Return the page that is painted, and what the user should know of it."""
-    (width, height), size = settings.page, tiling_size(given.tiling)
-    area = abs(given.tile.signed_area) / len(given.figures)
+    (width, height), size = settings.page, tiling_size(tile.tiling)
+    area = abs(tile.tile.signed_area) / len(tile.figures)
     scale = float(np.sqrt(width * height / USUAL_TILES / area))
     if settings.tile_size is not None:
         scale = settings.tile_size / size
     if settings.repeat is not None:
-        return repeating_page(given, settings, scale)
+        return repeating_page(tile, settings, scale)
     whole = None if settings.clip else edge_margin(scale * size)
     page = Page.placed(
-        given.tiling, settings, scale, y_down=given.y_down, whole=whole, centred=settings.clip
+        tile.tiling, settings, scale, y_down=tile.y_down, whole=whole, centred=settings.clip
     )
     if not len(page.copies):
         raise OrbiflowError(

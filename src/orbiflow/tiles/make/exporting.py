@@ -136,10 +136,10 @@ def laid_out(
 
 
 def _described(
-    scene: Scene, given: EscherTile, settings: ExportSettings, certificate: Certificate
+    scene: Scene, source: EscherTile, settings: ExportSettings, certificate: Certificate
 ) -> Scene:
-    tile = given.tile
-    title, notes = given.name, [*scene.notes]
+    tile = source.tile
+    title, notes = source.name, [*scene.notes]
     if not certificate.valid:
         title += ", NOT CERTIFIED"
         notes.insert(0, f"NOT CERTIFIED: {'; '.join(certificate.reasons)}.")
@@ -152,7 +152,7 @@ def _described(
         **scene.facts,
         "class": tile.isohedral_class or None,
         "group": tile.group.name or None,
-        "rank": given.rank,
+        "rank": source.rank,
         "certified": certificate.valid,
         "cut": settings.cut,
         "tile_size": settings.tile_size,

@@ -79,25 +79,25 @@ class Layout:
         return self.page.listed(self.outline.edges)
 
 
-def layout(given: EscherTile, settings: ExportSettings) -> Layout:
+def layout(tile: EscherTile, settings: ExportSettings) -> Layout:
     """Scale and turn the tile and put it on the page."""
     width, height = settings.page
     strip = STRIP if settings.calibrate else 0.0
-    box, tiling = inset(Box(0.0, 0.0, width, height - strip), settings.margin), given.tiling
+    box, tiling = inset(Box(0.0, 0.0, width, height - strip), settings.margin), tile.tiling
     if settings.cut == "template" and "tile_size" not in settings.fields_given:
         settings = settings.replace(tile_size=_largest(tiling, settings.rotate, box))
     page = Page.placed(
         tiling,
         settings,
         settings.tile_size / tiling_size(tiling),
-        y_down=given.y_down,
+        y_down=tile.y_down,
         box=box,
         whole=None if settings.clip or settings.cut == "jigsaw" else bleed(settings),
         centred=settings.clip or settings.cut in ("pieces", "template"),
     )
     if settings.cut != "pieces":
         _require_fit(page, settings, strip)
-    return Layout(settings, given, page, outline(page.tiling, settings.deviation))
+    return Layout(settings, tile, page, outline(page.tiling, settings.deviation))
 
 
 def _require_fit(page: Page, settings: ExportSettings, strip: float) -> None:

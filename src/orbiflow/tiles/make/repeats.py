@@ -43,14 +43,16 @@ def repeating_page(tile: EscherTile, settings: ArtSettings, scale: float) -> tup
     return page, _told(cell, cell.width * cell.height / (pixels**2 * page.tiling.tile_area))
 
 
-def _told(found: Rectangle, tiles: float) -> str:
-    note = f"the cell that repeats is {found.width} x {found.height} pixels and holds {tiles:.0f} tiles"
-    if abs(found.turn) > 0.05:
-        note += f"; the tiling is turned by {found.turn:.1f} degrees"
-    share = f"{100 * found.strain:.2g} %" if found.strain >= 5e-5 else "less than 0.01 %"
-    if found.strain < 1e-9:
+def _told(cell: Rectangle, tiles: float) -> str:
+    note = (
+        f"the cell that repeats is {cell.width} x {cell.height} pixels and holds {tiles:.0f} tiles"
+    )
+    if abs(cell.turn) > 0.05:
+        note += f"; the tiling is turned by {cell.turn:.1f} degrees"
+    share = f"{100 * cell.strain:.2g} %" if cell.strain >= 5e-5 else "less than 0.01 %"
+    if cell.strain < 1e-9:
         return note + "; nothing is stretched"
-    if found.exact:
+    if cell.exact:
         return note + f"; whole pixels stretch it by {share}"
     return note + f"; it is stretched by {share} to be a rectangle"
 

@@ -73,9 +73,9 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
     return tile.changed(map_source=TileMap(stored.settings, stored.arrays, frame, bending), **said)
 
 
-def _silhouette(own: dict[str, Any]) -> Target:
+def _silhouette(stored: dict[str, Any]) -> Target:
     """Return the silhouette of a run, read again, unless it is missing or has changed."""
-    source = Path(str(own["source"]))
+    source = Path(str(stored["source"]))
     if not source.is_file():
         raise InputFileError(
             f"the run saved no map, and its silhouette {source} is not there; run from the folder "
@@ -83,9 +83,9 @@ def _silhouette(own: dict[str, Any]) -> Target:
         )
     target = Target.read(source)
     # it may have been read with another threshold, or edited since
-    area = own.get("area")
+    area = stored.get("area")
     same = isinstance(area, int | float) and np.isclose(target.area, area)
-    if not same or len(target.outline) != own.get("vertices"):
+    if not same or len(target.outline) != stored.get("vertices"):
         raise InputFileError(
             f"the run saved no map, and {source} is not the silhouette that it was; search again"
         )

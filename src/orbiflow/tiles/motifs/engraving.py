@@ -121,9 +121,9 @@ class Eye(NamedTuple):
     parts: tuple[PathPart, ...]
 
 
-def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
+def eye(tile: EscherTile, place: tuple[float, ...], palette: Palette) -> Eye:
     """Carry an eye (x, y) or (x, y, radius) from the silhouette onto the tile; it stays round."""
-    x, y = given[:2]
+    x, y = place[:2]
     outline = shapely.Polygon(tile.silhouette_outline)
     if not outline.contains(shapely.Point(x, y)):
         raise outside("the eye", x, y, outline)
@@ -137,7 +137,7 @@ def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     moved = tile.forward(here + around) - middle
     # how the map turns and scales the eye's surroundings
     factor = complex(best_similarity(complex_points(around), complex_points(moved)))
-    radius = USUAL_EYE * size if len(given) < 3 else given[2] * abs(factor)
+    radius = USUAL_EYE * size if len(place) < 3 else place[2] * abs(factor)
     radius = min(radius, room)
     up = -1.0 if tile.y_down else 1.0
     spot = complex(-0.3, 0.35 * up) * (factor / abs(factor))

@@ -95,36 +95,36 @@ BEND = 0.45
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-def motion(given: EscherTile, settings: AnimationSettings, *overs: Over) -> Motion:
+def motion(tile: EscherTile, settings: AnimationSettings, *overs: Over) -> Motion:
     """Return what moves, in pixels, before it is a file.
 
     `overs` are what lies over the silhouette of each of the tile's figures.
     """
     settings = settings.in_pixels()
-    page, chosen = _page(given, settings), palette(settings.palette)
+    page, chosen = _page(tile, settings), palette(settings.palette)
     dress = None
     if any(over.picture or over.drawing for over in overs) or settings.draws:
         count = max(page.count, 2)  # the tile that is alone at first has the second
-        dress = Dress.of(given, settings, overs, page.place.scale, page.palette(chosen), count)
+        dress = Dress.of(tile, settings, overs, page.place.scale, page.palette(chosen), count)
     bodies = () if dress is None else dress.bodies
     kinds: dict[str, Callable[[], Motion]] = {
-        "morph": lambda: morph(given, page, bodies, steady=settings.format == "svg"),
-        "grow": lambda: grow(given, page, bodies),
-        "bend": lambda: bend(given, page),
+        "morph": lambda: morph(tile, page, bodies, steady=settings.format == "svg"),
+        "grow": lambda: grow(tile, page, bodies),
+        "bend": lambda: bend(tile, page),
     }
     width = max(1.0, OUTLINE * page.size[0]) if settings.outline is None else settings.outline
     line = Style(None, chosen.outline, width) if width else NO_LINE
     return replace(kinds[settings.kind](), line=line, dress=dress)
 
 
-def _page(given: EscherTile, settings: AnimationSettings) -> Page:
+def _page(tile: EscherTile, settings: AnimationSettings) -> Page:
     """Return the page, by default with the tile's default window or one that is as large."""
-    (width, height), window = settings.page, default_window(given.tiling)
+    (width, height), window = settings.page, default_window(tile.tiling)
     scale = math.sqrt(width * height * ASPECT) / (window[2] - window[0])
     if settings.tile_size is not None:
-        scale = settings.tile_size / tiling_size(given.tiling)
-    whole = None if settings.clip else edge_margin(scale * tiling_size(given.tiling))
-    return Page.placed(given.tiling, settings, scale, y_down=given.y_down, whole=whole)
+        scale = settings.tile_size / tiling_size(tile.tiling)
+    whole = None if settings.clip else edge_margin(scale * tiling_size(tile.tiling))
+    return Page.placed(tile.tiling, settings, scale, y_down=tile.y_down, whole=whole)
 
 
 def _window(page: Page, linear: Array) -> Window:
@@ -135,16 +135,16 @@ def _window(page: Page, linear: Array) -> Window:
 
 
 def morph(
-    given: EscherTile, page: Page, bodies: Sequence[BendingFigure] = (), *, steady: bool = False
+    whole: EscherTile, page: Page, bodies: Sequence[BendingFigure] = (), *, steady: bool = False
 ) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
     It is a tiling throughout; if `steady`, the tile's lattice is there from the start.
     """
-    tile, middle = given.tile, np.array(page.size) / 2
-    parts = [part.prototile.polygon for part in given.division]
+    tile, middle = whole.tile, np.array(page.size) / 2
+    parts = [part.prototile.polygon for part in whole.division]
     inner = [
-        part.place(body.points) for part, body in zip(given.figures, bodies, strict=bool(bodies))
+        part.place(body.points) for part, body in zip(whole.figures, bodies, strict=bool(bodies))
     ]
     way = Morph(OwnFrame.of(tile), [*parts, *inner])
     every = lru_cache(maxsize=2)(way.rings)  # of a frame, for its outlines and its bodies
@@ -154,7 +154,7 @@ def morph(
 
     end = way.end
     group, tiling = end.kind.group(), Tiling(end.kind.group(), rings(1.0))
-    center = np.linalg.solve(end.linear, given.tiling.center - end.offset)
+    center = np.linalg.solve(end.linear, whole.tiling.center - end.offset)
 
     def linear(progress: float) -> Array:
         return page.place.linear @ (end.linear if steady else way.at(progress).linear)
@@ -187,14 +187,12 @@ def morph(
     )
 
 
-def grow(given: EscherTile, page: Page, bodies: Sequence[BendingFigure] = ()) -> Motion:
+def grow(tile: EscherTile, page: Page, bodies: Sequence[BendingFigure] = ()) -> Motion:
     """Return one tile, with all of its figures, and the tiling growing around it, nearest first."""
     outlines = [prototile.polygon - prototile.center for prototile in page.tiling.prototiles]
     still = [
         page.place.after(part.place)(body.points) - prototile.center
-        for prototile, part, body in zip(
-            page.tiling.prototiles, given.figures, bodies, strict=False
-        )
+        for prototile, part, body in zip(page.tiling.prototiles, tile.figures, bodies, strict=False)
     ]
     places, kinds, colours = _still_places(page)
     return Motion(
@@ -205,15 +203,15 @@ def grow(given: EscherTile, page: Page, bodies: Sequence[BendingFigure] = ()) ->
         colours,
         _births(places, 0.0, len(outlines)),
         (0.0, 1.0),
-        f"The tiling of {given.isohedral_class or 'a tile'} grows around one tile",
+        f"The tiling of {tile.isohedral_class or 'a tile'} grows around one tile",
         bodies=lambda _: still,
     )
 
 
-def bend(given: EscherTile, page: Page) -> Motion:
+def bend(tile: EscherTile, page: Page) -> Motion:
     """Return each silhouette bending into its figure, and then the tiling growing around them."""
     ways, borders = list[Callable[[float], Array]](), list[Integers]()
-    for part, prototile in zip(given.figures, page.tiling.prototiles, strict=True):
+    for part, prototile in zip(tile.figures, page.tiling.prototiles, strict=True):
         bending, frame = part.figure.bending, part.figure.frame
         if bending is None or frame is None:
             raise OrbiflowError(
@@ -224,7 +222,7 @@ def bend(given: EscherTile, page: Page) -> Motion:
         ways.append(partial(_bent, BendingWay(bending), place, prototile.center))
         borders.append(border(bending.triangles))
     places, kinds, colours = _still_places(page)
-    silhouettes = "silhouettes bend" if len(given.figures) > 1 else "silhouette bends"
+    silhouettes = "silhouettes bend" if len(tile.figures) > 1 else "silhouette bends"
 
     @lru_cache(maxsize=2)  # of a frame, for its outlines and its bodies
     def bodies(progress: float) -> list[Array]:
@@ -240,7 +238,7 @@ def bend(given: EscherTile, page: Page) -> Motion:
         colours,
         _births(places, BEND, len(ways)),
         (*np.linspace(0, BEND, 13).tolist(), 1.0),
-        f"The {silhouettes} into a tile of {given.isohedral_class}, and its tiling grows",
+        f"The {silhouettes} into a tile of {tile.isohedral_class}, and its tiling grows",
         bodies=bodies,
     )
 
@@ -285,7 +283,7 @@ def _births(places: Places, begin: float, alone: int) -> Array:
 
 
 def _seen(
-    own: Tiling,
+    tiling: Tiling,
     center: Array,
     linear: Callable[[float], Array],
     outlines: Callable[[float], list[Array]],
@@ -294,9 +292,9 @@ def _seen(
 ) -> Copies:
     """Return the copies that come into the picture at any time, those nearest to its middle first."""
     boxes = np.array([_window(page, linear(look)) for look in LOOKS])
-    reach = own.radius
+    reach = tiling.radius
     low, high = center + boxes[:, :2].min(axis=0) - reach, center + boxes[:, 2:].max(axis=0) + reach
-    copies = copies_meeting(own, (*low.tolist(), *high.tolist()))
+    copies = copies_meeting(tiling, (*low.tolist(), *high.tolist()))
     seen = np.zeros(len(copies), dtype=bool)
     for look in LOOKS:
         by, offset = places(look, copies)

@@ -85,12 +85,12 @@ class VertexOrbits:
         return np.where(self.fixed[:, None], points, images)
 
 
-def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
+def _links(frame: OwnFrame) -> list[list[tuple[int, Isometry]]]:
     """Return for each vertex i the vertices j and elements g with p_j = g p_i, one for each edge."""
-    count = len(own.points)
+    count = len(frame.points)
     links: list[list[tuple[int, Isometry]]] = [[] for _ in range(count)]
-    bounds = [*own.starts, count]
-    for edge, image in relations(own.edge_classes):
+    bounds = [*frame.starts, count]
+    for edge, image in relations(frame.edge_classes):
         element = image.isometry
         back = element.inverse()
         first = np.arange(bounds[edge], bounds[edge + 1] + 1) % count
@@ -178,12 +178,12 @@ class _Within(NamedTuple):
     weights: Array  # (n, 3)
 
     @classmethod
-    def of(cls, known: _Weights, points: Array) -> _Within:
+    def of(cls, weights: _Weights, points: Array) -> _Within:
         """Return those of points (n, 2) of the tile in its own frame."""
-        corners = known.guess[known.triangles]
+        corners = weights.guess[weights.triangles]
         tree = shapely.STRtree(np.asarray(shapely.polygons(corners)))
-        nearest = known.triangles[tree.nearest(shapely.points(points))]
-        first, second, third = known.guess[nearest].transpose(1, 0, 2)
+        nearest = weights.triangles[tree.nearest(shapely.points(points))]
+        first, second, third = weights.guess[nearest].transpose(1, 0, 2)
         sides = np.stack([second - first, third - first], axis=-1)
         two = np.linalg.solve(sides, (points - first)[..., None])[..., 0]
         return cls(nearest, np.column_stack([1 - two.sum(axis=1), two]))
@@ -312,9 +312,9 @@ def _block_matrix(blocks: Array, rows: Array, columns: Array, count: int) -> csc
     return csc_array(coo_array(entries, shape=(2 * count, 2 * count)))
 
 
-def _open_ways(own: OwnFrame) -> Array:
+def _open_ways(frame: OwnFrame) -> Array:
     """Return the orthonormal directions (k, 2) of shifts that commute with the group."""
-    rows = [np.eye(2) - g.linear for g in own.group.cosets]
+    rows = [np.eye(2) - g.linear for g in frame.group.cosets]
     _, sizes, ways = np.linalg.svd(np.concatenate(rows))
     return ways[sizes < 1e-6]
 
@@ -325,15 +325,15 @@ def _sums(weights: Array, sides: NDArray[np.int64], orbits: VertexOrbits) -> Arr
     return np.bincount(orbit, weights, minlength=len(orbits.source))[orbit]
 
 
-def _stiff_edges(own: OwnFrame, sides: NDArray[np.int64]) -> Array:
+def _stiff_edges(frame: OwnFrame, sides: NDArray[np.int64]) -> Array:
     """Return weights (E,) whose solution is a tile with edges that are straight up to 1 / `STIFF`."""
-    n = len(own.points)
+    n = len(frame.points)
     weights = np.ones(len(sides))
     along = (sides < n).all(axis=1)  # no side crosses the inside from outline to outline
     behind = np.where((sides[:, 0] + 1) % n == sides[:, 1], sides[:, 0], sides[:, 1])[along]
-    edge = np.searchsorted(own.starts, behind, side="right") - 1
+    edge = np.searchsorted(frame.starts, behind, side="right") - 1
     # an edge pulls with the same force however many sides it has
-    weights[along] = STIFF * np.diff([*own.starts, n])[edge]
+    weights[along] = STIFF * np.diff([*frame.starts, n])[edge]
     return weights
 
 

@@ -17,7 +17,7 @@ from orbiflow.tiles.tilings import Colouring, Tiling, colouring
 DIGITS = 6  # of the coordinates of a polygon, of which so many show
 
 
-def tiling_json(tiling: Tiling, known: Colouring, *, y_down: bool) -> dict[str, Any]:
+def tiling_json(tiling: Tiling, coloured: Colouring, *, y_down: bool) -> dict[str, Any]:
     """Return what a browser draws a tiling from, as JSON; `tiling.js` reads it.
 
     - `y_down`: Whether y points down.
@@ -39,9 +39,9 @@ def tiling_json(tiling: Tiling, known: Colouring, *, y_down: bool) -> dict[str, 
             ],
         },
         "colours": {
-            "sublattice": list(known.sublattice),
-            "table": known.table.tolist(),
-            "shares": list(known.shares),
+            "sublattice": list(coloured.sublattice),
+            "table": coloured.table.tolist(),
+            "shares": list(coloured.shares),
         },
     }
     rings = [polygon_json(prototile.polygon) for prototile in tiling.prototiles]

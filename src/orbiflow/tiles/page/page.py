@@ -344,9 +344,9 @@ class Page:
         )
 
 
-def shades(chosen: Palette, known: Colouring) -> Palette:
+def shades(chosen: Palette, coloured: Colouring) -> Palette:
     """Return a palette in which each of several prototiles has a colour of its own, and its shades."""
-    return chosen if len(known.shares) == 1 else chosen.shaded(known.shares)
+    return chosen if len(coloured.shares) == 1 else chosen.shaded(coloured.shares)
 
 
 def symbol_of(prototile: int, what: str = "tile") -> str:

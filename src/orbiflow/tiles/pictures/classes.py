@@ -113,22 +113,22 @@ def draw_template(axes: Axes, kind: IsohedralClass) -> None:
     axes.plot(*vertices.T, "o", color="#1a1a1a", markersize=3, zorder=5)
 
 
-def _arrow(kind: IsohedralClass, own: EdgeClass) -> Array:
+def _arrow(kind: IsohedralClass, edge_class: EdgeClass) -> Array:
     """Return an arrowhead on a class's first edge: in its middle, or further on for a half-turn.
 
     Of an edge with a mirror across it is a bar.
     """
     vertices = kind.template()
-    start, end = vertices[own.edge], vertices[(own.edge + 1) % len(vertices)]
+    start, end = vertices[edge_class.edge], vertices[(edge_class.edge + 1) % len(vertices)]
     along = (end - start) / np.linalg.norm(end - start)
     inward = np.array([-along[1], along[0]])  # templates are counter-clockwise
-    if own.turn and own.turn.isometry.determinant < 0:
+    if edge_class.turn and edge_class.turn.isometry.determinant < 0:
         middle, bar = (start + end) / 2, np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         return middle + bar * (0.025, 0.12) @ np.stack([along, inward])
-    share = 0.8 if own.turn else 0.5
+    share = 0.8 if edge_class.turn else 0.5
     tip = start + share * (end - start) + 0.12 * along
     back = tip - 0.26 * along
-    one_barb = any(image.isometry.determinant < 0 for image in own.images)
+    one_barb = any(image.isometry.determinant < 0 for image in edge_class.images)
     other = back if one_barb else back - 0.11 * inward
     return np.stack([tip, back + (0.17 if one_barb else 0.11) * inward, other])
 

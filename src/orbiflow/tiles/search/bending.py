@@ -134,9 +134,9 @@ def _all_carved(
     return _best_first([bent for bent in done if bent.factor] + simple[len(first) :])
 
 
-def _best_first(found: list[Bent]) -> list[Bent]:
+def _best_first(shapes: list[Bent]) -> list[Bent]:
     """Return the tiles without twins, by their scores."""
-    return unlike(sorted(found, key=lambda bent: -bent.score), len(found), _twins)
+    return unlike(sorted(shapes, key=lambda bent: -bent.score), len(shapes), _twins)
 
 
 def _twins(a: Bent, b: Bent) -> bool:

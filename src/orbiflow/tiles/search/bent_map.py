@@ -94,12 +94,12 @@ def onto_polygon(
     return mesh, images
 
 
-def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Integers) -> Array:
+def _places(ring: Array, polygon: Array, knots: Array, begins: Integers, goal: Integers) -> Array:
     """Return where (Q,) the polygon's vertices belong on the ring, in arc length: increasing from 0."""
     lengths = arc_lengths(polygon)
     closed, loop = np.concatenate([ring, ring[:1]]), np.concatenate([polygon, polygon[:1]])
     places = np.empty(len(polygon))
-    ends = zip(own, [*own[1:], len(ring)], goal, [*goal[1:], len(polygon)], strict=True)
+    ends = zip(begins, [*begins[1:], len(ring)], goal, [*goal[1:], len(polygon)], strict=True)
     for a, b, p, q in ends:
         edge = shapely.LineString(closed[a : b + 1])
         at = knots[a] + shapely.line_locate_point(edge, shapely.points(loop[p : q + 1]))
@@ -116,11 +116,11 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
     return places
 
 
-def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[np.bool_]]:
+def _snapped(places: Array, marks: Array, total: float) -> tuple[Array, NDArray[np.bool_]]:
     """Return places moved to the known ones that they agree with, and which agree with none."""
-    after = np.searchsorted(known, places).clip(1, len(known) - 1)
+    after = np.searchsorted(marks, places).clip(1, len(marks) - 1)
     near = np.where(
-        places - known[after - 1] < known[after] - places, known[after - 1], known[after]
+        places - marks[after - 1] < marks[after] - places, marks[after - 1], marks[after]
     )
     fresh = abs(near - places) > SAME_PLACE * total
     return np.where(fresh, places, near), fresh

@@ -87,7 +87,7 @@ def _result(
     return result.changed(search=SearchFacts(starts=fit.starts))
 
 
-def measured_tile(target: Target, tile: Tile, known: TileMap, original: Target) -> EscherTile:
+def measured_tile(target: Target, tile: Tile, tile_map: TileMap, original: Target) -> EscherTile:
     """Return a tile in the target's normal form as a finished one, with its measures."""
     placed = tile.transformed(target.frame.linear, target.frame.offset)
     region, simple = _region(placed.polygon)
@@ -95,7 +95,7 @@ def measured_tile(target: Target, tile: Tile, known: TileMap, original: Target) 
         placed,
         y_down=target.y_down,
         silhouette=original.report(),
-        map_source=replace(known, frame=target.frame),
+        map_source=replace(tile_map, frame=target.frame),
         normal=tile,
         likeness=Likeness(
             metrics=compare(region, original.outline),

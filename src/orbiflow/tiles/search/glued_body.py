@@ -89,12 +89,12 @@ class GluedBody(ElasticBody):
     def places(self) -> tuple[Integers, Integers]:
         return self._places
 
-    def path(self, one: Complex, two: Complex) -> tuple[Complex, Complex]:
+    def path(self, left: Complex, right: Complex) -> tuple[Complex, Complex]:
         """Return the path's points (length + 1,) as each figure's own points have them."""
         first, second, length = self.glue
         along = np.arange(length + 1)
         sizes = [part.size for part in self.figures]
-        return one[(first + along) % sizes[0]], two[(second + length - along) % sizes[1]]
+        return left[(first + along) % sizes[0]], right[(second + length - along) % sizes[1]]
 
     def joined(self, shapes: Sequence[Complex]) -> Complex:
         """Return shapes (N, C) of both from those of the figures, which meet in the middle."""
@@ -139,9 +139,9 @@ class Couple:
     stiff: tuple[Stiff | None, Stiff | None] = field(default=(None, None), compare=False)
 
     @classmethod
-    def of(cls, one: Array, two: Array, **others: Any) -> Couple:
+    def of(cls, left: Array, right: Array, **others: Any) -> Couple:
         """Return those of two rings (M, 2), with other fields by name."""
-        rings = np.ascontiguousarray(one, np.float64), np.ascontiguousarray(two, np.float64)
+        rings = np.ascontiguousarray(left, np.float64), np.ascontiguousarray(right, np.float64)
         return cls((rings[0].tobytes(), rings[1].tobytes()), **others)
 
     @property

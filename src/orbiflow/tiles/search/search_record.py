@@ -36,12 +36,12 @@ class Found(NamedTuple):
     interrupted: frozenset[str]  # the classes that were not finished
 
 
-def outcome_event(found: Outcome) -> TileFound | ClassFailed:
+def outcome_event(result: Outcome) -> TileFound | ClassFailed:
     """Return the event that tells of an outcome."""
-    if isinstance(found, ClassFailure):
-        return ClassFailed(found.name, found.reason)
-    iou, certified = found.worst.likeness.metrics.iou, found.certificate.valid
-    return TileFound(found.isohedral_class, iou, found.score, certified)
+    if isinstance(result, ClassFailure):
+        return ClassFailed(result.name, result.reason)
+    iou, certified = result.worst.likeness.metrics.iou, result.certificate.valid
+    return TileFound(result.isohedral_class, iou, result.score, certified)
 
 
 def preview_event(tile: EscherTile, begin: float) -> Preview:
@@ -96,16 +96,16 @@ class Record:
     def _what(self) -> str:
         return STAGE_WORDS[self.stage] if self.on_tile else "fitting"
 
-    def level_outcome(self, found: Outcome) -> None:
+    def level_outcome(self, result: Outcome) -> None:
         """Keep what a level of effort gave for a class, unless an earlier one gave better."""
         sketching = self.stage == "sketch"
-        whole = best_of(self.firsts.get(found.name), found, 1 if sketching else self.most)
-        self.firsts[found.name] = whole
+        whole = best_of(self.firsts.get(result.name), result, 1 if sketching else self.most)
+        self.firsts[result.name] = whole
         if self.stage == "final":
             self._finish(whole)
             return
-        self.progress(found.name, 1.0)
-        if whole is found:
+        self.progress(result.name, 1.0)
+        if whole is result:
             self._show(whole)
 
     def settled(self, names: Sequence[str], is_promising: IsPromising) -> list[str]:
@@ -121,22 +121,22 @@ class Record:
                 self._finish(self.firsts[name])
         return kept
 
-    def _finish(self, found: Outcome) -> None:
-        self.shares[found.name] = 1.0
-        self.outcome(found)
-        self._show(found)
+    def _finish(self, result: Outcome) -> None:
+        self.shares[result.name] = 1.0
+        self.outcome(result)
+        self._show(result)
 
-    def _show(self, found: Outcome) -> None:
-        if self.on_tile and isinstance(found, EscherTile):
-            for tile in found.family():
+    def _show(self, result: Outcome) -> None:
+        if self.on_tile and isinstance(result, EscherTile):
+            for tile in result.family():
                 if tile.certificate.valid:
                     self.on_tile(tile, self.stage)
 
-    def outcome(self, found: Outcome, share: float = 1.0) -> None:
+    def outcome(self, result: Outcome, share: float = 1.0) -> None:
         """Keep what a class gave, and report it."""
-        self.outcomes[found.name] = found
-        self.progress(found.name, share)
-        self.on_event(outcome_event(found))
+        self.outcomes[result.name] = result
+        self.progress(result.name, share)
+        self.on_event(outcome_event(result))
 
     def finish(self) -> Found:
         """Return what was found: of a class that was not finished, a first look is its tile."""

@@ -100,14 +100,14 @@ def _matching_mesh(ring: Array, step: float) -> Any:
 
 
 def _relief(
-    found: Unfolding, motions: Array, radius: float, scale: float, depth: float
+    unfolding: Unfolding, motions: Array, radius: float, scale: float, depth: float
 ) -> Manifold:
     """Return a ball with a groove between its tiles, which stands on a small foot."""
-    points, triangles = _ringed(shapely.Polygon(_divided(found.ring, FINE / scale)), scale)
-    off = scale * shapely.distance(shapely.points(points), shapely.LinearRing(found.ring))
+    points, triangles = _ringed(shapely.Polygon(_divided(unfolding.ring, FINE / scale)), scale)
+    off = scale * shapely.distance(shapely.points(points), shapely.LinearRing(unfolding.ring))
     share = np.clip(off / GROOVE, 0, 1)
     height = radius - depth * (1 - share * share * (3 - 2 * share))
-    vectors = height[:, None] * found.vectors(points)
+    vectors = height[:, None] * unfolding.vectors(points)
     ball = _closed(*_welded([vectors @ motion.T for motion in motions], triangles))
     foot = (1 - FOOT) * (radius - depth)
     return ball.trim_by_plane((0, 0, 1), -foot).translate((0, 0, foot))

@@ -114,10 +114,10 @@ class IncidenceSymbol:
         return tuple(steps)
 
 
-def _carried(own: Array, there: Array, sign: int) -> Isometry:
+def _carried(here: Array, there: Array, sign: int) -> Isometry:
     """Return the isometry of determinant `sign` that takes two points (2, 2) to two others."""
-    start, end = own[1] - own[0], there[1] - there[0]
+    start, end = here[1] - here[0], there[1] - there[0]
     flip = np.diag([1.0, sign])
     angle = np.arctan2(end[1], end[0]) - np.arctan2(sign * start[1], start[0])
     linear = rotation_matrix(angle) @ flip
-    return Isometry(linear, there.mean(axis=0) - linear @ own.mean(axis=0))
+    return Isometry(linear, there.mean(axis=0) - linear @ here.mean(axis=0))

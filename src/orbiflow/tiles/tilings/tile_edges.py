@@ -215,16 +215,16 @@ def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Intege
     return turned
 
 
-def _mutual(own: Edges) -> Edges:
+def _mutual(tile_edges: Edges) -> Edges:
     """Choose partners where a stabiliser leaves a choice: an edge itself, or each other."""
-    across, partners = list(own.across), list(own.partners)
-    done: NDArray[np.bool_] = np.zeros(len(own), dtype=bool)
-    for edge in range(len(own)):
+    across, partners = list(tile_edges.across), list(tile_edges.partners)
+    done: NDArray[np.bool_] = np.zeros(len(tile_edges), dtype=bool)
+    for edge in range(len(tile_edges)):
         if done[edge]:
             continue
         there = across[edge].prototile
-        images = own.turned[there][:, partners[edge]]
-        signs = [s.determinant for s in own.tiling.stabilisers[there].elements]
+        images = tile_edges.turned[there][:, partners[edge]]
+        signs = [s.determinant for s in tile_edges.tiling.stabilisers[there].elements]
         choice = np.flatnonzero(images == edge)
         # prefer a mirror to a half-turn: it shows that the edge is straight
         order = np.array(signs)[choice] * across[edge].determinant
@@ -234,16 +234,23 @@ def _mutual(own: Edges) -> Edges:
         done[edge] = True
         if not len(choice):
             continue  # it has more images in its own tile than its partner has
-        by = own.tiling.stabilisers[there].elements[int(choice[0])].inverse()
+        by = tile_edges.tiling.stabilisers[there].elements[int(choice[0])].inverse()
         element, partner = across[edge] @ by, int(images[choice[0]])
         across[edge] = Placed(element.linear, element.translation, there)
         partners[edge] = partner
         if partner != edge:
             back = element.inverse()
-            across[partner] = Placed(back.linear, back.translation, own.owners[edge])
+            across[partner] = Placed(back.linear, back.translation, tile_edges.owners[edge])
             partners[partner] = edge
             done[partner] = True
-    return Edges(own.tiling, own.owners, own.starts, tuple(across), tuple(partners), own.turned)
+    return Edges(
+        tile_edges.tiling,
+        tile_edges.owners,
+        tile_edges.starts,
+        tuple(across),
+        tuple(partners),
+        tile_edges.turned,
+    )
 
 
 class EdgeImage(NamedTuple):
@@ -304,7 +311,7 @@ def mixing(tile: Tiles) -> float:
     return float(lengths[differ].sum() / lengths.sum())
 
 
-def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
+def edge_classes(tile_edges: Edges) -> tuple[EdgeClass, ...]:
     """Return the classes of a tiling's edges; one edge of each class determines all others.
 
     >>> from orbiflow.symmetry import wallpaper_group
@@ -313,10 +320,10 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
     >>> [(len(found.images), found.straight) for found in edge_classes(edges(cell))]
     [(3, True)]
     """
-    links = _links(own)
+    links = _links(tile_edges)
     images: dict[int, EdgeImage] = {}
     classes: list[EdgeClass] = []
-    for edge in range(len(own)):
+    for edge in range(len(tile_edges)):
         if edge in images:
             continue
         images[edge] = EdgeImage(edge, identity(2), reversed=False)
@@ -350,17 +357,19 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
     return tuple(classes)
 
 
-def _links(own: Edges) -> list[list[EdgeImage]]:
+def _links(tile_edges: Edges) -> list[list[EdgeImage]]:
     """Return, for each edge, its images next to it: beyond it, and in its own tile."""
-    links: list[list[EdgeImage]] = [[] for _ in range(len(own))]
-    for edge, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
+    links: list[list[EdgeImage]] = [[] for _ in range(len(tile_edges))]
+    for edge, (partner, element) in enumerate(
+        zip(tile_edges.partners, tile_edges.across, strict=True)
+    ):
         plain = Isometry(element.linear, element.translation)
         turned_over = plain.determinant > 0
         links[partner].append(EdgeImage(edge, plain, turned_over))
         links[edge].append(EdgeImage(partner, plain.inverse(), turned_over))
-    for k, stabiliser in enumerate(own.tiling.stabilisers):
-        for element, turned in zip(stabiliser.elements[1:], own.turned[k][1:], strict=True):
-            for edge in np.flatnonzero(np.array(own.owners) == k).tolist():
+    for k, stabiliser in enumerate(tile_edges.tiling.stabilisers):
+        for element, turned in zip(stabiliser.elements[1:], tile_edges.turned[k][1:], strict=True):
+            for edge in np.flatnonzero(np.array(tile_edges.owners) == k).tolist():
                 links[edge].append(EdgeImage(int(turned[edge]), element, element.determinant < 0))
     return links
 
@@ -424,7 +433,7 @@ class Skeleton:
         return len(self.copy)
 
 
-def skeleton(own: Edges, copies: Copies) -> Skeleton:
+def skeleton(tile_edges: Edges, copies: Copies) -> Skeleton:
     """Return each edge of each copy once.
 
     Edge k of the copy g is edge partner(k) of g @ across(k).
@@ -433,7 +442,7 @@ def skeleton(own: Edges, copies: Copies) -> Skeleton:
     however close edges come to each other.
 
     Args:
-        own: The edges of the copies' tiling.
+        tile_edges: The edges of the copies' tiling.
         copies: Any of its tiles.
 
     >>> from orbiflow.tiles import CLASSES, Tile, copies_inside, edges
@@ -442,29 +451,33 @@ def skeleton(own: Edges, copies: Copies) -> Skeleton:
     >>> len(both), len(skeleton(edges(tile), both))
     (2, 11)
     """
-    beyond = copies.neighbours(own.across, own.owners)
-    mine = copies.prototiles[:, None] == np.array(own.owners)
+    beyond = copies.neighbours(tile_edges.across, tile_edges.owners)
+    mine = copies.prototiles[:, None] == np.array(tile_edges.owners)
     numbers = np.arange(len(copies))[:, None]
     copy, edge = np.nonzero(mine & ((beyond.copy < 0) | (beyond.copy > numbers)))
-    vertices = _vertices(own, beyond)
-    ends = np.stack([vertices[copy, edge], vertices[copy, np.array(own.following)[edge]]], axis=1)
+    vertices = _vertices(tile_edges, beyond)
+    ends = np.stack(
+        [vertices[copy, edge], vertices[copy, np.array(tile_edges.following)[edge]]], axis=1
+    )
     return Skeleton(copy, edge, beyond.copy[copy, edge], ends)
 
 
-def _vertices(own: Edges, beyond: CopiesAcross) -> Integers:
+def _vertices(tile_edges: Edges, beyond: CopiesAcross) -> Integers:
     """Return (M, E) number of the vertex in which edge k of each copy starts."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     count, sides = beyond.copy.shape
-    following = np.array(own.following)
+    following = np.array(tile_edges.following)
     links: list[Integers] = []
-    for k, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
+    for k, (partner, element) in enumerate(
+        zip(tile_edges.partners, tile_edges.across, strict=True)
+    ):
         copy = np.flatnonzero(beyond.copy[:, k] >= 0)
         there, turn = beyond.copy[copy, k], beyond.turn[copy, k]
         # the copy beyond is its own image by an element of its stabiliser: so are its edges
-        mate = own.turned[element.prototile][turn, partner]
-        symmetries = own.tiling.stabilisers[element.prototile].elements
+        mate = tile_edges.turned[element.prototile][turn, partner]
+        symmetries = tile_edges.tiling.stabilisers[element.prototile].elements
         signs = np.array([s.determinant for s in symmetries])[turn] * element.determinant
         begin: Integers = there * sides + mate
         end: Integers = there * sides + following[mate]

@@ -71,17 +71,17 @@ class Aspects:
 
 
 def _first_cosets(
-    group: CrystallographicGroup, own: Stabiliser
+    group: CrystallographicGroup, symmetry: Stabiliser
 ) -> tuple[Integers, Integers, Integers]:
     """Return for each coset the first that makes the same tile, its cell, and the element before."""
     first = np.arange(group.order)
     steps = np.zeros((group.order, 2), dtype=np.int64)
     turns = np.zeros(group.order, dtype=np.int64)
     for i, g in enumerate(group.cosets):
-        for s in own.elements[1:]:
+        for s in symmetry.elements[1:]:
             coset, cell = coset_and_cell(group, g @ s)
             if coset < first[i]:  # g s = (translation) h, so g = (translation) h s^-1
-                errors = [np.abs(s.linear @ t.linear - np.eye(2)).max() for t in own.elements]
+                errors = [np.abs(s.linear @ t.linear - np.eye(2)).max() for t in symmetry.elements]
                 first[i], steps[i], turns[i] = coset, cell, int(np.argmin(errors))
     return first, steps, turns
 

@@ -45,12 +45,12 @@ class WorldLikeness:
         """The mark in the plane, from 0 to 10."""
         return self._mark(complex_points(self._bent))
 
-    def mark(self, found: Unfolding) -> float:
+    def mark(self, unfolding: Unfolding) -> float:
         """Return the mark of the image, in the stereographic picture about its middle."""
-        vectors = found.vectors(self._bent)
-        if found.sign > 0:
-            return self._mark(disc_of(vectors @ facing(found.middle).T))
-        z, middle = disc_of(vectors), complex(disc_of(found.middle))
+        vectors = unfolding.vectors(self._bent)
+        if unfolding.sign > 0:
+            return self._mark(disc_of(vectors @ facing(unfolding.middle).T))
+        z, middle = disc_of(vectors), complex(disc_of(unfolding.middle))
         return self._mark((z - middle) / (1 - np.conj(middle) * z))
 
     def _mark(self, outline: Complex) -> float:

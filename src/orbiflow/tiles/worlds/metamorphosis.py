@@ -297,12 +297,12 @@ def _on_page(ends: Sequence[Changing], settings: ArtSettings, scale: float) -> M
     return near[0] if len(near) == 1 else replace(near[0], before=near[1])
 
 
-def _placer(page: Page, own: Changing) -> Callable[[Array], Array]:
+def _placer(page: Page, end: Changing) -> Callable[[Array], Array]:
     """Return what takes points of the tile as it was found to the sheet."""
 
     def vectors(points: Array) -> Array:
         return np.column_stack(
-            [page.place(points @ own.linear.T + own.shift), np.ones(len(points))]
+            [page.place(points @ end.linear.T + end.shift), np.ones(len(points))]
         )
 
     return vectors

@@ -279,7 +279,7 @@ class CopyMotifs(NamedTuple):
 def world_scene(
     world: World,
     chosen: Palette,
-    worn: Sequence[CopyMotifs] = (),
+    dresses: Sequence[CopyMotifs] = (),
     *,
     line: float | None = None,
     cancel: Cancel = NEVER,
@@ -290,7 +290,7 @@ def world_scene(
     Args:
         world: The copies.
         chosen: Their colours.
-        worn: What lies on them.
+        dresses: What lies on them.
         line: The width of outlines in mm. Default: what suits each copy's size.
         cancel: What stops it.
         more: Further fields of the scene.
@@ -304,7 +304,9 @@ def world_scene(
     rings = (curve.flattened(TOLERANCE) for by_copy in outlines for curve in by_copy.values())
     under = PathPart(boundary(ground_of(rings)), ground)
     layers.append(Layer("ground", "paper", ground, (under,), clipped=True))
-    plain = not any(dress.pictures or any(motif.parts for motif in dress.motifs) for dress in worn)
+    plain = not any(
+        dress.pictures or any(motif.parts for motif in dress.motifs) for dress in dresses
+    )
     widths = {k: _width(world, k, line) for by_copy in outlines for k in by_copy}
     for kind, by_copy in enumerate(outlines):
         for colour in sorted(set(world.colours[list(by_copy)].tolist())):
@@ -315,7 +317,7 @@ def world_scene(
                 style = Style(fill, chosen.outline, width) if width else Style(fill, fill, SEAM)
                 curves = tuple(by_copy[k] for k in mine if not width or widths[k] == width)
                 layers.append(Layer(name, "tiles", style, curves, clipped=True))
-    for dress in worn:
+    for dress in dresses:
         if dress.pictures:
             layers.append(Layer("pictures", "drawing", Style(), tuple(dress.warped(cancel))))
         for kind, motif in enumerate(dress.motifs):

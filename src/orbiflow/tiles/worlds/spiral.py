@@ -21,7 +21,7 @@ TOUCHING = 1e-3  # of a tile's size: how far neighbours are made wider to see wh
 
 
 def spiral(
-    given: Tiling, tiling: Tiling, flip: Array, settings: ArtSettings
+    original: Tiling, tiling: Tiling, flip: Array, settings: ArtSettings
 ) -> tuple[World, list[str]]:
     """Return the copies of a tiling around a spiral: z goes to exp(2 pi i z / w), w of the lattice."""
     middle, size = complex(*tiling.center), float(np.sqrt(tiling.tile_area))
@@ -44,18 +44,18 @@ def spiral(
     def vectors(points: Array) -> Array:
         return np.column_stack([points @ flip, np.ones(len(points))])
 
-    rings = [vectors(prototile.polygon) for prototile in given.prototiles]
+    rings = [vectors(prototile.polygon) for prototile in original.prototiles]
     near = view.meets(view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings))))
     motions = motions[near]
     numbers = _around(motions, rings, period, size)
     if settings.colour == "one":
         numbers = 0 * numbers
     said = f"{len(motions)} copies, {arms[0]},{arms[1]} lattice vectors around"
-    return World(given, vectors, motions, numbers, view), [said]
+    return World(original, vectors, motions, numbers, view), [said]
 
 
 def cylinder(
-    given: Tiling, tiling: Tiling, flip: Array, settings: ArtSettings
+    original: Tiling, tiling: Tiling, flip: Array, settings: ArtSettings
 ) -> tuple[World, list[str]]:
     """Return the copies of a tiling on a page whose left and right edges meet around a cylinder."""
     (width, height), middle = settings.page, complex(*tiling.center)
@@ -74,7 +74,7 @@ def cylinder(
     def vectors(points: Array) -> Array:
         return np.column_stack([points @ flip, np.ones(len(points))])
 
-    rings = [vectors(prototile.polygon) for prototile in given.prototiles]
+    rings = [vectors(prototile.polygon) for prototile in original.prototiles]
     numbers = _around(once, rings, period, size)
     steps = np.array([period.real, period.imag]) * np.array([[-1.0], [0.0], [1.0]])
     motions = np.concatenate([motions_of(once[:, :2, :2], once[:, :2, 2] + step) for step in steps])
@@ -82,7 +82,7 @@ def cylinder(
     near = view.meets(view.places(np.einsum("mij,nj->mni", motions, np.concatenate(rings))))
     colours = np.tile(numbers, 3)[near] * (settings.colour != "one")
     said = f"the left and the right edge meet, {arms[0]},{arms[1]} lattice vectors around"
-    return World(given, vectors, motions[near], colours, view), [said]
+    return World(original, vectors, motions[near], colours, view), [said]
 
 
 def _first_copies(
@@ -105,8 +105,8 @@ def _turn(
     """
     first, second = (complex(*tiling.group.lattice[:, k]) for k in (0, 1))
 
-    def cost(own: tuple[int, int]) -> float:
-        turn = own[0] * first + own[1] * second
+    def cost(arms: tuple[int, int]) -> float:
+        turn = arms[0] * first + arms[1] * second
         off = abs(turn) / length - 1 if wound else np.log(abs(turn) / length)
         return abs(off) + (0.0 if wound else abs(float(np.angle(turn))))
 

@@ -224,9 +224,9 @@ class Unfolding:
         return logs, abs(doubled_areas(self.tile.mesh.points, self.tile.mesh.triangles))
 
 
-def distortion(found: Unfolding) -> float:
+def distortion(unfolding: Unfolding) -> float:
     """Return how unevenly a tile is enlarged: the deviation of the logarithm of its scale."""
-    logs, weights = found.scales
+    logs, weights = unfolding.scales
     mean = np.average(logs, weights=weights)
     return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
 

@@ -150,10 +150,10 @@ def world_of(
     return world, notes
 
 
-def _facing(found: Unfolding, settings: ArtSettings) -> Array:
+def _facing(unfolding: Unfolding, settings: ArtSettings) -> Array:
     """Return the motion that brings what is to be in the middle there, turned as asked."""
     turn = turned(np.radians(settings.rotate))
-    if found.sign > 0:
-        return turn @ facing(found.middle)
-    middle = int(np.argmax(found.development.orders))
-    return turn @ undone(found.development.frame(middle), found.sign)
+    if unfolding.sign > 0:
+        return turn @ facing(unfolding.middle)
+    middle = int(np.argmax(unfolding.development.orders))
+    return turn @ undone(unfolding.development.frame(middle), unfolding.sign)

@@ -55,8 +55,8 @@ class DecodedImage:
 
 def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
     """Return the picture of `decoded_image`, 8 bits deep, and its notes."""
-    found = decoded_image(path, enough=enough)
-    return _eight_bits(found.image), list(found.notes)
+    decoded = decoded_image(path, enough=enough)
+    return _eight_bits(decoded.image), list(decoded.notes)
 
 
 def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:

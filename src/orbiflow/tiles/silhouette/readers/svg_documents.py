@@ -136,10 +136,10 @@ class Document:
     def _within(self, text: str) -> str:
         """Return a text of style whose references to other files lead nowhere."""
 
-        def safe(found: re.Match[str]) -> str:
-            if found["target"].strip().startswith("#"):
-                return found[0]
-            self.notes.add(f"{quoted(found['target'])} is outside the file, and is not read")
+        def safe(match: re.Match[str]) -> str:
+            if match["target"].strip().startswith("#"):
+                return match[0]
+            self.notes.add(f"{quoted(match['target'])} is outside the file, and is not read")
             return "none"
 
         return _URL.sub(safe, text)
@@ -199,12 +199,12 @@ class Document:
         self,
         element: Element,
         by_id: dict[str, Element],
-        known: dict[Element, tuple[int, int]],
+        counts: dict[Element, tuple[int, int]],
         above: set[Element],
     ) -> tuple[int, int]:
         """Return how many elements and steps of filters are drawn for one."""
-        if element in known:
-            return known[element]
+        if element in counts:
+            return counts[element]
         if element.tag in ("linearGradient", "radialGradient"):  # which draw nothing themselves
             return 1, 0
         if element in above or len(above) > MAX_NESTED:
@@ -213,7 +213,7 @@ class Document:
         above.add(element)
         elements, filters = 1, int(element.tag.startswith("fe"))
         for child in element:
-            more = self._work(child, by_id, known, above)
+            more = self._work(child, by_id, counts, above)
             if child.tag not in DEFINED:
                 elements, filters = elements + more[0], filters + more[1]
         for name, times in self._references(element):
@@ -221,11 +221,11 @@ class Document:
             if target is None:
                 self.notes.add(f"<{element.tag}> refers to '#{name[:40]}', which is not there")
             else:
-                more = self._work(target, by_id, known, above)
+                more = self._work(target, by_id, counts, above)
                 elements, filters = elements + times * more[0], filters + times * more[1]
         above.discard(element)
-        known[element] = min(elements, 10**12), min(filters, 10**12)
-        return known[element]
+        counts[element] = min(elements, 10**12), min(filters, 10**12)
+        return counts[element]
 
     def _references(self, element: Element) -> Iterator[tuple[str, int]]:
         """Yield the names to which an element refers, and how often each is drawn for it."""

@@ -311,12 +311,12 @@ def _is_too_nested(text: str) -> bool:
     return False
 
 
-def _with_variables(text: str, known: dict[str, str]) -> str | None:
+def _with_variables(text: str, variables: dict[str, str]) -> str | None:
     """Return a value with each `var(--name, fallback)` replaced, or None where that is impossible."""
     for _ in range(20):
         if len(text) > MAX_VARIABLE or _is_too_nested(text):
             return None
-        parts = [_replaced(token, known) for token in tinycss2.parse_component_value_list(text)]
+        parts = [_replaced(token, variables) for token in tinycss2.parse_component_value_list(text)]
         if None in parts:
             return None
         text = "".join(part or "" for part in parts)
@@ -325,14 +325,14 @@ def _with_variables(text: str, known: dict[str, str]) -> str | None:
     return None
 
 
-def _replaced(token: Node, known: dict[str, str]) -> str | None:
+def _replaced(token: Node, variables: dict[str, str]) -> str | None:
     if not isinstance(token, FunctionBlock):
         return token.serialize()
     if token.lower_name != "var":
-        inner = [_replaced(part, known) for part in token.arguments]
+        inner = [_replaced(part, variables) for part in token.arguments]
         return None if None in inner else f"{token.name}({''.join(part or '' for part in inner)})"
     words = [part for part in token.arguments if part.type != "whitespace"]
-    value = known.get(words[0].serialize()) if words else None
+    value = variables.get(words[0].serialize()) if words else None
     if value is None and len(words) > 1 and words[1] == ",":
         return tinycss2.serialize(token.arguments[token.arguments.index(words[1]) + 1 :])
     return value
