@@ -27,11 +27,11 @@ SAME_POINT_SHARE = 1e-7  # of an outline's length: vertices of two outlines this
 SEARCHED = 0.8  # the share of the work that the search is
 
 
-def in_class(tile: EscherTile, name: str, told: Callable[[float], None]) -> EscherTile:
+def in_class(tile: EscherTile, name: str, report: Callable[[float], None]) -> EscherTile:
     """Return the certified tile of another class whose outline is most like this one's.
 
     The outline is searched for as a silhouette is; then the maps are carried on to what was found.
-    `told` hears the share of the work; it may raise to end it.
+    `report` hears the share of the work; it may raise to end it.
 
     Raises:
         OrbiflowError: For two figures in one tile, or an unknown class.
@@ -44,7 +44,7 @@ def in_class(tile: EscherTile, name: str, told: Callable[[float], None]) -> Esch
         Target.from_polygon(ring),
         kind,
         LikenessSearch.for_effort("fast"),
-        progress=lambda share, _: told(SEARCHED * share),
+        progress=lambda share, _: report(SEARCHED * share),
     )
     if isinstance(likest, ClassFailure):
         raise CertificationError(f"no tile that lies so is like this one: {likest.reason}")
@@ -58,7 +58,7 @@ def in_class(tile: EscherTile, name: str, told: Callable[[float], None]) -> Esch
         likest.tile,
         lambda share: before + share * (after - before),
         COMPARED_POINTS,
-        lambda share: told(SEARCHED + (1 - SEARCHED) * share),
+        lambda share: report(SEARCHED + (1 - SEARCHED) * share),
         note=LAID,
     )
 

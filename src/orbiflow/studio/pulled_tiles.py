@@ -54,7 +54,7 @@ LAST_RESORT_SHARE = 0.5  # of the work, which is told when they are tried
 MOST_STEPS = 4  # in which the inside follows a pull
 Way = Callable[[float], Array]  # the polygon of a figure at a share of the way, 0 to 1
 Move = Callable[[Array], Array]  # where points go
-Told = Callable[[float], object]
+Report = Callable[[float], object]
 PULLED = "its outline was pulled by hand"
 CROSSED = "the outline crosses itself there, so tiles would overlap: pull it less far"
 FOLDED = "the inside would be folded there: pull it less far"
@@ -207,13 +207,13 @@ def _sparse(matrix: Array) -> dict[str, Any]:
 
 
 def pulled(
-    tile: EscherTile, parameters: Any, told: Told = lambda _: None, inside: Sequence[float] = ()
+    tile: EscherTile, parameters: Any, report: Report = lambda _: None, inside: Sequence[float] = ()
 ) -> EscherTile:
     """Return the certified tile for parameters of its `PullSpace`, with the maps carried on.
 
     With `inside`, the coordinates x, y of each free point of the body of `space_json`, what lies on the
-    tile follows these. `told` hears the share of the way on which the inside has followed; it may raise
-    to end it.
+    tile follows these. `report` hears the share of the way on which the inside has followed; it may
+    raise to end it.
 
     Raises:
         OrbiflowError: for parameters that are not of this tile's space.
@@ -235,7 +235,7 @@ def pulled(
     move = _inner_move(space, values, inside) if len(inside) else None
 
     if len(tile.figures) == 1:
-        changed = moved_figure(tile, whole, on_the_way, COMPARED_POINTS, told, move)
+        changed = moved_figure(tile, whole, on_the_way, COMPARED_POINTS, report, move)
     else:
         parts = list[Any]()
         for part, ring, kept in zip(tile.figures, space.rings, space.kept, strict=True):
@@ -245,7 +245,7 @@ def pulled(
             count = COMPARED_POINTS // len(tile.figures)
             way = partial(_own_ring, on_the_way, ring, back)
             inner = None if move is None else partial(_moved_in, part.place, move)
-            figure = moved_figure(before, piece, way, count, told, inner)
+            figure = moved_figure(before, piece, way, count, report, inner)
             parts.append(part._replace(figure=figure))
         changed = EscherTile(
             whole,
@@ -302,14 +302,14 @@ def _own_ring(way: Way, ring: Integers, back: Callable[[Array], Array], share: f
 
 
 def _carried(
-    bending: Bending, frame: Frame, way: Way, told: Told, move: Move | None = None
+    bending: Bending, frame: Frame, way: Way, report: Report, move: Move | None = None
 ) -> Bending:
     """Return the map to a polygon that moved on a way, in as few steps as it follows without folds.
 
     With `move` its inside goes where that says, at once.
     """
     if move is not None:
-        told(0.0)
+        report(0.0)
         before, after = (frame.to_normal(way(share)) for share in (0.0, 1.0))
 
         def inner(points: Array) -> Array:
@@ -318,7 +318,7 @@ def _carried(
         return carried_on(bending, before, after, inner=inner)
 
     def follow(figure: Bending, start: float, end: float, steps: int) -> Bending:
-        told(start)
+        report(start)
         try:
             rings = (frame.to_normal(way(share)) for share in (start, end))
             return carried_on(figure, *rings, sharpenings=QUICK_SHARPENINGS)
@@ -331,7 +331,7 @@ def _carried(
     try:
         return follow(bending, 0.0, 1.0, 1)
     except OrbiflowError:
-        told(LAST_RESORT_SHARE)
+        report(LAST_RESORT_SHARE)
         before, after = (frame.to_normal(way(share)) for share in (0.0, 1.0))
         return carried_anew(bending, before, after, SHARPENINGS)
 
@@ -341,7 +341,7 @@ def moved_figure(
     tile: Tile,
     way: Way,
     count: int,
-    told: Told,
+    report: Report,
     move: Move | None = None,
     note: str = PULLED,
 ) -> EscherTile:
@@ -369,7 +369,7 @@ def moved_figure(
     if bending is None or frame is None:
         return moved.changed(no_map=before.no_map or "its run left no map")
     try:
-        bending = _carried(bending, frame, way, told, move)
+        bending = _carried(bending, frame, way, report, move)
     except OrbiflowError as error:
         return moved.changed(map_source=TileMap(frame=frame), no_map=str(error))
     rest, images = _outlines(bending, count)

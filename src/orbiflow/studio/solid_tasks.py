@@ -192,13 +192,13 @@ def film(
     """
     from orbiflow.solids import read_solid, solid_gif
 
-    def told(share: float) -> None:
+    def report(share: float) -> None:
         cancel.check()
         on_event(Progress(share, "drawing the film"))
 
     folder, solid = export_folder(job.project, job.task), read_solid(tile_folder(job.project, tile))
-    told(0.0)
-    content = solid_gif(solid, progress=told)
+    report(0.0)
+    content = solid_gif(solid, progress=report)
     write_atomic(make_folder(folder) / f"{plain_letters(called, 'solid')}-stack.gif", content)
     made = {"takeaway": job.task, "files": files_of(folder), "made": time.time()}
     return Outcome({**made, "preview": False})

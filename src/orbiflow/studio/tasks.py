@@ -285,8 +285,8 @@ def pull(
     """
     from orbiflow.studio.pulled_tiles import pulled
 
-    def move(original: EscherTile, told: Callable[[float], None]) -> EscherTile:
-        return pulled(original, parameters, told, inside)
+    def move(original: EscherTile, report: Callable[[float], None]) -> EscherTile:
+        return pulled(original, parameters, report, inside)
 
     return _by_hand(job, tile, move, on_event, cancel)
 
@@ -303,9 +303,9 @@ def lay_in_class(
     """
     from orbiflow.studio.other_classes import in_class
 
-    def move(original: EscherTile, told: Callable[[float], None]) -> EscherTile:
+    def move(original: EscherTile, report: Callable[[float], None]) -> EscherTile:
         with one_blas_thread():
-            return in_class(original, name, told)
+            return in_class(original, name, report)
 
     return _by_hand(job, tile, move, on_event, cancel)
 
@@ -321,12 +321,12 @@ def _by_hand(
     from orbiflow.studio.pulled_tiles import space_json
     from orbiflow.tiles import read_result
 
-    def told(share: float) -> None:
+    def report(share: float) -> None:
         cancel.check()
         on_event(Progress(share, "checking"))
 
-    told(0.0)
-    changed = move(read_result(tile_folder(job.project, tile)), told)
+    report(0.0)
+    changed = move(read_result(tile_folder(job.project, tile)), report)
     number, stage = tile_number(job.task, 0), STAGES[-1]
     put_tile(job.project, number, stage, changed, on_event, origin_of_pulled(job.project, tile))
     if place := best_stage(job.project, number):  # at hand when it is pulled again

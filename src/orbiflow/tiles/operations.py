@@ -302,11 +302,11 @@ def animate(
     for note in (*said, *shades(palette(settings.palette), colours).shortage(colours.count)):
         on_event(Note(note))
 
-    def told(share: float) -> None:
+    def report(share: float) -> None:
         cancel.check()
         on_event(Progress(share, "drawing"))
 
-    content = motion.animation(taken, settings, *overs, force=force, told=told)
+    content = motion.animation(taken, settings, *overs, force=force, report=report)
     cancel.check()
     write_atomic(out, content)
     width, height = (round(side * settings.pixels) for side in settings.page)

@@ -247,7 +247,7 @@ def test_a_known_colouring_is_the_one_that_is_drawn(name: str, y_down: bool) -> 
     """Each tile has the colour that the colouring says, although the page has other cosets."""
     tiling = NAMED[name][0].transformed(rotation_matrix(0.7), np.array([1.3, -4.1]))
     known, window = colouring(tiling), (0.3, -5.0, 2.4, -3.1)
-    page = Page.of_window(tiling, window, 100.0, y_down=y_down, known=known)
+    page = Page.of_window(tiling, window, 100.0, y_down=y_down, colouring=known)
     elements = copies_meeting(tiling, window).elements()
     middles = [page.place(e(tiling.prototiles[e.prototile].center)) for e in elements]
     expected = {

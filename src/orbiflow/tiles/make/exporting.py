@@ -78,7 +78,7 @@ def exported(
     placed, notes = laid_out(resolved, settings, pictures)
     settings, maker = placed.settings, MAKERS[placed.settings.cut]
     sheets = _sheets(placed, maker)
-    notes = (*notes, *_colour_notes(resolved, settings), *sheets[0].told)
+    notes = (*notes, *_colour_notes(resolved, settings), *sheets[0].remarks)
     sheets = [_described(scene, resolved, settings, certificate) for scene in sheets]
     if settings.marks:
         sheets = [registered(scene) for scene in sheets]

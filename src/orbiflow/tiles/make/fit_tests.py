@@ -99,4 +99,4 @@ def fit_test_scene(layout: Layout) -> Scene:
         Layer("cut", "cut", style, tuple(cuts)),
     )
     notes = (fit_words(settings.clearance),)
-    return layout.scene(layers, (), facts={"pieces": len(cuts)}, told=notes)
+    return layout.scene(layers, (), facts={"pieces": len(cuts)}, remarks=notes)

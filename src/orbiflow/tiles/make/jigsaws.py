@@ -61,7 +61,7 @@ def jigsaw_scenes(layout: Layout) -> list[Scene]:
     if tray:
         note += f"; the tray's two sheets are {tray[0].width:g} x {tray[0].height:g} mm"
     layers = (cuts, border)
-    return [layout.scene(layers, layout.placed_tiles, facts=facts, told=(note,)), *tray]
+    return [layout.scene(layers, layout.placed_tiles, facts=facts, remarks=(note,)), *tray]
 
 
 def _faces(lines: Sequence[BaseGeometry], area: shapely.Polygon) -> list[shapely.Polygon]:

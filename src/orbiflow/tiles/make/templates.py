@@ -55,7 +55,7 @@ def template_scene(layout: Layout) -> Scene:
     tiles = (
         PlacedTile(0, np.eye(2), np.zeros(2), prototile=k) for k in range(len(layout.prototiles))
     )
-    return layout.scene(layers, tuple(tiles), told=notes)
+    return layout.scene(layers, tuple(tiles), remarks=notes)
 
 
 def numbered_edges(layout: Layout) -> Iterator[tuple[int, Array]]:

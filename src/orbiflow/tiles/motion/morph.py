@@ -132,7 +132,7 @@ class Morph:
         self._parts: list[_Within] = []
         if parts or not all(straight):
             self.weights = _Weights.of(frame)
-            self.end = self.weights.own
+            self.end = self.weights.frame
             self.start = replace(self.end.straight(), points=self.weights.points(0.0))
             # how far the outline has moved, 0 to 1, at even shares of the weights' way
             outlines = [self.weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
@@ -197,7 +197,7 @@ class _Within(NamedTuple):
 class _Weights:
     """The weights of template and tile, from which places between them are solved for."""
 
-    own: OwnFrame  # with as many vertices as the triangles need; they are the first n points
+    frame: OwnFrame  # with as many vertices as the triangles need; they are the first n points
     orbits: VertexOrbits  # the orbits of all points
     sides: NDArray[np.int64]  # each side (E, 2) of a triangle, from either end
     first: Array  # with `last`: weights (E,) of template and tile, which add up to 1 for each orbit
@@ -234,12 +234,12 @@ class _Weights:
 
     def points(self, share: float) -> Array:
         """Return the outline (n, 2) at a share of the way."""
-        return self.every(share)[: len(self.own.points)]
+        return self.every(share)[: len(self.frame.points)]
 
     def every(self, share: float) -> Array:
         """Return all points (N, 2) at a share of the way."""
         weights = self.first ** (1 - share) * self.last**share
-        ways = _open_ways(self.own)
+        ways = _open_ways(self.frame)
         i, j = self.sides.T
         along = (self.guess[j] - self.guess[i]) @ ways.T
         tilt = np.zeros(len(ways))

@@ -49,9 +49,9 @@ def animation(
     settings: AnimationSettings | None = None,
     *overs: Over,
     force: bool = False,
-    told: ProgressCall = lambda _: None,
+    report: ProgressCall = lambda _: None,
 ) -> bytes | str:
-    """Return the content of the file; `told` hears the share of the work done. Raises as `animate`.
+    """Return the content of the file; `report` hears the share of the work done. Raises as `animate`.
 
     `overs` are what lies over the silhouette of each of the tile's figures, as `read_over` returns it.
     """
@@ -60,9 +60,9 @@ def animation(
         require_ffmpeg()  # before the work
     resolved.require_certified(force=force, otherwise="so it is not animated; {force} animates it")
     made = motion(resolved, settings, *overs)
-    told(0.0)
+    report(0.0)
     named = replace(made, what=f"{resolved.name}: {made.what}")
-    return WRITERS[settings.file_format](named, settings, told)
+    return WRITERS[settings.file_format](named, settings, report)
 
 
 def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
@@ -123,10 +123,10 @@ def still(
     return png_bytes(image)
 
 
-def write_gif(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
+def write_gif(motion: Motion, settings: AnimationSettings, report: ProgressCall) -> bytes:
     """Return a GIF that repeats for ever, with one palette for all frames."""
     chosen, loop = motion.palette(settings), frames(settings.seconds, settings.fps)
-    shown = list(_shown(motion, chosen, loop, told, _limiting(motion, chosen)))
+    shown = list(_shown(motion, chosen, loop, report, _limiting(motion, chosen)))
     # a GIF counts in hundredths of a second
     ends = [round(100 * end) for end in accumulate(seconds for _, seconds in loop)]
     lasting = np.maximum(np.diff([0, *ends]), 2) * 10
@@ -163,7 +163,7 @@ def require_ffmpeg() -> str:
     return path
 
 
-def write_mp4(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
+def write_mp4(motion: Motion, settings: AnimationSettings, report: ProgressCall) -> bytes:
     """Return an MP4 (H.264) of one loop, which every player and browser shows."""
     ffmpeg, chosen, fps = require_ffmpeg(), motion.palette(settings), settings.fps
     loop = frames(settings.seconds, fps)
@@ -174,7 +174,7 @@ def write_mp4(motion: Motion, settings: AnimationSettings, told: ProgressCall) -
         command += ["-pix_fmt", "rgb24", "-s", size, "-r", f"{fps:g}"]
         command += ["-i", "-", "-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18"]
         command += ["-movflags", "+faststart", str(out)]
-        shown = _shown(motion, chosen, loop, told, lambda image: image)
+        shown = _shown(motion, chosen, loop, report, lambda image: image)
         content = b"".join(
             image.tobytes() * max(1, round(seconds * fps))
             for image, (_, seconds) in zip(shown, loop, strict=True)
@@ -190,7 +190,7 @@ def _shown(
     motion: Motion,
     chosen: Palette,
     loop: list[tuple[float, float]],
-    told: ProgressCall,
+    report: ProgressCall,
     made: Callable[[Image.Image], Image.Image],
 ) -> Iterator[Image.Image]:
     """Yield the pictures of a loop, each of which is drawn once."""
@@ -199,7 +199,7 @@ def _shown(
     for progress, _ in loop:
         if progress not in pictures:
             pictures[progress] = made(frame_image(motion, chosen, progress))
-            told(len(pictures) / count)
+            report(len(pictures) / count)
         yield pictures[progress]
 
 

@@ -67,7 +67,7 @@ class Page:
     - `place`: The map to the page, whose y points down, from the tile's own units.
     - `whole`: The distance that whole tiles keep from the box's edge. None shows all that meet the box.
     - `colour`: Which tiles have the same colour.
-    - `known`: A colouring of the tiling in its own units. Default: the one with fewest colours.
+    - `colouring`: A colouring of the tiling in its own units. Default: the one with fewest colours.
     - `stretch`: A linear map of all copies, near the identity, for cells that repeat.
     - `most`: The largest number of whole tiles. Default: all that the box holds.
     """
@@ -78,7 +78,7 @@ class Page:
     place: Place
     whole: float | None = None
     colour: ColourRule = "neighbour"
-    known: Colouring | None = None
+    colouring: Colouring | None = None
     stretch: Array = field(default_factory=lambda: np.eye(2))
     most: int | None = None
 
@@ -119,7 +119,7 @@ class Page:
         width: float,
         *,
         y_down: bool = False,
-        known: Colouring | None = None,
+        colouring: Colouring | None = None,
     ) -> Page:
         """Return a page of this width with a window (xmin, ymin, xmax, ymax) of the tile's units."""
         tiling, (xmin, ymin, xmax, ymax) = as_tiling(tile), checked_window(window)
@@ -128,7 +128,7 @@ class Page:
         place = Place(linear, -linear @ (xmin, ymin if y_down else ymax))
         size = width, scale * (ymax - ymin)
         moved = tiling.transformed(*place)
-        return cls(size, Box(0.0, 0.0, *size), moved, place, known=known)
+        return cls(size, Box(0.0, 0.0, *size), moved, place, colouring=colouring)
 
     @property
     def ring(self) -> Array:
@@ -160,7 +160,7 @@ class Page:
 
     @cached_property
     def _colouring(self) -> Colouring:
-        return self.known or colouring(self.tiling)
+        return self.colouring or colouring(self.tiling)
 
     @property
     def count(self) -> int:
@@ -189,10 +189,10 @@ class Page:
             return np.zeros(len(copies), dtype=np.int64)
         if tiling is not self.tiling:
             return colouring(tiling).colours(copies)
-        return self._colouring.colours(copies if self.known is None else self._own(copies))
+        return self._colouring.colours(copies if self.colouring is None else self._own(copies))
 
     def _own(self, copies: Copies) -> Copies:
-        """Return the same copies of the known colouring's tiling, which is not on the page.
+        """Return the same copies of the colouring's tiling, which is not on the page.
 
         On the page the representative of a coset may lie in another cell.
         """

@@ -315,7 +315,7 @@ class Scene:
     prototiles: tuple[Array, ...] = ()  # the polygons (N, 2) in mm of which `tiles` are copies
     tiles: tuple[PlacedTile, ...] = ()
     facts: dict[str, Any] = field(default_factory=dict)  # for the JSON file, such as the class
-    told: tuple[str, ...] = ()  # what the user should know of how it was made
+    remarks: tuple[str, ...] = ()  # what the user should know of how it was made
     motifs: dict[str, Motif] = field(default_factory=dict)  # drawings by name, for `Uses`
     endless: Endless | None = None  # the whole tiling, if it is shown in colours
     web_page: Callable[[], str] | None = None  # what makes the page to turn a curved world by hand

@@ -72,7 +72,7 @@ def tiling_picture(
     """
     sheet, tiling, chosen = sheet or Sheet.screen(1600), as_tiling(tile), palette(DEFAULT_PALETTE)
     window = window or default_window(tiling)
-    page = Page.of_window(tile, window, sheet.width * INCH, y_down=y_down, known=colours)
+    page = Page.of_window(tile, window, sheet.width * INCH, y_down=y_down, colouring=colours)
     width = outline * page.size[0]
     line = Style(None, chosen.outline, max(width, LEAST_LINE) if sheet.printed else width)
     what = "An isohedral tiling" if len(tiling.prototiles) == 1 else "A tiling"

@@ -90,7 +90,7 @@ def _patch(tile: EscherTile, colours: Colouring) -> dict[str, Any]:
     left, low, right, high = default_window(tile.tiling)
     middle, half = tile.tiling.center, np.array([right - left, high - low]) * 0.3
     window = (*(middle - half).tolist(), *(middle + half).tolist())
-    page = Page.of_window(tile.tiling, window, PATCH, y_down=tile.y_down, known=colours)
+    page = Page.of_window(tile.tiling, window, PATCH, y_down=tile.y_down, colouring=colours)
     (width, height), paths = page.size, list[str]()
     copies: list[list[tuple[int, str]]] = [[] for _ in range(page.count)]
     for kind, prototile in enumerate(page.tiling.prototiles):
