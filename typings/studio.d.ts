@@ -38,6 +38,8 @@ interface Card {
   parent: number | null;
   root?: number;
   found_for?: string[];
+  /** A better one that it is nearly like. */
+  like?: number;
   polygon: Point[];
   y_down: boolean;
   neck: [Point, Point];

@@ -368,3 +368,26 @@ def test_back_leads_to_the_place_and_to_what_was_chosen(page: Any, project: dict
     page.go_back()
     page.wait_for_selector(".form")
     assert (value(page, "purpose"), value(page, "tile_size")) == ("stickers", "33")
+
+
+def test_weak_tiles_and_those_like_a_better_one_are_folded_away(
+    page: Any, project: dict[str, Any]
+) -> None:
+    stars = [4, 3, 2, 1.5, 1, 2, 1, 3]
+    ids = [own["id"] for own in project["tiles"]]
+
+    def rated(route: Any) -> None:
+        shown = route.fetch().json()
+        for own in shown["tiles"]:
+            place = ids.index(own["id"])
+            own |= {"stars": stars[place], "like": ids[0] if place == 7 else None}
+        route.fulfill(json=shown)
+
+    page.route(f"**/api/projects/{project['id']}", rated)
+    page.goto(f"/#/p/{project['id']}")
+    page.wait_for_selector(".card")
+    seen = page.locator(".card:visible")
+    assert [own.get_attribute("data-tile") for own in seen.all()] == [str(own) for own in ids[:2]]
+    page.locator("summary", has_text=re.compile("^6 ")).click()
+    assert seen.count() == 8
+    page.unroute(f"**/api/projects/{project['id']}")

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import shapely
+
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
     NEVER,
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 PER_CLASS = 50  # numbers that a class has for its tiles
 MORE_TILES = 4  # tiles of a class, for "more like this one"
+NEARLY_ALIKE_IOU = 0.55  # from which one of two pairs is enough to see at first
 
 
 @operation("studio read")
@@ -142,13 +145,14 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
     first, second = (load_target(job.project, number) for number in (0, 1))
     settings = _search_settings(job.project, choice).replace(workers=cores())
     announce_tiles(job, on_event)
-    shown: dict[str, list[int]] = {stage: [] for stage in STAGES}
+    shown: dict[str, dict[int, EscherTile]] = {stage: {} for stage in STAGES}
     origin = {"found_for": marks_of(job.project)}
 
     def show(tile: EscherTile, stage: str) -> None:
-        number = tile_number(job.task, len(shown[stage]))
-        shown[stage].append(number)
-        put_tile(job.project, number, stage, tile, on_event, origin)
+        number, better = tile_number(job.task, len(shown[stage])), shown[stage]
+        like = next((key for key, other in better.items() if _nearly_alike(tile, other)), None)
+        better[number] = tile
+        put_tile(job.project, number, stage, tile, on_event, {**origin, "like": like})
 
     result = escherize(
         first, settings, second=second, on_tile=show, on_event=on_event, cancel=cancel
@@ -160,6 +164,14 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
     for number in gone:
         shutil.rmtree(job.project / "tiles" / str(number), ignore_errors=True)
     return Outcome({**summary, "gone": gone}, "done" if result.tiles else "nothing found")
+
+
+def _nearly_alike(tile: EscherTile, other: EscherTile) -> bool:
+    """Return whether two tiles lie alike and cover nearly the same of the silhouettes."""
+    if tile.isohedral_class != other.isohedral_class:
+        return False
+    first, second = (shapely.Polygon(each.normal_tile.polygon) for each in (tile, other))
+    return (first & second).area > NEARLY_ALIKE_IOU * (first | second).area
 
 
 def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:

@@ -65,7 +65,8 @@ def put_tile(
         tile: The tile.
         on_event: What is told.
         origin: Where it comes from, for its card: `parent`, the tile that it was made from by hand;
-            `root`, the first of these; `found_for`, the marks of the silhouettes that it is like.
+            `root`, the first of these; `found_for`, the marks of the silhouettes that it is like;
+            `like`, a better tile that it is nearly like.
     """
     from orbiflow.studio.tile_view import tile_card, tile_view
     from orbiflow.tiles import save_tiles

@@ -156,11 +156,11 @@ def test_wrong_number_of_parameters() -> None:
 
 
 WORDS = {
-    **{"IH1": "rows, all alike", "IH2": "brick rows, every other row turned over"},
+    **{"IH1": "rows, all alike", "IH2": "brick rows, every other row mirrored"},
     "IH3": "rows, every other row facing the other way",
     "IH4": "rows, every other row upside down",
-    "IH5": "rows, upside down and turned over by turns",
-    **{"IH6": "every other one upside down, half turned over", "IH7": "three around a point"},
+    "IH5": "rows, by turns upside down and mirrored",
+    **{"IH6": "every other one upside down, half of them mirrored", "IH7": "three around a point"},
     **{"IH21": "six around a point", "IH28": "four around a point"},
 }
 
@@ -182,8 +182,8 @@ def test_words_do_not_depend_on_the_frame(
     [
         ("p1", (0.1, 0.2), "rows, all alike"),
         ("p6m", (0, 0), "rows, all alike"),  # hexagons with all the symmetry there is
-        ("p4g", (0, 0), "every other one turned over"),  # a chessboard of whirls
-        ("pm", (0.13, 0.21), "rows, every other row turned over"),
+        ("p4g", (0, 0), "every other one mirrored"),  # a chessboard of whirls
+        ("pm", (0.13, 0.21), "rows, every other row mirrored"),
         ("p4m", (0.13, 0.21), "eight around a point, with their mirror images"),
         ("p6m", (0.13, 0.21), "twelve around a point, with their mirror images"),
         ("p4", (0.5, 0.0), "every other one turned a quarter"),

@@ -200,9 +200,9 @@ def search_pair(
     on_pairs("better", _certified(_ranked(carved)[: search.finalists]))
     before = dict(zip(map(id, carved), starts, strict=True))
     ranked = unlike(_ranked(carved), search.ranked, BentPair.is_twin)
-    nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "moving corners", 0.9)
+    nearby = team.each(_moved, [before[id(pair)] for pair in ranked], "trying other corners", 0.9)
     last = unlike(_ranked([*ranked, *nearby]), search.finalists, BentPair.is_twin)
-    done = team.each(_detailed, last, "carving with all detail", 1.0)
+    done = team.each(_detailed, last, "working out all detail", 1.0)
     return [pair for pair in _ranked(done) if (search.force and pair.is_whole) or pair.certified]
 
 
@@ -214,7 +214,7 @@ def _rough(
     settings: PairSearch, couples: Sequence[Couple], team: Team
 ) -> tuple[list[BentPair], list[BentPair]]:
     """Return pairs with half of the points, before they are carved and after it."""
-    options = team.each(partial(_placed, settings), couples, "gluing", 0.3)
+    options = team.each(partial(_placed, settings), couples, "laying both side by side", 0.3)
     kept = sorted(placement.residual for placed in options for placement in placed)[
         : settings.placed
     ]
@@ -228,7 +228,9 @@ def _rough(
     )
     middle.sort(key=lambda pair: -pair.promise)
     starts = unlike(middle, settings.carved, BentPair.is_twin)
-    return starts, team.each(partial(carved_pair, steps=FIRST_STEPS), starts, "carving", 0.75)
+    return starts, team.each(
+        partial(carved_pair, steps=FIRST_STEPS), starts, "making both look alike", 0.75
+    )
 
 
 def _placed(settings: PairSearch, couple: Couple) -> list[Placement]:

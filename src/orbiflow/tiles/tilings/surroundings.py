@@ -325,7 +325,7 @@ def _words(tiling: Tiling) -> str:
     turns = sum(g.determinant > 0 for g in cosets) // sum(s.determinant > 0 for s in symmetries)
     if turns > 2:
         return _around(tiling) + (", with their mirror images" if flips else "")
-    half = ", half turned over" if flips else ""
+    half = ", half of them mirrored" if flips else ""
     if turns == 2 and any(np.allclose(s.linear, -np.eye(2)) for s in symmetries):
         return f"every other one turned a quarter{half}"
     near = [g for g in neighbours(tiling).edge if g.prototile == 0]
@@ -333,11 +333,12 @@ def _words(tiling: Tiling) -> str:
     if turns == 2 and not rows:
         return f"every other one upside down{half}"
     if turns == 2:
-        both = "upside down and turned over by turns"
-        return f"rows, {both if flips else 'every other row upside down'}"
+        return "rows, " + (
+            "by turns upside down and mirrored" if flips else "every other row upside down"
+        )
     if not flips:
         return "rows, all alike"
-    return _flipped_rows(near, rows[0]) if rows else "every other one turned over"
+    return _flipped_rows(near, rows[0]) if rows else "every other one mirrored"
 
 
 def _around(tiling: Tiling) -> str:
@@ -350,7 +351,7 @@ def _around(tiling: Tiling) -> str:
 
 
 def _flipped_rows(near: Sequence[Placed], row: Array) -> str:
-    """Return the words for rows along a vector, with every other row turned over."""
+    """Return the words for rows along a vector, with every other row mirrored."""
     flipped = [g for g in near if g.determinant < 0]
     image = flipped[0].linear @ row
     size = _ROUNDING * float(np.linalg.norm(row))
@@ -358,4 +359,4 @@ def _flipped_rows(near: Sequence[Placed], row: Array) -> str:
         return "rows, every other row facing the other way"
     mirrored = any(np.linalg.norm((g @ g).translation) < size for g in flipped)
     bricks = np.linalg.norm(image - row) < size and not mirrored
-    return f"{'brick ' if bricks else ''}rows, every other row turned over"
+    return f"{'brick ' if bricks else ''}rows, every other row mirrored"

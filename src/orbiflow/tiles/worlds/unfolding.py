@@ -136,8 +136,10 @@ class Unfolding:
             return (
                 f"at one point of a tile's edge meet {orders[0] // 2} times as many as in the plane"
             )
-        every = [str(orders[pattern.kinds.index(kind)]) for kind in sorted(set(pattern.kinds))]
-        return f"they meet at centres of the orders {', '.join(every)}"
+        every = (orders[pattern.kinds.index(kind)] for kind in sorted(set(pattern.kinds)))
+        return (
+            f"around its turning points it repeats {', '.join(f'{count} times' for count in every)}"
+        )
 
     @property
     def ring(self) -> Array:

@@ -21,8 +21,8 @@ WRITERS: dict[str, str] = {
     "pdf": "orbiflow.tiles.write.pdf:write_pdf",
     "dxf": "orbiflow.tiles.write.dxf:write_dxf",
     "png": "orbiflow.tiles.write.png:write_png",
-    "json": "orbiflow.tiles.write.json:write_json",
     "html": "orbiflow.tiles.write.html:write_html",
+    "json": "orbiflow.tiles.write.json:write_json",
 }
 """The module and function that write a scene in each format, which is the ending of its files.
 

@@ -140,6 +140,15 @@ export const zooms = (zoom, fit) =>
     button("Fit", fit),
   );
 
+/** Palettes that are seen before "More". */
+export const FEW_PALETTES = 6;
+
+/** Options of a list; after the first few, under "More". */
+export const listed = (options, few) => [
+  ...options.slice(0, few),
+  options.length > few && h("optgroup", { label: "More" }, options.slice(few)),
+];
+
 /** A box to tick. */
 export const check = (words, checked, onchange) =>
   h(

@@ -1,6 +1,6 @@
 /** Forms from the JSON Schema of an operation's settings. */
 
-import { h, stack, unique } from "./dom.js";
+import { h, listed, unique } from "./dom.js";
 import { capital } from "./words.js";
 
 /** The kinds of values that a schema allows, `null` apart. */
@@ -57,15 +57,19 @@ function control(name, schema, words, changed) {
     };
     get = () => tick.checked;
   } else if (options) {
-    const first = standard === null
-      ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))]
+    const first = standard === null && words?.usual !== false
+      ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "none"))]
       : [];
+    const few = words?.few ?? options.length;
     box = h(
       "select",
       shared,
       first,
-      options.map((option) =>
-        h("option", { value: option }, words?.options?.[option] ?? capital(option))
+      listed(
+        options.map((option) =>
+          h("option", { value: option }, words?.options?.[option] ?? capital(option))
+        ),
+        few,
       ),
     );
     show = (value) => {
@@ -167,7 +171,7 @@ export function form(
       );
       controls.get(name).root.hidden = !applies || never;
     }
-    for (const box of made.querySelectorAll("details")) {
+    for (const box of made.querySelectorAll("details, .group")) {
       box.hidden = !box.querySelector(".field:not([hidden])");
     }
   }
@@ -180,12 +184,17 @@ export function form(
     "div",
     { class: "stack form" },
     first.filter((name) => controls.has(name)).map((name) => controls.get(name).root),
-    [...groups].map(([group, own]) =>
-      h(
-        "details",
-        h("summary", group),
-        stack(own.map((name) => controls.get(name).root)),
-      )
+    h(
+      "details",
+      h("summary", "More"),
+      [...groups].map(([group, own]) =>
+        h(
+          "div",
+          { class: "stack group" },
+          groups.size > 1 && h("h3", group),
+          own.map((name) => controls.get(name).root),
+        )
+      ),
     ),
   );
   function values() {

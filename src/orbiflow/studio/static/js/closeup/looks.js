@@ -1,6 +1,18 @@
 /** The controls for colours, outline, artwork and symmetry. */
 
-import { aside, button, check, choice, h, put, slider, soft, stack, unique } from "../dom.js";
+import {
+  aside,
+  button,
+  check,
+  choice,
+  FEW_PALETTES,
+  h,
+  put,
+  slider,
+  soft,
+  stack,
+  unique,
+} from "../dom.js";
 import { kindsOf, signInto } from "./signs.js";
 
 export const HELP = {
@@ -107,14 +119,21 @@ export function colourPanel(about, look, needed, change) {
       }),
       colours ? chips(colours) : h("span", words),
     );
+  const radios = about.palettes.map((own) => radio(own.name, own.name, own.colours));
   const made = h(
     "fieldset",
     h("legend", "Colours"),
     h(
       "div",
       { class: "palettes" },
-      about.palettes.map((palette) => radio(palette.name, palette.name, palette.colours)),
+      radios.slice(0, FEW_PALETTES),
       radio("own", "My own"),
+    ),
+    h(
+      "details",
+      { open: about.palettes.slice(FEW_PALETTES).some((own) => own.name === look.palette) },
+      h("summary", "More colours"),
+      h("div", { class: "palettes" }, radios.slice(FEW_PALETTES)),
     ),
     wells,
   );

@@ -166,7 +166,7 @@ class Closeup {
     const side = h(
       "div",
       { class: "closeup-side" },
-      h("div", this.heading, this.kind, this.noted),
+      h("div", this.heading, this.kind, h("details", h("summary", "More about it"), this.noted)),
       this.modes,
       this.panel,
       this.help,
@@ -193,10 +193,14 @@ class Closeup {
     this.#palette();
     this.pen.use(this.carries, drawing);
     this.heading.textContent = view.arrangement ? capital(view.arrangement) : "Close up";
-    this.kind.textContent = [named(view), view.class_name, view.group.name].filter(Boolean).join(
-      " · ",
+    this.kind.textContent = named(view);
+    put(
+      this.noted,
+      notes([
+        ...view.notes ?? [],
+        `In mathematics: isohedral class ${view.class_name}, wallpaper group ${view.group.name}`,
+      ]),
     );
-    put(this.noted, notes(view.notes ?? []));
     this.#proved();
     this.#panels();
     this.past.show(view, quiet);

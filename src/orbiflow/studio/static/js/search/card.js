@@ -19,7 +19,6 @@ export function cardView(project, actions) {
   const stars = h("span", { class: "stars", role: "img" });
   const word = h("span", { class: "word" });
   const lies = h("span", { class: "lies" });
-  const name = h("span", { class: "tag" });
   const stage = h("span", { class: "stage-word" });
   const why = h("span", { class: "soft small" });
   const link = h(
@@ -30,7 +29,7 @@ export function cardView(project, actions) {
       "span",
       { class: "facts" },
       h("span", { class: "row" }, stars, word, h("span", { class: "grow" }), stage),
-      h("span", { class: "row" }, lies, h("span", { class: "grow" }), name),
+      lies,
       why,
     ),
   );
@@ -132,13 +131,9 @@ export function cardView(project, actions) {
     stars.setAttribute("aria-label", starWords(card));
     word.textContent = card.stars && !card.figures ? capital(card.word) : "";
     lies.textContent = capital(card.arrangement);
-    name.textContent = card.parent ? `${card.class_name}, by hand` : card.class_name;
     stage.textContent = card.stage === "final" ? "" : STAGES[card.stage] ?? "";
     const about = `${capital(card.word || "a tile")}, ${card.arrangement}`;
-    link.setAttribute(
-      "aria-label",
-      `Open: ${about}. ${starWords(card)}. Class ${card.class_name}.`,
-    );
+    link.setAttribute("aria-label", `Open: ${about}. ${starWords(card)}.`);
     more.hidden = !project.silhouette || Boolean(card.figures) !== Boolean(project.second);
     more.setAttribute("aria-label", `More like this: ${about}`);
     take.setAttribute("aria-label", `Take away: ${about}`);

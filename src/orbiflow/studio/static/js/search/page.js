@@ -1,6 +1,19 @@
 /** The search as it goes: all classes side by side, best first. */
 
-import { button, confirmed, h, notes, put, row, soft, style, toast, trying } from "../dom.js";
+import {
+  button,
+  confirmed,
+  FEW_PALETTES,
+  h,
+  listed,
+  notes,
+  put,
+  row,
+  soft,
+  style,
+  toast,
+  trying,
+} from "../dom.js";
 import { better } from "../events.js";
 import { keeper, lookOf, paletteOf } from "../look.js";
 import { Pictures } from "../skin.js";
@@ -11,6 +24,7 @@ import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
 
 const NINE = 9; // classes that are searched for every picture
+const WEAK = 2; // stars of a tile that is folded away
 const REST = 1500; // ms after the last move of the mouse, for which cards stay where they are
 
 /**
@@ -29,7 +43,23 @@ export async function show(root, page) {
   return () => own.close();
 }
 
+/** Cards that are folded away. */
+class Fold {
+  title = h("summary");
+  list = h("ul", { class: "cards" });
+  root = h("details", this.title, this.list);
+
+  show(cards, title) {
+    reordered(this.list, cards);
+    this.title.textContent = title;
+    this.root.hidden = !cards.length;
+  }
+}
+
 class SearchPage {
+  weaker = new Fold();
+  earlier = new Fold();
+
   /** @param {Page} page */
   constructor(page) {
     const { api, events, project, about } = page;
@@ -59,9 +89,10 @@ class SearchPage {
       if (pointerType === "mouse") this.touched = performance.now();
     };
     this.grid = h("ul", { class: "cards", onpointermove: moved });
-    this.past = h("ul", { class: "cards" });
-    this.summary = h("summary");
-    this.earlier = h("details", this.summary, this.past);
+    this.folds = [this.weaker, this.earlier].map((fold) => {
+      fold.root.ontoggle = () => this.views.forEach((view) => view.paint(false));
+      return fold.root;
+    });
     this.said = h("p", { class: "state-words", role: "status" });
     this.noted = h("div", { role: "status" });
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
@@ -91,9 +122,8 @@ class SearchPage {
       this.noted,
       this.empty,
       this.grid,
-      this.earlier,
+      this.folds,
     );
-    this.earlier.ontoggle = () => this.views.forEach((view) => view.paint(false));
     this.watch = new ResizeObserver(() => this.views.forEach((view) => view.paint(false)));
     this.watch.observe(this.grid);
     this.off = ["card", "gone", "refresh", "silhouette", "task"].map((kind) =>
@@ -120,7 +150,8 @@ class SearchPage {
         this.palette.colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })),
       );
     };
-    const names = this.about.palettes.map(({ name }) => name).concat(this.look.custom ? "own" : []);
+    const names = this.about.palettes.map(({ name }) => name);
+    if (this.look.custom) names.unshift("own");
     const list = h(
       "select",
       {
@@ -132,7 +163,12 @@ class SearchPage {
           this.arrange();
         },
       },
-      names.map((name) => h("option", { value: name }, capital(name === "own" ? "my own" : name))),
+      listed(
+        names.map((name) =>
+          h("option", { value: name }, capital(name === "own" ? "my own" : name))
+        ),
+        FEW_PALETTES,
+      ),
     );
     list.value = this.look.palette;
     show();
@@ -240,14 +276,27 @@ class SearchPage {
     for (const id of keys) if (!views.has(id)) views.set(id, cardView(this.project, this));
     const roots = (own) => own.map((group) => views.get(key(group)).root);
     const isOld = ([first]) => isOutdated(first, this.project);
+    const now = groups.filter((group) => !isOld(group));
     const old = groups.filter(isOld);
-    reordered(this.past, roots(old));
-    this.earlier.hidden = !old.length;
-    this.summary.textContent = `Found before you changed the picture: ${
-      number(old.length, "tile")
-    }`;
-    reordered(grid, [...roots(groups.filter((own) => !isOld(own))), ...this.ghosts()]);
+    const weak = this.weak(now);
+    const alike = weak.some(([card]) => card.stars > WEAK);
+    const one = alike ? "weaker or nearly alike" : "weaker one";
+    this.weaker.show(roots(weak), number(weak.length, one, alike ? one : `${one}s`));
+    this.earlier.show(
+      roots(old),
+      `Found before you changed the picture: ${number(old.length, "tile")}`,
+    );
+    reordered(grid, [...roots(now.filter((group) => !weak.includes(group))), ...this.ghosts()]);
     groups.forEach((group) => views.get(key(group)).update(group, this.palette));
+  }
+
+  /** Of some groups those that are folded away once all are found: of few stars, or like a better one. */
+  weak(groups) {
+    const known = new Set(groups.map(([{ id }]) => id));
+    const poor = groups.filter(([{ like, stars }, ...pulled]) =>
+      !pulled.length && (stars && stars <= WEAK || known.has(like))
+    );
+    return alive(this.task) || poor.length === groups.length ? [] : poor;
   }
 
   /** Empty cards hold the places of the nine classes until the first tiles are done. */
@@ -280,7 +329,6 @@ function stateWords(task, { tiles: { length: every }, second, silhouette }, tile
   if (wait) return wait;
   if (task.state === "running") {
     if (second && !tiles) return "Looking for tiles of both: the first takes a moment";
-    if (task.what === "gluing") return "Laying both animals side by side";
     return task.what ? capital(task.what) : "Looking for tiles";
   }
   if (!tiles) return "No tile was found. Smooth the picture a little, or search more thoroughly.";

@@ -32,9 +32,8 @@ export function shapeCards(about) {
       canvas,
       h("span", { class: "shape-words" }, capital(own.arrangement)),
       own.symmetry !== "C1" && h("span", { class: "soft small" }, symmetryWords(own.symmetry)),
-      h("span", { class: "soft small" }, `${own.name} · ${own.group_name}`),
     ];
-    return h("li", link(own, parts));
+    return h("li", { title: `${own.name}, ${own.group_name}` }, link(own, parts));
   };
   return {
     list: (shapes, link) => h("ul", { class: "shapes" }, shapes.map((own) => card(own, link))),

@@ -1,5 +1,7 @@
 /** What can be made of a tile, and what its settings are called here. */
 
+import { FEW_PALETTES } from "../dom.js";
+
 /** Plain names of settings. */
 const PLAIN = {
   area: "How large is the tray at most?",
@@ -27,7 +29,6 @@ const PLAIN = {
   offset: "Cut this far outside",
   outline: "Width of lines between tiles",
   relief: "How far lines stand out",
-  repeat: "A piece that repeats, as for wallpaper",
   rotate: "Turn the pattern",
   spacing: "Room between cuts",
   strokes: "Kind of lines",
@@ -42,8 +43,8 @@ export const COLOURLESS = ["laser", "plotter", "template", "colouring"];
 
 const SHARED = { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" };
 
-const FORMAT = { about: "", title: "Kind of file", usual: "What suits it" };
-const PALETTE = { about: "", title: "Colours" };
+const FORMAT = { about: "", title: "Kind of file", usual: "The usual kind" };
+const PALETTE = { about: "", title: "Colours", few: FEW_PALETTES };
 
 const plain = (words) => ({
   palette: PALETTE,
@@ -64,6 +65,7 @@ export const KINDS = {
       purpose: {
         title: "What is it for?",
         about: "This sets everything else so that it suits.",
+        usual: "Nothing of these",
         sets: true,
         keeps: ["palette"],
         options: {
@@ -85,9 +87,10 @@ export const KINDS = {
           pdf: "PDF",
           dxf: "DXF",
           png: "PNG",
-          json: "JSON (numbers)",
           html: "HTML (a page without an end)",
+          json: "JSON (numbers)",
         },
+        few: 5,
       },
       area: {
         title: "How large is the page?",
@@ -142,6 +145,16 @@ export const KINDS = {
         title: "Polygons become animals",
         usual: "no",
         options: { right: "to the right", down: "downwards", middle: "to the middle" },
+      },
+      repeat: {
+        about: "",
+        title: "A piece that repeats, as for wallpaper?",
+        usual: "no",
+        options: {
+          basic: "row on row",
+          brick: "like bricks",
+          "half-drop": "each column half lower",
+        },
       },
       order: { title: "How many meet there?" },
       arms: { title: "Steps of a turn" },

@@ -66,7 +66,8 @@ export const THINGS = {
     image: "fabric",
     makes: "art",
     start: { repeat: "basic" },
-    first: ["repeat", "dpi", "palette"],
+    first: ["repeat", "tile_size", "palette"],
+    words: { repeat: { ...KINDS.art.words.repeat, title: "How does it repeat?", usual: false } },
   },
   mug: printed("Mug", "mug", { purpose: "print", area: "mug" }, ["tile_size", "palette", "format"]),
   stickers: printed("Stickers", "sticker", { purpose: "stickers" }, [
