@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 TURTLE = HERE.parent / "examples" / "silhouettes" / "turtle.png"
 ANGLES = HERE.parent / "examples" / "density" / "backbone.csv"
 TORUS = "--space torus --columns phi,psi --unit degrees"
-BASE_HAS = ("starlette", "uvicorn", "platformdirs")
+BASE_HAS = ("starlette", "uvicorn")
 """Packages of the studio, which is installed with the base by `make demo`."""
 
 

@@ -56,6 +56,7 @@ class RunningStudio:
             stdout=subprocess.DEVNULL,
             env={
                 **os.environ,
+                "XDG_CONFIG_HOME": str(self.folder / "config"),
                 "PYTHONPATH": f"{TESTS}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
             },
         )

@@ -89,7 +89,7 @@ def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> Non
     page.reload()
     page.wait_for_selector(f"{DONE} >> nth=1")
     other.wait_for_selector(f"{DONE} >> nth=1")
-    names = [tab.locator(f"{CARD} .tag").all_inner_texts() for tab in (page, other)]
+    names = [tab.locator(f"{CARD} .lies").all_inner_texts() for tab in (page, other)]
     assert names[0] == names[1]
     page.get_by_label("Name of the project").fill("Boots")
     expect(other.get_by_label("Name of the project")).to_have_value("Boots")
@@ -192,7 +192,7 @@ def test_each_thing_has_three_fields_and_its_own_settings(page, studio, searched
     fields = page.locator(".form > .field:not([hidden])")
     page.wait_for_selector(".form")
     titles = {}
-    for thing in page.locator(".wishes .choice label").all_inner_texts()[:-3]:
+    for thing in page.locator(".wishes > .choice label").all_inner_texts()[:-3]:
         before = page.locator(".form").element_handle()
         page.get_by_role("radio", name=thing).check()
         page.wait_for_function("form => !form.isConnected", arg=before)
@@ -218,7 +218,7 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     studio.client.patch(f"projects/{searched}", json={"view": view})
     page.goto(f"/#/p/{searched}/take/{tile}")
     page.get_by_role("radio", name="Print or cut").check()
-    page.get_by_text("Page and file").click()
+    page.locator(".form summary").click()
     purpose, drawn = page.get_by_label("What is it for?"), page.get_by_label("What is drawn")
     filled, thin = page.get_by_label("Fill the page to its edge"), page.get_by_label("thinner than")
     assert (purpose.input_value(), drawn.input_value()) == ("print", "none")
@@ -248,7 +248,6 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     assert not page.get_by_label("Colours").is_visible()
     page.get_by_label("What is it for?").select_option("")
     page.get_by_label("What is drawn").select_option("pieces")
-    page.get_by_text("Pieces", exact=True).click()
     page.get_by_label("Width of the machine's cut").fill("0.2")
     page.get_by_label("How long is one tile?").fill("much")
     page.get_by_role("button", name="Make it").click()
@@ -300,3 +299,33 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, searched) -> None:
         assert serious_issues(page) == []
         page.set_viewport_size({"width": 360, "height": 700})
         assert untidy_parts(page) == []
+
+
+def test_machines_are_kept_by_name_and_lengths_shown_in_inches(page, studio, searched) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.goto(f"/#/p/{searched}/take/{tile}")
+    page.get_by_role("radio", name="Pieces for a laser").check()
+    kerf = page.get_by_label("Width of the machine's cut")
+    kerf.fill("0.2")
+    page.get_by_role("button", name="Keep these settings").click()
+    page.get_by_label("Name", exact=True).fill("my K40")
+    page.get_by_role("button", name="Keep", exact=True).click()
+    page.get_by_role("radio", name="Jigsaw").check()
+    page.reload()
+    page.get_by_role("radio", name="Pieces for a laser").check()
+    machine = page.get_by_label("Machine and material")
+    machine.select_option("my K40")
+    assert kerf.input_value() == "0.2"
+    page.get_by_role("radio", name="inches").check()
+    size = page.get_by_label("How long is one tile? (in)")
+    assert size.input_value() == "1.575"
+    size.fill("2")
+    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name="Make it").click()
+    page.get_by_text("not now").wait_for()
+    page.unroute("**/tasks")
+    wanted = {"tile": tile, "purpose": "laser", "cut": "pieces", "kerf": 0.2, "tile_size": 50.8}
+    assert caught.value.post_data_json["settings"] == wanted
+    page.get_by_role("button", name="Forget it").click()
+    machine.locator("option", has_text="my K40").wait_for(state="detached")

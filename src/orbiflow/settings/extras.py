@@ -18,7 +18,6 @@ EXTRAS = {
     "pandas": "density",
     "starlette": "studio",
     "uvicorn": "studio",
-    "platformdirs": "studio",
     "gemmi": "crystals",
     "skimage": "solids",
     "trimesh": "solids",

@@ -29,6 +29,7 @@ from orbiflow.studio import (
     density_routes,
     mask_routes,
     offers,
+    profile_routes,
     project_routes,
     shape_routes,
     solid_routes,
@@ -88,7 +89,15 @@ def create_app(
         await asyncio.to_thread(queue.close)
         store.close()
 
-    topics = (density_routes, solid_routes, project_routes, mask_routes, offers, shape_routes)
+    topics = (
+        density_routes,
+        solid_routes,
+        project_routes,
+        mask_routes,
+        offers,
+        profile_routes,
+        shape_routes,
+    )
     every = [*routes, *(route for topic in topics for route in topic.routes)]
     pages, scripts = (
         GZipMiddleware(

@@ -16,7 +16,7 @@ from orbiflow.runtime import Call, Operation, find
 from orbiflow.settings import Field, Hidden, NotWith, OnlyWith, PathKind
 from orbiflow.studio.words import LABELS, plain_letters
 
-SERVER_SET = ("project", "task", "force", "workers", "tile", "picture")
+SERVER_SET = ("project", "task", "force", "workers", "tile", "picture", "profile")
 """Parameters of operations that the server sets, or nobody."""
 
 

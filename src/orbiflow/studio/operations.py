@@ -16,7 +16,7 @@ from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, make_fo
 from orbiflow.settings import naming_extras
 from orbiflow.studio.settings import StudioSettings
 
-PACKAGES = ("starlette", "uvicorn", "platformdirs")
+PACKAGES = ("starlette", "uvicorn")
 
 
 @operation("studio", starts_processes=True)

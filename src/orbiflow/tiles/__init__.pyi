@@ -60,6 +60,8 @@ from .make.art_settings import ArtSettings as ArtSettings
 from .make.export_settings import ExportSettings as ExportSettings
 from .make.exporting import exported as exported
 from .make.made import Made as Made
+from .make.profiles import OF_MACHINE as OF_MACHINE
+from .make.profiles import Profiles as Profiles
 from .motifs.artwork import page_picture as page_picture
 from .motifs.carried import Over as Over
 from .motifs.carried import read_over as read_over

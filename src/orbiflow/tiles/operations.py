@@ -76,6 +76,7 @@ def export(
     settings: ExportSettings = ExportSettings(),
     *,
     tile: Which = None,
+    profile: str | None = None,
     force: bool = False,
     picture: Path | None = None,
     second_picture: Path | None = None,
@@ -90,6 +91,8 @@ def export(
         result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file; several sheets are numbered. Its ending decides the format unless one is given.
         tile: A class, such as IH4, or a rank; 1 is best.
+        profile: A machine and its material that were kept by name: their settings, unless others are
+            given.
         force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
         second_picture: One over the second silhouette, of a tile of two figures.
@@ -100,10 +103,11 @@ def export(
         OutputError: If a file cannot be written.
         Cancelled: If it was cancelled; nothing is then written.
     """
-    settings = settings.for_file(out)
-
     from orbiflow.tiles import make
 
+    if profile is not None:
+        settings = make.Profiles().applied(profile, settings)
+    settings = settings.for_file(out)
     pictures = picture, second_picture
     taken, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)
     on_event(Progress(0.0, "laying out"))

@@ -16,3 +16,5 @@ from .made import Made as Made
 from .made import sheet_names as sheet_names
 from .offsets import cut_ring as cut_ring
 from .offsets import place_on as place_on
+from .profiles import OF_MACHINE as OF_MACHINE
+from .profiles import Profiles as Profiles

@@ -88,8 +88,9 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
                 items[name].append(_uses(symbol_of(kind, name), tiles))
     ink = palette(settings.palette).outline if settings.coloured else None
     clip = settings.clip or settings.cut == "jigsaw"
+    power = "" if settings.power is None else f" {settings.power:g} %"
     layers = [
-        Layer(name, "drawing", styles[name], tuple(uses), clip, ink)
+        Layer(name + power, "drawing", styles[name], tuple(uses), clip, ink)
         for name, uses in items.items()
         if uses
     ]

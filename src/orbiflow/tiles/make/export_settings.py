@@ -120,6 +120,9 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
     dxf: Annotated[DxfVersion, OnlyWith(format=("dxf", None))] = "r2010"
     """Version of DXF; r12 is read by old machines."""
 
+    power: Annotated[float | None, Range(0, 100), Unit("%")] = None
+    """Power of what is engraved and scored, which the names of its layers say."""
+
     offset: Annotated[
         SignedLength,
         OnlyWith(cut="pieces", because="an edge that two tiles share is drawn only once"),

@@ -1,6 +1,7 @@
 /** Forms from the JSON Schema of an operation's settings. */
 
 import { h, listed, unique } from "./dom.js";
+import { millimetres, shown, unit as lengthUnit } from "./lengths.js";
 import { capital } from "./words.js";
 
 /** The kinds of values that a schema allows, `null` apart. */
@@ -38,7 +39,8 @@ function control(name, schema, words, changed) {
   const described = meaning ? `${id}-about` : undefined;
   const about = meaning && h("p", { class: "soft small", id: described }, meaning);
   const shared = { id, name, "aria-describedby": described, onchange: changed };
-  const unit = schema["x-unit"];
+  const isLength = schema["x-unit"] === "mm";
+  const unit = isLength ? lengthUnit() : schema["x-unit"];
   const title = words?.title ?? label(name);
   const yes = found.some(({ type }) => type === "boolean");
   const some = words?.some &&
@@ -89,13 +91,21 @@ function control(name, schema, words, changed) {
       list: some?.id,
       inputmode: bare ? "decimal" : undefined,
     });
+    let before = ["", null]; // what it shows as long as nobody changes it, and the value
     show = (value) => {
-      field.value = text(value, unit);
+      const isNumber = isLength && typeof value === "number";
+      const sides = isLength && Array.isArray(value) ? value.map(shown) : value;
+      field.value = text(isNumber ? shown(value) : sides, unit);
       field.placeholder = field.value || schema["x-default"] || "";
+      before = [field.value, value];
     };
-    get = () => (["", text(standard, unit)].includes(box.value.trim())
-      ? standard
-      : read(box.value.trim(), found));
+    get = () => {
+      const given = box.value.trim();
+      if (given === "") return standard;
+      if (given === before[0]) return before[1];
+      const value = read(given, found);
+      return isLength && typeof value === "number" ? millimetres(value) : value;
+    };
   }
   const value = () => (get() === standard ? undefined : get());
   const usual = (next) => {
@@ -118,7 +128,7 @@ function control(name, schema, words, changed) {
  * `sets`: whether its choice begins all others anew, but those in `keeps`.
  * `hidden`: settings that the page sets itself. `start`: values to begin with.
  * `.values()`: what differs from the defaults and applies. `.refuse(name, text)`: show what is wrong beside the
- * setting that the text begins with; false if it names none.
+ * setting that the text begins with; false if it names none. `.take(names, values)`: set some anew.
  */
 export function form(
   schema,
@@ -172,7 +182,7 @@ export function form(
       controls.get(name).root.hidden = !applies || never;
     }
     for (const box of made.querySelectorAll("details, .group")) {
-      box.hidden = !box.querySelector(".field:not([hidden])");
+      box.toggleAttribute("hidden", !box.querySelector(".field:not([hidden])"));
     }
   }
   const now = (name) => controls.get(name).now();
@@ -227,5 +237,14 @@ export function form(
     fit();
   }
   const known = (name) => (controls.has(name) ? now(name) : undefined);
-  return Object.assign(made, { now: known, values, refuse });
+  function take(others, chosen) {
+    for (const name of others.filter((own) => controls.has(own))) {
+      const { show, reset } = controls.get(name);
+      if (name in chosen) show(chosen[name]);
+      else reset();
+    }
+    fit();
+    changed(values());
+  }
+  return Object.assign(made, { now: known, values, refuse, take });
 }

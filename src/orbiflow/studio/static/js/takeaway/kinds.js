@@ -267,15 +267,6 @@ export const EVERY_KIND = {
   film: { title: "Film", image: "film", words: {} },
 };
 
-const UNITS = { mm: 1, cm: 10, m: 1000, in: 25.4, pt: 25.4 / 72 };
-
-/** A length in mm from a number or a text such as "4 cm"; undefined if it is none. */
-export function lengthIn(value) {
-  const found = /^\s*([\d.]+)\s*(mm|cm|m|in|pt)?\s*$/.exec(String(value ?? ""));
-  const length = found ? Number(found[1]) * UNITS[found[2] ?? "mm"] : NaN;
-  return length > 0 ? length : undefined;
-}
-
 const OWN = "My own colours";
 
 /**

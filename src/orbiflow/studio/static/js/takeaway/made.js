@@ -3,7 +3,8 @@
 import { button, h, icon, put, row, section, soft, trying } from "../dom.js";
 import { LATE } from "../steering.js";
 import { ago, alive, bytes, capital, sentence } from "../words.js";
-import { EVERY_KIND as KINDS, lengthIn } from "./kinds.js";
+import { lengthIn, measure } from "../lengths.js";
+import { EVERY_KIND as KINDS } from "./kinds.js";
 
 const SEEN = /\.(png|gif|svg)$/;
 
@@ -93,7 +94,7 @@ function about({ operation, result }) {
   return [
     title,
     ...options,
-    length && `tiles of ${Number(length.toFixed(1))} mm`,
+    length && `tiles of ${measure(length)}`,
     chosen.area,
     pixels,
     solid,

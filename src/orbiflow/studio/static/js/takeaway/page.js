@@ -8,9 +8,11 @@ import { keeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf, Pictures, skinsOf } from "../skin.js";
 import { figuresOf, paintCard } from "../../../../drawing/js/tiling.js";
 import { sentence } from "../words.js";
-import { COLOURLESS, colours, KINDS, lengthIn } from "./kinds.js";
+import { lengthIn, showIn, unit } from "../lengths.js";
+import { COLOURLESS, colours, KINDS } from "./kinds.js";
 import { Making, picture } from "./made.js";
 import { Preview } from "./preview.js";
+import { profiles } from "./profiles.js";
 import { share } from "./share.js";
 import { THINGS } from "./things.js";
 import { trueSize } from "./truesize.js";
@@ -194,7 +196,7 @@ class TakeawayPage {
 
   /** Show the settings of another thing. */
   async choose(thing) {
-    const { first, fixed, makes: kind, start } = THINGS[thing];
+    const { first, fixed, machine, makes: kind, start } = THINGS[thing];
     this.thing = this.kept.thing = thing;
     this.kind = kind;
     if (!this.schemas.has(kind)) {
@@ -231,7 +233,12 @@ class TakeawayPage {
     put(
       this.wishes,
       this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)),
+      machine && profiles(this.api, this.form),
       this.form,
+      choice("Lengths in", [["mm", "mm"], ["in", "inches"]], unit(), (/** @type {any} */ own) => {
+        showIn(own);
+        trying(() => this.choose(thing));
+      }),
     );
     this.making.task = null;
     this.changed();

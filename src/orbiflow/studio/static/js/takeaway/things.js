@@ -12,6 +12,7 @@ import { KINDS } from "./kinds.js";
  * @property {string[]} [fixed] settings that are the thing itself
  * @property {Record<string, object>} [words] what its fields are called here
  * @property {Record<string, any>} [shown] what its preview has instead
+ * @property {boolean} [machine] whether machines are kept with their settings
  */
 
 /** @returns {Thing} */
@@ -35,16 +36,23 @@ const solid = (title, image, kind, first) => ({
 
 /** @type {Record<string, Thing>} */
 export const THINGS = {
-  laser: printed("Pieces for a laser", "laser", { purpose: "laser", cut: "pieces" }, [
-    "tile_size",
-    "kerf",
-    "area",
-  ]),
-  jigsaw: printed("Jigsaw", "jigsaw", { purpose: "laser", cut: "jigsaw" }, [
-    "area",
-    "tile_size",
-    "tray",
-  ]),
+  laser: {
+    ...printed("Pieces for a laser", "laser", { purpose: "laser", cut: "pieces" }, [
+      "tile_size",
+      "kerf",
+      "area",
+    ]),
+    words: { area: { title: "How large is your sheet?", about: "Such as 300x200mm or A4." } },
+    machine: true,
+  },
+  jigsaw: {
+    ...printed("Jigsaw", "jigsaw", { purpose: "laser", cut: "jigsaw" }, [
+      "area",
+      "tile_size",
+      "tray",
+    ]),
+    machine: true,
+  },
   poster: {
     ...printed("Poster", "poster", { purpose: "print", area: "A2", bed: "A4" }, [
       "area",
@@ -92,6 +100,6 @@ export const THINGS = {
   film: { ...KINDS.animate, makes: "animate", title: "Film", first: ["kind", "seconds", "format"] },
   share: printed("Page to share", "page", { purpose: "share" }, ["palette", "colour", "outline"]),
   art: { ...KINDS.art, makes: "art" },
-  export: { ...KINDS.export, makes: "export" },
+  export: { ...KINDS.export, makes: "export", machine: true },
   solid: { ...KINDS.solid, makes: "solid" },
 };

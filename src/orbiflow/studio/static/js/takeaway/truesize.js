@@ -1,6 +1,7 @@
 /** The tile as large as it will be, on a screen that was measured with a bank card. */
 
 import { button, h, put, row, slider } from "../dom.js";
+import { measure as inUnit } from "../lengths.js";
 import { figuresOf, measured, pathOf } from "../../../../drawing/js/tiling.js";
 
 const CARD = [85.6, 53.98]; // mm: ISO/IEC 7810 ID-1
@@ -179,17 +180,16 @@ export function trueSize(tile) {
     context.lineWidth = 1 / unit;
     context.stroke(pathOf(corners));
     if (neck) tellNeck(context, context.getTransform(), ratio, width);
-    const [length, across, lying, standing] = [long, short, ...upright(polygon).slice(2)].map((
-      side,
-    ) => ((side * size) / long).toFixed(1));
+    const sides = (...lengths) => inUnit(...lengths.map((side) => (side * size) / long));
+    const [rectangle, lying] = [sides(long, short), sides(...upright(polygon).slice(2))];
     const lie = figures.length > 1 ? "they lie" : "it lies";
     const around = figures.length > 1 ? "the larger one" : "it";
     canvas.setAttribute(
       "aria-label",
-      `The tile in its true size, ${lying} by ${standing} mm as ${lie}, in a rectangle of ${length} by ${across} mm`,
+      `The tile in its true size, ${lying} as ${lie}, in a rectangle of ${rectangle}`,
     );
     said.textContent =
-      `${lying} × ${standing} mm as ${lie}; the smallest rectangle around ${around} has ${length} × ${across} mm. ${
+      `${lying} as ${lie}; the smallest rectangle around ${around} has ${rectangle}. ${
         localStorage.getItem(KEY)
           ? "Your screen is measured."
           : "Screens differ: measure yours once."
@@ -198,8 +198,9 @@ export function trueSize(tile) {
 
   function tellNeck(context, at, ratio, wide) {
     const [[a, b], [c, d]] = neck;
-    const words = `${((Math.hypot(c - a, d - b) * size) / long).toFixed(1)} mm`;
-    const narrow = parseFloat(words) < least;
+    const neckWidth = (Math.hypot(c - a, d - b) * size) / long;
+    const words = inUnit(neckWidth);
+    const narrow = neckWidth < least;
     const { x, y } = at.transformPoint({ x: (a + c) / 2, y: (b + d) / 2 });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     markNeck(

@@ -1,0 +1,39 @@
+"""Routes of machines with their materials, which are kept for all projects and for the command line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+
+from orbiflow.studio.routes import Routes, Studio, body_object
+
+routes = Routes()
+
+
+@routes("GET", "/profiles")
+def profiles(here: Studio) -> dict[str, Any]:
+    """Return the names of the `settings` that a profile may hold, and the profiles that are `kept`."""
+    from orbiflow.tiles import OF_MACHINE, Profiles
+
+    del here
+    return {"settings": OF_MACHINE, "kept": Profiles().read()}
+
+
+@routes("PUT", "/profiles")
+async def keep(request: Request, here: Studio, name: str = "") -> dict[str, Any]:
+    """Keep settings under a name."""
+    from orbiflow.tiles import Profiles
+
+    await run_in_threadpool(Profiles().keep, name, await body_object(request))
+    return profiles(here)
+
+
+@routes("DELETE", "/profiles")
+def forget(here: Studio, name: str = "") -> dict[str, Any]:
+    """Remove a profile."""
+    from orbiflow.tiles import Profiles
+
+    Profiles().forget(name)
+    return profiles(here)
