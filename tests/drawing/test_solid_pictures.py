@@ -4,6 +4,7 @@ import io
 import zipfile
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from orbiflow.drawing import (
 )
 from orbiflow.drawing.solid_pictures import crease_normals
 from refusals import refused
-from solids_read import read_3mf, read_stl
+from solids_read import CORE, read_3mf, read_stl
 
 FROM_THE_TOP = SolidView((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 
@@ -161,7 +162,7 @@ def test_copies_of_a_part_repeat_no_mesh(tmp_path: Path) -> None:
     content = write_3mf(PARTS, places={"block": [AS_IT_IS, HALF_TURN]})
     text = model(content)
     assert text.count("<mesh>") == 2
-    assert text.count('<item objectid="1" transform=') == 2
+    assert text.count(" transform=") == text.count('<component objectid="1"/>') == 2
     assert text.count('<item objectid="2"/>') == 1
     (tmp_path / "a.3mf").write_bytes(content)
     first, second, ball = read_triangles(tmp_path / "a.3mf")
@@ -170,3 +171,26 @@ def test_copies_of_a_part_repeat_no_mesh(tmp_path: Path) -> None:
     assert ball.min() == pytest.approx(-1)
     with refused("(3, 4)"):
         write_3mf(PARTS, places={"block": [-AS_IT_IS]})
+
+
+def test_colours_are_filaments_for_slicers() -> None:
+    colours = {"block": "#c0ffee", "ball": "#102030"}
+    content = write_3mf(PARTS, colours=colours, places={"block": [AS_IT_IS, HALF_TURN]})
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        prusa, bambu = (
+            ElementTree.fromstring(archive.read(f"Metadata/{name}.config"))
+            for name in ("Slic3r_PE_model", "model_settings")
+        )
+    built = [
+        own.get("objectid") for own in ElementTree.fromstring(model(content)).iter(f"{CORE}item")
+    ]
+    extruders = {
+        own.get("id"): [
+            row.get("value") for row in own.iter("metadata") if row.get("key") == "extruder"
+        ]
+        for own in (*prusa.iter("object"), *bambu.iter("object"))
+    }
+    # by the number of the mesh, and by that of each copy
+    assert extruders["1"] == ["1", "1"]
+    assert extruders["2"] == ["2", "2"]
+    assert [extruders[number][0] for number in built if number] == ["1", "1", "2"]

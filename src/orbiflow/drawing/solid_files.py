@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping, Sequence
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -47,6 +48,9 @@ def write_3mf(
 ) -> bytes:
     """Return a 3MF file with each part as an object of its own, in millimetres.
 
+    Each colour is a filament of its own, in their order, for PrusaSlicer, Bambu Studio and OrcaSlicer,
+    which read no colours but files of their own beside the model.
+
     Args:
         parts: Closed bodies by name.
         title: What the file says about itself.
@@ -60,24 +64,24 @@ def write_3mf(
     mirror the part.
     """
     meshes = {name: body.to_mesh64() for name, body in parts.items()}
-    texts = {name: list(map(_transform, moves)) for name, moves in (places or {}).items()}
-    together = {part for members in (groups or {}).values() for part in members[1:]}
-    numbers: dict[Any, int] = {name: number for number, name in enumerate(meshes, 1)}
-    numbers |= {(name, "all"): len(meshes) + 1 + k for k, name in enumerate(groups or {}, 1)}
+    colours = colours or {}
+    order = list(dict.fromkeys(colours.values()))
     values = {
         "meshes": meshes,
         "title": title,
-        "colours": colours or {},
-        "places": texts,
-        "groups": groups or {},
-        "numbers": numbers,
-        "built": [name for name in meshes if name not in together],
+        "colours": colours,
+        "filaments": {name: order.index(colour) + 1 for name, colour in colours.items()},
+        "numbers": {name: number for number, name in enumerate(meshes, 1)},
+        "items": _items(list(meshes), places or {}, groups or {}),
     }
     files = {
         "[Content_Types].xml": "solid_content_types.xml",
         "_rels/.rels": "solid_relationships.xml",
         "3D/3dmodel.model": "solid_model.xml",
     }
+    if colours:
+        files["Metadata/Slic3r_PE_model.config"] = "solid_filaments_prusa.xml"
+        files["Metadata/model_settings.config"] = "solid_filaments_bambu.xml"
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, template in files.items():
@@ -85,6 +89,33 @@ def write_3mf(
             text = rendered("orbiflow.drawing", template, **values)
             archive.writestr(entry, text, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
+
+
+class _Item(NamedTuple):
+    """What is printed in one place: the number of its object, which may be of several parts."""
+
+    number: int
+    name: str
+    parts: Sequence[str]
+    place: str = ""
+
+
+def _items(
+    names: list[str], places: Mapping[str, Sequence[Array]], groups: Mapping[str, Sequence[str]]
+) -> list[_Item]:
+    """Return what is printed: each copy is an object, or all but the first would lose their colour."""
+    together = {part for parts in groups.values() for part in parts[1:]}
+    free = count(len(names) + 2)  # after the parts and the materials
+    items: list[_Item] = []
+    for number, name in enumerate(names, 1):
+        if name in groups:
+            items.append(_Item(next(free), name, groups[name]))
+        elif name in places:
+            copies = map(_transform, places[name])
+            items += [_Item(next(free), name, [name], place) for place in copies]
+        elif name not in together:
+            items.append(_Item(number, name, [name]))
+    return items
 
 
 def _transform(place: Array) -> str:
