@@ -120,6 +120,16 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
     dxf: Annotated[DxfVersion, OnlyWith(format=("dxf", None))] = "r2010"
     """Version of DXF; r12 is read by old machines."""
 
+    tabs: Annotated[
+        int | None,
+        Range(1, 100),
+        OnlyWith(cut=("skeleton", "pieces"), because="tabs hold pieces in their sheet"),
+    ] = None
+    """Leave so many gaps in the outline of each piece, which hold it in the sheet."""
+
+    tab_width: Annotated[Length, OnlyWith(cut=("skeleton", "pieces"))] = 0.5
+    """Width of such a gap, as it is left."""
+
     power: Annotated[float | None, Range(0, 100), Unit("%")] = None
     """Power of what is engraved and scored, which the names of its layers say."""
 

@@ -35,7 +35,7 @@ def jigsaw_scenes(layout: Layout) -> list[Scene]:
     """
     area = shapely.box(*layout.page.box)
     flat = layout.fine / 2
-    edges = {shapely.LineString(c.flattened(flat)): c for c, _ in shared_edges(layout)}
+    edges = {shapely.LineString(c.flattened(flat)): c for c, *_ in shared_edges(layout)}
     lines = [area.exterior, *edges]
     tiles = [shapely.Polygon(curve.flattened(flat)) for curve in layout.outline.closed]
     widest = min(shapely.maximum_inscribed_circle(tile).length for tile in tiles)

@@ -16,6 +16,7 @@ from orbiflow.tiles.make.layout import BLUE, Layout, line_style
 from orbiflow.tiles.make.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.make.offsets import LEAST_GAP, closed_fit, cut_ring
 from orbiflow.tiles.make.sheets import counts_by_sheet
+from orbiflow.tiles.make.tabs import with_tabs
 from orbiflow.tiles.page import (
     USUAL_WIDTH,
     Box,
@@ -88,7 +89,11 @@ def _scene(layout: Layout, kind: int, placed: Uses, curve: Curve, line: Array, g
         PlacedTile(aspect, placed.linear[aspect], offset, prototile=kind)
         for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
     ]
-    layers = [Layer("cut", "cut", line_style(layout), _moved(curve, pieces))]
+    settings, lines = layout.settings, (curve,)
+    if settings.tabs is not None:  # the beam takes half of the kerf from both sides of each
+        lines = with_tabs(curve, settings.tabs, settings.tab_width + settings.kerf)
+    cuts = tuple(curve for line in lines for curve in _moved(line, pieces))
+    layers = [Layer("cut", "cut", line_style(layout), cuts)]
     if layout.settings.purpose == "stickers":
         layers = [*_coloured(layout, pieces), *layers]
     elif layout.settings.offset > 0 and not layout.settings.coloured:

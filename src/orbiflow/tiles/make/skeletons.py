@@ -14,25 +14,30 @@ from scipy.sparse.csgraph import connected_components
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make.layout import Layout, layout, line_style
 from orbiflow.tiles.make.sheets import counts_by_sheet
+from orbiflow.tiles.make.tabs import edges_with_tabs
 from orbiflow.tiles.page import Curve, Layer, Scene, clipped, rectangle
 from orbiflow.tiles.tilings import skeleton
 
 
-def shared_edges(layout: Layout) -> Iterator[tuple[Curve, tuple[int, int]]]:
-    """Yield the curve of each edge on the page once, and the numbers of the vertices at its ends."""
-    edges, copies = layout.outline.edges, layout.page.copies
+def shared_edges(layout: Layout) -> Iterator[tuple[Curve, tuple[int, int], list[Curve]]]:
+    """Yield each edge on the page once: its curve, the numbers of its ends, and what of it is cut."""
+    edges, copies, settings = layout.outline.edges, layout.page.copies, layout.settings
     if edges is None:
         raise OrbiflowError(
             "this tile's edges do not match its neighbours', so there are no shared edges to cut "
             "once; choose cut none or cut pieces"
         )
+    cut = [(curve,) for curve in layout.outline.curves]
+    if settings.tabs is not None:
+        cut = edges_with_tabs(layout.outline, settings.tabs, settings.tab_width)
     lines = skeleton(edges, copies)
     linear, translations = copies.group.linear_parts, copies.translations
     for copy, edge, (start, end) in zip(
         lines.copy.tolist(), lines.edge.tolist(), lines.ends.tolist(), strict=True
     ):
-        curve = layout.outline.curves[edge]
-        yield curve.moved(linear[copies.cosets[copy]], translations[copy]), (start, end)
+        place = linear[copies.cosets[copy]], translations[copy]
+        parts = [part.moved(*place) for part in cut[edge]]
+        yield layout.outline.curves[edge].moved(*place), (start, end), parts
 
 
 def skeleton_scenes(placed: Layout) -> list[Scene]:
@@ -51,12 +56,10 @@ def _skeleton_scene(placed: Layout) -> Scene:
     arcs: list[Curve] = []
     ends: list[tuple[int, int]] = []
     free = -1
-    for curve, vertices in shared_edges(placed):
-        if not settings.clip:
-            arcs.append(curve)
-            ends.append(vertices)
-            continue
-        for part in clipped(curve, box, placed.fine, filled=False):
+    for curve, vertices, parts in shared_edges(placed):
+        if settings.clip:
+            parts = [bit for part in parts for bit in clipped(part, box, placed.fine, filled=False)]
+        for part in parts:
             # a cut end is a vertex of its own
             start, end = vertices
             if not np.allclose(part.start, curve.start, 0, 1e-9):
