@@ -33,12 +33,28 @@ WRAPPED = ("mug", "phone")  # pages that things are wrapped in, and so without a
 PRINTER_EDGE = 5.0  # width in mm of the page's edge that printers at home leave empty
 
 Purpose = Literal[
-    "laser", "print", "paper", "web", "plotter", "template", "colouring", "stickers", "share"
+    "laser",
+    "print",
+    "paper",
+    "web",
+    "plotter",
+    "template",
+    "lesson",
+    "colouring",
+    "stickers",
+    "share",
 ]
 """What an export is for, by which many settings go."""
 
 COLOURED = ("print", "paper", "web", "stickers", "share")  # what shows drawings in their colours
-PRINTED = ("print", "paper", "template", "colouring", "stickers")  # what is a PDF unless told
+PRINTED = (
+    "print",
+    "paper",
+    "template",
+    "lesson",
+    "colouring",
+    "stickers",
+)  # what is a PDF unless told
 
 
 class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and file"):
@@ -61,10 +77,11 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
     margin: LengthOrZero = 0.0
     """Width of the page's edge that stays empty; 5 mm for pieces that are printed."""
 
-    cut: Literal["none", "skeleton", "pieces", "jigsaw", "template"] = "none"
+    cut: Literal["none", "skeleton", "pieces", "jigsaw", "template", "lesson"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
     apart; with jigsaw, a rectangle cut into tiles, without slivers at its border; with template,
-    one tile to draw on, as large as the page allows."""
+    one tile to draw on, as large as the page allows; with lesson, a page that shows how the tile comes
+    of a shape with straight sides."""
 
     rotate: Annotated[
         float,
@@ -277,6 +294,7 @@ PURPOSES: Mapping[str, Mapping[str, Any]] = {
     "web": {"clip": True},
     "share": {"clip": True},
     "template": {**_SHEET, "cut": "template"},
+    "lesson": {**_SHEET, "cut": "lesson"},
     "stickers": {
         "cut": "pieces",
         "area": PAGES["a4"],

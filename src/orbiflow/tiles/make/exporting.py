@@ -16,6 +16,7 @@ from orbiflow.tiles.make.drawings import drawn_on, with_drawing
 from orbiflow.tiles.make.export_settings import ExportSettings
 from orbiflow.tiles.make.jigsaws import jigsaw_scenes
 from orbiflow.tiles.make.layout import Layout, layout, tiling_scene
+from orbiflow.tiles.make.lessons import lesson_scene
 from orbiflow.tiles.make.made import Made
 from orbiflow.tiles.make.offsets import place_on
 from orbiflow.tiles.make.paper import paper_sheets
@@ -56,6 +57,7 @@ MAKERS = {
     "pieces": Maker(pieces_scenes, "pieces", EVERY),
     "jigsaw": Maker(jigsaw_scenes, "pieces of a jigsaw", FIRST),
     "template": Maker(lambda layout: [template_scene(layout)], "template"),
+    "lesson": Maker(lambda layout: [lesson_scene(layout)], "lesson"),
 }
 """The kinds of cut: to add one, write its scenes in a file here, name it here and in `cut`."""
 
@@ -149,7 +151,6 @@ def _described(
         "one unit is one millimetre."
     )
     facts = {
-        **scene.facts,
         "class": tile.isohedral_class or None,
         "group": tile.group.name or None,
         "rank": source.rank,
@@ -160,6 +161,7 @@ def _described(
         "clearance": settings.clearance,
         "offset": settings.offset,
         "tolerance": settings.deviation,
+        **scene.facts,
     }
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
 

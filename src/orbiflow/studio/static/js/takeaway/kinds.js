@@ -42,7 +42,7 @@ const PLAIN = {
 };
 
 /** What shows no colours of tiles. */
-export const COLOURLESS = ["laser", "plotter", "template", "colouring"];
+export const COLOURLESS = ["laser", "plotter", "template", "lesson", "colouring"];
 
 const SHARED = { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" };
 
@@ -79,6 +79,7 @@ export const KINDS = {
           share: "A page to share, to play with",
           plotter: "Pen plotter",
           template: "Template to trace by hand",
+          lesson: "Lesson with scissors",
           colouring: "Colouring page",
           stickers: "Stickers",
         },
@@ -121,6 +122,7 @@ export const KINDS = {
           pieces: "tiles apart",
           jigsaw: "a jigsaw",
           template: "one tile, by hand",
+          lesson: "how it comes of a plain shape",
         },
       },
     }),
