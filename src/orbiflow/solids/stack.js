@@ -1,14 +1,8 @@
-// A stack of solids, to be turned and taken apart: WebGL 2, nothing from another host.
+// A stack of solids, to be turned and taken apart: WebGL 2, nothing from another host. It comes after turned.js in one
+// module.
 
 const EYE = 5; // distance of the eye, in radii of what is seen
 const GLIDE = 1400, ROUND = 24000; // milliseconds of opening a stack, and of a turn
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-
-function unpack(text, Kind) {
-  const raw = atob(text), bytes = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-  return new Kind(bytes.buffer);
-}
 
 const VERTEX = `#version 300 es
   precision highp float;
@@ -48,7 +42,7 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
   const calm = matchMedia("(prefers-reduced-motion: reduce)");
   const view = { ...data.start, zoom: 1, apart: 0, shown: "stack", turning: false };
   let drawn = prepare();
-  let asked = false, glide = null, before = 0, reach = goal();
+  let glide = null, before = 0, reach = goal();
 
   function prepare() {
     const made = gl.createProgram();
@@ -116,13 +110,8 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
       gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
     }
   }
-  function redraw() {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(paint);
-  }
+  const redraw = atNextFrame(paint);
   function paint(now) {
-    asked = false;
     const passed = before ? Math.min(now - before, 500) : 0;
     if (glide) {
       glide.done = Math.min(1, glide.done + passed / GLIDE);
@@ -132,9 +121,7 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
       changed(view);
     }
     if (view.turning) view.yaw += 2 * Math.PI * passed / ROUND;
-    const scale = window.devicePixelRatio || 1;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map(side => Math.max(1, Math.round(side * scale)));
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    sharpened(canvas);
     reach = goal();
     draw();
     const moves = glide || view.turning;
@@ -142,12 +129,6 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
     if (moves) redraw();
   }
 
-  function turn(dx, dy) {
-    view.yaw -= dx;
-    view.pitch = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, view.pitch + dy));
-    redraw();
-  }
-  function zoom(factor) { view.zoom = Math.max(0.4, Math.min(8, view.zoom * factor)); redraw(); }
   function moveApart(share) {
     view.shown = "stack";
     glide = null;
@@ -168,28 +149,8 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
     moveApart(0);
   }
 
-  const held = new Map();
-  const spread = () => { const [a, b] = [...held.values()]; return Math.hypot(a.x - b.x, a.y - b.y); };
-  canvas.addEventListener("pointerdown", e => { canvas.setPointerCapture(e.pointerId); held.set(e.pointerId, { x: e.clientX, y: e.clientY }); });
-  canvas.addEventListener("pointermove", e => {
-    const last = held.get(e.pointerId);
-    if (!last) return;
-    const before = held.size === 2 ? spread() : 0, per = 3 / canvas.clientHeight / Math.sqrt(view.zoom);
-    if (held.size === 1) turn((e.clientX - last.x) * per, (e.clientY - last.y) * per);
-    held.set(e.pointerId, { x: e.clientX, y: e.clientY });
-    if (before > 0) zoom(spread() / before);
-  });
-  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, e => held.delete(e.pointerId));
-  canvas.addEventListener("wheel", e => { e.preventDefault(); zoom(Math.exp(-0.0015 * e.deltaY)); }, { passive: false });
-  canvas.addEventListener("keydown", e => {
-    const step = 0.1, moves = {
-      ArrowLeft: () => turn(-step, 0), ArrowRight: () => turn(step, 0), ArrowUp: () => turn(0, -step), ArrowDown: () => turn(0, step),
-      "+": () => zoom(1.15), "=": () => zoom(1.15), "-": () => zoom(1 / 1.15),
-      "[": () => moveApart(view.apart - 0.1), "]": () => moveApart(view.apart + 0.1), 0: startAgain,
-    };
-    if (!moves[e.key] || e.ctrlKey || e.metaKey) return;
-    e.preventDefault();
-    moves[e.key]();
+  turnedByHand(canvas, view, redraw, {
+    keys: { "[": () => moveApart(view.apart - 0.1), "]": () => moveApart(view.apart + 0.1), 0: startAgain },
   });
   canvas.addEventListener("webglcontextlost", e => e.preventDefault());
   canvas.addEventListener("webglcontextrestored", () => { drawn = prepare(); redraw(); });

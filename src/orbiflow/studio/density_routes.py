@@ -13,7 +13,7 @@ from typing import Any
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import JSONResponse, Response
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.studio.density_tasks import (
@@ -27,7 +27,7 @@ from orbiflow.studio.density_tasks import (
     map_file,
 )
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.routes import Routes, Studio, body_object, save_body, whole
+from orbiflow.studio.routes import Routes, Studio, body_object, save_body, turned_script, whole
 from orbiflow.studio.words import NAMES, plain_name
 
 EXAMPLES = {
@@ -48,9 +48,9 @@ routes = Routes()
 
 
 @routes("GET", "/density/surface.js")
-async def script() -> FileResponse:
+def script() -> Response:
     """Serve the script that turns surfaces, here and in the page that a plot writes."""
-    return FileResponse(SCRIPT, media_type="text/javascript")
+    return turned_script(SCRIPT)
 
 
 @routes("GET", "/projects/{project}/density")

@@ -110,6 +110,16 @@ class Studio:
         return self.store.task(task)
 
 
+TURNED = Path(__file__).parents[1] / "drawing" / "js" / "turned.js"
+"""The script that comes before those of what is turned by hand."""
+
+
+def turned_script(script: Path) -> Response:
+    """Answer with a script of what is turned by hand, here and in pages of its own, as one module."""
+    text = "\n".join(file.read_text("utf-8") for file in (TURNED, script))
+    return Response(text, media_type="text/javascript")
+
+
 def whole(file: Path, kind: str = "application/json", **headers: str) -> Response:
     """Answer with a file of a project as it is now: it may be replaced or deleted at any moment."""
     try:

@@ -11,11 +11,11 @@ from typing import Any
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse
+from starlette.responses import FileResponse, Response
 
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.project_routes import SANDBOX, stage_of
-from orbiflow.studio.routes import Routes, Studio, save_body
+from orbiflow.studio.routes import Routes, Studio, save_body, turned_script
 from orbiflow.studio.solid_tasks import (
     ENDINGS,
     FIGURE,
@@ -37,9 +37,9 @@ routes = Routes()
 
 
 @routes("GET", "/solids/stack.js")
-async def script() -> FileResponse:
+def script() -> Response:
     """Serve the script that turns stacks, here and in the page that a search writes."""
-    return FileResponse(SCRIPT, media_type="text/javascript")
+    return turned_script(SCRIPT)
 
 
 @routes("GET", "/projects/{project}/mesh")

@@ -1,15 +1,8 @@
 // A surface coloured by a density, to be turned: WebGL 2 draws it, or a plain canvas if there is none.
+// It comes after turned.js in one module.
 
 const PULL = 0.006; // how far lines and dots are pulled forward
 const PALENESS = 0.85; // how grey is what lies outside a region
-
-/** The numbers in a base64 text. */
-export function unpack(text, Kind) {
-  const raw = atob(text), bytes = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-  return new Kind(bytes.buffer);
-}
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 /**
  * Draw a surface on a canvas, to be turned by mouse, touch and keys; labels are put beside the canvas.
@@ -289,48 +282,15 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
 
   const gl = plain ? null : canvas.getContext("webgl2");
   const draw = gl ? webglDrawer(gl) : canvasDrawer(canvas.getContext("2d"));
-  let asked = false;
-  function redraw() {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(paint);
-  }
+  const redraw = atNextFrame(paint);
   function paint() {
-    asked = false;
-    const scale = window.devicePixelRatio || 1;
-    const width = Math.max(1, Math.round(canvas.clientWidth * scale)), height = Math.max(1, Math.round(canvas.clientHeight * scale));
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    const [width, height, scale] = sharpened(canvas);
     draw(width, height, scale);
     placeLabels(width, height);
   }
-  function turn(dx, dy) {
-    view.yaw -= dx;
-    view.pitch = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, view.pitch + dy));
-    redraw();
-  }
-  function zoom(factor) { view.zoom = Math.max(0.4, Math.min(8, view.zoom * factor)); redraw(); }
-
-  const held = new Map();
-  const spread = () => { const [a, b] = [...held.values()]; return Math.hypot(a.x - b.x, a.y - b.y); };
-  canvas.addEventListener("pointerdown", e => { canvas.setPointerCapture(e.pointerId); held.set(e.pointerId, { x: e.clientX, y: e.clientY }); });
-  canvas.addEventListener("pointermove", e => {
-    const last = held.get(e.pointerId);
-    if (!last) return;
-    const before = held.size === 2 ? spread() : 0, per = 3 / canvas.clientHeight / Math.sqrt(view.zoom);
-    if (held.size === 1) turn((e.clientX - last.x) * per, (e.clientY - last.y) * per);
-    held.set(e.pointerId, { x: e.clientX, y: e.clientY });
-    if (before > 0) zoom(spread() / before);
-  });
-  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, e => held.delete(e.pointerId));
-  canvas.addEventListener("wheel", e => { if (scrolls && !e.ctrlKey) return; e.preventDefault(); zoom(Math.exp(-0.0015 * e.deltaY)); }, { passive: false });
-  canvas.addEventListener("keydown", e => {
-    const step = 0.1, moves = {
-      ArrowLeft: () => turn(-step, 0), ArrowRight: () => turn(step, 0), ArrowUp: () => turn(0, -step), ArrowDown: () => turn(0, step),
-      "+": () => zoom(1.15), "=": () => zoom(1.15), "-": () => zoom(1 / 1.15), 0: () => { Object.assign(view, data.start, { zoom: 1 }); changed(view); redraw(); },
-    };
-    if (!moves[e.key] || e.ctrlKey || e.metaKey) return;
-    e.preventDefault();
-    moves[e.key]();
+  turnedByHand(canvas, view, redraw, {
+    scrolls,
+    keys: { 0: () => { Object.assign(view, data.start, { zoom: 1 }); changed(view); redraw(); } },
   });
   // at once: a frame later the old picture would have been stretched to the new size
   const observer = new ResizeObserver(paint);
