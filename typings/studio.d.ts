@@ -115,6 +115,8 @@ interface Task {
   what: string;
   error: string | null;
   place: number;
+  /** Seconds that such a task took here before. */
+  usual?: number;
   result: any;
 }
 
@@ -170,6 +172,8 @@ interface Project extends Picture {
   head?: number;
   second: Picture | null;
   tasks: Task[];
+  /** Seconds that tasks took since the studio was started, by what they were. */
+  took?: Record<string, number>;
   tiles: Card[];
   view: Views | null;
   changed_by?: string;

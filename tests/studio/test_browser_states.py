@@ -1,5 +1,7 @@
 """States of pages that pass quickly, and failures, in a real browser."""
 
+from typing import Any
+
 import pytest
 
 from studio_checks import serious_issues, untidy_parts
@@ -26,3 +28,17 @@ def test_a_thousand_projects_are_shown_when_they_are_asked_for(page, studio, sea
     assert page.locator(".project").count() == 10
     page.get_by_role("button", name="Show all 1000").click()
     page.wait_for_selector(".project >> nth=999")
+
+
+def test_what_is_left_is_told_by_the_pace_that_was_measured(page: Any) -> None:
+    page.goto("/")
+    told = page.evaluate("""async () => {
+        const { timeLeft } = await import("/js/waiting.js");
+        let now = 0;
+        performance.now = () => now;
+        const task = (id, share, usual) => ({ id, share, usual, state: "running" });
+        const first = [timeLeft(task(1, 0)), timeLeft(task(2, 0.25, 40))];
+        now = 10_000;
+        return [...first, timeLeft(task(1, 0.25)), timeLeft({ id: 1, state: "paused" })];
+    }""")
+    assert told == ["", "about 30 s more", "about 30 s more", ""]

@@ -64,6 +64,9 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.listeners: set[Callable[[str], object]] = set()
+        self.took: dict[
+            str, float
+        ] = {}  # seconds of tasks since the server began, by what they were
         self._lock = threading.RLock()
         folder.mkdir(parents=True, exist_ok=True)
         self._data = sqlite3.connect(

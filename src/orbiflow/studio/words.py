@@ -94,6 +94,16 @@ def plain_letters(name: str, otherwise: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", letters)[:40].strip("-") or otherwise
 
 
+def what_task(store: Store, task: dict[str, Any]) -> str:
+    """Return what a task does, for those that take about as long: "search normal of two"."""
+    settings = task["settings"]
+    chosen = (settings.get(name) for name in ("effort", "purpose", "kind", "world"))
+    words = [task["operation"], *filter(None, chosen)]
+    if task["operation"] == "search" and store.project(task["project"])["second"]:
+        words.append("of two")
+    return " ".join(words)
+
+
 def shown_task(store: Store, task: dict[str, Any]) -> dict[str, Any]:
     """Return what a browser needs of a task."""
     place = 0
@@ -105,7 +115,8 @@ def shown_task(store: Store, task: dict[str, Any]) -> dict[str, Any]:
             for other in store.undone()
         )
     names = ("id", "operation", "state", "share", "what", "error", "result")
-    return {name: task[name] for name in names} | {"place": place}
+    usual = store.took.get(what_task(store, task))
+    return {name: task[name] for name in names} | {"place": place, "usual": usual}
 
 
 def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict[str, Any]:
@@ -142,6 +153,7 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
         **part,
         "tiles": store.cards(project_id),
         "tasks": [shown_task(store, task) for task in store.tasks(project_id)],
+        "took": store.took,
         "head": store.head,
     }
 

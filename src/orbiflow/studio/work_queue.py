@@ -12,6 +12,7 @@ import os
 import re
 import signal
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
@@ -33,7 +34,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.store import Missing, Store
-from orbiflow.studio.words import OF_PICTURE, own_names, page_words, plain_name
+from orbiflow.studio.words import OF_PICTURE, own_names, page_words, plain_name, what_task
 
 READINGS = frozenset({*READS, "density table", "mesh read"})
 """Tasks whose results the later ones of their project use."""
@@ -98,6 +99,7 @@ class WorkQueue:
         self._held: dict[int, CallProcess] = {}  # in the order in which they were paused
         # project, lane and operation of what runs
         self._lanes: dict[int, tuple[str, str, str]] = {}
+        self._begun: dict[int, float] = {}  # when tasks began that were never held, in seconds
         self._turns: dict[str, int] = {}  # when each project was served last
         self._turn = 0
         self._lock = threading.RLock()
@@ -148,6 +150,7 @@ class WorkQueue:
                     self.store.change_task(task, state="paused")
                 return
             self.store.change_task(task, state="paused")
+            self._begun.pop(task, None)
             if process.pause():
                 self._held[task] = self._running.pop(task)
                 for oldest in list(self._held)[:-MAX_HELD]:
@@ -256,7 +259,7 @@ class WorkQueue:
                 return True
             if (process := self._ready()) is None:
                 return False
-            self._running[number] = process
+            self._running[number], self._begun[number] = process, time.monotonic()
             self.store.change_task(number, state="running", pid=process.pid, share=0.0)
             follow = partial(self._follow, number, project, process, call)
             threading.Thread(target=follow, daemon=True, name=f"task {number}").start()
@@ -282,7 +285,12 @@ class WorkQueue:
             else:
                 recorder.record(event)
         with self._lock:
+            begun = self._begun.pop(number, None)
             if self._owner(number) is process and not self._closed:
+                if begun is not None and isinstance(ending, Finished):
+                    with suppress(Missing):
+                        what = what_task(self.store, self.store.task(number))
+                        self.store.took[what] = round(time.monotonic() - begun, 1)
                 recorder.end(ending)
                 self._let_go(number, process)
         self._schedule()

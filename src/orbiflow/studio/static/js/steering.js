@@ -1,6 +1,7 @@
 /** The buttons of a task that is not done: hold it or let it go on, and stop it. */
 
 import { button, icon, row, trying } from "./dom.js";
+import { clock } from "./waiting.js";
 
 /** Milliseconds for which a click is still meant for the button that stood at its place before. */
 export const LATE = 600;
@@ -18,7 +19,8 @@ export function steering(api) {
   const hold = button("Pause", () => act(task.state === "paused" ? "resume" : "pause"), {
     kind: "hold",
   });
-  const root = row(hold, button("Stop", () => act("cancel"), { image: "stop" }));
+  const left = clock();
+  const root = row(hold, button("Stop", () => act("cancel"), { image: "stop" }), left.root);
 
   /** @param {Task} now */
   function update(now) {
@@ -28,6 +30,7 @@ export function steering(api) {
     }
     hold.classList.toggle("primary", held);
     task = now;
+    left.update(now);
   }
   return { root, update };
 }

@@ -1,7 +1,8 @@
 /** How to search, one wish for all pages of a project: how long, and what counts. */
 
 import { aside, choice, h, newest } from "./dom.js";
-import { EFFORT_TIMES, EFFORTS, OBJECTIVE_MEANINGS, OBJECTIVES, PAIR_TIMES } from "./words.js";
+import { tookWords } from "./waiting.js";
+import { EFFORTS, OBJECTIVE_MEANINGS, OBJECTIVES } from "./words.js";
 
 /**
  * The choices as elements, `objective` null for two pictures, and what they make of a search's `settings()`.
@@ -12,13 +13,13 @@ export function wishes({ api, project, about }) {
   const wanted = { effort: "normal", objective: "likeness", ...project.view?.search };
   const keep = newest(() => api.patch(`projects/${project.id}`, { view: { search: wanted } }), 400);
 
-  /** @type {(label: string, name: string, options: [string, string][], meanings: Record<string, string>) => HTMLElement} */
-  const wish = (label, name, options, meanings) => {
-    const meaning = aside(meanings[wanted[name]]);
+  /** @type {(label: string, name: string, options: [string, string][], meaningOf: (own: string) => string) => HTMLElement} */
+  const wish = (label, name, options, meaningOf) => {
+    const meaning = aside(meaningOf(wanted[name]));
     const chosen = (own) => {
       wanted[name] = own;
       project.view = { ...project.view, search: wanted };
-      meaning.textContent = meanings[own] ?? "";
+      meaning.textContent = meaningOf(own);
       keep();
     };
     return h("div", { class: "wish" }, choice(label, options, wanted[name], chosen), meaning);
@@ -28,11 +29,14 @@ export function wishes({ api, project, about }) {
       "How long",
       "effort",
       about.efforts.map((own) => [own, EFFORTS[own] ?? own]),
-      project.second ? PAIR_TIMES : EFFORT_TIMES,
+      (own) => tookWords(project, "search", own),
     ),
-    objective: project.second
-      ? null
-      : wish("What counts", "objective", Object.entries(OBJECTIVES), OBJECTIVE_MEANINGS),
+    objective: project.second ? null : wish(
+      "What counts",
+      "objective",
+      Object.entries(OBJECTIVES),
+      (own) => OBJECTIVE_MEANINGS[own],
+    ),
     settings: () => ({
       effort: wanted.effort,
       ...(!project.second && { objective: wanted.objective }),

@@ -3,13 +3,9 @@
 export const STAGES = { sketch: "first sketch", better: "getting better", final: "finished" };
 
 export const EFFORTS = { fast: "Quick", normal: "Careful" };
-export const EFFORT_TIMES = {
-  fast: "Ten seconds or so.",
-  normal: "A quarter of a minute or so: usually better.",
-};
-export const PAIR_TIMES = {
-  fast: "Half a minute or so.",
-  normal: "A minute or so: usually better.",
+export const EFFORT_MEANINGS = {
+  fast: "The best of fewer tries.",
+  normal: "Usually better, and slower.",
 };
 
 export const OBJECTIVES = { likeness: "Looks alike", overlap: "Covers it best" };

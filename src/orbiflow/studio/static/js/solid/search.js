@@ -3,8 +3,9 @@
 import { aside, button, choice, h, put, stack } from "../dom.js";
 import { form } from "../forms.js";
 import { steering } from "../steering.js";
+import { tookWords } from "../waiting.js";
 import { alive, EFFORTS } from "../words.js";
-import { EFFORT_MEANINGS, sides } from "./words.js";
+import { sides } from "./words.js";
 
 const AXES = ["x", "y", "z"];
 const SHOWN = ["size", "groups", "emphasis", "tiles"]; // settings of the form; the page has its own for the rest
@@ -22,14 +23,14 @@ export class Search {
     const wanted = { effort: "normal", up: mesh.up, form: {}, ...project.view?.fill };
     this.wanted = wanted;
     const changed = () => keep(wanted);
-    const meaning = aside(EFFORT_MEANINGS[wanted.effort]);
+    const meaning = aside(tookWords(project, "fill", wanted.effort));
     const long = choice(
       "How long",
       about.efforts.map((own) => [own, EFFORTS[own] ?? own]),
       wanted.effort,
       (own) => {
         wanted.effort = own;
-        meaning.textContent = EFFORT_MEANINGS[own] ?? "";
+        meaning.textContent = tookWords(project, "fill", own);
         changed();
       },
     );

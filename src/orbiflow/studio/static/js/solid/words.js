@@ -3,11 +3,6 @@
 import { aside, h } from "../dom.js";
 import { number, waitWords } from "../words.js";
 
-export const EFFORT_MEANINGS = {
-  fast: "A minute or two.",
-  normal: "Five minutes or more: usually better.",
-};
-
 const STEPS = {
   placing: "Laying copies side by side",
   bending: "Bending the figure until its copies meet",

@@ -2,6 +2,7 @@
 
 import { button, h, icon, put, row, section, soft, trying } from "../dom.js";
 import { LATE } from "../steering.js";
+import { clock } from "../waiting.js";
 import { ago, alive, bytes, capital, sentence } from "../words.js";
 import { lengthIn, measure } from "../lengths.js";
 import { EVERY_KIND as KINDS } from "./kinds.js";
@@ -57,12 +58,15 @@ export function picture(task) {
  */
 function words(task) {
   if (alive(task)) {
+    const left = clock();
+    left.update(task);
     return [
       h(
         "p",
         task.state === "waiting" ? "Waiting its turn …" : capital(task.what || "At work …"),
       ),
       h("progress", { max: 1, value: task.share, "aria-label": "How far it is" }),
+      left.root,
     ];
   }
   if (task?.state === "failed") return [h("p", { class: "error" }, sentence(task.error))];

@@ -163,7 +163,6 @@ class TakeawayPage {
 
   /** What the preview has to say. */
   heard(error, notes) {
-    this.noted.classList.remove("past");
     if (error && this.form.refuse(error.setting, error.message, false)) return;
     const words = error ? [error.message] : notes;
     this.noted.hidden = !words.length;
@@ -344,7 +343,7 @@ class TakeawayPage {
     if (!this.real.hidden) this.size.show(size, this.form.now("warn_neck"));
     const title = THINGS[this.thing].title.toLowerCase();
     const shown = { ...this.settings(), ...THINGS[this.thing].shown };
-    if (this.live.ask(this.kind, shown, title)) this.noted.classList.add("past");
+    this.live.ask(this.kind, shown, title);
     this.making.change();
   }
 

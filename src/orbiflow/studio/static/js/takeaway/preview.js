@@ -1,12 +1,15 @@
 /** What will be made, drawn small as soon as a setting changes. */
 
 import { h, put, stack } from "../dom.js";
+import { duration } from "../waiting.js";
 
 const PATIENCE = 1500; // ms after which an unwanted drawing is given up
 const SIDES = [480, 1000]; // pixels: soon, then in detail
-const SLOW = 400; // ms after which the page says so
+const SLOW = 1000; // ms after which the page says so
 
 const SAYS = { animate: "One moment of the animation." };
+/** Seconds that previews took in this session, by operation and detail. */
+const took = {};
 
 export class Preview {
   /**
@@ -44,13 +47,20 @@ export class Preview {
     this.running = running;
     this.again = false;
     this.began = performance.now();
-    const slow = setTimeout(() => this.image.setAttribute("aria-busy", "true"), SLOW);
     const { operation, settings } = JSON.parse(asked);
+    const kind = `${operation} ${settings.kind ?? settings.world ?? ""} ${detail}`;
+    const slow = setTimeout(() => {
+      const usual = took[kind] > 1.5 ? ` It took ${duration(took[kind])} the last time.` : "";
+      this.says.textContent = `Drawing ${
+        detail ? "it in more detail" : "what will be made"
+      } …${usual}`;
+    }, SLOW);
     try {
       const body = { operation, settings, instead, side: SIDES[detail] };
       const { signal } = running;
       const found = await this.api.post(`${this.place}/preview`, body, { signal });
       if (running !== this.running) return;
+      took[kind] = (performance.now() - this.began) / 1000;
       const src = `data:image/png;base64,${found.image}`;
       put(this.image, h("img", { src, alt: `What will be made: ${this.title}` }));
       this.says.textContent = SAYS[operation] ?? "";
@@ -62,7 +72,6 @@ export class Preview {
     } finally {
       clearTimeout(slow);
       if (running === this.running) {
-        this.image.removeAttribute("aria-busy");
         this.running = null;
         if (asked !== this.wanted) this.#draw(false);
         else if (this.again) this.#draw(false, 1);
