@@ -331,12 +331,10 @@ class BatchFolder:
             if not self.path.exists() or (self.path / self.overview.journal).exists():
                 return
             harmless = (*LITTER, LOCK)
-            stranger = next(
-                (p for p in sorted(self.path.iterdir()) if p.name not in harmless), None
-            )
-        if stranger is not None:
+            other = next((p for p in sorted(self.path.iterdir()) if p.name not in harmless), None)
+        if other is not None:
             raise OutputError(
-                f"{self.path} holds {stranger.name}, which is of no earlier {self.overview.what}: "
+                f"{self.path} holds {other.name}, which is of no earlier {self.overview.what}: "
                 "choose another folder or move it"
             )
 

@@ -171,9 +171,7 @@ def solid_picture(parts: Sequence[Array], size: tuple[int, int] = (1000, 750)) -
         size: Width and height in pixels.
     """
     colours = palette("festival").colours
-    shaded = [
-        ShadedPart.flat(triangles, colours[k % len(colours)]) for k, triangles in enumerate(parts)
-    ]
+    shaded = [ShadedPart.flat(part, colours[k % len(colours)]) for k, part in enumerate(parts)]
     return draw_solids(shaded, size)
 
 

@@ -141,12 +141,8 @@ def _try_out(field: VectorField, dim: int) -> None:
     module = isinstance(field, nn.Module)
     if module and any(True for _ in field.buffers()):
         return  # an evaluation may change them
-    parameter = next(field.parameters(), None) if module else None
-    points = (
-        torch.zeros(3, dim, dtype=torch.float64)
-        if parameter is None
-        else parameter.new_zeros(3, dim)
-    )
+    first = next(field.parameters(), None) if module else None
+    points = torch.zeros(3, dim, dtype=torch.float64) if first is None else first.new_zeros(3, dim)
     with torch.no_grad(), cast(Any, torch.random).fork_rng(devices=[]):
         try:
             values: object = field(points)

@@ -209,10 +209,8 @@ def _millimetres(number: str, unit: str, text: str, numbers: str, dpi: float | N
     """Return a number of a unit in mm; `numbers` are all of the text's, for the message."""
     units = MILLIMETRES if dpi is None else {**MILLIMETRES, "px": MILLIMETRES["in"] / dpi}
     if not unit:
-        choices = [f"{numbers}{name}" for name in units if name != "pt"]
-        raise OrbiflowError(
-            f"{text!r} has no unit; write {', '.join(choices[:-1])} or {choices[-1]}"
-        )
+        forms = [f"{numbers}{name}" for name in units if name != "pt"]
+        raise OrbiflowError(f"{text!r} has no unit; write {', '.join(forms[:-1])} or {forms[-1]}")
     if unit not in units:
         raise OrbiflowError(
             f"{text!r} has the unknown unit {unit!r}; use one of {', '.join(units)}"

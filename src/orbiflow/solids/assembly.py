@@ -122,8 +122,7 @@ class Pieces:
         element, cone = self.contacts[number].element, self.cones[number]
         other = self.piece.moved(element.linear, element.translation)
         return _best(
-            _directions(cone),
-            lambda direction, most: self.blocked(self.piece, [other], direction, most),
+            _directions(cone), lambda way, most: self.blocked(self.piece, [other], way, most)
         )
 
     def leaving_stack(self, turns: Array | None = None) -> Leaving:
@@ -144,10 +143,8 @@ class Pieces:
         center = self.tile.centroid
         radius = float(np.linalg.norm(self.tile.points - center, axis=1).max())
         near = self.group.elements_near(center, 2 * radius, source=center)[1:]
-        meshes = [self.piece.moved(element.linear, element.translation) for element in near]
-        shifts = np.array(
-            [element.linear @ center + element.translation - center for element in near]
-        )
+        meshes = [self.piece.moved(g.linear, g.translation) for g in near]
+        shifts = np.array([g.linear @ center + g.translation - center for g in near])
         rays = [ray for cone in self.cones for ray in cone.rays]
         close = 1e-6 * radius
 

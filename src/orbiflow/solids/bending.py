@@ -96,15 +96,13 @@ class BentBody:
         corners = (
             np.array(np.meshgrid(*zip(low - REACH, high + REACH, strict=True))).reshape(3, -1).T
         )
-        local = corners @ inverse.T
+        box = corners @ inverse.T
         cosets, shifts = list[int](), list[Array]()
         for k, (turn, shift) in enumerate(zip(self.family.turns, self.family.shifts, strict=True)):
-            copy = local @ turn.T + shift
+            copy = box @ turn.T + shift
             ranges = [
                 np.arange(np.ceil(a - d), np.floor(b - c) + 1)
-                for a, b, c, d in zip(
-                    local.min(0), local.max(0), copy.min(0), copy.max(0), strict=True
-                )
+                for a, b, c, d in zip(box.min(0), box.max(0), copy.min(0), copy.max(0), strict=True)
             ]
             cells = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
             linear = lattice @ turn @ inverse

@@ -219,16 +219,14 @@ def _importance(distance: SignedDistance, surface: Mesh, edges: Integers, count:
     deep = surface.points[:, None] - surface.normals[:, None] * depths[:, None]
     out = (distance(deep.reshape(-1, 3)) > 0).reshape(len(surface.points), -1)
     thick = np.where(out.any(axis=1), depths[out.argmax(axis=1)], THICKEST)
-    importance, reached = np.ones(count), np.zeros(count)
-    importance[: len(thick)] = np.clip((THIN / thick) ** THIN_POWER, 1, MOST_IMPORTANT)
+    worth, reached = np.ones(count), np.zeros(count)
+    worth[: len(thick)] = np.clip((THIN / thick) ** THIN_POWER, 1, MOST_IMPORTANT)
     reached[: len(thick)] = 1
     ones, others = np.concatenate([edges, edges[:, ::-1]]).T
     links = scipy.sparse.csr_matrix((np.ones(len(ones)), (ones, others)), (count, count))
     near: Any = links + scipy.sparse.identity(count)
     for _ in range(5):
         total = near @ reached
-        importance = np.where(
-            total > 0, (near @ (importance * reached)) / np.maximum(total, 1e-9), importance
-        )
+        worth = np.where(total > 0, (near @ (worth * reached)) / np.maximum(total, 1e-9), worth)
         reached = (total > 0).astype(float)
-    return np.where(reached > 0, importance, 1.0)
+    return np.where(reached > 0, worth, 1.0)

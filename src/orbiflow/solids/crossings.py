@@ -124,13 +124,10 @@ def _hinges_meet(a: Array, b: Array) -> Mask:
     mine, other = np.cross(edge, a[:, 2] - a[:, 0]), np.cross(edge, b[:, 2] - a[:, 0])
     dots, sizes = np.einsum("ij,ij->i", mine, other), _norms(mine) * _norms(other)
     meet = dots > -1e-9 * sizes  # the others are folded by less than a right angle
-    candidates = np.flatnonzero(meet)
-    flat = (
-        orientation_signs(a[candidates, 0], a[candidates, 1], a[candidates, 2], b[candidates, 2])
-        == 0
-    )
-    meet[candidates[~flat]] = False
-    for k in candidates[flat]:
+    rest = np.flatnonzero(meet)
+    flat = orientation_signs(a[rest, 0], a[rest, 1], a[rest, 2], b[rest, 2]) == 0
+    meet[rest[~flat]] = False
+    for k in rest[flat]:
         v, w, p, q = (_exact(row) for row in (*a[k], b[k, 2]))
         along = _less(w, v)
         meet[k] = _dot(_cross(along, _less(p, v)), _cross(along, _less(q, v))) > 0
@@ -141,10 +138,10 @@ def _fans_meet(a: Array, b: Array) -> Mask:
     """Return whether pairs with one common corner, the first, meet elsewhere too."""
     apart = _planes_part(a, b, 1) | _planes_part(b, a, 1)
     meet = np.zeros(len(a), bool)
-    candidates = np.flatnonzero(~apart)
-    candidates = candidates[~_fans_part(a[candidates], b[candidates])]
-    meet[candidates] = _edge_meets(a[candidates, 1], a[candidates, 2], b[candidates]) | _edge_meets(
-        b[candidates, 1], b[candidates, 2], a[candidates]
+    rest = np.flatnonzero(~apart)
+    rest = rest[~_fans_part(a[rest], b[rest])]
+    meet[rest] = _edge_meets(a[rest, 1], a[rest, 2], b[rest]) | _edge_meets(
+        b[rest, 1], b[rest, 2], a[rest]
     )
     return meet
 
@@ -153,11 +150,11 @@ def _disjoint_meet(a: Array, b: Array) -> Mask:
     """Return whether pairs without a common corner meet."""
     apart = _planes_part(a, b, 0) | _planes_part(b, a, 0)
     meet = np.zeros(len(a), bool)
-    candidates = np.flatnonzero(~apart)
-    candidates = candidates[~_edges_part(a[candidates], b[candidates])]
+    rest = np.flatnonzero(~apart)
+    rest = rest[~_edges_part(a[rest], b[rest])]
     for k in range(3):
-        meet[candidates] |= _edge_meets(a[candidates, k], a[candidates, k - 1], b[candidates])
-        meet[candidates] |= _edge_meets(b[candidates, k], b[candidates, k - 1], a[candidates])
+        meet[rest] |= _edge_meets(a[rest, k], a[rest, k - 1], b[rest])
+        meet[rest] |= _edge_meets(b[rest, k], b[rest, k - 1], a[rest])
     return meet
 
 
@@ -214,14 +211,11 @@ def _edge_meets(p: Array, q: Array, triangle: Array) -> Mask:
     a, b, c = np.moveaxis(triangle, 1, 0)
     start, end = orientation_signs(a, b, c, p), orientation_signs(a, b, c, q)
     meet = np.zeros(len(p), bool)
-    candidates = np.flatnonzero((start * end <= 0) & ((start != 0) | (end != 0)))
+    rest = np.flatnonzero((start * end <= 0) & ((start != 0) | (end != 0)))
     sides = np.stack(
-        [
-            orientation_signs(p[candidates], q[candidates], u[candidates], v[candidates])
-            for u, v in ((a, b), (b, c), (c, a))
-        ]
+        [orientation_signs(p[rest], q[rest], u[rest], v[rest]) for u, v in ((a, b), (b, c), (c, a))]
     )
-    meet[candidates] = np.all(sides >= 0, axis=0) | np.all(sides <= 0, axis=0)
+    meet[rest] = np.all(sides >= 0, axis=0) | np.all(sides <= 0, axis=0)
     for k in np.flatnonzero((start == 0) & (end == 0)):
         meet[k] = _meets_in_plane(_exact(p[k]), _exact(q[k]), [_exact(row) for row in triangle[k]])
     return meet

@@ -112,10 +112,8 @@ def surface_points(mesh: Mesh, spacing: float) -> tuple[Array, Array]:
         shares = shares[shares.max(axis=1) < 1]
         points.append(np.einsum("sk,fkj->fsj", shares, corners[faces]).reshape(-1, 3))
         # half of the face's own normal, or creases would be rounded off over large faces
-        blended = (
-            0.5 * np.einsum("sk,fkj->fsj", shares, normals[faces]) + 0.5 * flat[faces][:, None]
-        )
-        directions.append(blended.reshape(-1, 3))
+        mixed = 0.5 * np.einsum("sk,fkj->fsj", shares, normals[faces]) + 0.5 * flat[faces][:, None]
+        directions.append(mixed.reshape(-1, 3))
     spots, ways = np.concatenate(points), np.concatenate(directions)
     _, first = np.unique(
         np.round(spots / (0.3 * spacing)).astype(np.int64), axis=0, return_index=True

@@ -175,15 +175,12 @@ def _divided_faces(
     _, second, third = np.take_along_axis(orbits, turned, axis=1).T
     parts = [
         (count == 0, (a, b, c)),
-        *((count == 1, corners) for corners in ((a, ab, c), (ab, b, c))),
+        *((count == 1, points) for points in ((a, ab, c), (ab, b, c))),
         (count == 2, (ca, bc, c)),
-        *(((count == 2) & (second < third), corners) for corners in ((a, b, bc), (a, bc, ca))),
-        *(((count == 2) & (second > third), corners) for corners in ((a, b, ca), (b, bc, ca))),
-        *(
-            (count == 3, corners)
-            for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        ),
+        *(((count == 2) & (second < third), points) for points in ((a, b, bc), (a, bc, ca))),
+        *(((count == 2) & (second > third), points) for points in ((a, b, ca), (b, bc, ca))),
+        *((count == 3, points) for points in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))),
     ]
     parents = [np.flatnonzero(chosen) for chosen, _ in parts]
-    cut = [np.stack(corners, axis=1)[chosen] for chosen, corners in parts]
+    cut = [np.stack(points, axis=1)[chosen] for chosen, points in parts]
     return np.concatenate(cut), np.concatenate(parents).astype(np.int64)

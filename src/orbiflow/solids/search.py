@@ -313,28 +313,26 @@ def _bent(goal: SolidGoal, body: Body, stages: Stages, pose: Pose) -> BentPose |
 
 
 def _solid(
-    goal: SolidGoal, body: Body, make: TileMaker, grain: float, bent_pose: BentPose
+    goal: SolidGoal, body: Body, make: TileMaker, grain: float, pose: BentPose
 ) -> EscherSolid | None:
     """Return the solid of a bent body, or None if it is not one piece without handles."""
     begin = time.process_time()
-    bent_body, group = BentBody(body, *bent_pose[:3]), bent_pose.family.group(bent_pose.stretches)
-    tile = make(_depth(bent_pose.mesh, bent_body, grain), bent_pose.mesh, group)
+    bent_body, group = BentBody(body, *pose[:3]), pose.family.group(pose.stretches)
+    tile = make(_depth(pose.mesh, bent_body, grain), pose.mesh, group)
     if tile is None:
         return None
-    turn, _ = rigid_motion(body.rest, bent_pose.nodes)
-    likeness = measured(
-        tile, bent_pose.target, bent_pose.mesh, bent_pose.importance, bent_pose.likeness.strain
-    )
+    turn, _ = rigid_motion(body.rest, pose.nodes)
+    likeness = measured(tile, pose.target, pose.mesh, pose.importance, pose.likeness.strain)
     solid = EscherSolid(
         name=goal.name,
         group=group,
         tile=tile,
-        target=bent_pose.target,
-        bent=bent_pose.mesh,
+        target=pose.target,
+        bent=pose.mesh,
         millimetres=goal.millimetres,
         likeness=likeness,
         upright=turn @ goal.axes,
-        seconds=bent_pose.seconds + time.process_time() - begin,
+        seconds=pose.seconds + time.process_time() - begin,
     )
     return solid if solid.certificate.valid else None
 

@@ -161,9 +161,7 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
 def is_outdated(card: dict[str, Any], project: dict[str, Any]) -> bool:
     """Whether a tile was found for an outline that has been changed or removed since."""
     pictures = [project, project["second"]]
-    marks = [
-        (picture.get("silhouette") or {}).get("mark") if picture else "none" for picture in pictures
-    ]
+    marks = [(image.get("silhouette") or {}).get("mark") if image else "none" for image in pictures]
     pairs = zip(card.get("found_for", ()), marks, strict=False)
     return any(mark and mark != earlier for earlier, mark in pairs)
 

@@ -226,19 +226,17 @@ def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
 
 def _result_in(folder: Path) -> Path:
     """Return the result.json of a run's folder, or of the run that a tile's folder belongs to."""
-    inside, above = folder / RESULT, folder.resolve().parent / RESULT
-    runs = (
-        [] if inside.exists() else sorted(file.parent.name for file in folder.glob(f"*/{RESULT}"))
-    )
+    here, above = folder / RESULT, folder.resolve().parent / RESULT
+    runs = [] if here.exists() else sorted(file.parent.name for file in folder.glob(f"*/{RESULT}"))
     if runs:
         some = ", ".join(runs[:MOST_NAMED]) + ", ..." * (len(runs) > MOST_NAMED)
         raise InputFileError(
             f"{folder} holds the runs {some}: give one, such as {folder / runs[0]}"
         )
-    if not inside.exists() and not above.exists():
+    if not here.exists() and not above.exists():
         what = f"{folder} holds no {RESULT}; give the folder that orbiflow escherize wrote"
         raise InputFileError(what)
-    return inside if inside.exists() else above
+    return here if here.exists() else above
 
 
 def _index(names: list[str], which: str | int, file: Path) -> int:

@@ -128,12 +128,10 @@ class OverlapSearch(Settings, SearchMethod):
             return super().sketch(goal, kind, cancel)
         few: dict[str, Any] = {"candidates": 3, "projected": 1000, "measured": 40, "seed": 0}
         few |= {"resolutions": (PREVIEW_POINTS,), "boundary": PREVIEW_POINTS}
-        prototiles = outline_starts(
-            goal.target, kind, replace(self, **few), cancel=cancel
-        ).prototiles
-        if not len(prototiles):
+        tiles = outline_starts(goal.target, kind, replace(self, **few), cancel=cancel).prototiles
+        if not len(tiles):
             raise CertificationError("no tile near the outline is simple")
-        return ClassFinalists(StillTiles(kind, prototiles), len(prototiles), 0, 1)
+        return ClassFinalists(StillTiles(kind, tiles), len(tiles), 0, 1)
 
     def prepare(self, goal: Goal) -> None:
         """Draw the silhouette's soft edge."""

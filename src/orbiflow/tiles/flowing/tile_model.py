@@ -275,10 +275,8 @@ def trainable(candidates: ClassCandidates) -> TileModel:
         return candidates
     if not isinstance(candidates, StillTiles):
         raise OrbiflowError("expected the candidates of a fit; see fit_tile")
-    prototiles = candidates.prototiles
-    return TileModel(
-        candidates.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=prototiles
-    )
+    starts = candidates.prototiles
+    return TileModel(candidates.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=starts)
 
 
 def placed_field(model: TileModel) -> Callable[[Tensor], Tensor]:

@@ -268,10 +268,8 @@ def _turns(chords: Complex, step: int) -> Array:
 
 def _turned(chords: Complex, step: int, along: Array) -> Complex:
     """Return the gradient in the points of what has a gradient (n,) in `_turns` of chords."""
-    of_chords = (
-        (along - _shifted(along, -step)) * 1j * chords / np.maximum(abs(chords) ** 2, 1e-300)
-    )
-    return _stepped(of_chords, step)
+    pulls = (along - _shifted(along, -step)) * 1j * chords / np.maximum(abs(chords) ** 2, 1e-300)
+    return _stepped(pulls, step)
 
 
 def _discs(z: Complex) -> tuple[_Discs, _Discs]:

@@ -42,10 +42,8 @@ def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
     settings, (figure, within) = layout.settings, layout.tile.figures[number]
     place = layout.page.place.after(within)
     chosen = palette(settings.palette if settings.coloured else "ink")
-    figure_settings = settings.of_figure(number)
-    motif = drawn_motif(
-        figure, figure_settings, chosen, over.drawing, hairlines=not settings.coloured
-    )
+    wanted = settings.of_figure(number)
+    motif = drawn_motif(figure, wanted, chosen, over.drawing, hairlines=not settings.coloured)
     rasters = ()
     if over.picture is not None:
         if settings.purpose == "plotter":

@@ -80,9 +80,7 @@ class Made(Outcome):
             contents.append(self.content(number))
         cancel.check()
         names = sheet_names(out, len(contents))
-        files = tuple(
-            write_atomic(name, content) for name, content in zip(names, contents, strict=True)
-        )
+        files = tuple(write_atomic(name, data) for name, data in zip(names, contents, strict=True))
         return replace(self, files=files, summary=self._facts(files))
 
     def _facts(self, files: tuple[Path, ...]) -> dict[str, Any]:

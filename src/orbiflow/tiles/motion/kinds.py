@@ -189,10 +189,10 @@ def morph(
 
 def grow(tile: EscherTile, page: Page, bodies: Sequence[BendingFigure] = ()) -> Motion:
     """Return one tile, with all of its figures, and the tiling growing around it, nearest first."""
-    outlines = [prototile.polygon - prototile.center for prototile in page.tiling.prototiles]
+    outlines = [shape.polygon - shape.center for shape in page.tiling.prototiles]
     still = [
-        page.place.after(part.place)(body.points) - prototile.center
-        for prototile, part, body in zip(page.tiling.prototiles, tile.figures, bodies, strict=False)
+        page.place.after(part.place)(body.points) - shape.center
+        for shape, part, body in zip(page.tiling.prototiles, tile.figures, bodies, strict=False)
     ]
     places, kinds, colours = _still_places(page)
     return Motion(
@@ -230,9 +230,7 @@ def bend(tile: EscherTile, page: Page) -> Motion:
 
     return Motion(
         page,
-        lambda progress: [
-            points[ring] for points, ring in zip(bodies(progress), borders, strict=True)
-        ],
+        lambda progress: [body[ring] for body, ring in zip(bodies(progress), borders, strict=True)],
         lambda _: places,
         kinds,
         colours,
@@ -260,9 +258,7 @@ def _still_places(page: Page) -> tuple[Places, Integers, Integers]:
     numbers = np.repeat(kinds, [len(used) for used in uses])
     colours = page.colours[np.concatenate(mine)]
     far = np.linalg.norm(offsets - np.array(page.size) / 2, axis=1)
-    itself = [
-        np.linalg.norm(offsets - prototile.center, axis=1) for prototile in page.tiling.prototiles
-    ]
+    itself = [np.linalg.norm(offsets - tile.center, axis=1) for tile in page.tiling.prototiles]
     first = [int(np.argmin(np.where(numbers == k, away, np.inf))) for k, away in enumerate(itself)]
     far[first] = -1.0
     order = np.argsort(far, kind="stable")

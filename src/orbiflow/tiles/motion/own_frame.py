@@ -106,17 +106,16 @@ class OwnFrame:
         marks = np.zeros(len(self.points), dtype=bool)
         marks[list(sides)] = True
         parts = [marks[bounds[k] : bounds[k + 1]] for k in range(len(self.starts))]
-        for edge_class in self.edge_classes:
+        for kind in self.edge_classes:
             steps = [
-                (image.edge, -1 if image.reversed else 1)
-                for image in (*edge_class.folds, *edge_class.images)
+                (image.edge, -1 if image.reversed else 1) for image in (*kind.folds, *kind.images)
             ]
-            every = parts[edge_class.edge]
+            every = parts[kind.edge]
             for edge, step in steps:
                 every = every | parts[edge][::step]
-            if edge_class.turn:
+            if kind.turn:
                 every = every | every[::-1]
-            for edge, step in ((edge_class.edge, 1), *steps):
+            for edge, step in ((kind.edge, 1), *steps):
                 parts[edge] = every[::step]
         chosen = np.concatenate(parts)
         index = np.flatnonzero(chosen)

@@ -203,24 +203,22 @@ def outline(tile: Tiles, tolerance: float) -> Outline:
     images. Where curves would touch, they are fitted more closely, at worst along the polygon.
     """
     try:
-        tile_edges = edges(tile)
+        net = edges(tile)
     except OrbiflowError as error:
         plain = (Curve.polyline(p.polygon, closed=True) for p in as_tiling(tile).prototiles)
         return Outline(None, tuple(plain), f"the outline is left as it is: {error}")
     for share in _SHARES:
-        candidate = Outline(tile_edges, _curves(tile_edges, share * tolerance))
+        candidate = Outline(net, _curves(net, share * tolerance))
         rings = (curve.flattened(tolerance / 20) for curve in candidate.closed)
         if all(shapely.Polygon(ring).is_valid for ring in rings):
             return candidate
-    return Outline(
-        tile_edges, tuple(Curve.polyline(tile_edges.points(k)) for k in range(len(tile_edges)))
-    )
+    return Outline(net, tuple(Curve.polyline(net.points(k)) for k in range(len(net))))
 
 
-def _curves(tile_edges: Edges, tolerance: float) -> tuple[Curve, ...]:
+def _curves(net: Edges, tolerance: float) -> tuple[Curve, ...]:
     curves: dict[int, Curve] = {}
-    for kind in edge_classes(tile_edges):
-        points = tile_edges.points(kind.edge)
+    for kind in edge_classes(net):
+        points = net.points(kind.edge)
         if kind.straight:
             curve = Curve.polyline(points)
         elif kind.folds:
@@ -231,7 +229,7 @@ def _curves(tile_edges: Edges, tolerance: float) -> tuple[Curve, ...]:
         for image in kind.images:
             moved = curve.moved(image.isometry.linear, image.isometry.translation)
             curves[image.edge] = moved.reversed() if image.reversed else moved
-    return tuple(curves[k] for k in range(len(tile_edges)))
+    return tuple(curves[k] for k in range(len(net)))
 
 
 def _folded(points: Array, fold: EdgeImage, tolerance: float) -> Curve:

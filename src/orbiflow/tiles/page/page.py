@@ -138,9 +138,7 @@ class Page:
     @property
     def polygons(self) -> list[Curve]:
         """The polygon of each prototile, in its place, as a curve."""
-        return [
-            Curve.polyline(prototile.polygon, closed=True) for prototile in self.tiling.prototiles
-        ]
+        return [Curve.polyline(p.polygon, closed=True) for p in self.tiling.prototiles]
 
     @property
     def tile_size(self) -> float:
@@ -308,17 +306,15 @@ class Page:
             return [Layer("tiles", "tiles", line, tuple(every), clipped)]
         layers = list[Layer]()
         for colour in sorted(set(self.colours.tolist())):
-            coloured = [
+            uses = [
                 uses.select(self.colours[mine] == colour)
                 for uses, mine in zip(every, numbers, strict=True)
             ]
             fill, name = chosen.fill(colour), f"colour {colour + 1}"
             style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
-            layers.append(Layer(name, "tiles", style, tuple(filter(len, coloured)), clipped))
+            layers.append(Layer(name, "tiles", style, tuple(filter(len, uses)), clipped))
             what = tinted_name(colour) if tint else MOTIF
-            on = tuple(
-                replace(coloured[k], symbol=symbol_of(k, what)) for k in drawn if len(coloured[k])
-            )
+            on = tuple(replace(uses[k], symbol=symbol_of(k, what)) for k in drawn if len(uses[k]))
             if on:
                 ink = chosen.ink(colour)
                 layers.append(Layer(f"drawing on {name}", "drawing", Style(), on, clipped, ink))

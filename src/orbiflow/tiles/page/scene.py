@@ -200,8 +200,7 @@ class Warped(NamedTuple):
     def raster(self) -> Raster:
         """Return it as it is seen, with as many pixels as it has, and a little beyond its edge."""
         areas = (
-            np.abs(doubled_areas(points, self.triangles)).sum()
-            for points in (self.texels, self.points)
+            np.abs(doubled_areas(at, self.triangles)).sum() for at in (self.texels, self.points)
         )
         grid = Grid.over(self.points, float(np.sqrt(next(areas) / next(areas))))
         size = grid.width, grid.height

@@ -34,10 +34,8 @@ def tile_picture(
     page = Page.of_window(tile, window, sheet.width * INCH, y_down=y_down)
     width, first = 0.003 * page.size[0], int(len(page.polygons) == 1)
     layers = tuple(
-        Layer(
-            symbol_of(k), "tiles", Style(chosen.fill(first + k), chosen.outline, width), (polygon,)
-        )
-        for k, polygon in enumerate(page.polygons)
+        Layer(symbol_of(k), "tiles", Style(chosen.fill(first + k), chosen.outline, width), (ring,))
+        for k, ring in enumerate(page.polygons)
     )
     note = "A tile of the plane, made with orbiflow"
     return ScenePicture(page.empty(layers, title=title or _name(tile), notes=(note,)), sheet)

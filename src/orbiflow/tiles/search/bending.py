@@ -286,12 +286,10 @@ def _detailed(lot: _Lot, kind: IsohedralClass, settings: LikenessSearch) -> Bent
     """Work out the one shape of a lot, with all points; None if nothing is left of it."""
     body, space = lot.body, TileSpace(kind, lot.placements)
     tiles = held_on_tiles(body, space, lot.points, settings.rounds)
-    ring, placements = tiles.points[: body.size, 0], tiles.placements
-    corners = (
-        np.cumsum(placements.lengths[0]) - placements.lengths[0] + placements.starts[0]
-    ) % body.size
+    ring, laid = tiles.points[: body.size, 0], tiles.placements
+    corners = (np.cumsum(laid.lengths[0]) - laid.lengths[0] + laid.starts[0]) % body.size
     as_bent = Carved(ring, np.arange(body.size), corners, tiles.linear[0], tiles.offset[0])
-    return _bent(lot.side, body, as_bent, tiles.points, placements, settings.min_neck)
+    return _bent(lot.side, body, as_bent, tiles.points, laid, settings.min_neck)
 
 
 def _carved(kind: IsohedralClass, bent: Bent, min_neck: float, race: Race) -> Bent:

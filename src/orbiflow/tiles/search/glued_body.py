@@ -59,22 +59,20 @@ class GluedBody(ElasticBody):
         self.size = free + right.size - length
         self.outer = count = self.size + length - 1
         within = np.arange(1, length)
-        left_places, right_places = (
+        at_left, at_right = (
             np.empty(len(left), dtype=np.int64),
             np.empty(len(right), dtype=np.int64),
         )
-        left_places[(first + length + np.arange(free)) % left.size] = np.arange(free)
+        at_left[(first + length + np.arange(free)) % left.size] = np.arange(free)
         rest = np.arange(right.size - length)
-        right_places[(second + length + rest) % right.size] = free + rest
-        left_places[first % left.size], right_places[second % right.size] = free, 0
+        at_right[(second + length + rest) % right.size] = free + rest
+        at_left[first % left.size], at_right[second % right.size] = free, 0
         on_path = self.size + within - 1
-        left_places[(first + within) % left.size] = on_path
-        right_places[(second + length - within) % right.size] = on_path
-        left_places[left.size :] = count + np.arange(len(left) - left.size)
-        right_places[right.size :] = (
-            count + len(left) - left.size + np.arange(len(right) - right.size)
-        )
-        self._places: tuple[Integers, Integers] = (left_places, right_places)
+        at_left[(first + within) % left.size] = on_path
+        at_right[(second + length - within) % right.size] = on_path
+        at_left[left.size :] = count + np.arange(len(left) - left.size)
+        at_right[right.size :] = count + len(left) - left.size + np.arange(len(right) - right.size)
+        self._places: tuple[Integers, Integers] = (at_left, at_right)
         self._count = count + len(left) - left.size + len(right) - right.size
         paths = self.path(left.rest, right.rest)
         turn = np.vdot(np.diff(paths[1]), np.diff(paths[0]))

@@ -129,23 +129,20 @@ class Orbits:
         for values in (self.mirror, self.foot):
             values[:] = np.take_along_axis(values, self.source, axis=1)
 
-    def _edges(self, edge_class: EdgeClass, length: Integers, middle: complex) -> None:
+    def _edges(self, kind: EdgeClass, length: Integers, middle: complex) -> None:
         """Map the inner vertices of edges of one class from those of the first half of its first."""
-        first = self.corners[:, [edge_class.edge]]
-        straight = next((fold for fold in edge_class.folds if not fold.reversed), None)
-        back = edge_class.turn
+        first = self.corners[:, [kind.edge]]
+        straight = next((fold for fold in kind.folds if not fold.reversed), None)
+        back = kind.turn
         j = np.arange(1, int(length.max(initial=1)))
         inner = j < length
         half = inner & (2 * j > length) if back else np.zeros_like(inner)
-        for edge, isometry, reverse in (
-            EdgeImage(edge_class.edge, identity(2), False),
-            *edge_class.images,
-        ):
+        for edge, isometry, reverse in (EdgeImage(kind.edge, identity(2), False), *kind.images):
             at = self.corners[:, [edge]] + (length - j if reverse else j)
-            if edge != edge_class.edge:
+            if edge != kind.edge:
                 self._map(inner & ~half, at, first + j, Element.of(isometry))
             if back:
-                turned = isometry @ back.isometry if edge != edge_class.edge else back.isometry
+                turned = isometry @ back.isometry if edge != kind.edge else back.isometry
                 self._map(half, at, first + length - j, Element.of(turned))
         if straight:
             self._hold(inner & ~half, first + j, Element.of(straight.isometry))
@@ -153,10 +150,7 @@ class Orbits:
             self._hold(2 * j == length, first + j, Element.of(back.isometry))
         if back and not _flips(back):
             rows = np.flatnonzero(length[:, 0] % 2 == 0)
-            for edge, isometry, _ in (
-                EdgeImage(edge_class.edge, identity(2), False),
-                *edge_class.images,
-            ):
+            for edge, isometry, _ in (EdgeImage(kind.edge, identity(2), False), *kind.images):
                 at = (self.corners[:, [edge]] + length // 2)[rows, 0]
                 self._fix(rows, at, complex(*isometry(np.array([middle.real, middle.imag]))))
 

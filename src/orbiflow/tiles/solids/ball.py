@@ -128,11 +128,7 @@ def _ringed(tile: shapely.Polygon, scale: float) -> tuple[Array, Integers]:
             corners += [mesh.points[mesh.triangles] for mesh in meshes]
         fresh = [shapely.Polygon(ring) for ring in rings]
         for outer in regions:
-            holes = [
-                polygon.exterior
-                for polygon in fresh
-                if outer.contains(polygon.representative_point())
-            ]
+            holes = [part.exterior for part in fresh if outer.contains(part.representative_point())]
             corners.append(_between(shapely.Polygon(outer.exterior, holes)))
         regions = fresh
     points, index = np.unique(np.concatenate(corners).reshape(-1, 2), axis=0, return_inverse=True)

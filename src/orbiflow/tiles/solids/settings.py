@@ -130,12 +130,9 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
 
     def defaults(self) -> Mapping[str, Any]:
         values = {**super().defaults(), **KINDS[self.kind]}
-        effective = {
-            **vars(self),
-            **{k: v for k, v in values.items() if k not in self.fields_given},
-        }
-        slope = effective["height"] * self.slope if self.kind == "mould" else effective["chamfer"]
-        bevelled = 0.0 if self.kind in ("cutter", "stamp") else 2 * slope + effective["clearance"]
+        used = {**vars(self), **{k: v for k, v in values.items() if k not in self.fields_given}}
+        slope = used["height"] * self.slope if self.kind == "mould" else used["chamfer"]
+        bevelled = 0.0 if self.kind in ("cutter", "stamp") else 2 * slope + used["clearance"]
         if self.kind in BALLS:
             return values
         least = max(self.nozzle, bevelled, FRAGILE.get(self.kind, 0.0))

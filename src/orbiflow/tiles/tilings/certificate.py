@@ -142,30 +142,28 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
     area = float(shares @ [p.signed_area for p in tiling.prototiles] / shares.sum())
     size, nan = tiling.tile_area, math.nan
     off = abs(abs(area) - size) / size
-    certificate = Certificate(False, area, size, off, nan, "none", nan, nan, nan, 0, tolerance, ())
+    proof = Certificate(False, area, size, off, nan, "none", nan, nan, nan, 0, tolerance, ())
     numbers = range(len(tiling.prototiles))
     try:
         around = [surroundings(tiling, k, _MARGIN) for k in numbers]
     except OrbiflowError as error:
-        return replace(certificate, reasons=(str(error),))
+        return replace(proof, reasons=(str(error),))
     mismatch, matching = _edge_mismatch(tiling, around, tolerance)
-    certificate = replace(certificate, edge_mismatch=mismatch, edge_matching=matching)
+    proof = replace(proof, edge_mismatch=mismatch, edge_matching=matching)
     for k in numbers:
         crossing = _self_crossing(tiling, k, around[k].ring)
         if crossing:
-            return replace(certificate, reasons=(crossing,))
+            return replace(proof, reasons=(crossing,))
     areas = np.array([_areas(a) for a in around])
     overlap, total, bare = (float(x) for x in areas[:, :3].max(axis=0))
     count = max(int(touching(a, max(1e-7, tolerance))[1].sum()) for a in around)
-    certificate = replace(
-        certificate, simple=True, overlap=overlap, total_overlap=total, uncovered=bare
-    )
-    return replace(certificate, neighbours=count, reasons=_reasons(certificate, areas, tiling))
+    proof = replace(proof, simple=True, overlap=overlap, total_overlap=total, uncovered=bare)
+    return replace(proof, neighbours=count, reasons=_reasons(proof, areas, tiling))
 
 
-def _reasons(certificate: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...]:
+def _reasons(proof: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...]:
     """Return what fails, given what `_areas` gives for each prototile, (K, 5)."""
-    several, bound = len(tiling.prototiles) > 1, certificate.tolerance
+    several, bound = len(tiling.prototiles) > 1, proof.tolerance
     _, overlaps, bare, lengths, widths = areas.T
     reasons: list[str] = []
     if several and widths.min() < _LEAST_WIDTH * bound:
@@ -173,18 +171,16 @@ def _reasons(certificate: Certificate, areas: Array, tiling: Tiling) -> tuple[st
             f"prototile {widths.argmin()} is only {widths.min():.1e} of a tile's size wide: within "
             f"the tolerance of {bound:.0e} it is hardly more than a line, leave it out"
         )
-    if not certificate.area_error <= bound:
+    if not proof.area_error <= bound:
         symmetry = max(s.order for s in tiling.stabilisers)
         of_order = f" for a tile with a symmetry of order {symmetry}" if symmetry > 1 else ""
         reasons.append(
             f"{'the mean area of its tiles' if several else 'its area'} "
-            f"{abs(certificate.signed_area):.9g} is not the group's {certificate.expected_area:.9g}"
-            f"{'' if several else of_order} (relative error {certificate.area_error:.1e})"
+            f"{abs(proof.signed_area):.9g} is not the group's {proof.expected_area:.9g}"
+            f"{'' if several else of_order} (relative error {proof.area_error:.1e})"
         )
-    if not certificate.edge_mismatch <= bound:
-        reasons.append(
-            f"its edges miss their partners by {certificate.edge_mismatch:.1e} of its size"
-        )
+    if not proof.edge_mismatch <= bound:
+        reasons.append(f"its edges miss their partners by {proof.edge_mismatch:.1e} of its size")
     if np.isnan(overlaps).any():
         needles = "a tile has needles or gaps thinner than 1e-12 of its size: smooth its outline"
         return (*reasons, f"overlaps cannot be computed, as {needles}")
@@ -195,11 +191,9 @@ def _reasons(certificate: Certificate, areas: Array, tiling: Tiling) -> tuple[st
         whose = "a tile's" if several else "its"
         much = overlaps[excess.argmax()]
         reasons.append(f"{who} overlaps its neighbours by {much:.1e} of {whose} area")
-    if not certificate.uncovered <= bound:
+    if not proof.uncovered <= bound:
         who = f"prototile {bare.argmax()}" if several else "it"
-        reasons.append(
-            f"its images leave {certificate.uncovered:.1e} of its area uncovered around {who}"
-        )
+        reasons.append(f"its images leave {proof.uncovered:.1e} of its area uncovered around {who}")
     return tuple(reasons)
 
 
@@ -223,9 +217,7 @@ def _self_crossing(tiling: Tiling, prototile: int, ring: Array) -> str:
 def _edge_mismatch(
     tiling: Tiling, around: list[Surroundings], tolerance: float
 ) -> tuple[float, EdgeMatching]:
-    asymmetry = max(stabiliser.error for stabiliser in tiling.stabilisers) / math.sqrt(
-        tiling.tile_area
-    )
+    asymmetry = max(s.error for s in tiling.stabilisers) / math.sqrt(tiling.tile_area)
     matches: list[SegmentMatch] = [match_segments(a, tolerance) for a in around]
     mismatch = max(float(match.distance.max()) for match in matches)
     if mismatch <= tolerance and boundaries_cancel(tiling, around, matches):

@@ -144,11 +144,9 @@ def colouring(tile: Tiles) -> Colouring:
     )
     a, _, c = sublattice
     numbers, shares = np.zeros((len(table), a, c), dtype=np.int64), list[int]()
-    for kind, numbering in zip(kinds, colours, strict=True):
-        order = np.argsort(-np.bincount(numbering), kind="stable")  # the most frequent colour first
-        numbers[kind] = sum(shares) + np.argsort(order)[np.array(numbering)].reshape(
-            len(kind), a, c
-        )
+    for kind, used in zip(kinds, colours, strict=True):
+        order = np.argsort(-np.bincount(used), kind="stable")  # the most frequent colour first
+        numbers[kind] = sum(shares) + np.argsort(order)[np.array(used)].reshape(len(kind), a, c)
         shares.append(len(order))
     return Colouring(tiling, sum(shares), sublattice, numbers, tuple(shares))
 

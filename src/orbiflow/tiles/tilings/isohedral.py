@@ -170,18 +170,16 @@ _cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
 
 def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
     """Return cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
-    functions = array_functions(square)
-    hyperbolic_cosh, hyperbolic_sinh = (
-        (functions.cosh, functions.sinh) if is_tensor(square) else (_cosh, _sinh)
-    )
+    xp = array_functions(square)
+    hyperbolic_cosh, hyperbolic_sinh = (xp.cosh, xp.sinh) if is_tensor(square) else (_cosh, _sinh)
     small = square < 1e-2
-    root = functions.sqrt(functions.where(small, functions.ones_like(square), square))
-    s = functions.where(small, square, functions.zeros_like(square))
+    root = xp.sqrt(xp.where(small, xp.ones_like(square), square))
+    s = xp.where(small, square, xp.zeros_like(square))
     cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
     sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
     return (
-        functions.where(small, cosh, hyperbolic_cosh(root)),
-        functions.where(small, sinhc, hyperbolic_sinh(root) / root),
+        xp.where(small, cosh, hyperbolic_cosh(root)),
+        xp.where(small, sinhc, hyperbolic_sinh(root) / root),
     )
 
 

@@ -267,10 +267,8 @@ def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
     """Return all whole numbers in some intervals, and one more at either end for rounding."""
     first = np.ceil(low - 1e-9)
     counts = np.maximum(np.floor(high + 1e-9) + 1 - first, 0).astype(np.int64)
-    interval = np.repeat(np.arange(len(counts)), counts)
-    return interval, first[interval] + np.arange(len(interval)) - (np.cumsum(counts) - counts)[
-        interval
-    ]
+    which = np.repeat(np.arange(len(counts)), counts)
+    return which, first[which] + np.arange(len(which)) - (np.cumsum(counts) - counts)[which]
 
 
 def _by_rows(copies: Copies) -> Copies:

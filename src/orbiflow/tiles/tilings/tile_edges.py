@@ -172,9 +172,7 @@ def edges(tile: Tiles) -> Edges:
 
 def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
     missing = sum(int((match.distance > VERTEX_TOLERANCE).sum()) for match in matches)
-    if missing or any(
-        order is None for stabiliser in tiling.stabilisers for order in stabiliser.orders
-    ):
+    if missing or any(order is None for s in tiling.stabilisers for order in s.orders):
         count = sum(len(match.distance) for match in matches)
         what = f"{missing} of the tile's {count} sides are not sides of a neighbour"
         if not missing:
@@ -215,16 +213,16 @@ def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Intege
     return turned
 
 
-def _mutual(tile_edges: Edges) -> Edges:
+def _mutual(net: Edges) -> Edges:
     """Choose partners where a stabiliser leaves a choice: an edge itself, or each other."""
-    across, partners = list(tile_edges.across), list(tile_edges.partners)
-    done: NDArray[np.bool_] = np.zeros(len(tile_edges), dtype=bool)
-    for edge in range(len(tile_edges)):
+    across, partners = list(net.across), list(net.partners)
+    done: NDArray[np.bool_] = np.zeros(len(net), dtype=bool)
+    for edge in range(len(net)):
         if done[edge]:
             continue
         there = across[edge].prototile
-        images = tile_edges.turned[there][:, partners[edge]]
-        signs = [s.determinant for s in tile_edges.tiling.stabilisers[there].elements]
+        images = net.turned[there][:, partners[edge]]
+        signs = [s.determinant for s in net.tiling.stabilisers[there].elements]
         choice = np.flatnonzero(images == edge)
         # prefer a mirror to a half-turn: it shows that the edge is straight
         order = np.array(signs)[choice] * across[edge].determinant
@@ -234,23 +232,16 @@ def _mutual(tile_edges: Edges) -> Edges:
         done[edge] = True
         if not len(choice):
             continue  # it has more images in its own tile than its partner has
-        by = tile_edges.tiling.stabilisers[there].elements[int(choice[0])].inverse()
+        by = net.tiling.stabilisers[there].elements[int(choice[0])].inverse()
         element, partner = across[edge] @ by, int(images[choice[0]])
         across[edge] = Placed(element.linear, element.translation, there)
         partners[edge] = partner
         if partner != edge:
             back = element.inverse()
-            across[partner] = Placed(back.linear, back.translation, tile_edges.owners[edge])
+            across[partner] = Placed(back.linear, back.translation, net.owners[edge])
             partners[partner] = edge
             done[partner] = True
-    return Edges(
-        tile_edges.tiling,
-        tile_edges.owners,
-        tile_edges.starts,
-        tuple(across),
-        tuple(partners),
-        tile_edges.turned,
-    )
+    return Edges(net.tiling, net.owners, net.starts, tuple(across), tuple(partners), net.turned)
 
 
 class EdgeImage(NamedTuple):
@@ -300,14 +291,9 @@ def mixing(tile: Tiles) -> float:
     >>> round(mixing(dirichlet_tiling(wallpaper_group("p4m"), [(0, 0), (0.5, 0.5)])), 9)
     1.0
     """
-    tile_edges = edges(edge_to_edge(tile))
-    lengths = np.array(
-        [np.hypot(*np.diff(tile_edges.points(k), axis=0).T).sum() for k in range(len(tile_edges))]
-    )
-    differ = [
-        there.prototile != here
-        for there, here in zip(tile_edges.across, tile_edges.owners, strict=True)
-    ]
+    net = edges(edge_to_edge(tile))
+    lengths = np.array([np.hypot(*np.diff(net.points(k), axis=0).T).sum() for k in range(len(net))])
+    differ = [there.prototile != here for there, here in zip(net.across, net.owners, strict=True)]
     return float(lengths[differ].sum() / lengths.sum())
 
 
@@ -357,19 +343,17 @@ def edge_classes(tile_edges: Edges) -> tuple[EdgeClass, ...]:
     return tuple(classes)
 
 
-def _links(tile_edges: Edges) -> list[list[EdgeImage]]:
+def _links(net: Edges) -> list[list[EdgeImage]]:
     """Return, for each edge, its images next to it: beyond it, and in its own tile."""
-    links: list[list[EdgeImage]] = [[] for _ in range(len(tile_edges))]
-    for edge, (partner, element) in enumerate(
-        zip(tile_edges.partners, tile_edges.across, strict=True)
-    ):
+    links: list[list[EdgeImage]] = [[] for _ in range(len(net))]
+    for edge, (partner, element) in enumerate(zip(net.partners, net.across, strict=True)):
         plain = Isometry(element.linear, element.translation)
         turned_over = plain.determinant > 0
         links[partner].append(EdgeImage(edge, plain, turned_over))
         links[edge].append(EdgeImage(partner, plain.inverse(), turned_over))
-    for k, stabiliser in enumerate(tile_edges.tiling.stabilisers):
-        for element, turned in zip(stabiliser.elements[1:], tile_edges.turned[k][1:], strict=True):
-            for edge in np.flatnonzero(np.array(tile_edges.owners) == k).tolist():
+    for k, stabiliser in enumerate(net.tiling.stabilisers):
+        for element, turned in zip(stabiliser.elements[1:], net.turned[k][1:], strict=True):
+            for edge in np.flatnonzero(np.array(net.owners) == k).tolist():
                 links[edge].append(EdgeImage(int(turned[edge]), element, element.determinant < 0))
     return links
 
@@ -462,22 +446,20 @@ def skeleton(tile_edges: Edges, copies: Copies) -> Skeleton:
     return Skeleton(copy, edge, beyond.copy[copy, edge], ends)
 
 
-def _vertices(tile_edges: Edges, beyond: CopiesAcross) -> Integers:
+def _vertices(net: Edges, beyond: CopiesAcross) -> Integers:
     """Return (M, E) number of the vertex in which edge k of each copy starts."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     count, sides = beyond.copy.shape
-    following = np.array(tile_edges.following)
+    following = np.array(net.following)
     links: list[Integers] = []
-    for k, (partner, element) in enumerate(
-        zip(tile_edges.partners, tile_edges.across, strict=True)
-    ):
+    for k, (partner, element) in enumerate(zip(net.partners, net.across, strict=True)):
         copy = np.flatnonzero(beyond.copy[:, k] >= 0)
         there, turn = beyond.copy[copy, k], beyond.turn[copy, k]
         # the copy beyond is its own image by an element of its stabiliser: so are its edges
-        mate = tile_edges.turned[element.prototile][turn, partner]
-        symmetries = tile_edges.tiling.stabilisers[element.prototile].elements
+        mate = net.turned[element.prototile][turn, partner]
+        symmetries = net.tiling.stabilisers[element.prototile].elements
         signs = np.array([s.determinant for s in symmetries])[turn] * element.determinant
         begin: Integers = there * sides + mate
         end: Integers = there * sides + following[mate]

@@ -134,26 +134,24 @@ class Tiling:
         if group.dim != 2:
             raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
         try:
-            sequence = list(prototiles)
+            listed = list(prototiles)
         except TypeError:
-            sequence = []
-        if sequence and not isinstance(sequence[0], Prototile | str) and np.ndim(sequence[0]) == 1:
-            sequence = []  # a single polygon instead of a sequence
-        figures = tuple(
-            p if isinstance(p, Prototile) else Prototile(np.asarray(p)) for p in sequence
-        )
-        if not figures:
+            listed = []
+        if listed and not isinstance(listed[0], Prototile | str) and np.ndim(listed[0]) == 1:
+            listed = []  # a single polygon instead of a sequence
+        tiles = tuple(p if isinstance(p, Prototile) else Prototile(np.asarray(p)) for p in listed)
+        if not tiles:
             raise OrbiflowError(
                 "a tiling needs a sequence of at least one prototile: Tiling(group, [polygon])"
             )
-        for number, prototile in enumerate(figures):
-            if prototile.signed_area * figures[0].signed_area < 0:
+        for number, prototile in enumerate(tiles):
+            if prototile.signed_area * tiles[0].signed_area < 0:
                 raise OrbiflowError(
                     f"prototile {number} and prototile 0 have opposite orientations: reverse the "
                     "vertices of one"
                 )
         object.__setattr__(self, "group", group)
-        object.__setattr__(self, "prototiles", figures)
+        object.__setattr__(self, "prototiles", tiles)
 
     @cached_property
     def stabilisers(self) -> tuple[Stabiliser, ...]:

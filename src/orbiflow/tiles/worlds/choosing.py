@@ -113,9 +113,7 @@ def best_in_world(
         if seen.plane + BETTER < highest:
             break
         try:
-            world = _unfolded(
-                tile, orders, sign, lambda unfolding, seen=seen: -seen.mark(unfolding)
-            )
+            world = _unfolded(tile, orders, sign, lambda opened, seen=seen: -seen.mark(opened))
         except OrbiflowError:  # it stays in the plane
             if spare is None and orders and order_count(tile.tiling.group) == len(orders):
                 spare = tile

@@ -236,9 +236,7 @@ def _triangles(
 def _parallelograms(group: CrystallographicGroup, places: list[complex]) -> list[Complex]:
     """Return the parallelograms of centres of half-turns, halves of the shortest lattice vectors."""
     first, second = (complex(*vector) / 2 for vector in _positive(reduced_basis(group.lattice)).T)
-    return [
-        np.array([place, place + first, place + first + second, place + second]) for place in places
-    ]
+    return [np.array([at, at + first, at + first + second, at + second]) for at in places]
 
 
 def _positive(basis: Array) -> Array:

@@ -279,7 +279,7 @@ class CopyMotifs(NamedTuple):
 def world_scene(
     world: World,
     chosen: Palette,
-    dresses: Sequence[CopyMotifs] = (),
+    skins: Sequence[CopyMotifs] = (),
     *,
     line: float | None = None,
     cancel: Cancel = NEVER,
@@ -304,9 +304,7 @@ def world_scene(
     rings = (curve.flattened(TOLERANCE) for by_copy in outlines for curve in by_copy.values())
     under = PathPart(boundary(ground_of(rings)), ground)
     layers.append(Layer("ground", "paper", ground, (under,), clipped=True))
-    plain = not any(
-        dress.pictures or any(motif.parts for motif in dress.motifs) for dress in dresses
-    )
+    plain = not any(skin.pictures or any(motif.parts for motif in skin.motifs) for skin in skins)
     widths = {k: _width(world, k, line) for by_copy in outlines for k in by_copy}
     for kind, by_copy in enumerate(outlines):
         for colour in sorted(set(world.colours[list(by_copy)].tolist())):
@@ -317,12 +315,12 @@ def world_scene(
                 style = Style(fill, chosen.outline, width) if width else Style(fill, fill, SEAM)
                 curves = tuple(by_copy[k] for k in mine if not width or widths[k] == width)
                 layers.append(Layer(name, "tiles", style, curves, clipped=True))
-    for dress in dresses:
-        if dress.pictures:
-            layers.append(Layer("pictures", "drawing", Style(), tuple(dress.warped(cancel))))
-        for kind, motif in enumerate(dress.motifs):
-            drawn = sorted(dress.world.drawn(motif, kind), key=lambda entry: entry[0])
-            parts = tuple(_inked(part, chosen, dress.world.colour(k, kind)) for k, part in drawn)
+    for skin in skins:
+        if skin.pictures:
+            layers.append(Layer("pictures", "drawing", Style(), tuple(skin.warped(cancel))))
+        for kind, motif in enumerate(skin.motifs):
+            drawn = sorted(skin.world.drawn(motif, kind), key=lambda entry: entry[0])
+            parts = tuple(_inked(part, chosen, skin.world.colour(k, kind)) for k, part in drawn)
             if parts:
                 layers.append(Layer("drawing", "drawing", Style(), parts, clipped=True))
     for width in sorted(set(widths.values())) if line != 0 and not plain else []:

@@ -328,10 +328,7 @@ def unfolded(
     worlds = list[Unfolding]()
     for pattern, assignments in every:
         tile = TileMesh.of(tiling, ring, pattern)
-        worlds += [
-            Unfolding(tiling, Development.of(pattern, assignment), tile)
-            for assignment in assignments
-        ]
+        worlds += [Unfolding(tiling, Development.of(pattern, cones), tile) for cones in assignments]
     return min(worlds, key=lambda world: round(cost(world), 9))
 
 

@@ -54,9 +54,9 @@ def world_artwork(
         chosen = chosen.shaded((world.count,) * len(tile.figures))
     own_overs = overs if begin is None else overs[:1]
     require_figures(tile, settings, len(own_overs))
-    dresses = [_worn(tile, world, settings, chosen, own_overs, notes)]
+    skins = [_worn(tile, world, settings, chosen, own_overs, notes)]
     if isinstance(world, Metamorphosis) and world.before and begin:
-        dresses.append(_worn(with_map(begin), world.before, settings, chosen, overs[1:], notes))
+        skins.append(_worn(with_map(begin), world.before, settings, chosen, overs[1:], notes))
     notes += chosen.shortage(count)
     more = {
         "title": tile.name,
@@ -65,10 +65,10 @@ def world_artwork(
         ),
     }
     if settings.format == "html":
-        page = partial(turning_page, world, chosen, dresses[0].motifs, tile.name)
+        page = partial(turning_page, world, chosen, skins[0].motifs, tile.name)
         scene = Scene(*settings.page, (), web_page=page, **more)
     else:
-        scene = world_scene(world, chosen, dresses, line=settings.outline, cancel=cancel, **more)
+        scene = world_scene(world, chosen, skins, line=settings.outline, cancel=cancel, **more)
     return Made(
         tile=tile,
         settings=settings,

@@ -84,17 +84,14 @@ def colour_moves(unfolding: Unfolding, most: int = FEW_COLOURS) -> list[Integers
     if words is None:
         return None
     for count in range(2, most + 1):
-        every = [np.array(permutation) for permutation in permutations(range(count))]
-        choices = [
-            [permutation for permutation in every if _is_one(permutation, power)]
-            for power in powers
-        ]
+        every = [np.array(order) for order in permutations(range(count))]
+        choices = [[order for order in every if _is_one(order, power)] for power in powers]
         if np.prod([len(options) for options in choices]) > MOST_CHOICES:
             return None
         for choice in product(*choices):
             whole = choice[0]
-            for permutation in choice[1:]:
-                whole = whole[permutation]
+            for order in choice[1:]:
+                whole = whole[order]
             if not _is_one(whole, last):
                 continue
             moves = [_moved(word, (*choice, *map(np.argsort, choice))) for word in words]

@@ -110,12 +110,8 @@ class Document:
         for key, text in element.items():
             if "url" in text.lower():
                 element.set(key, self._within(text))
-            elif (
-                key in LENGTHS
-                and (length := _LENGTH.fullmatch(text))
-                and length[2].lower() in _RARE
-            ):
-                element.set(key, f"{float(length[1]) * _PIXELS[length[2].lower()]:.9g}")
+            elif key in LENGTHS and (size := _LENGTH.fullmatch(text)) and size[2].lower() in _RARE:
+                element.set(key, f"{float(size[1]) * _PIXELS[size[2].lower()]:.9g}")
         if "pathLength" in element.attrib:
             self._scale_dashes(element)
         if link is not None and element.tag != "a":

@@ -118,10 +118,7 @@ def _write(
     node.local_name = element.tag if element.tag[:1] != "{" else node.local_name
     node.namespace_url = SVG
     ruled = [
-        declared
-        for *_, pseudo, declarations in matcher.match(node)
-        if pseudo is None
-        for declared in declarations
+        declared for *_, pseudo, rule in matcher.match(node) if pseudo is None for declared in rule
     ]
     text = element.get("style", "")
     ruled += [] if _is_too_nested(text) else _declarations(text)
