@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import shapely
-
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
     NEVER,
@@ -168,6 +166,8 @@ def _search_pairs(job: Job, choice: SearchChoice, on_event: Sink, cancel: Cancel
 
 def _nearly_alike(tile: EscherTile, other: EscherTile) -> bool:
     """Return whether two tiles lie alike and cover nearly the same of the silhouettes."""
+    import shapely
+
     if tile.isohedral_class != other.isohedral_class:
         return False
     first, second = (shapely.Polygon(each.normal_tile.polygon) for each in (tile, other))
