@@ -76,7 +76,7 @@ from orbiflow.density.fitting.rows import (
 )
 from orbiflow.density.fitting.settings import COMPONENTS, PARAMETRIC, DensitySettings
 from orbiflow.density.models import MOST_BESIDE, MOST_DIM, Density, Mixture, flow_obstacle
-from orbiflow.density.spaces import ProductSpace, Space, Torus
+from orbiflow.density.spaces import Line, ProductSpace, Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.runtime import SideBySide
 from orbiflow.settings import as_instance
@@ -220,8 +220,7 @@ def fit_in_folds(
     if together and repeats.step is not None:  # a deviation of one step
         narrowest = min(narrowest, 1 / space.step_angle(repeats.step) ** 2)
     families = _families(space, folds, settings, together, narrowest)
-    enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
-    flows = "flow" in settings.allowed and not flow_obstacle(space) and enough
+    flows = _is_flow_tried(space, folds, settings)
     total = work_of(len(families), folds.used) + FLOW_WORK * flows
     course = Course(lambda done, what: say(BEFORE_END * done, what), total)
     with SideBySide(waiting=1) as beside, Rivals() as rivals:
@@ -253,6 +252,20 @@ def fit_in_folds(
     )
     report = replace(report, notes=(*notes, *after))
     return ChosenFit(density, report, folds, evidence)
+
+
+def _is_flow_tried(space: Space, folds: Folds, settings: DensitySettings) -> bool:
+    """Return whether a flow is fitted: with three columns, some of them real, only if it is asked for.
+
+    There it gained .002 nats at most of 10,000 rows, and took a fifth to two fifths of the time.
+    """
+    if "flow" not in settings.allowed or flow_obstacle(space):
+        return False
+    if settings.components is None and not settings.of_flow:
+        lines = isinstance(space, Torus) and any(isinstance(axis, Line) for axis in space.axes)
+        if lines and space.dim == MOST_DIM:
+            return False
+    return len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
 
 
 def _flow_fits(
