@@ -18,6 +18,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import FileContent, Reading, Target, iou, read_outline
 from orbiflow.tiles.silhouette import doubts
+from orbiflow.tiles.silhouette.readers.colour_models import ColourCut, middle_of
 from png_files import promise
 from refusals import refused
 
@@ -334,6 +335,33 @@ def test_a_shadow_is_background(name: str) -> None:
     assert iou(reading.outline, ANIMAL) > 0.93
     assert any("photograph" in note for note in reading.notes)
     assert not doubts(Target(**vars(reading)))
+
+
+def test_colours_that_the_border_has_too_may_be_the_shapes() -> None:
+    """Grass and sky around a white and brown animal, and a white fence along the border."""
+    ground = np.where(noise(6, 8, 20) > 0, (0.3, 0.5, 0.2), (0.45, 0.55, 0.7)) + 0.03 * noise(
+        7, 1, 1
+    )
+    ground[-30:, ::24] = ground[-30:, 1::24] = (0.95, 0.93, 0.9)
+    reading = read_outline(photograph(ground, stripes((0.95, 0.93, 0.9), (0.4, 0.25, 0.15)), 0.0))
+    assert iou(reading.outline, ANIMAL) > 0.9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_cut_from_the_middle_costs_no_more_than_the_truth(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:60, :80]
+    disc = (x - rng.integers(30, 50)) ** 2 + (y - rng.integers(25, 35)) ** 2 < 400
+    colours = np.array([[[20, 5, 5], [90, 0, 9]], [[60, -40, 30], [40, 9, -50]]], dtype=float)
+    lab = colours[disc.astype(int), rng.integers(2, size=disc.shape)] + rng.normal(
+        0, 4, (60, 80, 3)
+    )
+    border = np.ones(disc.shape, bool)
+    border[2:-2, 2:-2] = False
+    cut, start = ColourCut(lab, border), middle_of(disc.shape)
+    shape = cut.shape(start)
+    assert (shape & disc).sum() > 0.9 * (shape | disc).sum()
+    assert cut.cost(shape) < cut.cost(disc) < cut.cost(start)
 
 
 def test_one_level_of_luminance_takes_the_shadow_too() -> None:

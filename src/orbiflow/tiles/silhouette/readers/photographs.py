@@ -9,11 +9,16 @@ import scipy
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
+from orbiflow.tiles.silhouette.readers.colour_models import ColourCut, middle_of
 
 SEARCH_SIDE_PIXELS = 400  # the shape is found at this size, its edge in the picture itself
 LUMINANCE = np.array([0.299, 0.587, 0.114])  # of red, green and blue, as Pillow weighs them
 FLAT_SPREAD = 8.0  # in CIE Lab: one ink or one paper differs less from itself
 MAX_SHARE_NOT_FLAT = 0.02  # of the pixels of a drawing in two colours, edges apart
+CUT_SIDE_PIXELS = 320  # colour models are fitted at this size
+SHARP_SHARE = 0.7  # of the sharpest outline's slope: a duller one is no shape's
+MIN_SLOPE = 2.0  # in CIE Lab a pixel: so steep is a shape's outline
+SAME_SHAPE = 0.8  # IoU of two shapes from which on they are one: the first knows shadows
 MARGIN_SHARE = 0.03  # of the shorter side: the border, which is background
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a background's colours, which are parted around them
 MIN_COLOUR_SHARE = 0.02  # of the background: rarer colours are none of its own
@@ -63,12 +68,13 @@ def shape_in(rgb: Array) -> Array:
     """Return how far each pixel belongs to the shape, 0 to 1.
 
     The background is what the border shows, in a light that varies slowly. Shadows of several
-    depths are taken for background; the depth that leaves the sharpest outline is right.
+    depths are taken for background; the depth that leaves the sharpest outline is right. Where colour
+    models find another shape, from this one or from the middle, theirs is taken.
     """
     scale = min(SEARCH_SIDE_PIXELS / max(rgb.shape), 1)
     size = tuple(round(scale * side) for side in rgb.shape[:2])
     lab = _lab(resized(rgb, size))
-    region = _sharpest(scipy.ndimage.gaussian_filter(lab, (1, 1, 0)))
+    region = _by_colour_models(lab, _sharpest(scipy.ndimage.gaussian_filter(lab, (1, 1, 0))))
     region = resized(region.astype(float), rgb.shape[:2]) > 0.5
     return _matte(_lab(rgb), region, round(EDGE_PIXELS / scale))
 
@@ -77,21 +83,52 @@ def _lab(rgb: Array) -> Array:
     return lab_of(rgb) + np.array([16.0, 0.0, 0.0])
 
 
-def _sharpest(lab: Array) -> _Mask:
-    """Return the region with the sharpest outline."""
+def _border(lab: Array) -> _Mask:
+    """Return the border of a picture, which is background."""
     margin = max(3, round(MARGIN_SHARE * min(lab.shape[:2])))
     border = np.ones(lab.shape[:2], dtype=bool)
     border[margin:-margin, margin:-margin] = False
-    surprise = _surprise(lab, border)
+    return border
+
+
+def _by_colour_models(lab: Array, region: _Mask) -> _Mask:
+    """Return the region, or the shape of colour models where it is another one."""
+    scale = min(CUT_SIDE_PIXELS / max(lab.shape), 1)
+    size = tuple(round(scale * side) for side in lab.shape[:2])
+    small = resized(lab, size)
+    border = _border(small)
+    small = small / _light(small[..., 0], border)[..., None]
+    start = resized(region.astype(float), size) > 0.5
+    cut = ColourCut(scipy.ndimage.gaussian_filter(small, (0.5, 0.5, 0)), border)
+    shapes = [cut.shape(found) for found in (start, middle_of(size)) if found.any()]
+    slope = _slope(small)
+    sharp = [_steepness(slope, shape) for shape in shapes]
+    least = max(MIN_SLOPE, SHARP_SHARE * max(sharp))
+    kept = [shape for shape, slope in zip(shapes, sharp, strict=True) if slope >= least]
+    shape = min(kept, key=cut.cost, default=start)
+    both = (shape & start).sum() / max(1, (shape | start).sum())
+    return region if both > SAME_SHAPE else resized(shape.astype(float), lab.shape[:2]) > 0.5
+
+
+def _slope(lab: Array) -> Array:
+    """Return how steeply colours change about each pixel."""
     slopes = [scipy.ndimage.gaussian_gradient_magnitude(band, 1) for band in np.moveaxis(lab, 2, 0)]
-    slope = scipy.ndimage.maximum_filter(np.linalg.norm(slopes, axis=0), 3)
+    return scipy.ndimage.maximum_filter(np.linalg.norm(slopes, axis=0), 3)
+
+
+def _sharpest(lab: Array) -> _Mask:
+    """Return the region with the sharpest outline."""
+    border = _border(lab)
+    surprise = _surprise(lab, border)
+    slope = _slope(lab)
     regions = [_differing(surprise, deepest, border) for deepest in DEEPEST_GAINS]
-    return max(regions, key=lambda region: _steepness(slope, region, regions[0]))
+    large = [region for region in regions if 3 * region.sum() >= regions[0].sum()]
+    return max(large, key=lambda region: _steepness(slope, region))
 
 
-def _steepness(slope: Array, region: _Mask, whole: _Mask) -> float:
+def _steepness(slope: Array, region: _Mask) -> float:
     """Return the slope that three quarters of a region's outline exceed."""
-    if 3 * region.sum() < whole.sum() or not region.any():
+    if not region.any():
         return 0.0
     return float(
         np.quantile(slope[region & ~scipy.ndimage.binary_erosion(region, border_value=1)], 0.25)
