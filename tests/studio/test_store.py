@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Failed, Finished, ItemDone, Note, Progress
 from orbiflow.studio import Store, WorkQueue
 from orbiflow.studio.hub import Hub
@@ -424,6 +424,12 @@ def test_the_studio_remembers_what_was_seen(tmp_path: Path) -> None:
     again = load_target(tmp_path)
     assert np.isclose(shapely.Polygon(again.outline).area, ring.area)
     assert left_out_share(again) == pytest.approx(0.4, abs=1e-3)
+    # what was read is kept until the picture, or how it is read, is another
+    other = silhouette_file(tmp_path)
+    other.write_text(other.read_text().replace("a.svg", "b.svg"))
+    assert read_input(tmp_path, "b.svg", ReadingSettings()).source == "b.svg"
+    with pytest.raises(InputFileError):
+        read_input(tmp_path, "b.svg", ReadingSettings(invert=True))
 
 
 @pytest.mark.parametrize(("ink", "is_told"), [((16, 16, 16), False), ((60, 140, 90), True)])

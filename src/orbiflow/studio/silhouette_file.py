@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFilter
 
+from orbiflow import __version__
 from orbiflow.drawing import DEFAULT_PALETTE, palette, png_bytes
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import write_atomic, write_json
@@ -61,20 +62,41 @@ def silhouette_file(home: Path, number: int = 0) -> Path:
 
 
 def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 0) -> Target:
-    """Read one of a project's pictures and write its backdrop and its silhouette."""
+    """Read one of a project's pictures and write its backdrop and its silhouette.
+
+    What was read is kept, so that after a stroke only what was painted is looked at.
+    """
     content = FileContent(input_file(home, number).read_bytes(), called)
-    target = _framed(
-        Target.from_bytes(content.data, called, threshold=reading.threshold, invert=reading.invert)
-    )
-    picture = _picture(target, content)
-    end = OF_PICTURE[number]
+    end, file = OF_PICTURE[number], silhouette_file(home, number)
+    backdrop = home / f"backdrop{end}.png"
+    key = [
+        hashlib.sha256(content.data).hexdigest(),
+        called,
+        reading.threshold,
+        reading.invert,
+        __version__,
+    ]
+    earlier = json.loads(file.read_text()).get("read", {}) if file.exists() else {}
+    if earlier.get("key") == key and backdrop.is_file():
+        target, picture = _loaded(earlier["target"]), Image.open(backdrop)
+    else:
+        target = _framed(
+            Target.from_bytes(
+                content.data, called, threshold=reading.threshold, invert=reading.invert
+            )
+        )
+        picture = _picture(target, content)
+        drawn = png_bytes(picture)
+        # one that stays is not loaded again by the page
+        if not backdrop.is_file() or backdrop.read_bytes() != drawn:
+            write_atomic(backdrop, drawn)
     mended = reading.shaped(_mended(target, home / f"mend{end}.png", picture.size))
-    backdrop, drawn = home / f"backdrop{end}.png", png_bytes(picture)
-    # one that stays is not loaded again by the page
-    if not backdrop.is_file() or backdrop.read_bytes() != drawn:
-        write_atomic(backdrop, drawn)
-    document = {"shown": _shown(mended, target, picture), "target": _stored(mended)}
-    write_json(silhouette_file(home, number), document)
+    document = {
+        "shown": _shown(mended, target, picture),
+        "target": _stored(mended),
+        "read": {"key": key, "target": _stored(target)},
+    }
+    write_json(file, document)
     return mended
 
 
@@ -93,6 +115,10 @@ def load_target(home: Path, number: int = 0) -> Target:
         stored = json.loads(silhouette_file(home, number).read_text())["target"]
     except FileNotFoundError:
         raise InputFileError("there is no silhouette yet; choose a picture first") from None
+    return _loaded(stored)
+
+
+def _loaded(stored: dict[str, Any]) -> Target:
     stored["outline"] = np.array(stored["outline"])
     stored["seen"] = shapely.from_wkt(stored.get("seen"))
     stored["size"] = stored["size"] and tuple(stored["size"])
