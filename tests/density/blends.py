@@ -9,13 +9,14 @@ from orbiflow.density import (
     Factor,
     FlowDensity,
     Mixture,
+    ProductSpace,
     Space,
     Torus,
     UniformDensity,
     VonMisesChains,
     VonMisesNetwork,
 )
-from orbiflow.density.models import SCALES, chained
+from orbiflow.density.models import SCALES, ProductChains, chained
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
@@ -54,6 +55,23 @@ def random_network(rng: np.random.Generator, space: Torus, parents: int = 2) -> 
         own = random_chains(rng, Torus(len(chosen) + 1), natural=True)
         factors.append(Factor((*chosen, axis), own))
     return VonMisesNetwork(space, factors)
+
+
+def random_product_chains(space: ProductSpace, seed: int, count: int = 3) -> ProductChains:
+    """Chains on a product whose middles move with the other columns."""
+    noise, beside = torch.Generator().manual_seed(seed % 2**63), space.beside.dim
+
+    def normal(*shape: int) -> torch.Tensor:
+        return torch.randn(*shape, dtype=torch.float64, generator=noise)
+
+    spheres = space.base.spheres
+    width = (1 + spheres[0]) * len(spheres)
+    weights = torch.softmax(normal(count), dim=0)
+    centers = torch.rand(count, beside, dtype=torch.float64, generator=noise)
+    slopes = normal(count, 1 + 2 * beside, width)
+    slopes[:, 1:] *= 0.1  # hardly any middle jumps from one side to the other
+    kappa = (1.5 + normal(count, len(spheres))).exp()
+    return ProductChains(space, weights, centers, (1 + normal(count, beside)).exp(), slopes, kappa)
 
 
 def random_kernels(

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,17 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import vonmises
 
-from density.blends import even_grid, random_blend, random_chains, random_network
+from density.blends import even_grid, random_chains, random_network
 from orbiflow.density import (
     DensityEstimator,
     Factor,
     Torus,
     VonMisesChains,
     VonMisesNetwork,
-    density_to_bytes,
     make_space,
     marginal,
-    read_density,
 )
 from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.chains import Screen, fit_network, network_shapes
@@ -43,13 +40,6 @@ def at_random(seed: int, count: int, dim: int) -> torch.Tensor:
     return torch.tensor(np.random.default_rng(seed).uniform(size=(count, dim)))
 
 
-@given(seeds, st.integers(1, 3))
-@few
-def test_the_integral_is_one(seed: int, dim: int) -> None:
-    total = network_of(seed, dim).log_prob(even_grid(48, dim)).exp().mean()
-    assert float(total) == pytest.approx(1, abs=1e-7)
-
-
 @given(seeds, st.integers(2, 4))
 @few
 def test_a_factor_is_the_joint_density_over_that_of_the_parents(seed: int, dim: int) -> None:
@@ -59,39 +49,6 @@ def test_a_factor_is_the_joint_density_over_that_of_the_parents(seed: int, dim: 
     others[..., -1] = torch.arange(400) / 400
     expected = chains.log_prob(points) - chains.log_prob(others).exp().mean(dim=1).log()
     assert torch.allclose(log_conditional(chains, points), expected, atol=1e-9)
-
-
-@given(seeds, st.integers(1, 4))
-@few
-def test_derivatives(seed: int, dim: int) -> None:
-    network = network_of(seed, dim)
-    points = at_random(seed, 3, dim).requires_grad_()
-    assert torch.autograd.gradcheck(network.log_prob, points)
-
-
-@given(seeds)
-@few
-def test_samples_are_of_the_density(seed: int) -> None:
-    network = network_of(seed, 3)
-    drawn = network.sample(8_000, torch.Generator().manual_seed(seed))
-    grid = even_grid(24, 3)  # finer ones change the integrals by far less than draws scatter
-    density = network.log_prob(grid).exp()
-    rng = np.random.default_rng(seed)
-    for wave in torch.tensor(rng.integers(-2, 3, (6, 3))).double():
-        values, exact = ((2 * math.pi * (p @ wave)).cos() for p in (drawn, grid))
-        off = float(values.mean() - (exact * density).mean())
-        assert abs(off) < 5.5 * float(values.std()) / math.sqrt(len(drawn)) + 1e-9
-    assert network.sample(0, torch.Generator()).shape == (0, 3)
-
-
-@pytest.mark.parametrize("chains", [False, True])
-def test_a_file_gives_it_back(tmp_path: Path, chains: bool) -> None:
-    density, points = random_blend(3, 4, chains=chains, network=True), at_random(0, 20, 4)
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(density))
-    again, _ = read_density(path)
-    assert torch.equal(again.log_prob(points), density.log_prob(points))
-    assert repr(again) == repr(density)
 
 
 def without(header: dict[str, Any], **changes: Any) -> dict[str, Any]:

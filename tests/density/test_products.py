@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from density.blends import random_kernels as kernels_on
+from density.blends import random_product_chains
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
@@ -191,22 +192,10 @@ def test_widths_are_tuned_where_columns_have_nothing_in_common() -> None:
     assert bool(few.isfinite().all())
 
 
-def random_chains(name: str, seed: int, beside: int = 2, count: int = 3) -> ProductChains:
-    """Chains whose middles move with the other columns."""
+def random_chains(name: str, seed: int, beside: int = 2) -> ProductChains:
+    """Chains on a product."""
     space = ProductSpace(BASES[name], [(3.0, 2.0), 24.0, (0.0, 1.0)][:beside])
-    noise = torch.Generator().manual_seed(seed)
-
-    def normal(*shape: int) -> torch.Tensor:
-        return torch.randn(*shape, dtype=torch.float64, generator=noise)
-
-    spheres = space.base.spheres
-    width = (1 + spheres[0]) * len(spheres)
-    weights = torch.softmax(normal(count), dim=0)
-    centers = torch.rand(count, beside, dtype=torch.float64, generator=noise)
-    slopes = normal(count, 1 + 2 * beside, width)
-    slopes[:, 1:] *= 0.1  # hardly any middle jumps from one side to the other
-    kappa = (1.5 + normal(count, len(spheres))).exp()
-    return ProductChains(space, weights, centers, (1 + normal(count, beside)).exp(), slopes, kappa)
+    return random_product_chains(space, seed)
 
 
 @given(names, seeds)
@@ -283,20 +272,6 @@ def test_three_columns_beside_a_given_place(tmp_path: Path) -> None:
     path.write_bytes(density_to_bytes(part))
     again, _ = read_density(path)
     np.testing.assert_allclose(again.log_prob(even[:9]), part.log_prob(even[:9]))
-
-
-@given(names, seeds)
-def test_samples_have_the_entropy_of_the_density(name: str, seed: int) -> None:
-    chains = random_chains(name, seed, count=2)
-    noise = torch.Generator().manual_seed(seed % 1000)
-    drawn = chains.log_prob(chains.sample((4000,), noise), measure="uniform")
-    even = chains.log_prob(chains.space.uniform(40_000, noise), measure="uniform")
-    parts = even.exp() * even
-    error = float(parts.std()) / 200 + float(drawn.std()) / 63
-    assert float(drawn.mean()) == pytest.approx(float(parts.mean()), abs=5 * error)
-    copied = ProductChains.from_header(chains.space, chains.header(), chains.tensors())
-    points = chains.sample((9,), noise)
-    assert torch.equal(copied.log_prob(points), chains.log_prob(points))
 
 
 def test_em_finds_a_direction_that_goes_with_the_day() -> None:
