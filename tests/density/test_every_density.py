@@ -110,9 +110,9 @@ DENSITIES: dict[str, Callable[[int], Density]] = {
     "Bingham": lambda _: parametric(FisherBingham, "projective-plane"),
     "angular central Gaussian": lambda _: parametric(AngularCentralGaussian, "projective-plane"),
     **{
-        f"chains on {name}": partial(random_product_chains, SPACES[name])
-        for name in SPACES
-        if name.endswith(" and times")
+        f"chains on {name}": partial(random_product_chains, space)
+        for name, space in SPACES.items()
+        if isinstance(space, ProductSpace)
     },
 }
 names = st.sampled_from(sorted(DENSITIES))

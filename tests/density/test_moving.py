@@ -9,16 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from density.blends import blended, bump, flow_of, random_blend
+from density.blends import blended, flow_of
 from density.blends import random_kernels as kernels_on
-from density.test_products import BASES, random_chains, random_kernels
+from density.test_every_density import DENSITIES
 from elsewhere import DEVICE, a_device
 from orbiflow.density import (
     Density,
-    FlowDensity,
     Mixture,
     Space,
     UniformDensity,
@@ -54,60 +53,11 @@ def blend(name: str, seed: int, *, sharp: float = 1e7) -> Mixture:
     return blended(space, spline_flow(space, rng), UniformDensity(space), kernels, shares)
 
 
-def others(seed: int) -> list[Density]:
-    """Of the other parts."""
-    rng, bottle = np.random.default_rng(seed), make_space("klein-bottle")
-    return [
-        FlowDensity(bottle, spline_flow(bottle, rng), bump(bottle)),
-        random_blend(seed, 4),
-        random_blend(seed, 3, network=True),
-    ]
-
-
 def near(density: Density, seed: int, count: int = 40) -> torch.Tensor:
     """Points where kernels are felt, and others."""
     generator = torch.Generator().manual_seed(seed)
-    even = torch.rand(count, density.space.dim, dtype=torch.float64, generator=generator)
+    even = density.space.uniform(count, generator)
     return torch.cat([even, density.sample(count, generator)])
-
-
-@pytest.mark.parametrize("kind", [3, 4, 5, 6])
-def test_elsewhere_all_is_the_same(kind: int) -> None:
-    """One of each kind: every operation passes through Python, which is slow."""
-    seed = 1000 + kind
-    density = blend(SPACES[kind], seed) if kind < 4 else others(seed)[kind - 4]
-    points = near(density, seed)
-    expected = density.log_prob(points)
-    one, two = (torch.Generator().manual_seed(seed) for _ in range(2))
-    with a_device() as device:
-        moved = density.to(device)
-        found = moved.log_prob(points.to(device))
-        drawn = moved.sample(9, one)
-        assert found.device == drawn.device == DEVICE
-        torch.testing.assert_close(found.cpu(), expected, rtol=1e-9, atol=1e-9)
-        torch.testing.assert_close(drawn.cpu(), density.sample(9, two))
-        if any(part.is_carried for _, part in density.parts()):
-            there = flow_of(moved).flow.inverse(points.to(device))
-            assert there.device == DEVICE
-            torch.testing.assert_close(there.cpu(), flow_of(density).flow.inverse(points))
-        back = moved.to("cpu")
-    assert torch.equal(back.log_prob(points), expected)
-    assert torch.equal(density.log_prob(points), expected)
-
-
-@settings(max_examples=2)
-@given(SEEDS, st.sampled_from(SPACES))
-def test_gradients_elsewhere(seed: int, name: str) -> None:
-    density = blend(name, seed, sharp=1e3)
-    points = near(density, seed).requires_grad_()
-    (expected,) = torch.autograd.grad(density.log_prob(points).sum(), points)
-    with a_device() as device:
-        moved, there = density.to(device), points.detach().to(device).requires_grad_()
-        value = moved.log_prob(there).sum()
-        weights = list(flow_of(moved).flow.parameters())
-        found, *slopes = torch.autograd.grad(value, [there, *weights])
-        torch.testing.assert_close(found.cpu(), expected, rtol=1e-6, atol=1e-6)
-        assert all(slope.device == DEVICE for slope in slopes)
 
 
 def test_files_and_figures_elsewhere(tmp_path: Path) -> None:
@@ -198,26 +148,32 @@ class Checked(NamedTuple):
         torch.testing.assert_close(drawn.cpu(), self.drawn)
 
 
-@needs_cuda
-def test_densities() -> None:
-    for name in SPACES:
-        density = blend(name, 1, sharp=1e3)
-        Checked.of(density, near(density, 1)).is_same_on("cuda")
-    for density in others(2):
-        Checked.of(density, near(density, 2)).is_same_on("cuda")
-    for name in BASES:
-        mixture, points = random_kernels(name, 3)
-        Checked.of(mixture, points).is_same_on("cuda")
-        Checked.of(random_chains(name, 3), points).is_same_on("cuda")
-
-
-@pytest.mark.parametrize("name", ["sphere", "rotations", "orbifold"])
-def test_products_on_a_device_that_tests_make_up(name: str) -> None:
-    mixture, points = random_kernels(name, 3)
-    known = [Checked.of(own, points) for own in (mixture, random_chains(name, 3))]
+@pytest.mark.parametrize(
+    "name",
+    [
+        "bottle",
+        "axes",
+        "chains of 4",
+        "network",
+        "orientations and times",
+        "chains on pattern and times",
+    ],
+)
+def test_elsewhere_all_is_the_same(name: str) -> None:
+    """Not all of them: every operation passes through Python, which is slow."""
+    density = DENSITIES[name](3)
+    checked = Checked.of(density, near(density, 3))
     with a_device() as device:
-        for own in known:
-            own.is_same_on(device)
+        checked.is_same_on(device)
+        back = density.to(device).to("cpu")
+    assert torch.equal(back.log_prob(checked.points), checked.values)
+
+
+@needs_cuda
+@pytest.mark.parametrize("name", DENSITIES)
+def test_on_cuda_all_is_the_same(name: str) -> None:
+    density = DENSITIES[name](3)
+    Checked.of(density, near(density, 3)).is_same_on("cuda")
 
 
 @needs_cuda
