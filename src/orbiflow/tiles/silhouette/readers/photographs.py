@@ -44,6 +44,7 @@ WHITE_XYZ = np.array([0.95047, 1.0, 1.08883])
 LAB_KNEE = (6 / 29) ** 3
 """Share of white below which CIE Lab is linear."""
 
+FUR_PIXELS = 1.0  # pixels of that picture to which single hairs and grain are averaged
 EDGE_PIXELS = 2  # pixels of that picture within which the outline is drawn again
 
 _Mask = NDArray[np.bool_]
@@ -76,7 +77,8 @@ def shape_in(rgb: Array) -> Array:
     lab = _lab(resized(rgb, size))
     region = _by_colour_models(lab, _sharpest(scipy.ndimage.gaussian_filter(lab, (1, 1, 0))))
     region = resized(region.astype(float), rgb.shape[:2]) > 0.5
-    return _matte(_lab(rgb), region, round(EDGE_PIXELS / scale))
+    matte = _matte(_lab(rgb), region, round(EDGE_PIXELS / scale))
+    return scipy.ndimage.gaussian_filter(matte, FUR_PIXELS / scale)
 
 
 def _lab(rgb: Array) -> Array:
