@@ -1,6 +1,5 @@
 """Searches over classes, in this process and in others; tiles that come early and get better."""
 
-import math
 import multiprocessing
 import threading
 from dataclasses import asdict, replace
@@ -392,8 +391,7 @@ def test_levels_are_the_whole_search(
     kind: type[LikenessSearch] | type[OverlapSearch], effort: str
 ) -> None:
     method = kind.for_effort(effort)
-    shares, levels = zip(*method.levels(), strict=True)
-    assert math.isclose(sum(shares), 1)
+    _, levels = zip(*method.levels(), strict=True)
     if not isinstance(method, LikenessSearch):
         assert levels == (method,)
         return

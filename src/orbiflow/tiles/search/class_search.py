@@ -20,6 +20,7 @@ from orbiflow.tiles.silhouette import HOW_TO_GET_A_TARGET, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
+PROMISING_SHARE = 0.5  # of classes that go on to the next level, before that is known
 SKETCHING = 0.1  # the share of the work that first looks are, if somebody watches
 
 
@@ -108,7 +109,8 @@ class ClassSearch:
 
     def look_first(self, cancel: Cancel) -> None:
         """Show a certified tile of one of the classes in a moment, if the method can."""
-        self.record.next_level("sketch", SKETCHING * (self.record.on_tile is not None))
+        end = SKETCHING * (self.record.on_tile is not None)
+        self.record.next_level("sketch", 0.0, end, self.names)
         with one_thread(), one_blas_thread():
             first = self.method.preview(self.task.goal, self.names, cancel)
         if first is not None:
@@ -116,20 +118,25 @@ class ClassSearch:
 
     def search(self, cancel: Cancel) -> None:
         """Do the task, one level of effort after another, each for the promising classes."""
-        method, names, record, rest = self.method, self.names, self.record, 1.0
+        method, names, record, begin = self.method, self.names, self.record, 0.0
         # asked before torch is limited here: a limit makes no fork safe
         preload = (__name__, type(method).__module__)
         context = process_context(preload) if self.workers > 1 else None
         if record.on_tile is not None:
-            rest -= SKETCHING
+            begin = SKETCHING
             sketches = replace(self.task, method=Sketches(method), per_class=1)
             self._do(
                 sketches, [name for name in names if name not in record.looks], context, cancel
             )
-        levels = method.levels()
-        for share, level in levels:
-            is_last = level is levels[-1][1]
-            record.next_level("final" if is_last else "better", share * rest)
+        levels, done = method.levels(), 0.0
+        for number, (effort, level) in enumerate(levels):
+            is_last = number == len(levels) - 1
+            now = effort * len(names)
+            later = PROMISING_SHARE * len(names) * sum(other for other, _ in levels[number + 1 :])
+            left = (1 - begin) / (done + now + later)  # of the whole, for a unit of work
+            end = 1.0 if is_last else begin + (done + now) * left
+            record.next_level("final" if is_last else "better", begin + done * left, end, names)
+            done += now
             self._do(replace(self.task, method=level), names, context, cancel)
             if not is_last:
                 names = record.settled(names, method.is_promising)

@@ -176,15 +176,11 @@ class LikenessSearch(Settings, SearchMethod):
         return replace(search, carved=max(search.carved, wanted)) if search.carved else search
 
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
-        """Return the phases of each level of effort that this one holds."""
+        """Return the phases of each level of effort that this one holds, and how many they are."""
         ends = sorted({*(level for level in EFFORTS.values() if level < self.phases), self.phases})
         parts = [level for level in pairwise([0, *ends]) if level[1] > self.passed]
         methods = [replace(self, passed=max(a, self.passed), phases=b) for a, b in parts]
-        # later phases are of a few classes
-        work = [
-            1.0 if level.passed == 0 else (level.phases - level.passed) / 3 for level in methods
-        ]
-        return [(part / sum(work), level) for part, level in zip(work, methods, strict=True)]
+        return [(float(level.phases - level.passed), level) for level in methods]
 
     def is_promising(self, tile: EscherTile, best: EscherTile) -> bool:
         """Return whether the tile is at most `PROMISING` marks behind the best one."""

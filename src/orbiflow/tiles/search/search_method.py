@@ -158,7 +158,7 @@ class SearchMethod(ABC):
         return 0.0
 
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
-        """Return methods that find more and more, each with its share of the work.
+        """Return methods that find more and more, each with the work that it is for a class.
 
         A search takes one after another, each for the classes that are promising; together they find
         what this one does.

@@ -70,12 +70,15 @@ class Record:
         self.on_event, self.on_tile, self.most = on_event, on_tile, most
         self.begin = time.perf_counter()
         self.stage = "final"  # how good the tiles are that are found now
-        self._done, self._share = 0.0, 0.0  # of the level
+        self._begin, self._end = 0.0, 0.0  # shares of the whole between which the level is
+        self._level = dict.fromkeys(names, 0.0)  # the share of it that each of its classes has done
+        self._whole = 0.0
         on_event(Progress(0.0, "fitting"))
 
-    def next_level(self, stage: str, share: float) -> None:
-        """Go on to work that has this share of the whole, and gives tiles of a stage."""
-        self._done, self._share, self.stage = self._done + self._share, share, stage
+    def next_level(self, stage: str, begin: float, end: float, names: Sequence[str]) -> None:
+        """Go on to a stage: work for some classes, between two shares of the whole."""
+        self._begin, self._end, self.stage = begin, end, stage
+        self._level = dict.fromkeys(names, 0.0)
 
     def first_look(self, tile: EscherTile) -> None:
         """Keep a tile that the search is going to improve on."""
@@ -86,11 +89,19 @@ class Record:
 
     def progress(self, name: str, share: float, loss: float = math.nan) -> None:
         """Report how far a class is, which never falls."""
-        share = max(self._done + self._share * share, self.shares[name])
+        if name in self._level:
+            self._level[name] = max(self._level[name], share)
+        share = max(self._of_whole(share), self.shares[name])
         self.shares[name] = share = min(1.0, share)
-        whole = sum(self.shares.values()) / len(self.shares)
+        # a class that is not in the level takes no time any more
+        whole = self._of_whole(sum(self._level.values()) / max(1, len(self._level)))
+        self._whole = whole = max(self._whole, whole)
         finite = loss if math.isfinite(loss) else None  # no NaN in JSON
         self.on_event(Progress(whole, self._what, name, share, finite))
+
+    def _of_whole(self, share: float) -> float:
+        """Return the share of the whole that is done with a share of the level."""
+        return (1 - share) * self._begin + share * self._end
 
     @property
     def _what(self) -> str:
