@@ -147,7 +147,9 @@ class ExportSettings(PageSettings, MotifSettings, TintSettings, group="Page and 
     tab_width: Annotated[Length, OnlyWith(cut=("skeleton", "pieces"))] = 0.5
     """Width of such a gap, as it is left."""
 
-    power: Annotated[float | None, Range(0, 100), Unit("%")] = None
+    power: Annotated[
+        float | None, Range(0, 100), Unit("%"), OnlyWith(cut=("skeleton", "pieces", "jigsaw"))
+    ] = None
     """Power of what is engraved and scored, which the names of its layers say."""
 
     offset: Annotated[
