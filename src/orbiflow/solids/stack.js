@@ -149,7 +149,7 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
     moveApart(0);
   }
 
-  turnedByHand(canvas, view, redraw, {
+  turnedByHand(canvas, byAngles(canvas, view, redraw), {
     keys: { "[": () => moveApart(view.apart - 0.1), "]": () => moveApart(view.apart + 0.1), 0: startAgain },
   });
   canvas.addEventListener("webglcontextlost", e => e.preventDefault());

@@ -288,7 +288,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
     draw(width, height, scale);
     placeLabels(width, height);
   }
-  turnedByHand(canvas, view, redraw, {
+  turnedByHand(canvas, byAngles(canvas, view, redraw), {
     scrolls,
     keys: { 0: () => { Object.assign(view, data.start, { zoom: 1 }); changed(view); redraw(); } },
   });

@@ -1,6 +1,6 @@
-/** What is turned by hand on a canvas, such as a surface or a stack of solids: view, mouse, touch and keys. */
+/** What is turned by hand on a canvas, a surface, a stack of solids or a world: mouse, touch and keys. */
 
-const STEP = 0.1; // radians that an arrow key turns
+const STEP = 30; // pixels by which an arrow key turns
 const ZOOM = 1.15; // of + and -
 
 /**
@@ -41,59 +41,82 @@ export function atNextFrame(paint) {
 }
 
 /**
- * Let a canvas be turned: what is done by hand changes `yaw`, `pitch` and `zoom` of a view, and is then redrawn.
+ * What turns and zooms a view by its `yaw`, `pitch` and `zoom`, for `turnedByHand`.
  *
  * @param {HTMLCanvasElement} canvas
  * @param { { yaw: number, pitch: number, zoom: number } } view
  * @param {() => void} redraw
+ */
+export const byAngles = (canvas, view, redraw) => ({
+  turn([a, b], [c, d]) {
+    const per = 3 / canvas.clientHeight / Math.sqrt(view.zoom);
+    view.yaw -= (c - a) * per;
+    view.pitch = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, view.pitch + (d - b) * per));
+    redraw();
+  },
+  zoom(factor) {
+    view.zoom = Math.max(0.4, Math.min(8, view.zoom * factor));
+    redraw();
+  },
+});
+
+/**
+ * Let a canvas be turned: `turn` from one place of it to another, in its pixels, `zoom` by a factor.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param { { turn(from: Point, to: Point): void, zoom(factor: number): void, rest?(): void } } hand `rest` hears that
+ *   nothing is held any more
  * @param { { keys?: Record<string, () => void>, scrolls?: boolean } } more further keys; whether the page scrolls: then
  *   the wheel zooms only with the Ctrl key
  */
-export function turnedByHand(canvas, view, redraw, { keys = {}, scrolls = false }) {
-  const turn = (dx, dy) => {
-    view.yaw -= dx;
-    view.pitch = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, view.pitch + dy));
-    redraw();
-  };
-  const zoom = (factor) => {
-    view.zoom = Math.max(0.4, Math.min(8, view.zoom * factor));
-    redraw();
-  };
+export function turnedByHand(
+  canvas,
+  { turn, zoom, rest = () => {} },
+  { keys = {}, scrolls = false } = {},
+) {
+  /** @type {Map<number, Point>} */
   const held = new Map();
+  const place = ({ clientX, clientY }) => {
+    const { left, top } = canvas.getBoundingClientRect();
+    return /** @type {Point} */ ([clientX - left, clientY - top]);
+  };
   const spread = () => {
     const [[a, b], [c, d]] = [...held.values()];
     return Math.hypot(a - c, b - d);
   };
-  canvas.addEventListener("pointerdown", ({ pointerId, clientX, clientY }) => {
-    canvas.setPointerCapture(pointerId);
-    held.set(pointerId, [clientX, clientY]);
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    held.set(event.pointerId, place(event));
   });
-  canvas.addEventListener("pointermove", ({ pointerId, clientX, clientY }) => {
-    const last = held.get(pointerId);
+  canvas.addEventListener("pointermove", (event) => {
+    const last = held.get(event.pointerId);
     if (!last) return;
     const before = held.size === 2 ? spread() : 0;
-    const per = 3 / canvas.clientHeight / Math.sqrt(view.zoom);
-    if (held.size === 1) turn((clientX - last[0]) * per, (clientY - last[1]) * per);
-    held.set(pointerId, [clientX, clientY]);
+    if (held.size === 1) turn(last, place(event));
+    held.set(event.pointerId, place(event));
     if (before > 0) zoom(spread() / before);
   });
-  for (const name of ["pointerup", "pointercancel"]) {
-    canvas.addEventListener(
-      name,
-      (event) => held.delete(/** @type {PointerEvent} */ (event).pointerId),
-    );
-  }
+  const end = (event) => {
+    held.delete(event.pointerId);
+    if (!held.size) rest();
+  };
+  ["pointerup", "pointercancel"].forEach((name) => canvas.addEventListener(name, end));
   canvas.addEventListener("wheel", (event) => {
     if (scrolls && !event.ctrlKey) return;
     event.preventDefault();
     zoom(Math.exp(-0.0015 * event.deltaY));
   }, { passive: false });
+  const by = (x, y) => () => {
+    const [a, b] = [canvas.clientWidth / 2, canvas.clientHeight / 2];
+    turn([a, b], [a + x * STEP, b + y * STEP]);
+    rest();
+  };
   /** @type {Record<string, () => void>} */
   const moves = {
-    ArrowLeft: () => turn(-STEP, 0),
-    ArrowRight: () => turn(STEP, 0),
-    ArrowUp: () => turn(0, -STEP),
-    ArrowDown: () => turn(0, STEP),
+    ArrowLeft: by(-1, 0),
+    ArrowRight: by(1, 0),
+    ArrowUp: by(0, -1),
+    ArrowDown: by(0, 1),
     "+": () => zoom(ZOOM),
     "=": () => zoom(ZOOM),
     "-": () => zoom(1 / ZOOM),

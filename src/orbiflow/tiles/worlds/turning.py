@@ -59,7 +59,7 @@ def turning_page(world: World, chosen: Palette, motifs: Sequence[Motif], title: 
         "outline": chosen.outline,
         "paper": chosen.paper,
     }
-    script = page_script("tiles/write/turning.js")
+    script = page_script("drawing/js/turned.js", "tiles/write/turning.js")
     return canvas_page("turning.html", title, script, "showWorld", data)
 
 

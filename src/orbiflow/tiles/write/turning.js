@@ -5,11 +5,12 @@
  * from the one in the middle, as long as they can be seen.
  */
 
+import { atNextFrame, sharpened, turnedByHand } from "../../drawing/js/turned.js";
+
 const LEAST = [4, 9]; // pixels of the smallest copies, at rest and in the hand
 const DRAWN = [40, 110]; // pixels of those that carry their drawing, at rest and in the hand
 const FARTHEST = 1e3; // hyperbolic cosine of the distance at which copies are counted anew
 const MOST = 6000; // copies
-const STEP = 40; // pixels of an arrow key
 const SAVED = 2400; // pixels of a picture to keep
 
 /** @type {(id: string) => any} */
@@ -251,58 +252,32 @@ class World {
 export function showWorld(data) {
   const world = new World(data);
   const canvas = at("view");
-  let asked = 0;
-  let held = null;
-  const draw = () => {
-    asked ||= requestAnimationFrame(() => {
-      asked = 0;
-      const sharp = devicePixelRatio || 1;
-      canvas.width = Math.round(canvas.clientWidth * sharp);
-      canvas.height = Math.round(canvas.clientHeight * sharp);
-      world.paint(canvas.getContext("2d"), canvas.width, canvas.height, held);
-      canvas.dataset.drawn = "yes";
-    });
-  };
-  const scale = () => world.radius * Math.min(canvas.clientWidth, canvas.clientHeight);
-  const place = ({ clientX, clientY }) => [
-    (clientX - canvas.clientWidth / 2) / scale(),
-    (canvas.clientHeight / 2 - clientY) / scale(),
-  ];
+  let inHand = false;
+  const draw = atNextFrame(() => {
+    const [width, height] = sharpened(canvas);
+    world.paint(canvas.getContext("2d"), width, height, inHand);
+    canvas.dataset.drawn = "yes";
+  });
   const zoom = (by) => {
     world.radius = Math.min(20, Math.max(0.1, world.radius * by));
     draw();
   };
-  const turn = (from, to) => {
-    world.turn(from, to);
-    draw();
-  };
-  canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
-    held = place(event);
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    if (!held) return;
-    const now = place(event);
-    turn(held, now);
-    held = now;
-  });
-  ["pointerup", "pointercancel"].forEach((kind) =>
-    canvas.addEventListener(kind, () => {
-      held = null;
+  turnedByHand(canvas, {
+    turn(from, to) {
+      const scale = world.radius * Math.min(canvas.clientWidth, canvas.clientHeight);
+      const places = [from, to].map(([x, y]) => [
+        (x - canvas.clientWidth / 2) / scale,
+        (canvas.clientHeight / 2 - y) / scale,
+      ]);
+      inHand = true;
+      world.turn(...places);
       draw();
-    })
-  );
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    zoom(Math.exp(-event.deltaY / 400));
-  }, { passive: false });
-  const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-  canvas.addEventListener("keydown", (event) => {
-    if (ways[event.key]) turn([0, 0], ways[event.key].map((v) => v * STEP / scale()));
-    else if ("+=".includes(event.key)) zoom(1.2);
-    else if (event.key === "-") zoom(1 / 1.2);
-    else return;
-    event.preventDefault();
+    },
+    zoom,
+    rest() {
+      inHand = false;
+      draw();
+    },
   });
   at("nearer").onclick = () => zoom(1.2);
   at("farther").onclick = () => zoom(1 / 1.2);
