@@ -146,6 +146,23 @@ def test_images_are_one_point(name: str, seed: int) -> None:
     data = space.from_chart(points)
     again = space.features(space.to_chart(data)), space.features(points)[:1]
     assert float((again[0] - again[1]).abs().amax(dim=-1).amin(dim=0).max()) < 1e-7
+    found = space.from_features(space.features(points)[0])
+    torch.testing.assert_close(found, space.project(points), rtol=0, atol=1e-7)
+
+
+@given(name=st.sampled_from(sorted(name for name in SPACES if SPACES[name].has_chart)), seed=seeds)
+@settings(max_examples=20)
+def test_distance_is_a_metric_and_the_least_over_many_images(name: str, seed: int) -> None:
+    space, source = SPACES[name], torch.Generator().manual_seed(seed)
+    a, b, c = (space.uniform(20, source) for _ in range(3))
+    ab = space.distance(a, b)
+    assert torch.allclose(ab, space.distance(b, a), atol=1e-9)
+    assert bool((space.distance(a, c) <= ab + space.distance(b, c) + 1e-9).all())
+    near = space.group.elements_near(space.domain.site, 3.5)
+    brute = torch.stack([(g(b) - a).norm(dim=-1) for g in near]).amin(dim=0)
+    assert torch.allclose(ab, brute, atol=1e-9)
+    table = space.squared_distances(a, b)
+    assert torch.allclose(table.diagonal(), ab**2, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", DENSITIES)

@@ -56,17 +56,6 @@ def random_kernels(name: str, seed: int, count: int = 12) -> tuple[Mixture, torc
 
 
 @given(names, seeds)
-def test_data_and_features_come_back(name: str, seed: int) -> None:
-    space = ProductSpace(BASES[name], AXES)
-    points = space.project(space.uniform(9, torch.Generator().manual_seed(seed)))
-    again = space.to_chart(space.from_chart(points))
-    np.testing.assert_allclose(space.from_chart(again), space.from_chart(points), atol=1e-7)
-    features = space.features(points)
-    assert features.shape[-1] % len(space.spheres) == 0
-    np.testing.assert_allclose(space.from_features(features[0]), points, atol=1e-7)
-
-
-@given(names, seeds)
 def test_a_kernel_is_the_product_of_those_of_the_parts(name: str, seed: int) -> None:
     mixture, points = random_kernels(name, seed)
     whole = mixture.components[0]

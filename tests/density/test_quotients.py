@@ -82,18 +82,6 @@ def test_densities_integrate_to_one(name: str) -> None:
 
 @given(name=names, seed=seeds)
 @settings(max_examples=4)
-def test_distances_are_the_least_over_many_images(name: str, seed: int) -> None:
-    space = QuotientSpace(name)
-    start, end = points_of(space, seed), points_of(space, seed + 1)
-    near = space.group.elements_near(space.domain.site, 3.5)
-    brute = torch.stack([(g(end) - start).norm(dim=-1) for g in near]).amin(dim=0)
-    torch.testing.assert_close(space.distance(start, end), brute, rtol=0, atol=1e-9)
-    table = space.squared_distances(start, end)
-    torch.testing.assert_close(table.diagonal().sqrt(), brute, rtol=0, atol=1e-9)
-
-
-@given(name=names, seed=seeds)
-@settings(max_examples=4)
 def test_the_domain_holds_the_nearest_of_each_orbit(name: str, seed: int) -> None:
     space = QuotientSpace(name)
     rng = np.random.default_rng(seed)

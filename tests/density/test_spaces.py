@@ -51,20 +51,6 @@ def test_data_and_chart_there_and_back(space, seed: int) -> None:
 
 
 @every
-@given(seed=seeds)
-def test_distance_is_a_metric_and_the_least_over_many_images(space, seed: int) -> None:
-    a, b, c = square(seed, 30), square(seed + 1, 30), square(seed + 2, 30)
-    ab = space.distance(a, b)
-    assert torch.allclose(ab, space.distance(b, a), atol=1e-9)
-    assert bool((space.distance(a, c) <= ab + space.distance(b, c) + 1e-9).all())
-    elements = space.group.elements_near((0.5, 0.5), 5.0)
-    brute = torch.stack([(g(b) - a).norm(dim=-1) for g in elements]).amin(dim=0)
-    assert torch.allclose(ab, brute, atol=1e-9)
-    table = space.squared_distances(a, b)
-    assert torch.allclose(table.diagonal(), ab**2, atol=1e-9)
-
-
-@every
 def test_densities_of_the_uniform_distribution(space) -> None:
     points = square(0)
     natural = space.log_area(points) - math.log(space.volume)  # of the square, uniform in nature

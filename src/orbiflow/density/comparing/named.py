@@ -200,13 +200,9 @@ def _ratio_of_likelihoods(vectors: Array, labels: Labels) -> TestStatistic:
     return statistics.chi_square(2 * (sum(each) - every), free * (len(each) - 1))
 
 
-def _smallest(labels: Labels) -> int:
-    return int(np.bincount(labels).min())
-
-
 def _small(least: int) -> Callable[[Array, Labels], str]:
     def doubt(_vectors: Array, labels: Labels) -> str:
-        few = _smallest(labels)
+        few = int(np.bincount(labels).min())
         return f"as a sample has {few} rows, fewer than {least}" if few < least else ""
 
     return doubt

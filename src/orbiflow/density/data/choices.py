@@ -227,7 +227,8 @@ class _Choice:
 
     def in_space(self) -> Columns:
         """Return the columns of a space that is no torus, and those beside it."""
-        said, notes, cycles = self.said, list[str](), [k for k in self.data if self._is_cycle(k)]
+        said, notes = self.said, list[str]()
+        cycles = [k for k in self.data if (role := self._named(k)) and role.kind == "cycle"]
         of_space = [k for k, role in self.data.items() if role is None and k not in cycles]
         of_space = of_space or [
             k for k, role in self.data.items() if role is not None and role.kind == "angle"
@@ -242,10 +243,6 @@ class _Choice:
         angles = {k: Role("angle") for k in of_space if lacks_unit}
         self._ask({**angles, **beside}, [k for k in of_space if not lacks_unit])
         return [*of_space, *beside], (*(None for _ in of_space), *beside.values()), unit, notes
-
-    def _is_cycle(self, column: int) -> bool:
-        role = self._named(column)
-        return role is not None and role.kind == "cycle"
 
     def _by_names(self) -> tuple[list[int], list[str]]:
         """Return the columns that a space takes by their names, and notes."""

@@ -284,7 +284,8 @@ def _parametric(
         shapes = shape_parameters(local, spread)
         if local.form.name == DIRECTIONS and even:
             shapes = [_inverted(shapes[0], side.cloud, count)]
-        parameters += [_of_side(parameter, side.name) for parameter in shapes]
+        ending = f"_{side.name}" if side.name else ""
+        parameters += [replace(shape, name=f"{shape.name}{ending}") for shape in shapes]
     if name == SINE:
         parameters = [_of_columns(parameter, sides[0].writings) for parameter in parameters]
     if name in (ANGLES, SINE):
@@ -296,7 +297,7 @@ def _parametric(
     if even:
         goodness = _goodness(space, name, sides, density, torch.Generator().manual_seed(seed))
     notes = _notes(sides, count, rows.groups, free)
-    if 2 * count * gain < _chi_square_quantile(free):
+    if 2 * count * gain < float(special.chdtri(free, 1 - LEVEL)):
         notes.append(
             "the rows cannot tell this density from the uniform one: its directions and intervals mean "
             "little"
@@ -326,10 +327,6 @@ def _notes(sides: list[Side], count: float, groups: Tensor | None, free: int) ->
     return notes
 
 
-def _chi_square_quantile(free: int) -> float:
-    return float(special.chdtri(free, 1 - LEVEL))
-
-
 def _of_columns(one: Parameter, writings: tuple[Writing, ...]) -> Parameter:
     """Return a parameter named for a column instead of by its number."""
     for k, writing in enumerate(writings, 1):
@@ -337,10 +334,6 @@ def _of_columns(one: Parameter, writings: tuple[Writing, ...]) -> Parameter:
             one, name=re.sub(f"^concentration_{k}$", f"concentration_{writing.names[0]}", one.name)
         )
     return one
-
-
-def _of_side(one: Parameter, side: str) -> Parameter:
-    return replace(one, name=f"{one.name}_{side}") if side else one
 
 
 def _inverted(one: Parameter, cloud: Cloud, count: float) -> Parameter:
