@@ -334,7 +334,7 @@ def _families(
         MixtureFamily(space, settings.seed, narrowest),
     ]
     if space.is_torus and space.dim > 1:
-        families.append(ChainFamily(space, settings.seed, starts))
+        families.append(ChainFamily(space, settings.seed, starts=starts))
     if isinstance(space, ProductSpace) and space.beside.dim <= MOST_BESIDE:
         families.append(ProductChainFamily(space, settings.seed, narrowest))
     if isinstance(space, Torus) and space.dim > MOST_DIM:

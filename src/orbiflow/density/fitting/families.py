@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from itertools import compress
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import torch
 from torch import Tensor
@@ -148,14 +148,48 @@ class KernelFamily(Family):
         return {name: with_incomplete(part, rest, total) for name, part in estimates.items()}
 
 
+@dataclass
 class SizedFamily(Family):
     """Densities of several sizes, in the end the mean of those of all folds.
 
     By concavity the mean of densities scores at least the mean of their scores, and EM ends in another
     optimum from every start (Breiman, Bagging predictors, 1996).
+
+    - `starts`: How many of each size are fitted to each fold but the first.
     """
 
+    space: Space
+    seed: int
+    narrowest: float = NARROWEST
+    starts: int = 1
     sizes: tuple[int, ...] | None = None
+
+    tried: ClassVar[tuple[int, ...]] = SIZES
+    rows_each: ClassVar[int] = CHAIN_ROWS
+    most: ClassVar[int] = MOST_CHAINED
+
+    @abstractmethod
+    def fit(
+        self, size: int, train: Rows, held: Rows, generator: torch.Generator, *, first: bool
+    ) -> Density:
+        """Return a density of a size; of the `first` fold it is from the first start."""
+
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
+        train = train[: self.most]
+        generator = torch.Generator().manual_seed(self.seed + number)
+
+        def fit(size: int, turn: int = 0) -> Density:
+            say(f"{self.name} of {size}" + (f", start {turn + 1}" if self.starts > 1 else ""))
+            return self.fit(size, train, held, generator, first=number + turn == 0)
+
+        if self.sizes is None:
+            whole = int(is_whole(train).sum())
+            sizes = [k for k in self.tried if k == 1 or self.rows_each * k <= whole]
+            return _grown(fit, sizes, held)
+        return {
+            str(size): _mean([fit(size, turn) for turn in range(self.starts)])
+            for size in self.sizes
+        }
 
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del rows
@@ -166,92 +200,49 @@ class SizedFamily(Family):
         self.sizes = tuple(sorted(map(int, names)))
 
 
-@dataclass
 class MixtureFamily(SizedFamily):
     """Mixtures of kernels."""
 
-    space: Space
-    seed: int
-    narrowest: float = NARROWEST
     name = "mixture"
     precedes_floor = True
+    tried, rows_each, most = MIXTURE_SIZES, MIXTURE_ROWS, MOST_MIXED
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
-        train = train[:MOST_MIXED]
-        whole = int(is_whole(train).sum())
-        generator = torch.Generator().manual_seed(self.seed + number)
-
-        def fit(size: int) -> Density:
-            say(f"mixture of {size}")
-            return fit_mixture(
-                self.space, train, size, narrowest=self.narrowest, generator=generator
-            )
-
-        if self.sizes is None:
-            return _grown(
-                fit, [k for k in MIXTURE_SIZES if k == 1 or MIXTURE_ROWS * k <= whole], held
-            )
-        return {str(size): fit(size) for size in self.sizes}
+    def fit(
+        self, size: int, train: Rows, held: Rows, generator: torch.Generator, *, first: bool
+    ) -> Density:
+        del held, first
+        return fit_mixture(self.space, train, size, narrowest=self.narrowest, generator=generator)
 
 
-@dataclass
 class ChainFamily(SizedFamily):
     """Mixtures of von Mises chains on a torus.
 
-    `starts` are fitted to each fold but the first; those after the first have their angles in random
-    orders, so that they differ more.
+    Those after the first have their angles in random orders, so that they differ more.
     """
 
-    space: Space
-    seed: int
-    starts: int = 1
     name = "chains"
+    tried = tuple(size for size in SIZES if size >= SMALLEST_CHAINS)
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
-        train = train[:MOST_CHAINED]
-        generator = torch.Generator().manual_seed(self.seed + number)
-        natural = torch.arange(self.space.dim)
-
-        def fit(size: int, turn: int = 0) -> Density:
-            say(f"chains of {size}" + (f", start {turn + 1}" if self.starts > 1 else ""))
-            turned = number + turn > 0
-            order = torch.randperm(self.space.dim, generator=generator) if turned else natural
-            start = spread_chains(self.space, train, size, order, generator)
-            return fit_chain_mixture(start, train, held, MAX_ITERATIONS)
-
-        if self.sizes is None:
-            sizes = [k for k in SIZES if k >= SMALLEST_CHAINS and CHAIN_ROWS * k <= len(train)]
-            return _grown(fit, sizes, held)
-        return {
-            str(size): _mean([fit(size, turn) for turn in range(self.starts)])
-            for size in self.sizes
-        }
+    def fit(
+        self, size: int, train: Rows, held: Rows, generator: torch.Generator, *, first: bool
+    ) -> Density:
+        dim = self.space.dim
+        order = torch.arange(dim) if first else torch.randperm(dim, generator=generator)
+        start = spread_chains(self.space, train, size, order, generator)
+        return fit_chain_mixture(start, train, held, MAX_ITERATIONS)
 
 
-@dataclass
 class ProductChainFamily(SizedFamily):
     """Mixtures of chains on a product: other columns, then a point of its base."""
 
-    space: Space
-    seed: int
-    narrowest: float = NARROWEST
     name = "chains"
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
-        train = train[:MOST_CHAINED]
-        generator = torch.Generator().manual_seed(self.seed + number)
-
-        def fit(size: int) -> Density:
-            say(f"chains of {size}")
-            start = fit_mixture(
-                self.space, train, size, narrowest=self.narrowest, generator=generator
-            )
-            return fit_product_chains(start, train, narrowest=self.narrowest)
-
-        if self.sizes is None:
-            sizes = [k for k in SIZES if k == 1 or CHAIN_ROWS * k <= len(train)]
-            return _grown(fit, sizes, held)
-        return {str(size): fit(size) for size in self.sizes}
+    def fit(
+        self, size: int, train: Rows, held: Rows, generator: torch.Generator, *, first: bool
+    ) -> Density:
+        del held, first
+        start = fit_mixture(self.space, train, size, narrowest=self.narrowest, generator=generator)
+        return fit_product_chains(start, train, narrowest=self.narrowest)
 
 
 @dataclass
@@ -296,6 +287,8 @@ class NetworkFamily(Family):
 
 
 def _mean(parts: list[Density]) -> Density:
+    if len(parts) == 1:
+        return parts[0]
     mean = type(parts[0]).joined(parts, torch.ones(len(parts), dtype=torch.float64))
     assert mean is not None
     return mean

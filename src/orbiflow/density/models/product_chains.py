@@ -101,11 +101,9 @@ class ProductChains(Density, kind="product-chains"):
 
     def log_each(self, points: Tensor) -> Tensor:
         """Return the log density (N, K) of each component with its weight, as `log_density` has it."""
-        places, more = self._split(points)
-        return self._log_base(places, more) + self._log_beside(more) + self.weights.log()
-
-    def _split(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        return points[..., : self.base.chart_dim], points[..., self.base.chart_dim :]
+        chart = self.base.chart_dim
+        images = self.base.features(points[:, :chart])
+        return self.image_logs(images, points[:, chart:])[0].logsumexp(dim=0)
 
     def _log_beside(self, turns: Tensor, axes: Sequence[int] | None = None) -> Tensor:
         """Return log densities (N, K) of some of the other columns at turns (N, len(axes))."""
@@ -120,18 +118,11 @@ class ProductChains(Density, kind="product-chains"):
         sums = torch.einsum("nl,klm->nkm", waves(2 * math.pi * turns), self.slopes)
         return _directions(sums, len(self.base.spheres))
 
-    def _log_base(self, own: Tensor, turns: Tensor) -> Tensor:
-        return self._images(self.base.features(own), turns)[0].logsumexp(dim=0)
-
     def image_logs(self, images: Tensor, turns: Tensor) -> tuple[Tensor, Tensor]:
         """Return log densities (E, N, K) of components at images (E, N, m) of points, and cosines.
 
         The cosines (E, N, K, F) are those from the components' middles, on each sphere.
         """
-        logs, cosines = self._images(images, turns)
-        return logs + self._log_beside(turns) + self.weights.log(), cosines
-
-    def _images(self, images: Tensor, turns: Tensor) -> tuple[Tensor, Tensor]:
         middle = self.means(turns)
         # the square of the chord keeps the digits of narrow kernels
         below = [
@@ -139,8 +130,10 @@ class ProductChains(Density, kind="product-chains"):
             for image in images
         ]
         off = torch.stack(below)
-        logs = -(off * self.concentrations).sum(dim=-1)
-        return logs + kernel_peaks(self.base, self.concentrations), 1 - off
+        logs = kernel_peaks(self.base, self.concentrations) - (off * self.concentrations).sum(
+            dim=-1
+        )
+        return logs + self._log_beside(turns) + self.weights.log(), 1 - off
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         return self.to("cpu")._walk(count, {}, generator)
@@ -171,10 +164,9 @@ class ProductChains(Density, kind="product-chains"):
         logs = points.new_zeros(count)
         if len(lines) < len(given):  # the point of the base: weighed by how likely it is there
             points[:, :chart] = points.new_tensor([given[axis] for axis in range(chart)])
-            places, turns = self._split(points)
-            table = self._log_base(places, turns) + self._log_beside(turns) + self.weights.log()
-            logs = log_sum_exp(table) - log_sum_exp(self._log_beside(turns) + self.weights.log())
-            logs += self.base.log_kernel_factor(places, CHART)
+            beside = self._log_beside(points[:, chart:]) + self.weights.log()
+            logs = log_sum_exp(self.log_each(points)) - log_sum_exp(beside)
+            logs += self.base.log_kernel_factor(points[:, :chart], CHART)
         if lines:
             at = points[:1, [chart + axis for axis in lines]]
             logs += log_sum_exp(self._log_beside(at, [*lines]) + self.weights.log())
