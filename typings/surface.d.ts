@@ -18,5 +18,5 @@ export function unpack<Kind>(text: string, kind: new (buffer: ArrayBufferLike) =
 export function showSurface(
   canvas: HTMLCanvasElement,
   data: object,
-  options?: { changed?: (view: SurfaceView) => void; scrolls?: boolean; plain?: boolean },
-): Surface;
+  options?: { changed?: (view: SurfaceView) => void; scrolls?: boolean },
+): Surface | null;

@@ -1,21 +1,23 @@
-// A surface coloured by a density, to be turned: WebGL 2 draws it, or a plain canvas if there is none.
+// A surface coloured by a density, to be turned, by WebGL 2.
 // It comes after turned.js in one module.
 
 const PULL = 0.006; // how far lines and dots are pulled forward
 const PALENESS = 0.85; // how grey is what lies outside a region
 
 /**
- * Draw a surface on a canvas, to be turned by mouse, touch and keys; labels are put beside the canvas.
+ * Draw a surface on a canvas, to be turned by mouse, touch and keys; labels are put beside the canvas. Null where there
+ * is no WebGL 2.
  *
  * - `data`: What `surface_data` in surfaces.py returns.
  * - `changed`: Called with the view when a key sets it back.
  * - `scrolls`: Whether the page scrolls: then the wheel zooms only with the Ctrl key.
- * - `plain`: Whether WebGL is not used.
  *
  * Returns `view`, whose `cut` (0 to 100), `dots`, `least` (levels from 0 to 1: what is below is greyed) and `pale`
  * (that grey, 0 to 1) may be changed before a `redraw()`, and `stop()`.
  */
-export function showSurface(canvas, data, { changed = () => {}, scrolls = false, plain = false } = {}) {
+export function showSurface(canvas, data, { changed = () => {}, scrolls = false } = {}) {
+  const gl = canvas.getContext("webgl2");
+  if (!gl) return null;
   const view = { ...data.start, zoom: 1, dots: data.dots && data.samples !== "", least: -1, pale: 0.8 };
   const points = unpack(data.points, Float32Array), normals = unpack(data.normals, Int8Array);
   const values = unpack(data.values, Uint16Array), triangles = unpack(data.triangles, Uint16Array);
@@ -59,7 +61,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
   // depth of the cutting plane, towards the eye; nothing is cut at 1
   const cutDepth = () => data.round || view.cut === 0 ? 9 : 1 - 2 * view.cut / 100;
 
-  function webglDrawer(gl) {
+  function drawer() {
     const head = `#version 300 es
       precision highp float;
       uniform mat4 M; uniform vec3 eye, center; uniform float radius, cut, lowest, pale;`;
@@ -199,69 +201,6 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
     };
   }
 
-  // painter's algorithm: everything from far to near
-  function canvasDrawer(context) {
-    const count = points.length / 3, x = new Float32Array(count), y = new Float32Array(count), z = new Float32Array(count);
-    const shade = new Float32Array(count);
-    return function draw(width, height, scale) {
-      const m = matrix(width, height), { right, up, eye } = frame(), items = [], cut = cutDepth();
-      const raw = eye.map((t, i) => t + 0.5 * up[i] - 0.4 * right[i]), size = Math.hypot(...raw);
-      const place = (p, i) => {
-        const row = k => m[k] * p[i] + m[4 + k] * p[i + 1] + m[8 + k] * p[i + 2] + m[12 + k], w = row(3);
-        return [(1 + row(0) / w) * width / 2, (1 - row(1) / w) * height / 2, -row(2) / 0.4];
-      };
-      for (let i = 0; i < count; i++) {
-        [x[i], y[i], z[i]] = place(points, 3 * i);
-        const n = normals.subarray(3 * i, 3 * i + 3), side = Math.sign(dot(n, eye)) || 1;
-        shade[i] = 0.7 + 0.3 * Math.max(side * dot(n, raw) / size / 127, 0);
-      }
-      for (let k = 0; k < triangles.length; k += 3) {
-        const [a, b, c] = triangles.subarray(k, k + 3), depth = (z[a] + z[b] + z[c]) / 3;
-        if (depth <= cut) items.push([depth, () => {
-          const t = Math.min(255, (values[a] + values[b] + values[c]) / 771 | 0), s = (shade[a] + shade[b] + shade[c]) / 3;
-          const outside = levels[a] + levels[b] + levels[c] < 3 * 65535 * view.least;
-          const rgb = [0, 1, 2].map(j => colours[4 * t + j]).map(own =>
-            Math.round(s * (outside ? own + PALENESS * (255 * view.pale - own) : own)));
-          context.fillStyle = context.strokeStyle = `rgb(${rgb})`;
-          context.lineWidth = 0.7 * scale;
-          context.beginPath();
-          for (const i of [a, b, c]) context.lineTo(x[i], y[i]);
-          context.closePath();
-          context.fill();
-          context.stroke();
-        }]);
-      }
-      for (const { width: pixels, segments } of lines)
-        for (let k = 0; k < segments.length; k += 6) {
-          const a = place(segments, k), b = place(segments, k + 3), depth = (a[2] + b[2]) / 2;
-          if (depth <= cut) items.push([depth + 0.02, () => {
-            context.strokeStyle = `rgba(255, 255, 255, ${pixels < 1.5 ? 0.45 : 0.9})`;
-            context.lineWidth = pixels * scale;
-            context.beginPath();
-            context.moveTo(a[0], a[1]);
-            context.lineTo(b[0], b[1]);
-            context.stroke();
-          }]);
-        }
-      const { most, least, unit } = dotSizes(width, height, scale);
-      for (let k = 0; view.dots && k < samples.length; k += 3) {
-        const p = place(samples, k), own = unit * widths[k / 3], across = Math.min(most, Math.max(least, own));
-        const ink = Math.max(0.03, Math.min(1, (own / across) ** 2));
-        if (p[2] <= cut) items.push([p[2] + 0.02, () => {
-          context.beginPath();
-          context.arc(p[0], p[1], 0.4 * across, 0, 7);
-          context.fillStyle = `rgba(255, 255, 255, ${0.85 * ink})`;
-          context.strokeStyle = `rgba(26, 26, 26, ${0.8 * ink})`;
-          context.lineWidth = 0.15 * across;
-          context.fill();
-          context.stroke();
-        }]);
-      }
-      context.clearRect(0, 0, width, height);
-      for (const [, paint] of items.sort((a, b) => a[0] - b[0])) paint();
-    };
-  }
-
   const tags = data.labels.map(({ text }) => {
     const tag = document.createElement("div");
     tag.className = "label";
@@ -280,8 +219,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
     });
   }
 
-  const gl = plain ? null : canvas.getContext("webgl2");
-  const draw = gl ? webglDrawer(gl) : canvasDrawer(canvas.getContext("2d"));
+  const draw = drawer();
   const redraw = atNextFrame(paint);
   function paint() {
     const [width, height, scale] = sharpened(canvas);

@@ -279,8 +279,7 @@ def density_page(
     The torus is a ring, the sphere the unit sphere in the user's frame, the Klein bottle the figure-8
     immersion, the projective plane Boy's surface. The density is evaluated at every vertex, so the
     colours close over the seams; peaks narrower than its triangles are averaged over them, and the
-    caption says so. The page opens with the peak in front. WebGL 2 draws it, or a plain canvas if
-    there is none.
+    caption says so. The page opens with the peak in front. WebGL 2 draws it.
 
     Args:
         density: A density on a two-dimensional space.

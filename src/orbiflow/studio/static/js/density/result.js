@@ -150,6 +150,10 @@ export class Result {
       scrolls: true,
       changed: (view) => this.cut.set(view.cut),
     });
+    if (!this.surface) {
+      this.surfaceCanvas.replaceWith(h("p", { class: "lonely" }, "This picture needs WebGL 2."));
+      return;
+    }
     this.cut.set(data.start.cut);
     const shade = () => this.mark();
     dark.addEventListener("change", shade);
