@@ -16,6 +16,7 @@ from orbiflow.density.data import (
     alongside,
     asked_roles,
     cells_of,
+    check_lengths,
     columns_of,
     given_roles,
     is_declared,
@@ -168,9 +169,7 @@ def columns_given(given: Any, names: Sequence[str] | None = None) -> dict[str, V
                 f"given: there is no {', '.join(lacking)} among {', '.join(columns)}"
             )
         columns = {name: columns[name] for name in names}
-    shapes = {cells.shape for cells in columns.values()}
-    if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
-        raise OrbiflowError(f"given: the columns must be of one length, got {sorted(shapes)}")
+    check_lengths(list(columns.values()), "given")
     return columns
 
 

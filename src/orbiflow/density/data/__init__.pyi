@@ -14,6 +14,7 @@ from .frames import OUTPUTS as OUTPUTS
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
 from .frames import cells_of as cells_of
+from .frames import check_lengths as check_lengths
 from .frames import columns_of as columns_of
 from .frames import frame_of as frame_of
 from .frames import missing_among as missing_among

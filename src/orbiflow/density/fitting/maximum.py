@@ -34,11 +34,17 @@ def turned(frame: Tensor, angles: Tensor, planes: list[tuple[int, int]]) -> Tens
 
     The rotation's exponential to the second order, which first and second derivatives see.
     """
-    turn = frame.new_zeros(frame.shape)
-    if planes:
-        first, other = torch.tensor(planes).mT
-        turn = turn.index_put((first, other), angles).index_put((other, first), -angles)
+    turn = _skew(angles, planes, len(frame))
     return frame + turn @ frame + turn @ turn @ frame / 2
+
+
+def _skew(angles: Tensor, planes: list[tuple[int, int]], width: int) -> Tensor:
+    """Return the skew matrix (p, p) of turns by angles (P,) in planes of axes."""
+    turn = angles.new_zeros(width, width)
+    if not planes:
+        return turn
+    first, other = torch.tensor(planes).mT
+    return turn.index_put((first, other), angles).index_put((other, first), -angles)
 
 
 @dataclass(frozen=True)
@@ -93,13 +99,10 @@ class Local:
 
     def moved(self, step: Tensor) -> Local:
         """Return the family about where a step (q,) leads, its frame orthogonal again."""
-        turns, p = len(self.planes), self.width
-        skew = torch.zeros(p, p, dtype=torch.float64)
-        if turns:
-            first, other = torch.tensor(self.planes).mT
-            skew[first, other], skew[other, first] = step[:turns], -step[:turns]
+        turns = len(self.planes)
+        skew = _skew(step[:turns], self.planes, self.width)
         frame = linalg.matrix_exp(skew) @ self.at.frame
-        return Local(self.form, Start(frame, self.at.shape + step[turns:]), p)
+        return Local(self.form, Start(frame, self.at.shape + step[turns:]), self.width)
 
 
 def at_maximum(form: Form, cloud: Cloud) -> Local:

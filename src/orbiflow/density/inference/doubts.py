@@ -58,17 +58,18 @@ def data_doubts(
     )
     _check_beside_middle(space, values, called, place)
     angles = [k for k, role in enumerate(roles) if _is_angle(role, space, width)]
-    other = _other_unit(values[:, angles], unit) if angles else None
-    if unit is None or other is None or len(values) < FEW_ROWS:
+    most = float(np.nanmax(np.abs(values[:, angles]), initial=0.0))
+    are_small = unit == "degrees" and most <= TURNS["radians"] * (1 + 1e-4)
+    if not (angles and are_small) or len(values) < FEW_ROWS:
         return doubts
     factors = np.ones(width)
-    factors[angles] = TURNS[unit] / TURNS[other]
+    factors[angles] = TURNS["degrees"] / TURNS["radians"]
     if not _is_likelier(density, values, factors):
         return doubts
     listed = " and ".join(called[k] for k in angles)
     return [
         *doubts,
-        f"{listed}: all values are within 2 pi, and the model has degrees: if these are {other}, "
+        f"{listed}: all values are within 2 pi, and the model has degrees: if these are radians, "
         "convert them",
     ]
 
@@ -92,12 +93,6 @@ def _is_angle(role: Role | None, space: Space, width: int) -> bool:
     if role is not None:
         return role.kind == "angle"
     return space.data_unit(width) is not None or (space.data_name in DIRECTIONS and width == 2)
-
-
-def _other_unit(values: Array, unit: str | None) -> str | None:
-    """Return the other unit in which angles (N, k) may be by their size alone, or None."""
-    most = float(np.nanmax(np.abs(values), initial=0.0))
-    return "radians" if unit == "degrees" and most <= TURNS["radians"] * (1 + 1e-4) else None
 
 
 def given_doubts(space: Space, given: Mapping[str, float], names: Sequence[str]) -> list[str]:
