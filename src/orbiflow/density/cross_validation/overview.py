@@ -120,13 +120,13 @@ class CvOverview:
 
     def _spreads(self, found: HeldOut) -> dict[str, Any]:
         """Return how much folds differ, by setting."""
-        means = [mean for *_, mean in found.fold_means(self.splits)]
-        columns = {name: [mean[k] for mean in means] for k, name in enumerate(found.settings)}
+        means = found.fold_means(self.splits)
+        if len(means) < 2:
+            return dict.fromkeys(found.settings)
+        spreads = np.std(means, axis=0, ddof=1).tolist()
         return {
-            name: {"deviation": float(np.std(column, ddof=1)), "folds": len(column)}
-            if len(column) > 1
-            else None
-            for name, column in columns.items()
+            name: {"deviation": spread, "folds": len(means)}
+            for name, spread in zip(found.settings, spreads, strict=True)
         }
 
 

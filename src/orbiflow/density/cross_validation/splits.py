@@ -164,17 +164,17 @@ class HeldOut:
         sums = np.where(self.common, self.scores, 0.0).sum(axis=1)
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
-    def fold_means(self, splits: Sequence[Split]) -> list[tuple[int, int, Array]]:
-        """Return split and fold, from 1, and the weighted means (S,) of its whole, common rows."""
+    def fold_means(self, splits: Sequence[Split]) -> list[Array]:
+        """Return the weighted means (S,) of the whole, common rows of each fold."""
         rows, common = splits[0].rows, self.common
         weights = np.ones(len(rows.whole)) if rows.weights is None else rows.weights
-        means: list[tuple[int, int, Array]] = []
+        means: list[Array] = []
         for number, split in enumerate(splits):
             for fold in range(1, int(split.fold.max()) + 1):
                 chosen = (split.fold == fold) & common[number] & rows.whole
                 if chosen.any():
-                    mean = self.scores[:, number, chosen] @ weights[chosen] / weights[chosen].sum()
-                    means.append((number + 1, fold, mean))
+                    sums = self.scores[:, number, chosen] @ weights[chosen]
+                    means.append(sums / weights[chosen].sum())
         return means
 
 
