@@ -1,10 +1,8 @@
 /** The first page: bring a picture, go on with an earlier project, or take one of our animals. */
 
 import { aside, button, h, put, stack, style, trying } from "../dom.js";
-import { Camera, paint, sized, Tiling } from "../../../../drawing/js/tiling.js";
 import { Bringing } from "./bringing.js";
 import { Projects } from "./projects.js";
-import { sample } from "./sample.js";
 
 const MESH_WORDS =
   "Drop a 3D mesh: STL, OBJ, PLY, 3MF, glTF. We bend it until copies of it fill space.";
@@ -23,9 +21,8 @@ const other = (title, image, begin, words) =>
 export async function show(root, page) {
   await style("start");
   const bring = new Bringing(page);
-  const art = h("canvas", { class: "hero-art", role: "img", "aria-label": "A tiling of lizards" });
+  const art = h("img", { class: "hero-art", src: "hero.svg", alt: "A tiling of lizards" });
   const projects = new Projects(page.api);
-  const watch = new ResizeObserver(() => paintSample(art));
   put(
     root,
     h(
@@ -58,22 +55,9 @@ export async function show(root, page) {
       other("Open a project file", "open", () => bring.saved.click(), FILE_WORDS),
     ),
   );
-  watch.observe(art);
   await trying(() => projects.show());
   return () => {
     projects.close();
-    watch.disconnect();
     bring.close();
   };
-}
-
-function paintSample(canvas) {
-  const { context, width, height, ratio } = sized(canvas);
-  const tiling = new Tiling(sample.card);
-  paint(context, tiling, Camera.fit(tiling, width, height, 5.2), sample.palette, {
-    width,
-    height,
-    ratio,
-    line: 1.4,
-  });
 }
