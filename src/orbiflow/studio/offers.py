@@ -1,4 +1,4 @@
-"""What cannot be made of a tile, why, and the best tile of its project of which it can."""
+"""What a tile is measured by, what cannot be made of it, and the best tile of which that can."""
 
 from __future__ import annotations
 
@@ -47,3 +47,13 @@ def cannot(project: str, tile: int, here: Studio) -> dict[str, list[dict[str, An
                     {"setting": setting, "values": values, "why": why, "instead": next(able, None)}
                 )
     return refused
+
+
+@routes("GET", "/projects/{project}/tiles/{tile}/rectangles")
+def rectangles(project: str, tile: int, here: Studio) -> list[list[list[float]]]:
+    """Return the corners of the smallest rectangle around each figure, by which files measure it."""
+    from orbiflow.tiles import read_result, smallest_rectangle
+
+    here.store.card(project, tile)
+    figures = read_result(tile_folder(here.store.home(project), tile)).figures
+    return [smallest_rectangle(part.prototile.polygon).tolist() for part in figures]

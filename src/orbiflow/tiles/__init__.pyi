@@ -77,6 +77,7 @@ from .operations import solid as solid
 from .page.endless import polygon_json as polygon_json
 from .page.endless import tiling_json as tiling_json
 from .page.page import Page as Page
+from .page.page import smallest_rectangle as smallest_rectangle
 from .page.scene import Curve as Curve
 from .page.scene import Layer as Layer
 from .page.scene import Scene as Scene

@@ -22,6 +22,7 @@ from .page import longer_side as longer_side
 from .page import mark_corners as mark_corners
 from .page import rectangle_sides as rectangle_sides
 from .page import shades as shades
+from .page import smallest_rectangle as smallest_rectangle
 from .page import symbol_of as symbol_of
 from .page import tiling_size as tiling_size
 from .rastering import MARGIN as MARGIN

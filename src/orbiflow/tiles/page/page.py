@@ -402,20 +402,31 @@ def longer_side(ring: Array) -> float:
 
 
 def rectangle_sides(ring: Array) -> tuple[float, float]:
-    """Return the sides of the smallest rectangle by area around a ring, the shorter first.
-
-    Of the same area, as around a regular hexagon, the shortest: rounding does not choose.
+    """Return the sides of the smallest rectangle around a ring, the shorter first.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
     >>> [round(side, 6) for side in rectangle_sides(square)]
     [1.414214, 1.414214]
     """
+    first, second, third, _ = smallest_rectangle(ring)
+    short, long = sorted(float(np.linalg.norm(side)) for side in (second - first, third - second))
+    return short, long
+
+
+def smallest_rectangle(ring: Array) -> Array:
+    """Return the corners (4, 2) of the smallest rectangle by area around a ring.
+
+    Of the same area, as around a regular hexagon, the shortest: rounding does not choose.
+    """
     hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(ring)))
     steps = np.diff(hull, axis=0)  # a smallest rectangle lies along one of the hull's sides
     along = steps / np.linalg.norm(steps, axis=1)[:, None]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    sides = np.sort(np.stack([np.ptp(hull @ way.T, axis=0) for way in (along, across)]), axis=0)
-    areas = sides.prod(axis=0)
+    places = np.stack([hull @ way.T for way in (along, across)])  # of each point in each direction
+    low, high = places.min(axis=1), places.max(axis=1)
+    areas, longer = (high - low).prod(axis=0), (high - low).max(axis=0)
     smallest = np.flatnonzero(areas <= (1 + 1e-6) * areas.min())
-    best = smallest[sides[1, smallest].argmin()]
-    return float(sides[0, best]), float(sides[1, best])
+    best = smallest[longer[smallest].argmin()]
+    (left, bottom), (right, top) = low[:, best], high[:, best]
+    corners = np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
+    return corners @ np.stack([along[best], across[best]])

@@ -37,10 +37,9 @@ export async function show(root, page) {
   await style("takeaway");
   const own = new TakeawayPage(page, card);
   const place = `${own.place}/tiles/${card.id}`;
-  [own.view, own.cannot] = await Promise.all([
-    page.api.get(place),
-    page.api.get(`${place}/cannot`),
-  ]);
+  [own.view, own.cannot, own.rectangles] = await Promise.all(
+    [place, `${place}/cannot`, `${place}/rectangles`].map((path) => page.api.get(path)),
+  );
   own.build(root);
   await own.choose(own.kept.thing);
   return () => own.close();
@@ -67,6 +66,8 @@ class TakeawayPage {
     this.view = null;
     /** @type {Record<string, { setting: string, values: string[], why: string, instead: number }[]>} */
     this.cannot = {};
+    /** @type {Point[][]} */
+    this.rectangles = [];
     this.schemas = new Map();
     this.making = new Making(api, project, {
       asked: () => [this.kind, this.settings()],
@@ -89,7 +90,7 @@ class TakeawayPage {
     );
     this.shown = h("div", { class: "preview" }, this.live.root);
     this.noted = h("ul", { class: "notice", hidden: true });
-    this.size = trueSize(this.card);
+    this.size = trueSize(this.card, this.rectangles);
     this.real = section("panel real", "true", "In its true size", this.size.root);
     this.wishes = h("div", { class: "stack" });
     this.shared = share(this.api, this.project, this.card, () => ({

@@ -2,7 +2,7 @@
 
 import { button, h, put, row, slider } from "../dom.js";
 import { measure as inUnit } from "../lengths.js";
-import { figuresOf, measured, pathOf } from "../../../../drawing/js/tiling.js";
+import { figuresOf, measured as areaOf, pathOf } from "../../../../drawing/js/tiling.js";
 
 const CARD = [85.6, 53.98]; // mm: ISO/IEC 7810 ID-1
 const KEY = "orbiflow.px-per-mm";
@@ -12,66 +12,6 @@ const NECK = 9; // pixels of the circle around a narrow place
 const ROOM = 150; // pixels of a tile beside whose circle there is room for words
 
 export const pixels = () => Number(localStorage.getItem(KEY)) || USUAL;
-
-/**
- * The corners of a polygon's hull, in order.
- *
- * @param {Point[]} polygon
- */
-function hull(polygon) {
-  const half = (points) => {
-    /** @type {Point[]} */
-    const found = [];
-    for (const [x, y] of points) {
-      const turns = ([a, b], [c, d]) => (c - a) * (y - b) - (d - b) * (x - a) > 0;
-      while (found.length > 1 && !turns(found.at(-2), found.at(-1))) found.pop();
-      found.push([x, y]);
-    }
-    return found.slice(0, -1);
-  };
-  const sorted = [...polygon].sort(([a, b], [c, d]) => a - c || b - d);
-  return [...half(sorted), ...half(sorted.reverse())];
-}
-
-/**
- * The smallest rectangle of any direction around a polygon, by which files measure a tile.
- * It lies along a side of the hull. Of the same area, the shortest.
- *
- * @param {Point[]} polygon
- * @returns {{ long: number, short: number, corners: Point[] }}
- */
-export function smallest(polygon) {
-  const ring = hull(polygon);
-  const found = ring.map(([x, y], k) => {
-    const [p, q] = ring[(k + 1) % ring.length];
-    const far = Math.hypot(p - x, q - y);
-    const [u, v] = [(p - x) / far, (q - y) / far];
-    const along = ring.map(([a, b]) => a * u + b * v);
-    const across = ring.map(([a, b]) => b * u - a * v);
-    const [left, right, low, high] = [
-      Math.min(...along),
-      Math.max(...along),
-      Math.min(...across),
-      Math.max(...across),
-    ];
-    /** @type {(a: number, b: number) => Point} */
-    const corner = (a, b) => [a * u - b * v, a * v + b * u];
-    const corners = [
-      corner(left, low),
-      corner(right, low),
-      corner(right, high),
-      corner(left, high),
-    ];
-    const [short, long] = [right - left, high - low].sort((a, b) => a - b);
-    return { short, long, corners };
-  });
-  const area = ({ short, long }) => short * long;
-  const least = Math.min(...found.map(area));
-  return found.filter((own) => area(own) <= least * (1 + 1e-6)).reduce((
-    best,
-    own,
-  ) => (own.long < best.long ? own : best));
-}
 
 /** The least coordinates and the sides of the upright box around points: [left, top, width, height]. */
 function upright(points) {
@@ -105,16 +45,22 @@ function markNeck(context, [x, y], words, wide, look) {
  * A view of a card's tile: {root, show(size in mm, the width in mm below which a neck is told)}.
  *
  * @param {Card} tile
+ * @param {Point[][]} rectangles the smallest ones around its figures, by which files measure a tile
  */
-export function trueSize(tile) {
+export function trueSize(tile, rectangles) {
   const yDown = tile.y_down;
-  const figures = figuresOf(tile).map((figure) => ({ ...figure, ...smallest(figure.polygon) }));
-  const { long, short, corners } = figures.reduce((a, b) => (b.long > a.long ? b : a));
+  const figures = figuresOf(tile);
+  const far = ([a, b], [c, d]) => Math.hypot(c - a, d - b);
+  const measured = rectangles.map((corners) => {
+    const [p, q, r] = corners;
+    const [short, long] = [far(p, q), far(q, r)].sort((a, b) => a - b);
+    return { short, long, corners };
+  });
+  const { long, short, corners } = measured.reduce((a, b) => (b.long > a.long ? b : a));
   const polygon = figures.flatMap((figure) => figure.polygon);
-  const length = ([[a, b], [c, d]]) => Math.hypot(c - a, d - b);
   const neck = figures.filter((own) =>
-    own.neck && length(own.neck) <= WIDEST_NECK * Math.sqrt(measured(own.polygon).area)
-  ).map((own) => own.neck).reduce((a, b) => (a && length(a) <= length(b) ? a : b), null);
+    own.neck && far(...own.neck) <= WIDEST_NECK * Math.sqrt(areaOf(own.polygon).area)
+  ).map((own) => own.neck).reduce((a, b) => (a && far(...a) <= far(...b) ? a : b), null);
   const canvas = h("canvas", { class: "true-tile", role: "img" });
   const said = h("p", { class: "soft small" });
   const thin = h("p", { class: "small", hidden: !neck });
