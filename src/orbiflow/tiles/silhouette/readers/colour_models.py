@@ -100,13 +100,12 @@ class ColourCut:
         """Return the shape that colour models find from a region that is like it."""
         share = region.astype(float)
         along, down = (np.zeros(self._shape) for _ in range(2))
-        models = [self._model(part) for part in (region, ~region)]
+        models = [ColourModel.fitted(self._colours[part.ravel()]) for part in (region, ~region)]
         for _ in range(ROUNDS):
-            costs = (model.costs(self._colours).min(axis=0) for model in models)
-            shape_cost, ground_cost = costs
-            pull = np.clip(shape_cost - ground_cost, -MOST_COST, MOST_COST).reshape(self._shape)
-            pull[self._border] = SURE_COST
-            share = self._relaxed(share, pull / EDGE_COST, along, down)
+            pull = self._pull(models)
+            share = self._relaxed(
+                share, np.where(self._border, SURE_COST / EDGE_COST, pull), along, down
+            )
             before, region = region, share > 0.5
             if not region.any() or (region != before).mean() < 1e-4:
                 break
@@ -115,7 +114,14 @@ class ColourCut:
                 for model, part in zip(models, (region, ~region), strict=True)
                 for colours in (self._colours[part.ravel()],)
             ]
-        return region
+        # what reaches the border goes on to the picture's edge
+        return region | (self._relaxed(share, self._pull(models), along, down) > 0.5) & self._border
+
+    def _pull(self, models: list[ColourModel]) -> Array:
+        """Return by how much the background explains each pixel better, over the cost of an edge."""
+        shape, ground = (model.costs(self._colours).min(axis=0) for model in models)
+        pull = np.clip(shape - ground, -MOST_COST, MOST_COST) / EDGE_COST
+        return pull.reshape(self._shape)
 
     def _relaxed(self, share: Array, pull: Array, along: Array, down: Array) -> Array:
         """Return shares of 0 to 1 of least cost, from others; `along` and `down` are their duals."""
@@ -146,9 +152,6 @@ class ColourCut:
 
     def _least(self, colours: Array) -> float:
         return float(ColourModel.fitted(colours, 3).costs(colours).min(axis=0).sum())
-
-    def _model(self, part: _Mask) -> ColourModel:
-        return ColourModel.fitted(self._colours[part.ravel()])
 
 
 def middle_of(shape: tuple[int, ...]) -> _Mask:
