@@ -24,6 +24,7 @@ from orbiflow.density.data import (
     word_of,
 )
 from orbiflow.density.spaces.axes import Line
+from orbiflow.density.spaces.checked import row_count
 from orbiflow.errors import OrbiflowError
 
 Values = NDArray[Any]
@@ -82,7 +83,7 @@ class Covariate:
                 )
             return cls(name, words=words)
         numbers = _numbers(name, cells)
-        column = _checked(name, cells)
+        column = Checked(name, numbers)
         if role.turn is not None:
             check_turn(column, role.turn, role.kind)
             return cls(name, period=role.turn)
@@ -111,7 +112,7 @@ class Covariate:
             angle = 2 * math.pi * numbers / self.period
             return torch.stack([angle.cos(), angle.sin()], dim=1)
         assert self.line is not None
-        check_real(_checked(self.name, cells), self.role)
+        check_real(Checked(self.name, numbers.numpy()), self.role)
         return SPREAD * self.line.share(numbers)[:, None]
 
     def _known(self, words: NDArray[np.str_]) -> NDArray[np.intp]:
@@ -128,7 +129,7 @@ class Covariate:
         """Refuse new numbers that contradict what the column is, or stand apart from the fit's."""
         if self.words:
             return
-        column = _checked(self.name, cells)
+        column = Checked(self.name, _numbers(self.name, cells))
         if self.period is not None:
             check_turn(column, self.period, "angle")
         elif self.line is not None and self.line.kind == "linear":
@@ -204,7 +205,9 @@ class Covariates:
         return [
             doubt
             for column in lines
-            for doubt in check_real(_checked(column.name, cells[column.name]), column.role)
+            for doubt in check_real(
+                Checked(column.name, _numbers(column.name, cells[column.name])), column.role
+            )
         ]
 
     def doubts(self, cells: Mapping[str, Values]) -> list[str]:
@@ -230,20 +233,12 @@ def _numbers(name: str, cells: Values) -> Array:
     return numbers
 
 
-def _checked(name: str, cells: Values) -> Checked:
-    def place(row: int) -> str:
-        return f"row {row + 1}"
-
-    return Checked(name, _numbers(name, cells), place)
-
-
 def _refuse_missing(name: str, missing: NDArray[np.bool_]) -> None:
     at = np.flatnonzero(missing)
     if len(at):
-        more = f" ({len(at)} such rows)" if len(at) > 1 else ""
         raise OrbiflowError(
-            f"row {at[0] + 1} has no value of {name!r}{more}: what is given must be known, so leave "
-            "such rows out"
+            f"row {at[0] + 1} has no value of {name!r}{row_count(len(at))}: what is given must be "
+            "known, so leave such rows out"
         )
 
 
