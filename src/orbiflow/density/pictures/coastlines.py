@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from collections.abc import Iterator
+from codecs import BOM_UTF8
 from functools import cache
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,23 +17,10 @@ from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import Space
 from orbiflow.density.tables import read_table
 from orbiflow.errors import InputFileError, SettingError, system_errors
-from orbiflow.runtime import is_list, is_object
-from orbiflow.settings import described
 
 MAX_BYTES = 32_000_000
 MAX_POINTS = 1_000_000
 """Limits of a file: Natural Earth's finest coastline has 18 MB and 400,000 points."""
-
-_SHAPES = ("LineString", "MultiLineString", "Polygon", "MultiPolygon")
-"""Kinds of geometry that have lines."""
-
-_POINTS = ("Point", "MultiPoint")
-_PARTS = {
-    "FeatureCollection": "features",
-    "GeometryCollection": "geometries",
-    "Feature": "geometry",
-}
-"""Where the geometries are in what has some."""
 
 _EDGE = 1e-4
 """Degrees from a pole or longitude 180 within which a polygon's edge is where the globe was cut."""
@@ -85,7 +70,7 @@ def read_coastlines(path: Path) -> list[Array]:
             raise InputFileError(
                 f"{path} is {what}: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson FILE.shp"
             )
-    text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
+    text = start.removeprefix(BOM_UTF8).lstrip()
     lines = _geojson(path) if text.startswith((b"{", b"[")) else _table(path)
     if not lines:
         raise InputFileError(f"{path} holds no lines: coastlines need two points or more each")
@@ -112,43 +97,26 @@ def _parted(values: Array) -> list[Array]:
 
 
 def _geojson(path: Path) -> list[Array]:
+    """Return the lines of GeoJSON, as GEOS reads it: without heights."""
+    import shapely
+
     try:
-        lines = list(_lines(json.loads(path.read_bytes())))
-    # ValueError: also what is neither JSON nor UTF-8
-    except (ValueError, RecursionError, TypeError, LookupError, OverflowError) as error:
-        raise InputFileError(f"{path} is not GeoJSON: {error}"[:300]) from error
-    return [_checked(path, line) for line in lines]
-
-
-def _lines(item: Any) -> Iterator[Array]:
-    """Yield the lines (M, 2), M > 1, of a feature, a geometry or a collection of them."""
-    kind: Any = item.get("type") if is_object(item) else None
-    kind = kind if isinstance(kind, str) else None
-    if kind == "Topology":
-        raise ValueError("it is TopoJSON; make GeoJSON of it, with ogr2ogr -f GeoJSON")
-    if kind in _PARTS:
-        inner: Any = item[_PARTS[kind]]
-        for part in inner if is_list(inner) else [inner] * (inner is not None):
-            yield from _lines(part)
-    elif kind in _SHAPES:
-        for line in _positions(item["coordinates"]):
-            parts = without_cuts(line) if kind.endswith("Polygon") else [line]
-            yield from (part for part in parts if len(part) > 1)
-    elif kind not in _POINTS:
-        raise ValueError(f"expected a feature or a geometry, got {described(kind)}")
-
-
-def _positions(items: Any) -> Iterator[Array]:
-    """Yield latitudes and longitudes (M, 2) of the positions in lists of lists, without heights."""
-    if items and isinstance(items[0][0], list):
-        for item in items:
-            yield from _positions(item)
-        return
-    try:  # a position is longitude, latitude
-        line = np.array([(p[1], p[0]) for p in items], dtype=float).reshape(-1, 2)
-    except (TypeError, ValueError, LookupError) as error:
-        raise ValueError("a position is not longitude, latitude") from error
-    yield line
+        shapes = [shapely.from_geojson(path.read_bytes().removeprefix(BOM_UTF8))]
+    except shapely.errors.GEOSException as error:
+        raise InputFileError(
+            f"{path} is no GeoJSON ({str(error)[:200]}): make it with ogr2ogr -f GeoJSON"
+        ) from error
+    lines: list[Array] = []
+    while shapes:
+        shape = shapes.pop(0)
+        if isinstance(shape, shapely.Polygon):
+            for ring in (shape.exterior, *shape.interiors):
+                lines += without_cuts(shapely.get_coordinates(ring)[:, ::-1])
+        elif isinstance(shape, shapely.LineString):
+            lines.append(shapely.get_coordinates(shape)[:, ::-1])
+        else:
+            shapes = [*getattr(shape, "geoms", ()), *shapes]
+    return [_checked(path, line) for line in lines if len(line) > 1]
 
 
 def _checked(path: Path, line: Array) -> Array:
