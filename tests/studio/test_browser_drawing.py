@@ -171,7 +171,7 @@ def test_shape_is_chosen_and_opened(page: Any, studio: RunningStudio) -> None:
     assert len(studio.project(own)["tiles"]) == 2
     pulled_url, pull = page.url, int(page.url.rsplit("/", 1)[1])
     page.get_by_role("button", name="Lay the copies another way").click()
-    page.locator(".shapes button", has_text="IH5 ·").click()
+    page.locator("li[title^='IH5,'] button").click()
     page.wait_for_url(lambda url: url != pulled_url)
     last = int(page.url.rsplit("/", 1)[1])
     assert {card["id"]: card["class_name"] for card in studio.project(own)["tiles"]}[last] == "IH5"

@@ -17,7 +17,7 @@ from PIL import Image
 
 from exported import dxf_lines, polygons, scenes, sheet_content, svg_lines, tile_of, tiles
 from orbiflow.tiles import CLASSES, EscherTile, ExportSettings, Tile, colouring
-from orbiflow.tiles.page import longer_side
+from orbiflow.tiles.page import longer_side, smallest_rectangle
 from orbiflow.tiles.write import write_scene
 from refusals import refused
 
@@ -204,3 +204,13 @@ def test_a_drawing_of_lines_has_no_ground(bent_tile: Any, cut: dict[str, Any]) -
     text = str(write_scene(scene, "dxf"))
     assert "colour 1" in text
     assert "ground" not in text
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([3, 5, 40, 400]))
+def test_a_tile_is_measured_by_the_smallest_rectangle(seed: int, count: int) -> None:
+    random = np.random.default_rng(seed)
+    ring = random.normal(size=(count, 2)) @ random.normal(size=(2, 2))
+    box, points = shapely.Polygon(smallest_rectangle(ring)), shapely.MultiPoint(ring)
+    assert box.buffer(1e-9 * np.ptp(ring)).contains(points)
+    assert box.area == pytest.approx(shapely.minimum_rotated_rectangle(points).area, rel=1e-6)
