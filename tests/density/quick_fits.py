@@ -15,8 +15,9 @@ def quick_fits(patch: pytest.MonkeyPatch) -> None:
     """Try fewer widths, sizes and steps, hold out two parts of the rows, and draw fewer samples."""
     patch.setattr(f"{FITTING}.kernels.LADDER_RUNGS", 9)
     patch.setattr(f"{FITTING}.kernels.SCALES", (0.4, 1.6))
-    patch.setattr(f"{FITTING}.families.SIZES", (1, 4, 16))
-    patch.setattr(f"{FITTING}.families.MIXTURE_SIZES", (1, 4, 16))
+    for family in ("MixtureFamily", "ProductChainFamily"):
+        patch.setattr(f"{FITTING}.families.{family}.tried", (1, 4, 16))
+    patch.setattr(f"{FITTING}.families.ChainFamily.tried", (4, 16))
     patch.setattr(f"{FITTING}.held_out.USED", ())
     patch.setattr("orbiflow.density.models.figures.DRAWS", 2**13)
     patch.setattr("orbiflow.density.regions.boundaries.CHECKED", 20_000)

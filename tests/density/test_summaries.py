@@ -116,6 +116,7 @@ def test_axes() -> None:
     assert crowd.bingham_p == pytest.approx(stats.chi2.sf(shape, 5))
 
 
+@pytest.mark.filterwarnings("ignore:.*others hardly repeat")
 @settings(max_examples=15)
 @given(st.lists(st.floats(-3.1, 3.1), min_size=2, max_size=40), st.floats(-3, 3))
 def test_against_scipy_and_turned(angles: list[float], turn: float) -> None:
