@@ -43,6 +43,7 @@ NOT_HERE = {
     "--scheduler": "needs a cluster: tests/batch has one",
     "--pairs": "tests/batch has the smallest folder of pairs",
     "MODEL": "stands for any model",
+    "--profile": "takes a profile of the reader's: tests/tiles/exporting has one",
     "examples/silhouettes/nagata/spider_120.dat": "finds no pair where so little is tried",
     "examples/silhouettes/nagata/dolphin_60.dat": "a pair as that of the seal and the shark",
     "by-hour": "a fit to covariates as that of the weather",
