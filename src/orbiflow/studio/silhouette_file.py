@@ -79,6 +79,7 @@ def read_input(home: Path, called: str, reading: ReadingSettings, number: int = 
     earlier = json.loads(file.read_text()).get("read", {}) if file.exists() else {}
     if earlier.get("key") == key and backdrop.is_file():
         target, picture = _loaded(earlier["target"]), Image.open(backdrop)
+        picture.load()  # which closes the file
     else:
         target = _framed(
             Target.from_bytes(
