@@ -13,7 +13,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.data import alongside, as_data
 from orbiflow.density.spaces import RotationSpace
-from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle
+from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, principal_axes
 from orbiflow.settings import as_instance
 
 STARTS, STEPS, MOST_LOOKED_AT = 16, 100, 2_000
@@ -118,16 +118,10 @@ def _settled(
 def _cone(images: Array, rows: WeighedRows) -> float | None:
     """Return the misorientation in degrees that holds the true mean, by the errors of an axis.
 
-    The principal axis of quaternions is that of Fisher, Lewis and Embleton (1987), section 6.3.1, in
-    four dimensions.
+    The mean is the principal axis of quaternions, in four dimensions.
     """
-    tensor = np.einsum("n,ni,nj->ij", rows.weights, images, images)
-    values, axes = np.linalg.eigh(tensor)
-    along, gaps = images @ axes[:, ::-1], values[-1] - values[-2::-1]
-    if gaps.min() < 1e-12 or rows.units < 5:
+    if rows.units < 5:
         return None
-    errors = np.zeros_like(along)
-    errors[:, 1:] = along[:, :1] * along[:, 1:] / gaps
-    angle = half_angle(errors, rows)
+    *_, angle = principal_axes(images, rows)
     # the angle of a rotation is twice that of quaternions
     return math.degrees(2 * angle) if angle is not None and angle < math.pi / 4 else None

@@ -25,7 +25,7 @@ from orbiflow.density.data import alongside, written_from_zero
 from orbiflow.density.fitting import SAME, concentration
 from orbiflow.density.spaces import DataColumns, to_latlon, to_vectors, whole_turn
 from orbiflow.density.uniformity import bingham_p, kuiper_p, rao_p, rayleigh_p, watson_p
-from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, tail
+from orbiflow.density.weighed_rows import WeighedRows, chosen_rows, half_angle, principal_axes, tail
 from orbiflow.errors import OrbiflowError
 
 MIN_ROWS = 25
@@ -295,16 +295,7 @@ def summarize_axes(
     weights, groups = read.beside(weights, groups)
     table = read.values
     vectors, rows = chosen_rows(to_vectors(table), weights, groups, level)
-    products = vectors[:, :, None] * vectors[:, None, :]
-    tensor = np.tensordot(rows.weights, products, axes=1)
-    values, axes = np.linalg.eigh(tensor)
-    values, axes = np.clip(values[::-1], 0.0, 1.0), axes.T[::-1]
-    along, gaps = vectors @ axes.T, values[0] - values[1:]
-    cone = None
-    if gaps[0] > 1e-9:
-        errors = np.zeros_like(vectors)
-        errors[:, 1:] = along[:, :1] * along[:, 1:] / gaps
-        cone = half_angle(errors, rows)
+    values, axes, cone = principal_axes(vectors, rows)
     return AxisSummary(
         len(vectors), tuple(values.tolist()), _written(axes[0], table, end=True), _degrees(cone),
         _written(axes[2], table, end=True),

@@ -18,6 +18,9 @@ from orbiflow.density.data import as_numbers, group_numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_number
 
+CLOSEST = 1e-9
+"""Difference of the two largest eigenvalues up to which axes have no principal one."""
+
 
 @dataclass(frozen=True, eq=False)
 class WeighedRows:
@@ -96,3 +99,20 @@ def half_angle(errors: Array, rows: WeighedRows) -> float | None:
         quantile = free * tail(special.fdtri, free, units - 1, rows.level)
     sine = math.sqrt(quantile * variance)
     return math.asin(sine) if sine < 1 else None
+
+
+def principal_axes(vectors: Array, rows: WeighedRows) -> tuple[Array, Array, float | None]:
+    """Return the eigenvalues (p,) of the mean square of unit vectors (n, p), and their axes as rows.
+
+    The largest comes first. Last comes the half angle in radians of a cone that holds the true first
+    axis (Fisher, Lewis and Embleton, 1987, section 6.3.1), None if none does.
+    """
+    tensor = np.einsum("n,ni,nj->ij", rows.weights, vectors, vectors)
+    values, axes = np.linalg.eigh(tensor)
+    values, axes = np.clip(values[::-1], 0.0, 1.0), axes.T[::-1]
+    along, gaps = vectors @ axes.T, values[0] - values[1:]
+    if gaps[0] <= CLOSEST:
+        return values, axes, None
+    errors = np.zeros_like(along)
+    errors[:, 1:] = along[:, :1] * along[:, 1:] / gaps
+    return values, axes, half_angle(errors, rows)
