@@ -1,4 +1,4 @@
-"""Mixtures of von Mises chains: periodic, normalised, saved as they are, fitted by EM."""
+"""Mixtures of von Mises chains: orders, sums of components, what they refuse, fits by EM."""
 
 import math
 from typing import Any
@@ -55,20 +55,12 @@ def test_orders_are_checked() -> None:
         VonMisesChains(*parts, good.order.flip(1))
 
 
-def test_hostile_headers_and_tensors_are_refused() -> None:
+def test_hostile_headers_are_refused() -> None:
     mixture, space = random_mixture(3, 0), Torus(3)
-    header, tensors = mixture.header(), mixture.tensors()
     changes: list[dict[str, Any]] = [{"components": 5}, {"components": -1}, {"scales": [1.0]}]
     for change in changes:
         with refused():
-            VonMisesChains.from_header(space, {**header, **change}, tensors)
-    for name, own in tensors.items():
-        others = {k: v for k, v in tensors.items() if k != name}
-        with refused("missing"):
-            VonMisesChains.from_header(space, header, others)
-        for value in (own + math.nan, 1 - 2 * own.abs() - 9, own[:, :1], own.long()):
-            with refused():
-                VonMisesChains.from_header(space, header, {**others, name: value})
+            VonMisesChains.from_header(space, {**mixture.header(), **change}, mixture.tensors())
 
 
 def chained_angles(count: int, seed: int = 0) -> torch.Tensor:

@@ -1,4 +1,4 @@
-"""Density: normalised, invariant, continuous over the seams, sampled as it says."""
+"""Densities of flows: their mass, samples and entropy, in blocks and on any number of cores."""
 
 from collections.abc import Callable
 

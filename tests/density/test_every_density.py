@@ -1,5 +1,7 @@
 """What holds of every density on every space: invariant, normalised, sampled, differentiable, saved."""
 
+import json
+import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -39,6 +41,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.models import flow_obstacle
 from orbiflow.density.spaces import RoundSpace, UnitVectorSpace
+from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.symmetry import rotation_matrix, wallpaper_group
 from strategies import central_difference, random_field, seeds
@@ -243,3 +246,38 @@ def test_a_file_gives_the_same_density_back(name: str, tmp_path: Path) -> None:
     assert (type(again), again.kind) == (type(density), density.kind)
     with torch.no_grad():
         assert torch.equal(again.log_prob(points), density.log_prob(points))
+
+
+def first_part(name: str, seed: int) -> Density:
+    """What a density is made of, the first of them."""
+    return next(iter(DENSITIES[name](seed).parts()))[1]
+
+
+ONE_OF_EACH = (
+    "angle", "chains of 4", "network", "sine", "Bingham", "angular central Gaussian",
+    "chains on bottle and times",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ONE_OF_EACH)
+def test_damaged_tensors_are_refused(name: str) -> None:
+    part = first_part(name, 3)
+    header, tensors = json.loads(json.dumps(part.header())), part.tensors()
+    for key, tensor in tensors.items():
+        others = {k: v for k, v in tensors.items() if k != key}
+        wrong = [{}, *({key: t} for t in (tensor + math.nan, tensor[..., :0], tensor.long()))]
+        for damage in wrong:
+            with pytest.raises(OrbiflowError):
+                type(part).from_header(part.space, header, {**others, **damage})
+
+
+@pytest.mark.parametrize(
+    "name", ["angle", "rotations", "chains of 2", "chains on bottle and times"]
+)
+def test_several_of_a_kind_are_one(name: str) -> None:
+    parts = [first_part(name, seed) for seed in (1, 2)]
+    both = type(parts[0]).joined(parts, torch.tensor([1.0, 3.0]))
+    assert both is not None
+    at = both.space.uniform(50, torch.Generator().manual_seed(0))
+    expected = Mixture(parts, [0.25, 0.75]).log_prob(at)
+    torch.testing.assert_close(both.log_prob(at), expected, rtol=0, atol=1e-9)

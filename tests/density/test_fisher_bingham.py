@@ -1,4 +1,4 @@
-"""Fisher-Bingham and angular central Gaussian densities: constants, integrals, samples, files."""
+"""Fisher-Bingham and angular central Gaussian densities: their constants, and what they refuse."""
 
 from typing import Any
 

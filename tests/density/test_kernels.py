@@ -1,4 +1,4 @@
-"""Adaptive kernels: invariant, normalised, sampled as they score, fitted by EM; their sums."""
+"""Adaptive kernels: what they refuse, fits by EM with many images, and their sums."""
 
 import math
 from functools import partial

@@ -1,4 +1,4 @@
-"""Bayesian networks of angles: exact, normalised, found where there is one."""
+"""Bayesian networks of angles: exact, found where there is one."""
 
 import math
 from collections.abc import Callable

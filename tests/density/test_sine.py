@@ -1,4 +1,4 @@
-"""The bivariate von Mises density with sines: constant, samples, marginals, fits."""
+"""The bivariate von Mises density with sines: constant, marginals, fits."""
 
 import math
 

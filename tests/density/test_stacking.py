@@ -1,20 +1,12 @@
 """Weights by held-out rows, folds, repeats, mixtures by EM: what a fit by evidence is made of."""
 
-import math
-
 import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density import (
-    AdaptiveKernels,
-    DensitySettings,
-    VonMisesChains,
-    fit_automatic,
-    make_space,
-)
+from orbiflow.density import DensitySettings, fit_automatic, make_space
 from orbiflow.density.data import group_numbers
 from orbiflow.density.fitting import (
     Rows,
@@ -26,7 +18,6 @@ from orbiflow.density.fitting import (
 )
 from orbiflow.density.fitting.held_out import FOLDS, TOLERANCE_NATS, supported_weights
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
-from orbiflow.density.models import midpoints
 from refusals import refused
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -101,16 +92,11 @@ def test_a_mixture_finds_clusters(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["torus", "sphere"])
-def test_kernel_estimates_are_joined_and_know_repeats(name: str) -> None:
+def test_kernel_estimates_know_repeats(name: str) -> None:
     space = make_space(name)
     points = clustered(name, 60, 0)
     found = kernel_estimates(space, Rows(torch.cat([points, points[:5]])), narrowest=100.0)
     assert {"repeated", "near 2, 0.4, 1" if space.is_round else "near 2, 0.4, 0.3"} <= set(found)
-    grid = midpoints(space, 20)
-    parts = [found["repeated"], *found.values()][:2]
-    both = AdaptiveKernels.joined(parts, torch.tensor([1.0, 3.0]))
-    expected = 0.25 * parts[0].log_prob(grid).exp() + 0.75 * parts[1].log_prob(grid).exp()
-    assert torch.allclose(both.log_prob(grid).exp(), expected)
     alone = kernel_estimates(space, Rows(torch.cat([points, points[:5]])), repeats=False)
     assert "repeated" not in alone
 
@@ -120,17 +106,6 @@ def test_as_many_rows_have_kernels_as_images_allow(name: str, images: int, monke
     monkeypatch.setattr("orbiflow.density.fitting.kernels.MOST_IMAGES", 40)
     found = kernel_estimates(make_space(name), Rows(clustered(name, 60, 0)))
     assert {len(part.weights) for part in found.values()} == {40 // images}
-
-
-def test_mixtures_of_chains_are_mixed() -> None:
-    space, parts = make_space("torus"), []
-    for k in (1.0, 9.0):
-        weights = torch.full((1, 3), -math.log(3), dtype=torch.float64)
-        means, kappa = torch.zeros(1, 2, 5), torch.full((1, 2), k)
-        parts.append(VonMisesChains(space, weights, means, kappa))
-    both, at = VonMisesChains.joined(parts, torch.tensor([0.2, 0.8])), midpoints(space, 5)
-    expected = 0.2 * parts[0].log_prob(at).exp() + 0.8 * parts[1].log_prob(at).exp()
-    assert torch.allclose(both.log_prob(at).exp(), expected, atol=1e-7)
 
 
 @given(seeds, st.integers(30, 300), st.booleans())
