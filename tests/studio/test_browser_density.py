@@ -52,6 +52,27 @@ def test_a_fit_is_begun_held_and_stopped(page: Any, studio: RunningStudio) -> No
     page.get_by_role("button", name="Fit the density").wait_for()
 
 
+def test_hours_are_fitted_as_hours_and_unsaid_columns_are_asked_for(
+    page: Any, studio: RunningStudio
+) -> None:
+    page.goto(f"/#/d/{new_density(studio)}")
+    rows = "hour,minutes,when\n" + "".join(f"{k % 24}.5,{5 * k},9:30\n" for k in range(40))
+    table = {"name": "hours.csv", "mimeType": "text/csv", "buffer": rows.encode()}
+    page.set_input_files("input[type=file]", table)
+    fit = page.get_by_role("button", name="Fit the density")
+    assert page.get_by_label("How is hour counted?").input_value() == "cycle:24"
+    assert "Not shown: when," in page.inner_text(".density")
+    assert fit.is_enabled()
+    page.get_by_label("minutes", exact=True).check()
+    assert fit.is_disabled()
+    assert "Say how minutes is counted." in page.inner_text(".density")
+    page.get_by_label("How is minutes counted?").select_option("angle:degrees")
+    with page.expect_request(lambda request: request.url.endswith("/tasks")) as caught:
+        fit.click()
+    columns = caught.value.post_data_json["settings"]["columns"]
+    assert columns == ["hour=cycle:24", "minutes=angle:degrees"]
+
+
 def test_a_fit_is_told_in_words_and_new_rows_are_taken_away(page: Any, fitted: str) -> None:
     page.goto(f"/#/d/{fitted}")
     page.get_by_text(re.compile("times as likely as by chance$")).wait_for()

@@ -94,8 +94,11 @@ HEADS = {
     "trend,plunge\n300,2\n3,4\n": ("projective-plane", ["plunge", "trend"]),
     "t,x,y,z\n5,1,0,0\n9,0,0.6,-0.8\n": ("sphere", ["x", "y", "z"]),
     "phi,theta,size\n1,0.5,900\n2,3,40\n": ("klein-bottle", ["theta", "phi"]),
-    "id,wind\n1,350\n2,10\n3,90\n": ("torus", ["wind"]),
+    "id,wind\n1,350\n2,10\n3,90\n": (None, []),
+    "id,wind_dir\n1,350\n2,10\n3,90\n": ("torus", ["wind_dir"]),
     "a,b\n1,400\n2,800\n": (None, []),
+    "time,minutes\n18:30,10\n9:15,300\n": (None, []),
+    "hour_hours,b\n18.5,3\n9,8\n": ("torus", ["hour_hours"]),
 }  # fmt: skip
 
 

@@ -129,6 +129,7 @@ def _view(folder: Path, data: Path, on_event: Sink) -> dict[str, Any]:
         "space": space.name,
         "columns": list(names),
         "unit": space.unit,
+        "roles": [str(role) for role in space.roles(space.dim)] if space.is_torus else [],
         "angles": space.dim if space.is_torus else 0,
         "surface": space.is_planar,
         "rows": len(rows),
@@ -283,7 +284,7 @@ def table_view(path: Path) -> dict[str, Any]:
     first = list(zip(*shown, strict=True))
     return {
         "rows": rows,
-        "more": len(table.names) - len(names),
+        "more": [name[:MAX_NAME_LETTERS] for name in table.names if name not in names][:MAX_SHOWN],
         "first": [[None if math.isnan(v) else float(f"{v:.6g}") for v in row] for row in first],
         **seen,
     }

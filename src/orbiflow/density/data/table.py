@@ -200,7 +200,11 @@ class DataTable:
             "write numbers alone, in degrees negative to the south and west; if that stands for a "
         )
         cure += f"missing value, give {{missing_codes}} {literal(codes)} {{drop_missing}}"
-        if mark == "." and re.fullmatch(r"[+-]?\d*,\d+", cell):
+        if re.fullmatch(r"\d+:\d+(:\d+)?", cell):
+            cure = (
+                "write a time as hours with decimals, such as 18.5 for 18:30, and declare cycle:24"
+            )
+        elif mark == "." and re.fullmatch(r"[+-]?\d*,\d+", cell):
             cure = "write decimal points, or specify {decimal} , if commas stand before decimals"
         elif mark == "," and re.fullmatch(r"[+-]?\d*\.\d+", cell):
             cure = "write decimal commas, or leave {decimal} out if points stand before decimals"

@@ -48,7 +48,8 @@ def flat_frame(density: Density, names: tuple[str, ...], samples: Tensor) -> dic
         places = view.places(chosen)
         for axis in range(space.dim):
             label, at, texts = frames.angle_axis(view, axis)
-            axes.append({"label": label, "at": at, "texts": texts})
+            turn = {"low": view.low[axis], "period": space.periods[axis]}
+            axes.append({"label": label, "at": at, "texts": texts} | turn)
     ramp = 255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256))
     return {
         "names": list(view.names),

@@ -8,6 +8,7 @@ import numpy as np
 
 from orbiflow.density.data import (
     DataTable,
+    Role,
     TableError,
     chosen_arrangement,
     listing,
@@ -26,8 +27,8 @@ MOST_ANGLES = 7
 def table_overview(table: DataTable, most: int) -> dict[str, Any]:
     """Return what is seen of the first columns of numbers of a table, and where its rows may live.
 
-    Each has a "name", its "role", to be confirmed by who knows, the number of "missing" values, and
-    its least and largest value, "low" and "high". The "guess" says a "space", "columns" and "why".
+    Each has a "name", the "role" that its name says, the number of "missing" values, and its least and
+    largest value, "low" and "high". The "guess" says a "space", "columns" and "why".
 
     Raises `TableError` if there is no column of numbers.
     """
@@ -41,7 +42,7 @@ def table_overview(table: DataTable, most: int) -> dict[str, Any]:
             raise TableError(f"{table.place(int(rows[0]))} of {table.names[k]!r} is infinite")
         finite = values[np.isfinite(values)]
         ends = (float(finite.min()), float(finite.max())) if len(finite) else (None, None)
-        role = proposed_role(table.names[k], values)
+        role = proposed_role(table.names[k], values, by_size=False)
         columns.append(
             {"name": table.names[k], "role": role, "missing": len(values) - len(finite)}
             | {"low": ends[0], "high": ends[1]}
@@ -52,7 +53,7 @@ def table_overview(table: DataTable, most: int) -> dict[str, Any]:
 def _guess(columns: list[dict[str, Any]]) -> dict[str, Any]:
     """Return where the rows may live."""
     names = [column["name"] for column in columns]
-    angles = [c["name"] for c in columns if c["role"].startswith("angle")]
+    angles = [c["name"] for c in columns if Role.of(c["role"]).is_round]
     for space, names_of_space, why in (
         ("sphere", names, "these columns say a direction"),
         ("klein-bottle", angles, "so small picture patches lie on the Klein bottle"),
@@ -68,5 +69,9 @@ def _guess(columns: list[dict[str, Any]]) -> dict[str, Any]:
             space, why = "projective-plane", "a line has two ends, which mean the same"
         return {"space": space, "columns": taken, "why": why}
     if angles:
-        return {"space": "torus", "columns": angles[:MOST_ANGLES], "why": "these seem to be angles"}
-    return {"space": None, "columns": [], "why": "no column looks like an angle or a direction"}
+        return {"space": "torus", "columns": angles[:MOST_ANGLES], "why": "angles, by their names"}
+    return {
+        "space": None,
+        "columns": [],
+        "why": "no column says that it is an angle or a direction",
+    }

@@ -300,7 +300,7 @@ export class Result {
         max: 360,
         step: 1,
         value: 360 * this.held.place,
-        said: (at) => `${name} = ${angleText(at / 360, this.fit.unit)}`,
+        said: (at) => `${name} = ${angleText(at / 360, this.fit.axes[this.pair[this.held.axis]])}`,
       }, (at) => this.hold(at / 360));
       put(place, this.heldSlider);
       says.textContent =

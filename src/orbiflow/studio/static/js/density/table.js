@@ -2,7 +2,7 @@
 
 import { aside, button, h, icon, panel, put, row, soft, stack, trying, unique } from "../dom.js";
 import { bytes } from "../words.js";
-import { count, figure, roleWords, shape, spaceOf, SPACES, UNITS } from "./words.js";
+import { count, CYCLES, figure, roleWords, shape, spaceOf, SPACES, UNITS } from "./words.js";
 
 const ENDINGS = ".csv,.tsv,.txt,.npy";
 
@@ -109,15 +109,21 @@ function firstRows(table) {
 export function chooseSpace(table, start, last) {
   const guess = last ?? table.guess;
   const chosen = { space: guess.space, columns: [...guess.columns], unit: guess.unit };
+  const roles = Object.fromEntries(
+    table.columns.map(({ name, role }) => [name, /^(angle|axial|cycle):/.test(role) ? role : ""]),
+  );
+  last?.roles.forEach((role, k) => {
+    roles[last.columns[k]] = role;
+  });
   const units = h("div", { class: "unit" }),
     go = button("Fit the density", () => start(settings()), { kind: "primary big" });
   const says = h("p", { class: "soft", role: "status" });
   const settings = () => ({
     space: chosen.space,
     columns: chosen.space === "torus"
-      ? chosen.columns.map((name) => `${name}=angle:${chosen.unit}`)
+      ? chosen.columns.map((name) => `${name}=${roles[name]}`)
       : chosen.columns,
-    ...(spaceOf(chosen.space)?.angular ? { unit: chosen.unit } : {}),
+    ...(chosen.space === "klein-bottle" ? { unit: chosen.unit } : {}),
   });
 
   const name = unique("space");
@@ -172,24 +178,54 @@ export function chooseSpace(table, start, last) {
   function fit() {
     const space = spaceOf(chosen.space), number = chosen.columns.length;
     order.textContent = number > 1 ? `In this order: ${chosen.columns.join(", ")}.` : "";
-    const id = unique("unit");
-    if (space?.angular) {
-      const role = table.columns.find(({ name }) => name === chosen.columns[0])?.role ?? "";
-      const said = role.split(":")[1];
-      chosen.unit ??= UNITS.some(([value]) => value === said) ? said : "degrees";
-      const box = h("select", {
-        id,
-        onchange: () => {
-          chosen.unit = box.value;
+    const torus = space?.name === "torus";
+    const [kind, said] = (roles[chosen.columns[0]] ?? "").split(":");
+    if (kind === "angle") chosen.unit ??= said;
+    /** A box that asks how something is counted, and builds this form again. */
+    const asked = (words, choices, value, took) => {
+      const id = unique("unit");
+      const box = h(
+        "select",
+        {
+          id,
+          onchange: () => {
+            took(box.value);
+            fit();
+          },
         },
-      }, UNITS.map(([value, words]) => h("option", { value }, words)));
-      box.value = chosen.unit;
-      put(units, h("label", { for: id, class: "label" }, "How are angles counted?"), box);
-    } else put(units);
-    const fits = space && number >= space.least && number <= space.most;
+        [
+          ["", "Choose …"],
+          ...choices,
+          ...(value && !choices.some(([own]) => own === value) ? [[value, roleWords(value)]] : []),
+        ].map(([own, text]) => h("option", { value: own }, text)),
+      );
+      box.value = value ?? "";
+      return h("div", h("label", { for: id, class: "label" }, words), box);
+    };
+    const angles = UNITS.map(([unit, words]) => [`angle:${unit}`, words]);
+    put(
+      units,
+      torus &&
+        chosen.columns.map((name) =>
+          asked(`How is ${name} counted?`, [...angles, ...CYCLES], roles[name], (role) => {
+            roles[name] = role;
+          })
+        ),
+      space?.name === "klein-bottle" &&
+        asked("How are angles counted?", UNITS, chosen.unit, (unit) => {
+          chosen.unit = unit;
+        }),
+    );
+    const unsaid = torus ? chosen.columns.filter((name) => !roles[name]) : [];
+    const many = space && number >= space.least && number <= space.most;
+    const fits = many && !unsaid.length && (space.name !== "klein-bottle" || chosen.unit);
     go.disabled = !fits;
     says.textContent = !space
       ? "Choose what the numbers are."
+      : many && !fits
+      ? `Say how ${torus ? unsaid.join(" and ") : "the angles"} ${
+        unsaid.length === 1 ? "is" : "are"
+      } counted.`
       : fits
       ? `${shape(space.name, number)}.${
         table.rows > 5000 ? " So many rows take some minutes." : ""
@@ -212,7 +248,9 @@ export function chooseSpace(table, start, last) {
       "The table",
       soft(
         `${count(table.rows)} rows${
-          table.more ? `; ${count(table.more)} more columns are not shown` : ""
+          table.more.length
+            ? `. Not shown: ${table.more.join(", ")}, as only columns of numbers are, 30 at most`
+            : ""
         }. Rows with an empty cell are left out.`,
       ),
       firstRows(table),

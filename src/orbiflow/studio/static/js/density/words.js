@@ -8,7 +8,6 @@ export const SPACES = [
     needs: "1 to 7 columns of angles",
     least: 1,
     most: 7,
-    angular: true,
   },
   {
     name: "sphere",
@@ -33,7 +32,6 @@ export const SPACES = [
     needs: "theta, then phi",
     least: 2,
     most: 2,
-    angular: true,
   },
 ];
 
@@ -72,6 +70,17 @@ export const UNITS = [["degrees", "Degrees (360 all round)"], [
   "radians",
   "Radians (6.28 all round)",
 ], ["turns", "Turns (1 all round)"]];
+
+/** What a column that comes back may be, beside an angle. */
+export const CYCLES = [
+  ["cycle:24", "Hours of a day (24 all round)"],
+  [
+    "cycle:7",
+    "Days of a week (7 all round)",
+  ],
+  ["cycle:12", "Months (12 all round)"],
+  ["axial:degrees", "Both ends alike (180° all round)"],
+];
 
 /** What a density may be made of: a title, and what it is. */
 export const PARTS = {
@@ -117,15 +126,12 @@ export const percent = (share) => {
   } %`;
 };
 /**
- * An angle of a torus' window, from 0 to 1, in its unit.
+ * A place of a torus' window, from 0 to 1, in the unit of its axis.
  *
  * @param {number} place
- * @param {string} unit
+ * @param {{low: number, period: number, texts: string[]}} axis
  */
-export const angleText = (place, unit) => {
-  const turns = place - 0.5;
-  if (unit === "degrees") return `${Math.round(360 * turns)}°`.replace("-", "\u2212");
-  return figure(
-    unit === "radians" ? Number((2 * Math.PI * turns).toFixed(2)) : Number(turns.toFixed(3)),
-  );
+export const angleText = (place, { low, period, texts }) => {
+  const value = Number(((place + low) * period).toFixed(period > 100 ? 0 : period > 1 ? 2 : 3));
+  return figure(value) + (texts[0].endsWith("°") ? "°" : "");
 };
