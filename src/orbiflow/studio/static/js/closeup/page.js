@@ -154,6 +154,7 @@ class Closeup {
     this.heading = h("h1", { tabindex: "-1" }, "Close up");
     this.kind = h("p", { class: "soft small" });
     this.noted = h("div");
+    this.more = h("p", { class: "soft small" });
     this.modes = choice(
       "What to do",
       [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]],
@@ -166,7 +167,13 @@ class Closeup {
     const side = h(
       "div",
       { class: "closeup-side" },
-      h("div", this.heading, this.kind, h("details", h("summary", "More about it"), this.noted)),
+      h(
+        "div",
+        this.heading,
+        this.kind,
+        this.noted,
+        h("details", h("summary", "More about it"), this.more),
+      ),
       this.modes,
       this.panel,
       this.help,
@@ -194,13 +201,9 @@ class Closeup {
     this.pen.use(this.carries, drawing);
     this.heading.textContent = view.arrangement ? capital(view.arrangement) : "Close up";
     this.kind.textContent = named(view);
-    put(
-      this.noted,
-      notes([
-        ...view.notes ?? [],
-        `In mathematics: isohedral class ${view.class_name}, wallpaper group ${view.group.name}`,
-      ]),
-    );
+    put(this.noted, notes(view.notes ?? []));
+    this.more.textContent =
+      `In mathematics: isohedral class ${view.class_name}, wallpaper group ${view.group.name}.`;
     this.#proved();
     this.#panels();
     this.past.show(view, quiet);

@@ -2,6 +2,7 @@
 
 import { button, h, newest, put, row, soft, stack, style, toast, trying, zooms } from "../dom.js";
 import { sized } from "../../../../drawing/js/tiling.js";
+import { timeLeft } from "../waiting.js";
 import { wishes } from "../wishes.js";
 import { alive, sentence } from "../words.js";
 import { paintingControls, readingControls } from "./controls.js";
@@ -368,7 +369,7 @@ class PicturePage {
     const unread = !project.silhouette || (project.second && !project.second.silhouette);
     this.find.disabled = Boolean(unread || this.searching);
     this.searches.hidden = !project.tasks.some((own) => own.operation === "search" && alive(own));
-    this.busy.textContent = busy ? "Reading it again …" : "";
+    this.busy.textContent = busy ? `Reading it again … ${timeLeft(task)}` : "";
     this.both.update();
     this.back.disabled = !this.states.can(-1);
     this.again.disabled = !this.states.can(1);
