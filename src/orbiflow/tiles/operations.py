@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from orbiflow.errors import SettingError
+from orbiflow.errors import Advice, SettingError, literal
 from orbiflow.runtime import (
     NEVER,
     Cancel,
@@ -106,7 +106,12 @@ def export(
     from orbiflow.tiles import make
 
     if profile is not None:
-        settings = make.Profiles().applied(profile, settings)
+        settings, left = make.Profiles().applied(profile, settings)
+        if left:
+            said = ", ".join(f"{{{name}}}" for name in left) + literal(
+                f" of the profile {profile!r}"
+            )
+            on_event(Note(Advice(f"{said} does nothing for what is cut here, and was left out")))
     settings = settings.for_file(out)
     pictures = picture, second_picture
     taken, out = _taken(result, tile, out, f"{{}}.{settings.format}", *pictures)

@@ -62,11 +62,15 @@ class Profiles:
         """Remove a profile, if it is there."""
         self._write({key: settings for key, settings in self.read().items() if key != name})
 
-    def applied(self, name: str, settings: ExportSettings) -> ExportSettings:
-        """Return settings with those of a profile that were not given and apply to what is made."""
-        profiles = self.read()
+    def applied(self, name: str, settings: ExportSettings) -> tuple[ExportSettings, list[str]]:
+        """Return settings with those of a profile that were not given, and names of some left out.
+
+        These do not apply to what is made.
+        """
+        profiles, left = self.read(), list[str]()
         if name not in profiles:
-            hint = meant(name, list(profiles)) or f"there are {', '.join(profiles) or 'none'}"
+            hint = meant(name, list(profiles))
+            hint = hint or f"there are {', '.join(map(repr, profiles)) or 'none'}"
             raise SettingError(literal(f"there is no profile {name!r} in {self.file}; {hint}"))
         fields = _fields()
         for key, value in profiles[name].items():
@@ -75,9 +79,10 @@ class Profiles:
             try:
                 check_rules([fields[key]], {**vars(settings), key: value}, [key])
             except SettingError:
-                continue  # such as the kerf, where lines are cut once
-            settings = settings.replace(**{key: value})
-        return settings
+                left.append(key)  # such as the kerf, where lines are cut once
+            else:
+                settings = settings.replace(**{key: value})
+        return settings, left
 
     def _checked(self, name: str, settings: object) -> dict[str, Any]:
         """Return settings as `export` takes them."""

@@ -18,6 +18,9 @@ const text = (
   unit = "",
 ) => (Array.isArray(value) ? value.join("x") + unit : String(value ?? ""));
 
+/** Sides without their unit, which is then the one that is shown. */
+const BARE_SIDES = /^\d+(\.\d+)?\s*[x×]\s*\d+(\.\d+)?$/;
+
 /** What a box holds as a value: an array of texts, a number, or text. */
 function read(given, found) {
   const types = found.map(({ type }) => type);
@@ -103,6 +106,7 @@ function control(name, schema, words, changed) {
       const given = box.value.trim();
       if (given === "") return standard;
       if (given === before[0]) return before[1];
+      if (isLength && BARE_SIDES.test(given)) return given.replace("×", "x") + unit;
       const value = read(given, found);
       return isLength && typeof value === "number" ? millimetres(value) : value;
     };

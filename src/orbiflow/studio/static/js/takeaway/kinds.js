@@ -100,7 +100,7 @@ export const KINDS = {
       },
       area: {
         title: "How large is the page?",
-        about: "Such as A4, letter, mug, phone or 300x200mm.",
+        about: "Such as A4, letter, mug, phone, 300x200mm or 12x8in.",
         some: "A4 A4-landscape A3 A3-landscape letter letter-landscape mug phone".split(" "),
       },
       clip: {

@@ -208,11 +208,17 @@ class TakeawayPage {
     const { options, value } = colours(this.look, this.about);
     if (palette) palette.enum = Object.keys(options);
     const without = this.without(kind, schema);
-    const begin = Object.entries(start ?? {}).filter(([name, value]) => {
+    const wish = { ...start, ...this.kept[thing] };
+    const able = (name) => {
       const property = schema.properties[name];
       const allowed = [property, ...(property.anyOf ?? [])].flatMap((own) => own.enum ?? []);
-      return !allowed.length || allowed.includes(value);
-    });
+      return !allowed.length || allowed.includes(wish[name]);
+    };
+    const never = Object.keys(start ?? {}).find((name) => !able(name));
+    if (never) return this.refuse(without[never].about);
+    this.making.make.hidden = false;
+    const open = this.form?.querySelector("details").open && thing === this.built;
+    this.built = thing;
     const names = { ...KINDS[kind].words, ...THINGS[thing].words };
     this.form = form(schema, {
       first,
@@ -220,14 +226,14 @@ class TakeawayPage {
       words: { ...names, palette: { ...names.palette, options }, ...without },
       hidden: NEVER,
       start: {
-        ...Object.fromEntries(begin),
-        ...this.kept[thing],
+        ...Object.fromEntries(Object.entries(wish).filter(([name]) => able(name))),
         ...(palette && { palette: value }),
       },
     }, () => {
       this.keepLooks();
       this.changed();
     });
+    this.form.querySelector("details").open = open;
     this.layers = this.laidOn(kind);
     this.suits = null;
     put(
@@ -242,6 +248,17 @@ class TakeawayPage {
     );
     this.making.task = null;
     this.changed();
+  }
+
+  /** Say why this tile cannot be the thing that was chosen. */
+  refuse(why) {
+    put(this.wishes, h("p", { class: "notice" }, why));
+    this.making.make.hidden = this.real.hidden = true;
+    this.making.task = null;
+    this.making.change();
+    this.live.close();
+    this.noted.hidden = true;
+    this.paint();
   }
 
   /** Take choices out of a schema that this tile does not have; returns words on why, by setting. */

@@ -23,6 +23,7 @@ export class Preview {
     this.place = place;
     this.told = told;
     this.says = h("p", { class: "soft small", "aria-live": "polite" });
+    this.meanwhile = meanwhile;
     this.image = h("div", { class: "live" }, meanwhile);
     this.root = stack(this.image, this.says);
     this.wanted = "";
@@ -68,6 +69,7 @@ export class Preview {
       this.again = !detail && operation !== "solid";
     } catch (error) {
       if (running !== this.running || error.name === "AbortError") return;
+      this.says.textContent = "";
       if (asked === this.wanted) this.told(error, []);
     } finally {
       clearTimeout(slow);
@@ -80,7 +82,8 @@ export class Preview {
   }
 
   close() {
-    this.wanted = "";
+    this.wanted = this.says.textContent = "";
+    put(this.image, this.meanwhile);
     this.running?.abort();
     this.running = null;
   }

@@ -42,7 +42,9 @@ export const THINGS = {
       "kerf",
       "area",
     ]),
-    words: { area: { title: "How large is your sheet?", about: "Such as 300x200mm or A4." } },
+    words: {
+      area: { title: "How large is your sheet?", about: "Such as 300x200mm, 12x8in or A4." },
+    },
     machine: true,
   },
   jigsaw: {
@@ -60,7 +62,7 @@ export const THINGS = {
       "tile_size",
     ]),
     words: {
-      area: { title: "How large is the poster?", about: "Such as A2, A3 or 600x400mm." },
+      area: { title: "How large is the poster?", about: "Such as A2, A3, 600x400mm or 24x16in." },
       bed: {
         title: "Which paper does your printer take?",
         about:
@@ -88,6 +90,7 @@ export const THINGS = {
     "outline",
     "area",
   ]),
+  lesson: printed("Lesson with scissors", "cut", { purpose: "lesson" }, ["tile_size", "area"]),
   stamp: solid("Stamp", "stamp", "stamp", ["tile_size", "height", "format"]),
   cutter: solid("Cookie cutter", "cutter", "cutter", ["tile_size", "blade", "format"]),
   ball: {
