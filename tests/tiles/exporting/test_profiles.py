@@ -2,12 +2,11 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from exported import tile_of
-from orbiflow.runtime import Note
+from orbiflow.runtime import Event, Note
 from orbiflow.tiles import ExportSettings, export
 from orbiflow.tiles.make import Profiles, profiles
 from refusals import refused
@@ -30,9 +29,9 @@ def test_what_is_given_beats_a_profile_and_a_profile_beats_defaults(
     made = export(tile_of("IH4"), tmp_path / "pieces.svg", cut, profile=NAME).settings
     assert (made.kerf, made.bed, made.margin) == (0.3, (120.0, 100.0), 5.0)
     lines = ExportSettings(cut="skeleton", tile_size=30.0)
-    notes: list[Any] = []
-    options: dict[str, Any] = {"profile": NAME, "on_event": notes.append}
-    made = export(tile_of("IH4"), tmp_path / "lines.svg", lines, **options).settings
+    notes: list[Event] = []
+    path = tmp_path / "lines.svg"
+    made = export(tile_of("IH4"), path, lines, profile=NAME, on_event=notes.append).settings
     left = [note.text for note in notes if isinstance(note, Note) and NAME in note.text]
     assert [text for text in left if "kerf" in text and "margin" not in text] == left != []
     assert (made.kerf, made.margin, made.power) == (0.0, 5.0, 20)  # one line for two: no kerf
