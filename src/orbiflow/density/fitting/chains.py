@@ -360,7 +360,7 @@ def _factor_shape(
     while len(parents) < min(MOST_PARENTS, len(before)):
         proposed = seen.parents(axis, parents, before)[:MAX_PROPOSED_PARENTS]
         scores = {parent: score((*parents, parent, axis), first) for parent in proposed}
-        parent = max(scores, key=lambda one: held.mean(scores[one]))
+        parent = max(scores, key=lambda candidate: held.mean(scores[candidate]))
         gain = gain_of(scores[parent], best, held.weights)
         if gain.nats <= max(WORTHWHILE_NATS, gain.error):
             break

@@ -77,7 +77,7 @@ def tuned_concentrations(space: Space, rows: Rows, narrowest: float) -> Tensor |
     starts = (np.full(count, start).clip(*bounds) for start in STARTS)
     how: dict[str, Any] = {"jac": True, "method": "L-BFGS-B", "bounds": [bounds] * count}
     searches = [minimize(loss, start, options={"maxiter": STEPS}, **how) for start in starts]
-    best = min(searches, key=lambda one: float(one.fun))
+    best = min(searches, key=lambda search: float(search.fun))
     return torch.tensor(np.exp(best.x))[where]
 
 

@@ -242,9 +242,9 @@ def _refined(
     small enough together. Changes are of the whole, at its own samples.
     """
 
-    def refine(one: _Left) -> list[tuple[float, Density]]:
+    def refine(piece: _Left) -> list[tuple[float, Density]]:
         share = sum(each.levels for each in left) / (LEVELS * len(left))
-        return one.refine(space, partial(say, share, f"integrating, level {one.levels + 1}"))
+        return piece.refine(space, partial(say, share, f"integrating, level {piece.levels + 1}"))
 
     def whole() -> Mixture:
         return _mixture([*closed, *(part for each in left for part in each.found)])
@@ -252,27 +252,27 @@ def _refined(
     def now() -> Tensor:
         return torch.stack([logs_of_closed, *(each.logs for each in left)]).logsumexp(dim=0)
 
-    for one in left:
-        refine(one)
-    before = [refine(one) for one in left]
+    for piece in left:
+        refine(piece)
+    before = [refine(piece) for piece in left]
     points = _checked_points(whole(), CHECKED)
     logs_of_closed = (
         _log_sum(closed, points) if closed else points.new_full((len(points),), -math.inf)
     )
-    for one in left:
-        one.logs = _log_sum(one.found, points)
-    for one, old in zip(left, before, strict=True):
-        one.compare(_log_sum(old, points), now())
-    while math.hypot(*(one.error.usual for one in left)) > accuracy:
-        coarse = [one for one in left if one.levels < LEVELS]
+    for piece in left:
+        piece.logs = _log_sum(piece.found, points)
+    for piece, old in zip(left, before, strict=True):
+        piece.compare(_log_sum(old, points), now())
+    while math.hypot(*(piece.error.usual for piece in left)) > accuracy:
+        coarse = [piece for piece in left if piece.levels < LEVELS]
         if not coarse:
             break
-        one = max(coarse, key=lambda own: own.error.usual)
-        refine(one)
-        old, one.logs = one.logs, _log_sum(one.found, points)
-        one.compare(old, now())
-    usual = math.hypot(*(one.error.usual for one in left))
-    return whole(), Error(usual, sum(one.error.largest for one in left))
+        piece = max(coarse, key=lambda piece: piece.error.usual)
+        refine(piece)
+        old, piece.logs = piece.logs, _log_sum(piece.found, points)
+        piece.compare(old, now())
+    usual = math.hypot(*(piece.error.usual for piece in left))
+    return whole(), Error(usual, sum(piece.error.largest for piece in left))
 
 
 def _compared(whole: Mixture, closed: list[Weighted], left: list[_Left]) -> Error | None:

@@ -115,7 +115,7 @@ def elimination_order(
     most = max((_entries(axes, sizes) for axes in left), default=1)
     while hidden:
         cliques = {axis: frozenset[int]().union(*(t for t in left if axis in t)) for axis in hidden}
-        axis = min(sorted(hidden), key=lambda one: _entries(cliques[one], sizes))
+        axis = min(sorted(hidden), key=lambda candidate: _entries(cliques[candidate], sizes))
         terms, result = (
             _entries(clique, sizes) for clique in (cliques[axis], cliques[axis] - {axis})
         )
@@ -135,7 +135,7 @@ def _product(
     tables: Sequence[tuple[tuple[int, ...], Tensor]], sizes: Mapping[int, int], over: Sequence[int]
 ) -> tuple[tuple[int, ...], Tensor]:
     """Return the product of tables of some axes each, summed over axes."""
-    tables = sorted(tables, key=lambda one: one[1].numel())
+    tables = sorted(tables, key=lambda entry: entry[1].numel())
     letter = {axis: chr(ord("a") + k) for k, axis in enumerate(sizes)}
     axes = tuple(sorted({axis for table_axes, _ in tables for axis in table_axes} - set(over)))
     terms = ",".join("".join(letter[axis] for axis in table_axes) for table_axes, _ in tables)

@@ -172,7 +172,7 @@ def _along_covariate(
     torus = inference.check_torus(density.space, "trends")
     (axis,) = saved.axes([of], tell)
     column = density.covariates.column(along)
-    known, beside, panels = _others(density, along, settings.at, tell)
+    others, beside, panels = _others(density, along, settings.at, tell)
     low, high = (0.0, column.period) if column.period is not None else column.range
     values = (
         np.array(column.words)
@@ -182,7 +182,7 @@ def _along_covariate(
     count, done = len(values) * len(panels), 0
     trends: dict[str, Trend] = {}
     for word in panels:
-        fixed = {**known, beside: word} if beside else known
+        fixed = {**others, beside: word} if beside else others
         cells = {name: np.full(len(values), cell) for name, cell in fixed.items()}
         x = density.covariates.features({**cells, along: values})
 

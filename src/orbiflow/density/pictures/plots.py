@@ -110,7 +110,7 @@ def plot_density(
     for k, (name, make) in enumerate(makers.items()):
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
-    captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
+    captions = tuple(f"{picture.title}. {picture.caption}".strip() for picture in pictures.values())
     flowless = shown.space.is_surface and not shown.flows
     notes = ("there is no flow in this density, and so no picture of one",) * flowless
     if single:

@@ -58,14 +58,14 @@ def trend_picture(
     whole = down * high + sheet.em * (below + above + gap * down)
     figure = sheet.figure(whole)
     style: dict[str, Any] = {"fontsize": sheet.text, "color": frames.INK, "parse_math": False}
-    for number, (title, one) in enumerate(found.items()):
+    for number, (title, curve) in enumerate(found.items()):
         row, column = divmod(number, across)
         at = sheet.em * left + column * (side + gap * sheet.em)
         up = whole - sheet.em * (above + gap * (row > 0) * row) - (row + 1) * high
         if gap:
             up -= gap * sheet.em
         axes = frames.axes_at(figure, at, up, side, high)
-        _draw(axes, one, space, sheet, words)
+        _draw(axes, curve, space, sheet, words)
         if title:
             axes.set_title(frames.cut(title, 24), pad=2, **style)
         lowest = number + across >= len(found)

@@ -132,30 +132,30 @@ class ProductSpace(Space):
         return ask(self.base, first), ask(self.beside, second)
 
     def project(self, points: Tensor) -> Tensor:
-        return torch.cat(self._both(lambda own, x: own.project(x), points), dim=-1)
+        return torch.cat(self._both(lambda part, x: part.project(x), points), dim=-1)
 
     def retracted(self, points: Tensor) -> Tensor:
-        return torch.cat(self._both(lambda own, x: own.retracted(x), points), dim=-1)
+        return torch.cat(self._both(lambda part, x: part.retracted(x), points), dim=-1)
 
     def log_area(self, points: Tensor) -> Tensor:
-        first, second = self._both(lambda own, x: own.log_area(x), points)
+        first, second = self._both(lambda part, x: part.log_area(x), points)
         return first + second
 
     def log_density_factor(self, points: Tensor, measure: str) -> Tensor:
         if measure == CHART:
             return torch.zeros_like(points[..., 0])
-        both = self._both(lambda own, x: own.log_density_factor(x, measure), points)
+        both = self._both(lambda part, x: part.log_density_factor(x, measure), points)
         return both[0] + both[1]
 
     def log_kernel_factor(self, points: Tensor, measure: str) -> Tensor:
-        both = self._both(lambda own, x: own.log_kernel_factor(x, measure), points)
+        both = self._both(lambda part, x: part.log_kernel_factor(x, measure), points)
         return both[0] + both[1]
 
     def cover(self, data: ArrayLike) -> Tensor:
-        return self._of_data(data, lambda own, x: own.cover(x))
+        return self._of_data(data, lambda part, x: part.cover(x))
 
     def to_chart(self, data: ArrayLike) -> Tensor:
-        return self._of_data(data, lambda own, x: own.to_chart(x))
+        return self._of_data(data, lambda part, x: part.to_chart(x))
 
     def _of_data(self, data: ArrayLike, ask: Callable[[Space, Array], Tensor]) -> Tensor:
         first, second = self.split(checked_table(data, self.widths, "data"))
