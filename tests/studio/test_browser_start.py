@@ -1,6 +1,7 @@
 """The first page and the page of the picture, in a real browser."""
 
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -390,6 +391,15 @@ def test_pages_are_light(studio: RunningStudio) -> None:
             total += len(b"".join(answer.iter_raw()))
     assert total < 165_000
     assert sum(file.stat().st_size for file in STATIC.rglob("*") if file.is_file()) < 417_000
+
+
+def test_icons_that_buttons_name_are_drawn() -> None:
+    """A name that `icons.svg` lacks would show nothing, without an error."""
+    scripts = "".join(file.read_text() for file in STATIC.rglob("*.js"))
+    named = re.findall(r'(?:icon\(|image: |printed\("[\w ]+", |solid\("[\w ]+", )"(\w+)"', scripts)
+    drawn = re.findall(r'<path id="(\w+)"', (STATIC / "icons.svg").read_text())
+    assert len(set(named)) > 20
+    assert not set(named) - set(drawn)
 
 
 def test_faults_are_found(page: Any) -> None:
