@@ -102,7 +102,7 @@ def _by_colour_models(lab: Array, region: _Mask) -> _Mask:
     small = small / _light(small[..., 0], border)[..., None]
     start = resized(region.astype(float), size) > 0.5
     cut = ColourCut(scipy.ndimage.gaussian_filter(small, (0.5, 0.5, 0)), border)
-    shapes = [cut.shape(found) for found in (start, middle_of(size)) if found.any()]
+    shapes = [cut.shape(mask) for mask in (start, middle_of(size)) if mask.any()]
     slope = _slope(small)
     sharp = [_steepness(slope, shape) for shape in shapes]
     least = max(MIN_SLOPE, SHARP_SHARE * max(sharp))
