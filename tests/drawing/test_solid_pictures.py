@@ -194,3 +194,20 @@ def test_colours_are_filaments_for_slicers() -> None:
     assert extruders["1"] == ["1", "1"]
     assert extruders["2"] == ["2", "2"]
     assert [extruders[number][0] for number in built if number] == ["1", "1", "2"]
+
+
+def test_a_group_is_one_object_with_a_filament_for_each_part(tmp_path: Path) -> None:
+    """As objects of their own, slicers would drop all parts on the bed."""
+    colours = {"block": "#c0ffee", "ball": "#102030"}
+    content = write_3mf(PARTS, colours=colours, groups={"block": ["block", "ball"]})
+    triangles = list(ElementTree.fromstring(model(content)).iter(f"{CORE}triangle"))
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        prusa = ElementTree.fromstring(archive.read("Metadata/Slic3r_PE_model.config"))
+    block, ball = (
+        range(int(own.get("firstid", "")), int(own.get("lastid", "")) + 1)
+        for own in prusa.iter("volume")
+    )
+    assert (len(block), ball.start, ball.stop) == (12, 12, len(triangles))
+    assert [row.get("paint_color") for row in triangles] == [None] * 12 + ["8"] * len(ball)
+    (tmp_path / "a.3mf").write_bytes(content)
+    assert [len(part) for part in read_triangles(tmp_path / "a.3mf")] == [12, len(ball)]

@@ -48,8 +48,9 @@ def write_3mf(
 ) -> bytes:
     """Return a 3MF file with each part as an object of its own, in millimetres.
 
-    Each colour is a filament of its own, in their order, for PrusaSlicer, Bambu Studio and OrcaSlicer,
-    which read no colours but files of their own beside the model.
+    Each colour is a filament of its own, in their order. PrusaSlicer reads from a file beside the model
+    which triangles of an object are for which, and drops parts that are objects on the bed, each by
+    itself; Bambu Studio and OrcaSlicer read one for each object, and one painted on triangles.
 
     Args:
         parts: Closed bodies by name.
@@ -63,16 +64,21 @@ def write_3mf(
     Raises `OrbiflowError` for a place that is a reflection, which printers' programs read differently:
     mirror the part.
     """
-    meshes = {name: body.to_mesh64() for name, body in parts.items()}
-    colours = colours or {}
+    groups, colours = groups or {}, colours or {}
     order = list(dict.fromkeys(colours.values()))
+    filaments = {name: order.index(colour) + 1 for name, colour in colours.items()}
+    together = {part for names in groups.values() for part in names[1:]}
+    objects = [
+        _object(number, {part: parts[part] for part in groups.get(name, [name])})
+        for number, name in enumerate((name for name in parts if name not in together), 1)
+    ]
     values = {
-        "meshes": meshes,
+        "objects": objects,
         "title": title,
         "colours": colours,
-        "filaments": {name: order.index(colour) + 1 for name, colour in colours.items()},
-        "numbers": {name: number for number, name in enumerate(meshes, 1)},
-        "items": _items(list(meshes), places or {}, groups or {}),
+        "filaments": filaments,
+        "paints": {name: _painted(filament) for name, filament in filaments.items()},
+        "items": _items(objects, places or {}),
     }
     files = {
         "[Content_Types].xml": "solid_content_types.xml",
@@ -91,30 +97,46 @@ def write_3mf(
     return buffer.getvalue()
 
 
-class _Item(NamedTuple):
-    """What is printed in one place: the number of its object, which may be of several parts."""
+class _Object(NamedTuple):
+    """A mesh of one part or several: of each its name and its triangles, one after the other."""
 
     number: int
     name: str
-    parts: Sequence[str]
+    points: list[list[float]]
+    parts: list[tuple[str, list[list[int]]]]
+
+
+def _object(number: int, bodies: Mapping[str, Manifold]) -> _Object:
+    points, parts = list[list[float]](), list[tuple[str, list[list[int]]]]()
+    for name, body in bodies.items():
+        mesh: Any = body.to_mesh64()
+        parts.append((name, (mesh.tri_verts + len(points)).tolist()))
+        points += mesh.vert_properties.tolist()
+    return _Object(number, parts[0][0], points, parts)
+
+
+def _painted(filament: int) -> str:
+    """Return how a triangle says that all of it is of a filament, as slicers' brushes write it."""
+    return f"{4 * filament:X}" if filament < 3 else f"{filament - 3:X}C"
+
+
+class _Item(NamedTuple):
+    """What is printed in one place: the number of an object, or of a copy of it."""
+
+    number: int
+    of: _Object
     place: str = ""
 
 
-def _items(
-    names: list[str], places: Mapping[str, Sequence[Array]], groups: Mapping[str, Sequence[str]]
-) -> list[_Item]:
+def _items(objects: list[_Object], places: Mapping[str, Sequence[Array]]) -> list[_Item]:
     """Return what is printed: each copy is an object, or all but the first would lose their colour."""
-    together = {part for parts in groups.values() for part in parts[1:]}
-    free = count(len(names) + 2)  # after the parts and the materials
+    free = count(len(objects) + 2)  # after the meshes and the materials
     items: list[_Item] = []
-    for number, name in enumerate(names, 1):
-        if name in groups:
-            items.append(_Item(next(free), name, groups[name]))
-        elif name in places:
-            copies = map(_transform, places[name])
-            items += [_Item(next(free), name, [name], place) for place in copies]
-        elif name not in together:
-            items.append(_Item(number, name, [name]))
+    for own in objects:
+        if own.name in places:
+            items += [_Item(next(free), own, _transform(place)) for place in places[own.name]]
+        else:
+            items.append(_Item(own.number, own))
     return items
 
 
@@ -132,24 +154,24 @@ def read_triangles(path: Path) -> list[Array]:
         return [np.frombuffer(path.read_bytes()[84:], STL_TRIANGLE)["corners"].astype(float)]
     with zipfile.ZipFile(path) as archive:
         model = ElementTree.fromstring(archive.read("3D/3dmodel.model"))
-    triangles, groups = dict[str, Array](), dict[str, list[str]]()
+    parts, copies = dict[str, list[Array]](), dict[str, str]()
     for element in model.iter(f"{CORE}object"):
-        parts = [part.get("objectid", "") for part in element.iter(f"{CORE}component")]
-        if parts:
-            groups[element.get("id", "")] = parts
-            continue
-        points, corners = (
-            [list(row.attrib.values()) for row in element.iter(CORE + tag)]
-            for tag in ("vertex", "triangle")
+        name = element.get("id", "")
+        for copied in element.iter(f"{CORE}component"):
+            copies[name] = copied.get("objectid", "")
+        points = np.array(
+            [list(row.attrib.values()) for row in element.iter(f"{CORE}vertex")], float
         )
-        triangles[element.get("id", "")] = np.array(points, float)[
-            np.array([c[:3] for c in corners], int)
-        ]
+        sorts = dict[
+            str | None, list[list[str]]
+        ]()  # by the material of a part that is not the first
+        for row in element.iter(f"{CORE}triangle"):
+            sorts.setdefault(row.get("p1"), []).append(list(row.attrib.values())[:3])
+        parts[name] = [points[np.array(corners, int)] for corners in sorts.values()]
     placed = list[Array]()
     for item in model.iter(f"{CORE}item"):
         name = item.get("objectid", "")
-        for part in groups.get(name, [name]):
-            corners = triangles[part]
+        for corners in parts[copies.get(name, name)]:
             if text := item.get("transform"):
                 rows = np.array(text.split(), float).reshape(4, 3)
                 corners = corners @ rows[:3] + rows[3]
