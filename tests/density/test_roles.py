@@ -307,3 +307,11 @@ def test_two_columns_of_one_name_are_refused() -> None:
     frame = pandas.DataFrame(np.stack([DEGREES, DEGREES], 1), columns=["phi_deg", "phi_deg"])
     with refused("phi_deg", "1 and 2", kind=SettingError):
         DensityEstimator().fit(frame)
+
+
+def test_times_of_day_are_told_to_be_written_as_hours(tmp_path: Path) -> None:
+    table, where = tmp_path / "hours.csv", SpaceSettings(space="torus")
+    table.write_text("time,minutes\n" + "".join(f"{k % 24}:30,{7 * k}\n" for k in range(20)))
+    for columns in (None, ("time=cycle:24",)):
+        with refused("time", "18.5 for 18:30", "cycle:24"):
+            read_rows(table, RowSettings(columns=columns), ignore, where=where)

@@ -227,7 +227,9 @@ class Field:
 
     def missing(self) -> SettingError:
         """Return the error if it is required and not given."""
-        what = f"{self.kind.wanted}: {self.doc.rstrip('.')}" if self.doc else self.kind.wanted
+        what, doc = self.kind.wanted, self.doc.rstrip(".")
+        if doc:
+            what = doc[0].lower() + doc[1:] if what == "text" else f"{what}: {doc}"
         return SettingError(f"{{{self.name}}} is missing; give {literal(what)}")
 
     @cached_property

@@ -12,7 +12,14 @@ from orbiflow.density.data.checks import codes_among
 from orbiflow.density.data.names import check_columns, chosen_arrangement, is_number_name
 from orbiflow.density.data.proposals import proposed_role, undeclared
 from orbiflow.density.data.roles import Asked, Role, role_named
-from orbiflow.density.data.table import DataTable, UndeclaredError, found_column, listing
+from orbiflow.density.data.table import (
+    HOURS,
+    DataTable,
+    UndeclaredError,
+    found_column,
+    is_clock,
+    listing,
+)
 from orbiflow.density.data.units import DIRECTIONS, ROTATIONS, VECTORS, is_angular, words_of
 from orbiflow.errors import SettingError, literal
 
@@ -144,6 +151,8 @@ class _Choice:
         numeric = [k for k in left if self.table.is_numeric(k)]
         words = [k for k in left if k not in numeric and self._named(k) is None]
         notes = [f"left out {listing(self._names(words))}: no numbers"] if words else []
+        if any(is_clock(str(self.table.cells(k)[0]).strip()) for k in words):
+            notes[0] += f"; to use times of day, {HOURS}"
         if numeric:
             notes.append(f"left out {listing(self._names(numeric))}: name all columns to use them")
         return notes
@@ -333,7 +342,8 @@ class _Choice:
         listed = ",".join(f"{code:.10g}" for code in sorted(codes))
         cure = f" {{missing_codes}} {listed} {{drop_missing}}" if codes and table.is_file else ""
         values = {table.names[k]: column for k, column in unknown.items()}
-        raise undeclared("columns", values, ",".join(entries), cure)
+        left = "; ".join(self._left_out([*own, *roles])) if table.is_named else ""
+        raise undeclared("columns", values, ",".join(entries), cure, left=left)
 
     def _called(self, column: int) -> str:
         """Return a column's name, or its number where the name would be read otherwise."""

@@ -105,9 +105,17 @@ def unit_by_size(values: Array) -> str | None:
 
 
 def undeclared(
-    option: str, columns: Mapping[str, Array], proposal: str, cure: str = "", where: str = ""
+    option: str,
+    columns: Mapping[str, Array],
+    proposal: str,
+    cure: str = "",
+    where: str = "",
+    left: str = "",
 ) -> UndeclaredError:
-    """Return the error that asks for what columns (N,) are, with the words that answer it."""
+    """Return the error that asks for what columns (N,) are, with the words that answer it.
+
+    The `cure` follows these; `left` says what was left out.
+    """
     ranges: list[str] = []
     for name, values in columns.items():
         finite = values[np.isfinite(values)]
@@ -118,7 +126,8 @@ def undeclared(
     return UndeclaredError(
         literal(f"{where}{', '.join(ranges)}: say what {them}; if this is right, declare: ")
         + f"{{{option}}} {literal(quoted)}{cure} (a role is "
-        + f"{', '.join(WORDS[: 7 if option == 'given' else None])})",
+        + f"{', '.join(WORDS[: 7 if option == 'given' else None])})"
+        + literal(f"; {left}" if left else ""),
         list(columns),
         proposal,
     )

@@ -58,6 +58,11 @@ class UndeclaredError(SettingError):
         self.columns = tuple(columns)
         self.proposal = proposal
 
+    def __str__(self) -> str:
+        """Return the message with what is to be declared as Python has it."""
+        shown = rf"declare: (\w+) (?:'{re.escape(self.proposal)}'|{re.escape(self.proposal)})"
+        return re.sub(shown, lambda m: f"declare: {m[1]}={self.proposal!r}", super().__str__())
+
 
 def is_missing_word(text: str) -> bool:
     """Return whether a cell of text stands for a missing value in any table.
@@ -200,10 +205,8 @@ class DataTable:
             "write numbers alone, in degrees negative to the south and west; if that stands for a "
         )
         cure += f"missing value, give {{missing_codes}} {literal(codes)} {{drop_missing}}"
-        if re.fullmatch(r"\d+:\d+(:\d+)?", cell):
-            cure = (
-                "write a time as hours with decimals, such as 18.5 for 18:30, and declare cycle:24"
-            )
+        if is_clock(cell):
+            cure = HOURS
         elif mark == "." and re.fullmatch(r"[+-]?\d*,\d+", cell):
             cure = "write decimal points, or specify {decimal} , if commas stand before decimals"
         elif mark == "," and re.fullmatch(r"[+-]?\d*\.\d+", cell):
@@ -214,6 +217,15 @@ class DataTable:
     def cells(self, column: int) -> NDArray[Any]:
         """Return the cells (N,) of a column as they are: numbers or words."""
         return self.columns[column]
+
+
+HOURS = "write hours with decimals, such as 18.5 for 18:30, and declare cycle:24"
+"""What to do about times of day."""
+
+
+def is_clock(cell: str) -> bool:
+    """Return whether a cell is a time of day, such as 18:30."""
+    return re.fullmatch(r"\d{1,2}:\d\d(:\d\d(\.\d+)?)?", cell) is not None
 
 
 def _are_numbers(cells: NDArray[Any]) -> bool:

@@ -85,6 +85,8 @@ def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
             f"pictures of the {space.base.name}, of the columns beside it, and of one along the other "
             f"are written to {out}"
         )
+    if space.dim == 1:
+        return f"written {out}" if single else f"written to {out}"
     if space.dim != 2:
         where = out if single else f"the picture in {out}"
         return (

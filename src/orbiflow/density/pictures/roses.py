@@ -59,6 +59,7 @@ class Rose(NamedTuple):
     - `curve`: Values of a density per turn, at even steps from 0 to 1.
     - `first`: The turn from which they are written, 0 or -1/2.
     - `mean`: Mean direction, resultant length, and half the width of the mean's interval, in turns.
+    - `period`: Of a cycle, such as hours of a day: it is drawn as a clock, with its own numbers.
     """
 
     name: str
@@ -67,6 +68,11 @@ class Rose(NamedTuple):
     curve: Array | None = None
     mean: tuple[float | None, float, float | None] = (None, 0.0, None)
     first: float = 0.0
+    period: float | None = None
+
+    def text(self, turns: float, unit: str) -> str:
+        """Return a direction as it is written, angles in a unit."""
+        return frames.angle_text(turns, unit) if self.period is None else f"{turns * self.period:g}"
 
 
 def rose_picture(
@@ -78,7 +84,9 @@ def rose_picture(
     line = torch.linspace(0, 1, 721, dtype=torch.float64)[:, None]
     curve = density_at(density, line, "square")
     turns = frames.chart_points(density.space, points)[:, 0].numpy()
-    rose = Rose(view.names[0], turns, None, curve, first=float(view.low[0]))
+    space = view.space
+    period = None if space.axes[0].is_angle else space.periods[0]
+    rose = Rose(view.names[0], turns, None, curve, first=float(view.low[0]), period=period)
     words = f"{len(points)} {what}, and the density as a line"
     return roses_picture([rose], view.space.unit or "", words, settings.sheet)
 
@@ -165,12 +173,12 @@ def _draw(axes: PolarAxes, rose: Rose, unit: str, sheet: Sheet) -> None:
     axes.set_yticks([rim / 2], [""])
     quarters = [0.0, 0.25, 0.5, 0.75]
     written = [t if t <= rose.first + 1 else t - 1 for t in quarters]
-    axes.set_xticks([around * t for t in quarters], [frames.angle_text(t, unit) for t in written])
+    axes.set_xticks([around * t for t in quarters], [rose.text(t, unit) for t in written])
     axes.tick_params(labelsize=sheet.small, pad=0.1 * sheet.text, colors=frames.INK)
     axes.grid(color="#c8c8c4", linewidth=sheet.pen(0.6))
     axes.spines["polar"].set(color="#8a8a86", linewidth=sheet.pen(0.8))
     axes.set_axisbelow(True)
-    if _is_compass(rose.name):
+    if rose.period is not None or _is_compass(rose.name):
         axes.set_theta_zero_location("N")
         axes.set_theta_direction(-1)
     name = frames.cut(frames.symbol(rose.name), frames.MAX_NAME)
