@@ -21,7 +21,6 @@ from orbiflow.drawing import (
     write_stl,
 )
 from orbiflow.drawing.solid_pictures import crease_normals
-from refusals import refused
 from solids_read import CORE, read_3mf, read_stl
 
 FROM_THE_TOP = SolidView((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
@@ -131,8 +130,6 @@ def test_a_mirrored_part_is_seen_from_outside() -> None:
 
 
 PARTS = {"block": Manifold.cube((1, 2, 3)), "ball": Manifold.sphere(1, 16)}
-HALF_TURN = np.column_stack([np.diag([-1.0, -1.0, 1.0]), [10.0, 0.0, 2.5]])
-AS_IT_IS = np.eye(3, 4)
 
 
 def model(content: bytes) -> str:
@@ -158,44 +155,6 @@ def test_colours_of_parts() -> None:
     assert "basematerials" not in model(write_3mf(PARTS))
 
 
-def test_copies_of_a_part_repeat_no_mesh(tmp_path: Path) -> None:
-    content = write_3mf(PARTS, places={"block": [AS_IT_IS, HALF_TURN]})
-    text = model(content)
-    assert text.count("<mesh>") == 2
-    assert text.count(" transform=") == text.count('<component objectid="1"/>') == 2
-    assert text.count('<item objectid="2"/>') == 1
-    (tmp_path / "a.3mf").write_bytes(content)
-    first, second, ball = read_triangles(tmp_path / "a.3mf")
-    assert second.reshape(-1, 3).min(axis=0) == pytest.approx([9, -2, 2.5])
-    assert np.allclose(first @ HALF_TURN[:, :3].T + HALF_TURN[:, 3], second)
-    assert ball.min() == pytest.approx(-1)
-    with refused("(3, 4)"):
-        write_3mf(PARTS, places={"block": [-AS_IT_IS]})
-
-
-def test_colours_are_filaments_for_slicers() -> None:
-    colours = {"block": "#c0ffee", "ball": "#102030"}
-    content = write_3mf(PARTS, colours=colours, places={"block": [AS_IT_IS, HALF_TURN]})
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        prusa, bambu = (
-            ElementTree.fromstring(archive.read(f"Metadata/{name}.config"))
-            for name in ("Slic3r_PE_model", "model_settings")
-        )
-    built = [
-        own.get("objectid") for own in ElementTree.fromstring(model(content)).iter(f"{CORE}item")
-    ]
-    extruders = {
-        own.get("id"): [
-            row.get("value") for row in own.iter("metadata") if row.get("key") == "extruder"
-        ]
-        for own in (*prusa.iter("object"), *bambu.iter("object"))
-    }
-    # by the number of the mesh, and by that of each copy
-    assert extruders["1"] == ["1", "1"]
-    assert extruders["2"] == ["2", "2"]
-    assert [extruders[number][0] for number in built if number] == ["1", "1", "2"]
-
-
 def test_a_group_is_one_object_with_a_filament_for_each_part(tmp_path: Path) -> None:
     """As objects of their own, slicers would drop all parts on the bed."""
     colours = {"block": "#c0ffee", "ball": "#102030"}
@@ -211,3 +170,12 @@ def test_a_group_is_one_object_with_a_filament_for_each_part(tmp_path: Path) -> 
     assert [row.get("paint_color") for row in triangles] == [None] * 12 + ["8"] * len(ball)
     (tmp_path / "a.3mf").write_bytes(content)
     assert [len(part) for part in read_triangles(tmp_path / "a.3mf")] == [12, len(ball)]
+
+
+def test_colours_of_objects_are_filaments() -> None:
+    content = write_3mf(PARTS, colours={"block": "#c0ffee", "ball": "#102030"})
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        for name in ("Slic3r_PE_model", "model_settings"):
+            config = ElementTree.fromstring(archive.read(f"Metadata/{name}.config"))
+            rows = [row.get("value") for row in config.iter() if row.get("key") == "extruder"]
+            assert rows == ["1", "1", "2", "2"]  # of the object, and of its part

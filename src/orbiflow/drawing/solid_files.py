@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping, Sequence
-from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -15,7 +14,6 @@ from manifold3d import Manifold
 
 from orbiflow.arrays import Array
 from orbiflow.drawing.web_page import rendered
-from orbiflow.errors import OrbiflowError
 
 STL_TRIANGLE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 """A triangle in a binary STL file."""
@@ -43,7 +41,6 @@ def write_3mf(
     title: str = "",
     *,
     colours: Mapping[str, str] | None = None,
-    places: Mapping[str, Sequence[Array]] | None = None,
     groups: Mapping[str, Sequence[str]] | None = None,
 ) -> bytes:
     """Return a 3MF file with each part as an object of its own, in millimetres.
@@ -56,13 +53,8 @@ def write_3mf(
         parts: Closed bodies by name.
         title: What the file says about itself.
         colours: The colour of each part that has one, as #rrggbb.
-        places: Of a part that is there several times, the matrices (3, 4) of its copies: linear part
-            and shift, as `Manifold.transform` takes them. A part that is not named is there once.
         groups: Of a part that is one object with others, such as what fills a drawing in it, the
             names of all, itself the first.
-
-    Raises `OrbiflowError` for a place that is a reflection, which printers' programs read differently:
-    mirror the part.
     """
     groups, colours = groups or {}, colours or {}
     order = list(dict.fromkeys(colours.values()))
@@ -78,7 +70,6 @@ def write_3mf(
         "colours": colours,
         "filaments": filaments,
         "paints": {name: _painted(filament) for name, filament in filaments.items()},
-        "items": _items(objects, places or {}),
     }
     files = {
         "[Content_Types].xml": "solid_content_types.xml",
@@ -120,45 +111,14 @@ def _painted(filament: int) -> str:
     return f"{4 * filament:X}" if filament < 3 else f"{filament - 3:X}C"
 
 
-class _Item(NamedTuple):
-    """What is printed in one place: the number of an object, or of a copy of it."""
-
-    number: int
-    of: _Object
-    place: str = ""
-
-
-def _items(objects: list[_Object], places: Mapping[str, Sequence[Array]]) -> list[_Item]:
-    """Return what is printed: each copy is an object, or all but the first would lose their colour."""
-    free = count(len(objects) + 2)  # after the meshes and the materials
-    items: list[_Item] = []
-    for own in objects:
-        if own.name in places:
-            items += [_Item(next(free), own, _transform(place)) for place in places[own.name]]
-        else:
-            items.append(_Item(own.number, own))
-    return items
-
-
-def _transform(place: Array) -> str:
-    """Return a place (3, 4) as the twelve numbers of a 3MF file, for points as rows."""
-    matrix = np.asarray(place, float)
-    if matrix.shape != (3, 4) or not np.linalg.det(matrix[:, :3]) > 0:
-        raise OrbiflowError("a place is a matrix (3, 4) that does not reflect")
-    return " ".join(f"{number:.9g}" for number in (matrix.T + 0.0).ravel())
-
-
 def read_triangles(path: Path) -> list[Array]:
     """Return the triangles (n, 3, 3) of each part in a file that this package has written."""
     if path.suffix == ".stl":
         return [np.frombuffer(path.read_bytes()[84:], STL_TRIANGLE)["corners"].astype(float)]
     with zipfile.ZipFile(path) as archive:
         model = ElementTree.fromstring(archive.read("3D/3dmodel.model"))
-    parts, copies = dict[str, list[Array]](), dict[str, str]()
+    parts = list[Array]()
     for element in model.iter(f"{CORE}object"):
-        name = element.get("id", "")
-        for copied in element.iter(f"{CORE}component"):
-            copies[name] = copied.get("objectid", "")
         points = np.array(
             [list(row.attrib.values()) for row in element.iter(f"{CORE}vertex")], float
         )
@@ -167,13 +127,5 @@ def read_triangles(path: Path) -> list[Array]:
         ]()  # by the material of a part that is not the first
         for row in element.iter(f"{CORE}triangle"):
             sorts.setdefault(row.get("p1"), []).append(list(row.attrib.values())[:3])
-        parts[name] = [points[np.array(corners, int)] for corners in sorts.values()]
-    placed = list[Array]()
-    for item in model.iter(f"{CORE}item"):
-        name = item.get("objectid", "")
-        for corners in parts[copies.get(name, name)]:
-            if text := item.get("transform"):
-                rows = np.array(text.split(), float).reshape(4, 3)
-                corners = corners @ rows[:3] + rows[3]
-            placed.append(corners)
-    return placed
+        parts += [points[np.array(corners, int)] for corners in sorts.values()]
+    return parts

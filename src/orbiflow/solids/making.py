@@ -46,29 +46,22 @@ class PrintedParts:
 
     - `parts`: Closed bodies by name.
     - `colours`: The colour of each part that has one, #rrggbb.
-    - `places`: Of parts that are there several times, the matrices (3, 4) of their copies.
     - `notes`: What to know, a sentence each.
+    - `fixed`: Whether parts are to be printed where they are to each other, some above the bed.
     """
 
     parts: dict[str, Manifold]
     colours: dict[str, str] = field(default_factory=dict)
-    places: dict[str, list[Array]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-
-    def bodies(self) -> dict[str, Manifold]:
-        """Return each copy as a body of its own, in its place."""
-        bodies = dict[str, Manifold]()
-        for name, body in self.parts.items():
-            for k, place in enumerate(self.places.get(name, [np.eye(3, 4)]), 1):
-                label = f"{name}, {k}" if name in self.places else name
-                bodies[label] = body.transform(place)
-        return bodies
+    fixed: bool = False
 
     def file(self, format: str, title: str = "") -> bytes:
         """Return the content of a file, "3mf" with colours or "stl" without."""
         if format == "3mf":
-            return write_3mf(self.parts, title, colours=self.colours, places=self.places)
-        return write_stl(self.bodies(), title)
+            names = list(self.parts)
+            groups = {names[0]: names} if self.fixed else None
+            return write_3mf(self.parts, title, colours=self.colours, groups=groups)
+        return write_stl(self.parts, title)
 
 
 def make(solid: EscherSolid, settings: BuildSettings) -> PrintedParts:
@@ -114,7 +107,7 @@ def make_tile(
 def make_stack(
     solid: EscherSolid, *, copies: int = 8, clearance: float = CLEARANCE
 ) -> PrintedParts:
-    """Return a stack of copies as they fill space, a part for each colour, standing like the figure.
+    """Return a stack of copies as they fill space, in colours, standing like the figure.
 
     Args:
         solid: A tile that fills space.
@@ -126,20 +119,13 @@ def make_stack(
     body = offset_body(_in_mm(solid.tile, solid), -clearance / 2)
     placed = _placed(body, stack, solid, axes.T)
     corner = _corner(placed)
-    firsts, places, colours = dict[str, int](), dict[str, list[Array]](), dict[str, str]()
-    for k, copy in enumerate(stack):
+    parts, colours = dict[str, Manifold](), dict[str, str]()
+    for k, (copy, own) in enumerate(zip(stack, placed, strict=True), 1):
         number = colour_number(solid.group, copy)
-        # a reflection cannot be a place in a file
-        name = f"position {number + 1}{', mirrored' * copy.is_mirrored}"
-        first = stack[firsts.setdefault(name, k)]
-        turn = axes.T @ copy.linear @ first.linear.T @ axes
-        here, there = (solid.millimetres * axes.T @ c.shift - corner for c in (copy, first))
-        places.setdefault(name, []).append(np.column_stack([turn, here - turn @ there]))
-        colours[name] = STACK_PALETTE.fill(number)
-    parts = {name: placed[k].translate((-corner).tolist()) for name, k in firsts.items()}
-    return PrintedParts(
-        parts, colours, places, [f"{copies} copies with a gap of {clearance:g} mm."]
-    )
+        name = f"copy {k}, position {number + 1}{', mirrored' * copy.is_mirrored}"
+        parts[name], colours[name] = own.translate((-corner).tolist()), STACK_PALETTE.fill(number)
+    notes = [f"{copies} copies with a gap of {clearance:g} mm."]
+    return PrintedParts(parts, colours, notes, fixed=True)
 
 
 def make_block(
@@ -187,9 +173,8 @@ def make_block(
     tile = moved_body(offset_body(_in_mm(solid.tile, solid), -clearance / 2), turn)
     parts = _all_on_bed({"starting block": base, "tile": tile})
     notes += print_advice(parts["starting block"], name="The starting block").sentences
-    return PrintedParts(
-        parts, {"starting block": "#d9d3c7", "tile": STACK_PALETTE.fill(0)}, notes=notes
-    )
+    colours = {"starting block": "#d9d3c7", "tile": STACK_PALETTE.fill(0)}
+    return PrintedParts(parts, colours, notes, fixed=True)
 
 
 def _copies_above(
@@ -252,7 +237,7 @@ def make_puzzle(
         colours[name] = STACK_PALETTE.fill(colour_number(solid.group, copy))
     parts = _all_on_bed(parts)
     notes = [assembly.words, *notes, *print_advice(parts["box"], name="The box").sentences]
-    return PrintedParts(parts, colours, notes=notes)
+    return PrintedParts(parts, colours, notes, fixed=assembled)
 
 
 def _box_direction(

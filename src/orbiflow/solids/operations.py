@@ -177,4 +177,4 @@ def build(
     for event in (*map(Note, made.notes), Written(out)):
         on_event(event)
     summary = {"file": str(out), "kind": settings.kind, "group": taken.group_name}
-    return Outcome({**summary, "parts": len(made.bodies()), "notes": list(made.notes)})
+    return Outcome({**summary, "parts": len(made.parts), "notes": list(made.notes)})

@@ -172,7 +172,7 @@ class BuildSettings(FileSettings, group="Pieces"):
     of copies in an open box."""
 
     format: Annotated[Literal["stl", "3mf"] | None, DefaultText("3mf")] = None
-    """Format of the file. A 3MF has colours, and each part is an object of its own."""
+    """Format of the file. A 3MF has colours; parts beside each other are objects of their own."""
 
     size: Annotated[Length | None, DefaultText("as the search made it")] = None
     """Longest side of the solid's box."""
