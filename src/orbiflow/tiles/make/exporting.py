@@ -81,6 +81,12 @@ def exported(
     settings, maker = placed.settings, MAKERS[placed.settings.cut]
     sheets = _sheets(placed, maker)
     notes = (*notes, *_colour_notes(resolved, settings), *sheets[0].remarks)
+    if settings.on_paper and len(sheets) > 1:
+        size = f"{sheets[0].width:g} x {sheets[0].height:g} mm"
+        notes = (
+            *notes,
+            f"{len(sheets)} sheets of {size}: print them at 100 %, and join them by their marks",
+        )
     sheets = [_described(scene, resolved, settings, certificate) for scene in sheets]
     if settings.marks:
         sheets = [registered(scene) for scene in sheets]

@@ -151,6 +151,7 @@ export class Making {
   /** Something else is asked for now. */
   change() {
     this.stale = true;
+    this.turned = -Infinity;
     this.tell();
   }
 
