@@ -202,7 +202,7 @@ def unoriented(name: str) -> Data:
             table = np.loadtxt(BUNDLED / f"{name}.csv", delimiter=",", skiprows=1)
             return table[:, :2]
         case "three-circles":
-            return _draw_circles()
+            return _draw_circles() % (2 * math.pi)
         case _:
             return _draw_axes()
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from orbiflow.density import UndeclaredError
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, work
 from refusals import refused
@@ -37,6 +38,10 @@ class Odd(Exception):
         super().__init__(f"{one} and {two}")
 
 
+def undeclared(_item: int, _tell: Tell, _cancel: Cancel) -> int:
+    raise UndeclaredError("{columns} of it", ["v"], "v=linear")
+
+
 def odd(_item: int, _tell: Tell, _cancel: Cancel) -> int:
     raise Odd(1, 2)
 
@@ -62,6 +67,9 @@ def test_an_error_comes_out_with_its_traceback() -> None:
     with refused(7) as caught:
         list(work(mistaken, [7], 2))
     assert "in mistaken" in "".join(caught.value.__notes__)
+    with refused("columns of it", kind=UndeclaredError) as caught:
+        list(work(undeclared, [7], 2))
+    assert (caught.value.columns, caught.value.proposal) == (("v",), "v=linear")
     with refused("Odd", 1, 2, kind=RuntimeError):
         list(work(odd, [7], 1))
 

@@ -7,13 +7,17 @@ Every message says what is wrong, where, and what to do. All are kinds of `Orbif
 import re
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from typing import Self
+from typing import Any, Self
 
 NAME_IN_BRACES = re.compile(r"(?<!\{)\{(\w+)\}(?!\})")
 
 
 class OrbiflowError(ValueError):
     """An argument, a file or a setting that cannot be used: the base of all other errors."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how worker processes hand the error over, whatever it was made of."""
+        return BaseException.__new__, (type(self), *self.args), self.__dict__
 
 
 def with_names(template: str, named: Callable[[str], str]) -> str:
