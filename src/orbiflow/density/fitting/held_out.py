@@ -114,6 +114,9 @@ MAX_ITERATIONS, ITERATIONS_PER_CHECK = 3_000, 25
 MIN_WEIGHT = 3e-3
 """Weights below this are dropped."""
 
+LEAST_OF_BEST = 0.8
+"""Share of the best candidate's gain that another must have by itself to need no proof in a mixture."""
+
 
 def stacked(table: Tensor, weights: Tensor) -> Tensor:
     """Return log densities (N,) of the mixture in proportions (P,), from a table (P, N)."""
@@ -148,12 +151,13 @@ def supported_weights(table: Tensor, always: Tensor, row_weights: Tensor | None 
     """Return weights as `sparse_weights` does, without spikes that only a few rows support.
 
     Two rows that happen to be close give kernels as narrow as that a weight of about two rows, and
-    pictures a spike at every row. So what is worse by itself than what is `always` there must gain
-    more than chance.
+    pictures a spike at every row. So candidates that gain by themselves, beyond what is `always` there,
+    less than `LEAST_OF_BEST` of the best one's gain must gain more than chance, all together.
     """
     weights = sparse_weights(table, always, row_weights)
     means = torch.tensor([mean_of(row, row_weights) for row in table])
-    spikes = ~always & (means < means[always].max())
+    least = means[always].max()
+    spikes = ~always & (means < least + LEAST_OF_BEST * (means.max() - least).clamp_min(0.0))
     if not bool((weights[spikes] > 0).any()):
         return weights
     rest = ~spikes
