@@ -46,6 +46,15 @@ def test_outline_parts_and_holes_are_marked(picture: Path) -> None:
     assert (pixels[100 * scale, 40 * scale] < 10).all()
 
 
+@pytest.mark.parametrize("height", [199, 200, 201, 203, 211])
+def test_nothing_is_marked_below_the_words(height: int, tmp_path: Path) -> None:
+    image = Image.new("L", (307, height), 255)
+    ImageDraw.Draw(image).ellipse((20, 20, 180, 180), fill=0)
+    image.save(tmp_path / "disc.png")
+    read = read_png(Target.read(tmp_path / "disc.png"), tmp_path / "disc.png")
+    assert (np.asarray(Image.open(io.BytesIO(read)).convert("L"))[-5:] == 255).all()
+
+
 @pytest.mark.parametrize("size", [(3000, 40), (40, 3000), (2, 2)])
 def test_its_size_is_bounded(size: tuple[int, int], tmp_path: Path) -> None:
     target = Target.from_polygon([[0, 0], [size[0], 0], [size[0], size[1]], [0, size[1]]])

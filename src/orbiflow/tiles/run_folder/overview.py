@@ -60,7 +60,10 @@ def read_png(target: Target, source: Path) -> bytes:
     ):
         mask = sketch("#000000")
         mask.fill(geometry, "#" + 3 * f"{round(255 * opacity):02x}")
-        page.paste(colour, mask=mask.picture().image(width).convert("L"))
+        shares = mask.picture().image(width).convert("L")
+        # a last row of which the paper covers a part would be marked
+        shares.paste(0, (0, shares.height - STRIP // 2, *shares.size))
+        page.paste(colour, mask=shares)
     about = PngInfo()
     about.add_text("Software", SOFTWARE)
     return png_bytes(page, pnginfo=about)
