@@ -315,3 +315,9 @@ def test_times_of_day_are_told_to_be_written_as_hours(tmp_path: Path) -> None:
     for columns in (None, ("time=cycle:24",)):
         with refused("time", "18.5 for 18:30", "cycle:24"):
             read_rows(table, RowSettings(columns=columns), ignore, where=where)
+
+
+def test_a_frame_without_rows_is_asked_about() -> None:
+    frame = pandas.DataFrame({"time": pandas.Series([], dtype=str), "v": np.zeros(0)})
+    with refused("v", "time", kind=UndeclaredError):
+        DensityEstimator("torus").fit(frame)

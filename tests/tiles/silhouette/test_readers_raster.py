@@ -364,6 +364,20 @@ def test_a_cut_from_the_middle_costs_no_more_than_the_truth(seed: int) -> None:
     assert cut.cost(shape) < cut.cost(disc) < cut.cost(start)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("pixels", [1, 7, 39, 41, 4791])
+@pytest.mark.parametrize("spread", [0.0, 10.0])
+def test_a_cut_may_begin_with_few_pixels_and_colours(pixels: int, spread: float) -> None:
+    start = (np.arange(4800) < pixels).reshape(60, 80)
+    lab = 50 + spread * np.random.default_rng(0).normal(size=(60, 80, 3))
+    shape = ColourCut(lab, np.zeros((60, 80), bool)).shape(start)
+    assert shape.shape == start.shape
+    if min(pixels, 4800 - pixels) < 40:  # too few for a model
+        assert shape.sum() >= min(pixels, 4791)
+    else:
+        assert np.isfinite(ColourCut(lab, np.zeros((60, 80), bool)).cost(start))
+
+
 def test_one_level_of_luminance_takes_the_shadow_too() -> None:
     """What `threshold` asks for; so the test above can fail."""
     reading = read_outline(scene("an orange cat on grey"), threshold=0.5)

@@ -151,7 +151,7 @@ class _Choice:
         numeric = [k for k in left if self.table.is_numeric(k)]
         words = [k for k in left if k not in numeric and self._named(k) is None]
         notes = [f"left out {listing(self._names(words))}: no numbers"] if words else []
-        if any(is_clock(str(self.table.cells(k)[0]).strip()) for k in words):
+        if any(is_clock(str(cell).strip()) for k in words for cell in self.table.cells(k)[:1]):
             notes[0] += f"; to use times of day, {HOURS}"
         if numeric:
             notes.append(f"left out {listing(self._names(numeric))}: name all columns to use them")

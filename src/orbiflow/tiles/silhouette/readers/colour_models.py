@@ -7,6 +7,8 @@ Nikolova, 2006), found by primal-dual steps (Chambolle and Pock, 2011).
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -70,7 +72,11 @@ class ColourModel:
         """Return the model of colours (n, 3), which begins with k-means."""
         generator = np.random.default_rng(0)
         count = min(COLOURS, len(colours))
-        _, labels = scipy.cluster.vq.kmeans2(colours, count, iter=10, minit="++", seed=generator)
+        with np.errstate(invalid="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of fewer colours than centres some have no pixel
+            _, labels = scipy.cluster.vq.kmeans2(
+                colours, count, iter=10, minit="++", seed=generator
+            )
         model = cls(colours, labels)
         for _ in range(rounds - 1):
             model = cls(colours, model.costs(colours).argmin(axis=0))
@@ -97,7 +103,12 @@ class ColourCut:
         return scipy.ndimage.binary_fill_holes(labels == largest)
 
     def cut(self, region: _Mask) -> _Mask:
-        """Return the shape that colour models find from a region that is like it."""
+        """Return the shape that colour models find from a region that is like it.
+
+        A region, or a background, of too few pixels for a model stays as it is.
+        """
+        if not _have_colours(region):
+            return region
         share = region.astype(float)
         along, down = (np.zeros(self._shape) for _ in range(2))
         models = [ColourModel.fitted(self._colours[part.ravel()]) for part in (region, ~region)]
@@ -107,12 +118,12 @@ class ColourCut:
                 share, np.where(self._border, SURE_COST / EDGE_COST, pull), along, down
             )
             before, region = region, share > 0.5
-            if not region.any() or (region != before).mean() < 1e-4:
+            if not _have_colours(region) or (region != before).mean() < 1e-4:
                 break
+            parts = [self._colours[part.ravel()] for part in (region, ~region)]
             models = [
-                ColourModel(colours, model.costs(colours).argmin(axis=0))
-                for model, part in zip(models, (region, ~region), strict=True)
-                for colours in (self._colours[part.ravel()],)
+                ColourModel(part, model.costs(part).argmin(axis=0))
+                for model, part in zip(models, parts, strict=True)
             ]
         # what reaches the border goes on to the picture's edge
         return region | (self._relaxed(share, self._pull(models), along, down) > 0.5) & self._border
@@ -141,7 +152,7 @@ class ColourCut:
 
     def cost(self, region: _Mask) -> float:
         """Return minus the log density of all colours by both models, and what the outline costs."""
-        if min(region.sum(), (~region).sum()) < LEAST_PIXELS * COLOURS:
+        if not _have_colours(region):
             return np.inf
         parts = (self._colours[part.ravel()] for part in (region, ~region))
         colours = sum(float(self._least(part)) for part in parts)
@@ -152,6 +163,11 @@ class ColourCut:
 
     def _least(self, colours: Array) -> float:
         return float(ColourModel.fitted(colours, 3).costs(colours).min(axis=0).sum())
+
+
+def _have_colours(region: _Mask) -> bool:
+    """Return whether a region and its background have pixels for a colour each, however dealt."""
+    return bool(min(region.sum(), (~region).sum()) >= LEAST_PIXELS * COLOURS)
 
 
 def middle_of(shape: tuple[int, ...]) -> _Mask:
