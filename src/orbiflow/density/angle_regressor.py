@@ -23,9 +23,9 @@ class AngleRegressor(DensityEstimator):
     `trend_along` are those of the density. Parameters are the same.
 
     >>> rng = np.random.default_rng(0)
-    >>> x = rng.uniform(-1, 1, (200, 1))
+    >>> x = rng.uniform(-1, 1, (60, 1))
     >>> angles = rng.vonmises(2 * x[:, 0], 20.0)
-    >>> fit = AngleRegressor(unit="radians", components="kernels").fit(x, angles)
+    >>> fit = AngleRegressor(unit="radians", components="kernels", effort="fast").fit(x, angles)
     >>> bool(abs(fit.predict([[0.5]])[0] - 1.0) < 0.1)
     True
     """

@@ -189,7 +189,7 @@ def concentration(resultant: float, width: int, below: float | None = None) -> f
 
 def _resultant_cdf(resultant: float, kappa: float, rows: float, width: int) -> float:
     """Return the probability of a mean resultant length up to `resultant`, for a normal mean vector."""
-    there = moments(torch.tensor(kappa, dtype=torch.float64), width)
+    there = moments(np.array(kappa), width)
     mean, along, across = (float(there.mean), float(there.along), float(there.across))
     levels = (np.arange(QUANTILES) + 0.5) / QUANTILES
     first = mean + math.sqrt(along / rows) * special.ndtri(levels)
