@@ -53,9 +53,12 @@ def here_fixture(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     return here
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
+def test_what_is_read_stays(here: Path, orbiflow: Run) -> None:
+    shutil.copy(here / "r" / "IH4" / "tile.svg", here / "picture.svg")
+    (here / "cv").mkdir()
+    shutil.copy(here / "data.csv", here / "cv" / "rows.csv")
+    before = contents(here)
+    for words in (
         "density score data.csv -m m --out data.csv",
         "density score data.csv -m m --out ./m/../data.csv",
         "density score link.csv -m m --out data.csv",
@@ -84,37 +87,26 @@ def here_fixture(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         "animate r --out r/turtle.gif",
         "solid r --kind stamp --picture picture.svg --format stl --out picture.svg",
         "escherize r/IH4/tile.svg --classes IH4 --out r",
-    ],
-)
-def test_what_is_read_stays(words: str, here: Path, orbiflow: Run) -> None:
-    shutil.copy(here / "r" / "IH4" / "tile.svg", here / "picture.svg")
-    (here / "cv").mkdir()
-    shutil.copy(here / "data.csv", here / "cv" / "rows.csv")
-    before, out = contents(here), Path(words.split()[-1])
-    done = orbiflow.refused(*words.split())
-    assert any(part in done.err for part in (out.name, out.parent.name)), done.err
-    assert contents(here) == before
+    ):
+        out, done = Path(words.split()[-1]), orbiflow.refused(*words.split())
+        assert any(part in done.err for part in (out.name, out.parent.name)), done.err
+        assert contents(here) == before, words
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        "density score data.csv -m m --out scores.csv",  # beside the data
-        "density score psi/density.csv -m psi --out scores.csv",
-        "export r --out k.svg",
-        "export r/IH4 --out k.svg",
-        "export copy/result.json --out copy/k.svg",  # no run's folder: it holds other files
-        "density sample -m copy/density.safetensors --out copy/s.csv",
-        "density plot -m m --out m",  # documented
-    ],
-)
-def test_other_places_are_fine(words: str, here: Path, orbiflow: Run) -> None:
+def test_other_places_are_fine(here: Path, orbiflow: Run) -> None:
     (here / "copy").mkdir()
     (here / "copy" / "notes.txt").write_text("mine")
     shutil.copy(here / "r" / "result.json", here / "copy")
     for path in (here / "m").iterdir():
         shutil.copy(path, here / "copy")
-    orbiflow.done(*words.split())
+    for words in (
+        "density score data.csv -m m --out scores.csv",  # beside the data
+        "density score psi/density.csv -m psi --out scores.csv",
+        *("export r --out k.svg", "export r/IH4 --out k.svg"),
+        "export copy/result.json --out copy/k.svg",  # no run's folder: it holds other files
+        "density sample -m copy/density.safetensors --out copy/s.csv",
+    ):
+        orbiflow.done(*words.split())
 
 
 def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
@@ -123,31 +115,25 @@ def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
     assert json.loads((here / "m" / "report.json").read_text())["columns"] == ["phi", "psi"]
 
 
-@pytest.mark.parametrize(
-    ("words", "endings"),
-    [
-        ("density sample -m m --out s.npy", ".csv, .tsv, .txt, .dat"),
-        ("density sample -m linked --out density.safetensors", ".csv, .tsv, .txt, .dat"),
-        ("density sample -m m --out x.geojson", ".csv, .tsv, .txt, .dat"),
-        ("density score data.csv -m m --out s.XLSX", ".csv, .tsv, .txt, .dat"),
-        ("classes --out c.svg", ".png"),
-        ("classes --out c.jpg", ".png"),
-    ],
-)
-def test_an_ending_of_another_format_is_refused(words: str, endings: str, here, orbiflow) -> None:
+def test_an_ending_of_another_format_is_refused(here: Path, orbiflow: Run) -> None:
     before = contents(here)
-    done = orbiflow.refused(*words.split())
-    names(done.err, "--out", *endings.split(", "), words.split()[-1])
-    assert not done.out
+    for words in (
+        "density sample -m m --out s.npy",
+        "density sample -m linked --out density.safetensors",
+        "density sample -m m --out x.geojson",
+        "density score data.csv -m m --out s.XLSX",
+        *("classes --out c.svg", "classes --out c.jpg"),
+    ):
+        done = orbiflow.refused(*words.split())
+        endings = (".png",) if words.startswith("classes") else (".csv", ".tsv", ".txt", ".dat")
+        names(done.err, "--out", *endings, words.split()[-1])
+        assert not done.out
     assert contents(here) == before
 
 
-@pytest.mark.parametrize("name", ["s", "s.txt", "s.tsv", "s.dat", "run-1.5"])
-def test_text_may_be_called_otherwise(name: str, here: Path, orbiflow: Run) -> None:
-    orbiflow.done("density", "sample", "-m", "m", "-n", 2, "--out", name)
-    assert (here / name).read_text().startswith("phi,psi\n")
-
-
-def test_a_picture_without_an_ending(here: Path, orbiflow: Run) -> None:
+def test_files_may_be_called_otherwise(here: Path, orbiflow: Run) -> None:
+    for name in ("s", "s.txt", "s.tsv", "s.dat", "run-1.5"):
+        orbiflow.done("density", "sample", "-m", "m", "-n", 2, "--out", name)
+        assert (here / name).read_text().startswith("phi,psi\n")
     orbiflow.done("classes", "--classes", "IH4", "--out", "c")
     assert (here / "c").read_bytes().startswith(b"\x89PNG")

@@ -36,6 +36,7 @@ def quick_pictures(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("orbiflow.drawing.canvas._STEPS", 4)
     coasts = coastlines.earth()[::8]
     patch.setattr(f"{pictures}.coastlines.earth", lambda: coasts)
+    small_sheets(patch)
 
 
 def small_sheets(patch: pytest.MonkeyPatch) -> None:

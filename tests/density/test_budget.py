@@ -69,9 +69,10 @@ def test_a_budget_counts(limit: int, wanted: int) -> None:
 
 
 def test_the_same_evaluations_give_the_same_density() -> None:
-    space, points, values = make_space("sphere"), cluster("sphere"), []
+    space, points, values = make_space("sphere"), cluster("sphere", 60), []
+    settings = FlowSettings(**{**SMALL, "segments": 1}, evaluations=12)
     for _ in range(2):
-        density, report = fit_density(space, points, FlowSettings(**SMALL, evaluations=12))
+        density, report = fit_density(space, points, settings)
         assert report.notes == ("stopped by the budget of 12 evaluations",)
         with torch.no_grad():
             values.append(density.log_prob(points))
@@ -154,7 +155,7 @@ def test_progress_goes_on_from_one_tenth_to_the_next(tenths: int, monkeypatch) -
 def test_no_step_of_a_fit_is_half_of_it() -> None:
     parts: tuple[Component, ...] = ("flow", "kernels", "mixture")
     rng, shares = np.random.default_rng(0), [0.0]
-    points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(300, 2))))
+    points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(120, 2))))
     settings = DensitySettings(components=parts, **QUICK)
     fit_automatic(SPACE, points, settings, progress=lambda done, _: shares.append(done))
     assert shares == sorted(shares)
@@ -200,8 +201,9 @@ def test_a_flow_is_outdone_that_gains_nothing_and_cannot_catch_up(
 
 
 def test_an_outdone_flow_is_refined_no_further() -> None:
-    points = SPACE.project(0.1 * torch.randn(100, 2, generator=torch.Generator().manual_seed(0)))
-    settings = FlowSettings(**QUICK | {"iterations": 8, "roughness": (1e-3, 1e-4)})
+    points = SPACE.project(0.1 * torch.randn(50, 2, generator=torch.Generator().manual_seed(0)))
+    small = {"max_frequency": 1, "segments": 1, "iterations": 8, "roughness": (1e-3, 1e-4)}
+    settings = FlowSettings(**small)  # type: ignore[arg-type]
 
     def fitted(outdone) -> list[tuple[str, int]]:
         stages = fit_density(SPACE, points.double(), settings, outdone=outdone)[1].stages
