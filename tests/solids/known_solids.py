@@ -1,5 +1,7 @@
 """Groups, functions, bodies and solids for the tests of what fills space."""
 
+from functools import cache
+
 import numpy as np
 from hypothesis import strategies as st
 from manifold3d import Manifold
@@ -84,6 +86,7 @@ def ball(segments: int = 48) -> Mesh:
     return of_volume_one(as_mesh(Manifold.sphere(1.0, segments)))
 
 
+@cache
 def creature() -> Mesh:
     """Return a body with a head and two legs, of volume 1."""
     trunk = Manifold.sphere(1.0, 40).scale((1.5, 0.9, 0.8))

@@ -7,12 +7,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 from manifold3d import Manifold
 from scipy.spatial import HalfspaceIntersection
 
 from orbiflow.arrays import Array
-from orbiflow.solids import Mesh
+from orbiflow.solids import Mesh, reading
 from orbiflow.solids.bodies import as_mesh
+from orbiflow.solids.bounded import read_here
 from orbiflow.solids.mesh import joined
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -30,6 +32,11 @@ def ball(
     radius: float = 1.0, at: tuple[float, float, float] = (0, 0, 0), segments: int = 24
 ) -> Mesh:
     return as_mesh(Manifold.sphere(radius, segments).translate(at))
+
+
+def read_in_this_process(patch: pytest.MonkeyPatch) -> None:
+    """Read 3MF and glTF without the process that bounds memory and time, which takes a second."""
+    patch.setattr(reading, "read_bounded", read_here)
 
 
 def inside_out(mesh: Mesh) -> Mesh:

@@ -11,13 +11,13 @@ import pytest
 
 from orbiflow.drawing import write_stl
 from orbiflow.runtime import Event
-from orbiflow.solids import EscherSolid, FillSettings, fill, run_folder, search
+from orbiflow.solids import EscherSolid, FillSettings, fill, likeness, run_folder, search, solid_gif
 from orbiflow.solids.bodies import as_body
 from orbiflow.solids.closing import Function, ball_of_cells
 from orbiflow.symmetry import CrystallographicGroup
 from solids.known_solids import creature
 
-CELLS = 1200  # settings ask for 5000 at least
+CELLS = 400  # settings ask for 5000 at least
 SMALL = FillSettings(effort="fast", groups=("P-1", "P21"), detail=5000, workers=1, size=60)
 
 
@@ -31,12 +31,15 @@ def small_fills() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         few = search.Effort(
             groups=2, tried=30, climbed=2, steps=12, per_group=1, polishing=4, quick=2, full=2,
-            closed=2, rough=0.16, fine=0.13, grain=0.1, stages=((1.0, 3), (8.0, 3)),
+            closed=2, rough=0.25, fine=0.2, grain=0.1, stages=((1.0, 1), (8.0, 2)),
         )  # fmt: skip
         patch.setitem(search.EFFORTS, "fast", few)
+        patch.setattr(search, "FINE", 0.06)
+        patch.setattr(search, "PROBES", 500)
+        patch.setattr(likeness, "GRAIN", 0.06)
         patch.setattr(search, "ball_of_cells", _few_cells)
-        patch.setattr(run_folder, "SHEET_WIDTH", 480)
-        patch.setattr(run_folder, "FRAMES", 2)
+        patch.setattr(run_folder, "SHEET_WIDTH", 320)
+        patch.setattr(run_folder, "solid_gif", lambda own, **_: solid_gif(own, size=80, frames=2))
         yield
 
 

@@ -110,8 +110,8 @@ def test_hooks_on_all_axes_interlock() -> None:
     placed = [moved_body(body, own.linear, own.shift) for own in copies]
     for piece in found.stuck:
         rest = united([placed[k] for k in found.stuck if k != piece])
-        for direction in np.concatenate([AXES, sphere(6)]):
-            assert greatest_overlap(placed[piece], rest, direction, distance=1.5, steps=6) > 1e-4
+        for direction in np.concatenate([AXES, sphere(3)]):
+            assert greatest_overlap(placed[piece], rest, direction, distance=1.5, steps=3) > 1e-4
     assert not pieces.leaving_stack().is_free
 
 
@@ -133,7 +133,7 @@ def test_contacts_of_unlike_triangles() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_free_directions_against_many_that_are_tried(seed: int) -> None:
     rng = np.random.default_rng(seed)
     normals = rng.normal(size=(rng.integers(1, 12), 3)) + rng.normal(size=3)
@@ -199,7 +199,7 @@ def test_a_gap_lets_out_what_would_be_held() -> None:
         u, v = np.pi * places.T
         return 0.42 * np.sin(u) ** 2 * np.sin(v) ** 2 * np.sin(2 * u)
 
-    tile = bumpy_cell(height, steps=16)
+    tile = bumpy_cell(height, steps=12)
     shifted = moved_body(as_body(tile), np.eye(3), (0, 1, 1))
     assert common_volume(as_body(tile), shifted) < 1e-9
     held, loose = (Pieces(cubic_group(), tile, gap).leaving_stack() for gap in (0.0, 0.06))
@@ -229,15 +229,15 @@ def test_labels_are_sorted_as_well_as_can_be(count: int, length: int, seed: int)
 
 
 def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted(monkeypatch) -> None:
-    monkeypatch.setattr(separable, "FINE", 0.08)
-    monkeypatch.setattr(separable, "DIRECTIONS", 16)
+    monkeypatch.setattr(separable, "FINE", 0.1)
+    monkeypatch.setattr(separable, "DIRECTIONS", 12)
     group, body = group_named("P -1"), creature()
-    distance = SignedDistance.of_mesh(body, 0.08)
+    distance = SignedDistance.of_mesh(body, 0.1)
 
     def depth(points: Array) -> Array:
         return -distance(points)
 
-    tile = separable_tile(1500, depth, body, group)
+    tile = separable_tile(700, depth, body, group)
     assert tile is not None
     assert certify_solid(group, tile).valid
     size = float(np.ptp(tile.points, axis=0).max())
@@ -246,9 +246,8 @@ def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted(monkeypa
     assert leaving.is_free
     # what lines say is checked by moving the body out of copies that are lower
     center = tile.centroid
-    for direction in (
-        leaving.direction @ group.linear_parts
-    ):  # the second is that of inverted copies
+    # the second direction is that of inverted copies
+    for direction in leaving.direction @ group.linear_parts:
         lower = [
             as_body(pieces.piece.moved(g.linear, g.translation))
             for g in group.elements_near(center, 2.5, source=center)[1:]

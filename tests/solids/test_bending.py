@@ -36,7 +36,7 @@ def body() -> Body:
 def bent_creature(name: str) -> BentBody:
     family = GroupFamily.named(name)
     points = points_inside(creature(), 0.08)
-    pose = best_poses(family, points, np.random.default_rng(1), tried=200, climbed=2, steps=60)[0]
+    pose = best_poses(family, points, np.random.default_rng(1), tried=60, climbed=2, steps=30)[0]
     return bent(BentBody.of(body(), pose), QUICK_STAGES)
 
 

@@ -82,7 +82,7 @@ def test_parts_of_divided_faces_are_partners_as_the_certificate_finds_them(name,
 
 
 def test_a_flow_fits_a_body_and_gives_the_same_each_time(monkeypatch):
-    monkeypatch.setattr("orbiflow.solids.flowing.START_CELLS", (200,))
+    monkeypatch.setattr("orbiflow.solids.flowing.START_CELLS", (120,))
     group = group_named("P -1")
     body = ellipsoid(DirichletDomain(group).site)
     distance = SignedDistance.of_mesh(body, 0.05)
@@ -90,7 +90,7 @@ def test_a_flow_fits_a_body_and_gives_the_same_each_time(monkeypatch):
     def depth(points):
         return -distance(points)
 
-    start = dirichlet_cell(group, best_site(body, group)).mesh
+    start = dirichlet_cell(group, best_site(body, group), 250).mesh
     tile, again = (flowed_tile(depth, body, group, stages=QUICK) for _ in range(2))
     np.testing.assert_array_equal(tile.points, again.points)
     assert certify_solid(group, tile).is_ball
@@ -102,16 +102,18 @@ def test_what_no_ball_is_like_starts_as_a_dirichlet_cell(monkeypatch):
     body = ellipsoid(DirichletDomain(group).site)
     distance = SignedDistance.of_mesh(body, 0.05)
     monkeypatch.setattr("orbiflow.solids.flowing.START_CELLS", ())
+    monkeypatch.setattr("orbiflow.solids.flowing.SITES", 60)
+    start = dirichlet_cell(group, best_site(body, group), 250)
+    monkeypatch.setattr("orbiflow.solids.flowing.dirichlet_cell", lambda *_: start)
     tile = flowed_tile(lambda points: -distance(points), body, group, stages=QUICK)
     assert certify_solid(group, tile).is_ball
-    start = dirichlet_cell(group, best_site(body, group)).mesh
-    assert mean_overlap(tile, body) > mean_overlap(start, body) + 0.02
+    assert mean_overlap(tile, body) > mean_overlap(start.mesh, body) + 0.02
 
 
 @given(names, seeds)
-@settings(max_examples=6)
+@settings(max_examples=5)
 def test_a_surface_is_certified_and_knows_what_is_behind_each_face(name, seed):
-    tile, function = random_tile(name, seed)
+    tile, function = random_tile(name, seed, cubes=250)
     surface = tile_surface(tile, function)
     group, mesh = tile.complex.group, surface.mesh
     certificate = certify_solid(group, mesh)
@@ -127,9 +129,9 @@ def test_a_surface_is_certified_and_knows_what_is_behind_each_face(name, seed):
     assert distances.min(axis=2).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ["P 1", "P 21 21 21", "P 31", "P 21 3"])
+@pytest.mark.parametrize("name", ["P 21 21 21", "P 31", "P 21 3"])
 def test_points_lie_where_the_function_is_the_same_on_both_sides(name):
-    tile, function = random_tile(name, 5, cubes=1000)
+    tile, function = random_tile(name, 5, cubes=600)
     surface = tile_surface(tile, function)
     rough = tile_surface(tile)
     group, spacing = tile.complex.group, tile.complex.spacing

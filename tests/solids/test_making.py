@@ -18,7 +18,7 @@ from solids.known_solids import hooked_tile
 from solids.mesh_files import ball, box, bumpy_cell, space_tile
 from solids_read import read_3mf, read_stl
 
-BUMPY = space_tile(bumpy_cell(steps=8))
+BUMPY = space_tile(bumpy_cell(steps=5))
 HOOKED = space_tile(hooked_tile(0))
 
 

@@ -14,7 +14,17 @@ from orbiflow.solids import Mesh, read_mesh
 from orbiflow.solids.bounded import read_bounded, read_here
 from orbiflow.solids.mesh import joined
 from refusals import refused
-from solids.mesh_files import archive, ball, box, inside_out, obj, stl, stl_text, three_mf
+from solids.mesh_files import (
+    archive,
+    ball,
+    box,
+    inside_out,
+    obj,
+    read_in_this_process,
+    stl,
+    stl_text,
+    three_mf,
+)
 
 
 def read(folder: Path, name: str, content: bytes) -> tuple[Mesh, list[str]]:
@@ -58,7 +68,8 @@ def test_formats(name: str, content: bytes, tmp_path: Path) -> None:
     assert (len(mesh.points), len(mesh.faces), notes) == (8, 12, [])
 
 
-def test_gltf_is_in_metres(tmp_path: Path) -> None:
+def test_gltf_is_in_metres(tmp_path: Path, monkeypatch) -> None:
+    read_in_this_process(monkeypatch)
     mesh, _ = read(tmp_path, "a.glb", glb(box(0.001, 0.002, 0.003)))
     assert np.ptp(mesh.points, axis=0) == pytest.approx([1, 2, 3])
 
@@ -102,7 +113,9 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("what", HOSTILE)
-def test_gltf_that_is_hostile(what: str, tmp_path: Path) -> None:
+def test_gltf_that_is_hostile(what: str, tmp_path: Path, monkeypatch) -> None:
+    if what != "many points":
+        read_in_this_process(monkeypatch)
     start = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]}
     content = json.dumps({**start, **HOSTILE[what]}).encode()
     words = "KHR_draco_mesh_compression" if what == "what is compressed" else ": "
@@ -119,7 +132,8 @@ def test_glb_that_is_cut_off(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("unit", "scale"), [("micron", 1e-3), ("centimeter", 10), ("inch", 25.4), ("meter", 1000)]
 )
-def test_units_of_3mf(unit: str, scale: float, tmp_path: Path) -> None:
+def test_units_of_3mf(unit: str, scale: float, tmp_path: Path, monkeypatch) -> None:
+    read_in_this_process(monkeypatch)
     mesh, _ = read(tmp_path, "a.3mf", three_mf(box(1, 2, 3), unit))
     assert mesh.volume == pytest.approx(6 * scale**3)
 
@@ -156,7 +170,8 @@ LAUGHS = "".join(f'<!ENTITY b{k + 1} "{f"&b{k};" * 10}">' for k in range(12))
         (archive(f'<!DOCTYPE a [<!ENTITY b0 "ha">{LAUGHS}]><model>&b12;</model>'), ": "),
     ],
 )
-def test_3mf_that_is_hostile(content: bytes, words: str, tmp_path: Path) -> None:
+def test_3mf_that_is_hostile(content: bytes, words: str, tmp_path: Path, monkeypatch) -> None:
+    read_in_this_process(monkeypatch)
     check_refused(tmp_path, "a.3mf", content, words)
 
 
@@ -165,9 +180,9 @@ def test_3mf_that_is_hostile(content: bytes, words: str, tmp_path: Path) -> None
 def test_memory_and_time_are_bounded(what: str, tmp_path: Path) -> None:
     file, memory, seconds = tmp_path / "a.3mf", 2**40, 1
     if what == "unpacks":
-        file.write_bytes(archive("<model>" + "<a/>" * 5_000_000 + "</model>"))
-        assert file.stat().st_size < 100_000
-        memory, seconds = 400 * 2**20, 60
+        file.write_bytes(archive("<model>" + "<a/>" * 2_500_000 + "</model>"))
+        assert file.stat().st_size < 50_000
+        memory, seconds = 300 * 2**20, 60
     else:
         file.write_bytes(of_components(9, 10))
     with refused("memory", "time", kind=OrbiflowError):
@@ -175,80 +190,57 @@ def test_memory_and_time_are_bounded(what: str, tmp_path: Path) -> None:
 
 
 def test_files_that_are_cut_off_or_lie(tmp_path: Path) -> None:
-    content = stl(ball())
-    check_refused(tmp_path, "a.stl", content[:-70], r"cut off: [\d,]+ triangles are announced")
-    many = content[:80] + (10**9).to_bytes(4, "little") + content[84:]
-    check_refused(tmp_path, "a.stl", many, "at most 4,000,000 triangles")
-    check_refused(tmp_path, "a.stl", stl_text(box())[:400], "cut off")
-    check_refused(tmp_path, "a.stl", b"hello", "not an STL")
-    check_refused(tmp_path, "a.obj", b"", "holds no triangles")
-    check_refused(
-        tmp_path,
-        "a.ply",
-        b"ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n",
-        "most",
-    )
-    check_refused(
-        tmp_path, "a.ply", b"ply\nformat ascii 1.0\nelement vertex 999\nend_header\n", "cut off"
-    )
-    check_refused(tmp_path, "a.step", b"", "a mesh is read from .stl")
+    content, ply = stl(ball()), b"ply\nformat ascii 1.0\nelement vertex %d\nend_header\n"
+    for name, data, words in [
+        ("a.stl", content[:-70], r"cut off: [\d,]+ triangles are announced"),
+        ("a.stl", content[:80] + (10**9).to_bytes(4, "little") + content[84:], "4,000,000"),
+        ("a.stl", stl_text(box())[:400], "cut off"),
+        ("a.stl", b"hello", "not an STL"),
+        ("a.obj", b"", "holds no triangles"),
+        ("a.ply", ply % 99999999999, "most"),
+        ("a.ply", ply % 999, "cut off"),
+        ("a.step", b"", "a mesh is read from .stl"),
+    ]:
+        check_refused(tmp_path, name, data, words)
     with refused("b.stl", kind=InputFileError):
         read_mesh(tmp_path / "b.stl")
 
 
 def test_obj_with_polygons_relative_numbers_and_a_missing_library(tmp_path: Path) -> None:
-    quads = b"""mtllib ../../secrets.mtl
-usemtl skin
-v 0 0 0
-v 1 0 0
-v 1 1 0
-v 0 1 0
-v 0 0 1
-v 1 0 1
-v 1 1 1
-v 0 1 1
-vn 0 0 1
-vt 0 0
-f 4//1 3//1 2//1 1//1
-f -4 -3 -2 -1
-f 1/1 2/1 6/1 5/1
-f 2 3 7 6
-f 3 4 8 7
-f 4 1 5 \\
-8
-l 1 2
-"""
+    points = [
+        b"v %d %d %d" % (x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))
+    ]
+    faces = (
+        b"f 4//1 3//1 2//1 1//1;f -4 -3 -2 -1;f 1/1 2/1 6/1 5/1;f 2 3 7 6;f 3 4 8 7;f 4 1 5 \\;8"
+    )
+    lines = [b"mtllib ../../secrets.mtl", b"usemtl skin", *points, b"vn 0 0 1", b"vt 0 0"]
+    quads = b"\n".join([*lines, *faces.split(b";"), b"l 1 2", b""])
     mesh, notes = read(tmp_path, "a.obj", quads)
     assert mesh.volume == pytest.approx(1)
     assert notes == []
-    check_refused(tmp_path, "a.obj", quads.replace(b"f 2 3 7 6", b"f 2 3 7 99"), "not there")
-    check_refused(tmp_path, "a.obj", quads.replace(b"f 2 3 7 6", b"f 2 3 seven 6"), "b'seven'")
-    check_refused(tmp_path, "a.obj", quads.replace(b"v 1 0 1", b"v 1 nan 1"), "NaN")
-    check_refused(tmp_path, "a.obj", quads.replace(b"v 1 0 1", b"v 1 one 1"), "not a number")
+    for before, after, words in [
+        (b"f 2 3 7 6", b"f 2 3 7 99", "not there"),
+        (b"f 2 3 7 6", b"f 2 3 seven 6", "b'seven'"),
+        (b"v 1 0 1", b"v 1 nan 1", "NaN"),
+        (b"v 1 0 1", b"v 1 one 1", "not a number"),
+    ]:
+        check_refused(tmp_path, "a.obj", quads.replace(before, after), words)
 
 
 def test_what_is_mended(tmp_path: Path) -> None:
     whole = box(10, 20, 30)
-    mesh, notes = read(tmp_path, "a.stl", stl(inside_out(whole)))
-    assert (mesh.volume, notes) == (
-        pytest.approx(6000),
-        ["The surface was inside out, and was turned."],
-    )
-    mesh, notes = read(tmp_path, "a.stl", stl(whole.of_faces(whole.face_vectors[:, 2] <= 0)))
-    assert (mesh.volume, notes) == (pytest.approx(6000), ["1 hole was closed."])
     some = whole.faces.copy()
     some[3] = some[3, ::-1]
-    mesh, notes = read(tmp_path, "a.stl", stl(Mesh(whole.points, some)))
-    assert (mesh.volume, notes) == (
-        pytest.approx(6000),
-        ["1 face was turned to agree with their neighbours."],
-    )
     twice = Mesh(whole.points, np.concatenate([whole.faces, whole.faces[:1], [[0, 0, 1]]]))
-    mesh, notes = read(tmp_path, "a.obj", obj(twice))
-    assert (mesh.volume, notes) == (
-        pytest.approx(6000),
-        ["2 degenerate or repeated faces were left out."],
-    )
+    cases = {
+        "The surface was inside out, and was turned.": inside_out(whole),
+        "1 hole was closed.": whole.of_faces(whole.face_vectors[:, 2] <= 0),
+        "1 face was turned to agree with their neighbours.": Mesh(whole.points, some),
+        "2 degenerate or repeated faces were left out.": twice,
+    }
+    for note, broken in cases.items():
+        mesh, notes = read(tmp_path, "a.obj", obj(broken))
+        assert (mesh.volume, notes) == (pytest.approx(6000), [note])
 
 
 def test_holes_that_are_large_and_curved_are_refused(tmp_path: Path) -> None:
@@ -298,14 +290,11 @@ def test_what_encloses_nothing(tmp_path: Path) -> None:
     ribbon = list[list[int]]()
     t = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     middle = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
-    across = 0.3 * np.stack(
-        [np.cos(t) * np.cos(t / 2), np.sin(t) * np.cos(t / 2), np.sin(t / 2)], axis=1
-    )
+    across = 0.3 * (middle * np.cos(t / 2)[:, None] + np.sin(t / 2)[:, None] * (0, 0, 1))
     points = np.concatenate([middle - across, middle + across])
     for k in range(24):
-        a, b = k, k + 24
-        c, d = ((k + 1), k + 25) if k < 23 else (24, 0)
-        ribbon += [[a, c, b], [c, d, b]]
+        c, d = (k + 1, k + 25) if k < 23 else (24, 0)
+        ribbon += [[k, c, k + 24], [c, d, k + 24]]
     check_refused(tmp_path, "a.obj", obj(Mesh(points, np.array(ribbon))), "one side only")
 
 

@@ -60,32 +60,36 @@ def stack_of(group: CrystallographicGroup, tile: Mesh, count: int) -> list[Stack
     """
     source = tile.centroid
     spacing = (group.cell_volume / group.order) ** (1 / 3)
+    places = source + np.array([*product((0.0, 0.25, 0.5), repeat=3)]) @ group.lattice.T
+    copies, images, distances = _near(group, source, places, count, spacing)
     best, compact = np.inf, list[StackedCopy]()
-    for halves in product((0.0, 0.25, 0.5), repeat=3):
-        copies = _nearest(group, source, source + group.lattice @ halves, count, spacing)
-        centers = np.stack([copy.linear @ source + copy.shift for copy in copies])
-        spread = float(((centers - centers.mean(axis=0)) ** 2).sum())
-        if spread < best * (1 - 1e-9) and any(_is_itself(copy) for copy in copies):
-            best, compact = spread, copies
+    for column in np.round(distances / spacing, 6).T.tolist():
+        keys = [(column[k], copy.coset, copy.cell, k) for k, copy in enumerate(copies)]
+        nearest = [k for *_, k in sorted(keys)[:count]]
+        spread = float(((images[nearest] - images[nearest].mean(axis=0)) ** 2).sum())
+        if spread < best * (1 - 1e-9) and any(_is_itself(copies[k]) for k in nearest):
+            best, compact = spread, [copies[k] for k in nearest]
     return sorted(compact, key=lambda copy: not _is_itself(copy))
 
 
-def _nearest(
-    group: CrystallographicGroup, source: Array, center: Array, count: int, spacing: float
-) -> list[StackedCopy]:
-    """Return the copies whose images of a place are nearest to a centre, in an order that is fixed."""
-    radius = spacing * (0.8 + 0.7 * count ** (1 / 3))
-    elements = group.elements_near(center, radius, source=source)
-    while len(elements) < count:
+def _near(
+    group: CrystallographicGroup, source: Array, places: Array, count: int, spacing: float
+) -> tuple[list[StackedCopy], Array, Array]:
+    """Return all copies that may be among so many nearest to one of places (m, 3).
+
+    Beside them are the images (n, 3) of the source, and how far those are from the places (n, m).
+    """
+    middle, radius = places.mean(axis=0), spacing * (0.8 + 0.7 * count ** (1 / 3))
+    reach = float(np.linalg.norm(places - middle, axis=1).max())
+    while True:
+        elements = group.elements_near(middle, radius + reach, source=source)
+        images = np.stack([element(source) for element in elements])
+        distances = np.linalg.norm(images[:, None] - places, axis=2)
+        if ((distances <= radius).sum(axis=0) >= count).all():
+            break
         radius *= 1.25
-        elements = group.elements_near(center, radius, source=source)
-    numbered = [_numbered(group, element.linear, element.translation) for element in elements]
-
-    def order(copy: StackedCopy) -> tuple[float, int, tuple[int, int, int]]:
-        distance = np.linalg.norm(copy.linear @ source + copy.shift - center)
-        return round(float(distance) / spacing, 6), copy.coset, copy.cell
-
-    return sorted(numbered, key=order)[:count]
+    copies = [_numbered(group, element.linear, element.translation) for element in elements]
+    return copies, images, distances
 
 
 def _is_itself(copy: StackedCopy) -> bool:
