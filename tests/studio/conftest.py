@@ -6,10 +6,23 @@ from typing import Any
 
 import pytest
 
+from orbiflow import drawing
+from orbiflow.studio import silhouette_file, taking
 from studio.browser import RunningStudio, running_studio
 from studio.served import Client, studio
 
 VIEWPORT = {"width": 1280, "height": 900}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_pictures() -> Iterator[None]:
+    """Draw backdrops and previews with fewer pixels in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(silhouette_file, "BACKDROP_SIDE_PIXELS", 400)
+        patch.setattr(taking, "PREVIEW_SIDE_PIXELS", 300)
+        full = drawing.solid_picture
+        patch.setattr(drawing, "solid_picture", lambda parts, *_: full(parts, (240, 180)))
+        yield
 
 
 @pytest.fixture(scope="module", name="client")

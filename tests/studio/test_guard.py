@@ -16,6 +16,14 @@ from png_files import promise
 from studio.served import SQUARE, Client, done, new_project, studio
 
 
+@pytest.fixture(scope="module", name="shared")
+def shared_fixture(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    """A studio for attacks that leave nothing behind."""
+    with studio(tmp_path_factory.mktemp("shared")) as served:
+        yield served
+        assert served.get("/api/projects").json() == []
+
+
 @pytest.fixture
 def client(tmp_path: Path) -> Iterator[Client]:
     with studio(tmp_path, upload=100_000, message=5_000, projects=20) as served:
@@ -27,31 +35,31 @@ def files(folder: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:8437", "127.0.0.1", "127.0.0.1:80"])
-def test_another_host_is_refused(client: Client, host: str) -> None:
-    answer = client.get("/api/projects", headers={"Host": host})
+def test_another_host_is_refused(shared: Client, host: str) -> None:
+    answer = shared.get("/api/projects", headers={"Host": host})
     assert answer.status_code == 421
     assert "address" in answer.json()["error"]
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8437", "localhost:8437", "[::1]:8437"])
-def test_the_own_host_is_answered(client: Client, host: str) -> None:
-    assert client.get("/api/projects", headers={"Host": host}).status_code == 200
+def test_the_own_host_is_answered(shared: Client, host: str) -> None:
+    assert shared.get("/api/projects", headers={"Host": host}).status_code == 200
 
 
 OTHERS = ["http://evil.example", "http://127.0.0.1:9000", "http://127.0.0.1:84370", "null", ""]
 
 
+@pytest.mark.parametrize("origin", OTHERS)
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_another_origin_is_refused(shared: Client, origin: str, method: str) -> None:
+    answer = shared.request(method, "/api/projects", headers={"Origin": origin})
+    assert answer.status_code == 403
+    assert shared.get("/api/projects").json() == []
+
+
 def test_the_own_page_is_answered(client: Client) -> None:
     own = {"Origin": "http://127.0.0.1:8437"}
     assert client.post("/api/projects", json={}, headers=own).status_code == 200
-
-
-@pytest.mark.parametrize("origin", OTHERS)
-@pytest.mark.parametrize("method", ["GET", "POST"])
-def test_another_origin_is_refused(client: Client, origin: str, method: str) -> None:
-    answer = client.request(method, "/api/projects", headers={"Origin": origin})
-    assert answer.status_code == 403
-    assert client.get("/api/projects").json() == []
 
 
 def test_a_form_of_another_page_is_refused(client: Client) -> None:
@@ -66,8 +74,8 @@ def test_a_form_of_another_page_is_refused(client: Client) -> None:
 
 
 @pytest.mark.parametrize("path", ["/", "/api/about", "/no/such/page", "/api/projects/none"])
-def test_every_answer_forbids_inline_script(client: Client, path: str) -> None:
-    headers = client.get(path).headers
+def test_every_answer_forbids_inline_script(shared: Client, path: str) -> None:
+    headers = shared.get(path).headers
     policy = headers["content-security-policy"]
     assert "default-src 'none'; script-src 'self'" in policy
     assert "unsafe" not in policy
@@ -117,8 +125,8 @@ PATHS = [
 
 
 @pytest.mark.parametrize("path", PATHS)
-def test_paths_lead_nowhere(client: Client, path: str) -> None:
-    answer = client.get(path)
+def test_paths_lead_nowhere(shared: Client, path: str) -> None:
+    answer = shared.get(path)
     assert answer.status_code in (404, 422)
     assert set(answer.json()) == {"error"}
 
@@ -213,12 +221,12 @@ def test_bodies_that_are_no_requests(client: Client, body: bytes) -> None:
     assert client.get(address).json()["view"] == {}
 
 
-@pytest.mark.parametrize("name", ["out", "result", "picture", "force", "no such"])
-def test_paths_cannot_be_set(client: Client, name: str) -> None:
-    for operation in ("export", "art", "solid", "animate"):
-        ask = {"operation": operation, "settings": {"tile": 1, name: "/etc/passwd"}}
-        answer = client.post(f"{new_project(client)}/tasks", json=ask)
-        assert answer.status_code == 422
+def test_paths_cannot_be_set(client: Client) -> None:
+    address = new_project(client)
+    for name in ("out", "result", "picture", "force", "no such"):
+        for operation in ("export", "art", "solid", "animate"):
+            ask = {"operation": operation, "settings": {"tile": 1, name: "/etc/passwd"}}
+            assert client.post(f"{address}/tasks", json=ask).status_code == 422
 
 
 def begun(limits: Limits, parts: Iterator[bytes]) -> tuple[int, bytes]:

@@ -50,7 +50,7 @@ def home_fixture(tmp_path: Path) -> Path:
 def mask() -> bytes:
     """A mask that adds a block to a picture."""
     data = io.BytesIO()
-    Image.new("RGBA", (1200, 1200), (255, 255, 255, 255)).save(data, "PNG")
+    Image.new("RGBA", (400, 400), (255, 255, 255, 255)).save(data, "PNG")
     return data.getvalue()
 
 

@@ -84,14 +84,15 @@ def run_in_node(program: str, given: Any) -> Any:
     return json.loads(done.stdout)
 
 
-CASES = [(name, lattice) for name in ("IH1", "IH6", "IH21") for lattice in (True, False)]
+NAMES = "IH1", "IH6", "IH21"
+CASES = [(name, lattice) for name in NAMES for lattice in (True, False)]
 
 
 @pytest.fixture(scope="module", name="told")
 def told_fixture() -> dict[str, Any]:
     """For some classes what a pull with and one without the lattice gave."""
     found = {}
-    for name in ("IH1", "IH6", "IH21"):
+    for name in NAMES:
         tile = EscherTile(bent_tile(name, 30.0))
         space = space_json(tile)
         pulls = [
@@ -110,7 +111,7 @@ def ring_of(answer: dict[str, Any]) -> Array:
     return np.array(answer["polygon"]).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH6", "IH21"])
+@pytest.mark.parametrize("name", NAMES)
 def test_it_starts_as_the_tile_is(told, name: str) -> None:
     space, start = told[name]["space"], told[name]["start"]
     assert np.abs(ring_of(start) - space["polygon"]).max() < 1e-9
@@ -166,7 +167,7 @@ def followed_fixture() -> dict[tuple[str, float], Any]:
     for name in ("IH1", "IH4"):
         tile = EscherTile(bent_tile(name) if name == "IH1" else bent_squirrel(name).tile)
         space = space_json(tile)
-        for reach, count in ((0.05, 6), (1.0, 2)):
+        for reach, count in ((0.05, 4), (1.0, 1)):
             turns = rng.uniform(0, 2 * np.pi, count)
             pulls = [
                 {"share": rng.random(), "by": [reach * np.cos(turn), reach * np.sin(turn)]}
@@ -181,19 +182,19 @@ def followed_fixture() -> dict[tuple[str, float], Any]:
 def test_ordinary_pulls_succeed_whole(followed, name: str) -> None:
     _, answers = followed[name, 0.05]
     assert all(shapely.Polygon(ring_of(answer)).is_valid for answer in answers)
-    assert sum(not answer["stopped"] for answer in answers) >= 5
+    assert sum(not answer["stopped"] for answer in answers) >= 3
     assert min(answer["moved"] for answer in answers if not answer["stopped"]) > 0.03
 
 
 @pytest.mark.parametrize("name", ["IH1", "IH4"])
 def test_a_pull_too_far_stops_at_a_tile_and_can_go_back(followed, name: str) -> None:
     tile, answers = followed[name, 1.0]
-    for answer in answers:
-        assert answer["stopped"]
-        assert shapely.Polygon(ring_of(answer)).is_valid
-        assert answer["back"] < 0.01
-    assert max(answer["moved"] for answer in answers) > 0.1
-    assert pulled(tile, answers[0]["parameters"]).certificate.valid
+    (answer,) = answers
+    assert answer["stopped"]
+    assert shapely.Polygon(ring_of(answer)).is_valid
+    assert answer["back"] < 0.01
+    assert answer["moved"] > 0.1
+    assert pulled(tile, answer["parameters"]).certificate.valid
 
 
 def test_what_is_drawn_is_carried_simplified_and_rubbed_out() -> None:

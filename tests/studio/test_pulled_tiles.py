@@ -1,6 +1,7 @@
 """A tile that was pulled by hand tiles still, keeps its map, or is refused; its page's answers."""
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,7 @@ from studio.served import Client, house_tile
 from swirled_tiles import is_sound, swirled
 
 
+@cache
 def squirrel(name: str, *, y_down: bool = False) -> EscherTile:
     """A tile with the map of its silhouette, in an input of its own coordinates."""
     case = bent_squirrel(name)
@@ -78,11 +80,10 @@ def test_a_pull_tells_how_far_it_is_and_can_be_ended() -> None:
         pulled(tile, given, end)
 
 
-@pytest.mark.parametrize(("name", "y_down"), [("IH1", False), ("IH5", True)])
-def test_what_lies_on_a_tile_comes_along_to_another_class(name: str, y_down: bool) -> None:
-    tile, heard = squirrel("IH4", y_down=y_down), list[float]()
-    found = in_class(tile, name, heard.append)
-    assert (found.isohedral_class, found.certificate.valid) == (name, True)
+def test_what_lies_on_a_tile_comes_along_to_another_class() -> None:
+    tile, heard = squirrel("IH4", y_down=True), list[float]()
+    found = in_class(tile, "IH5", heard.append)
+    assert (found.isohedral_class, found.certificate.valid) == ("IH5", True)
     assert found.bending is not None
     assert found.frame is not None
     ring = found.frame.to_input(found.bending.images)[border(found.bending.triangles)]
@@ -100,18 +101,15 @@ def test_what_the_browser_is_told_is_the_space_of_the_tile(tile: Tile, seed: int
     ring = np.array(told["polygon"])
     assert np.abs((matrix @ told["start"]).reshape(-1, 2) - ring).max() < 1e-9 * tile.radius
     moved = nudged(EscherTile(tile), seed, 0.3)
-    assert (
-        np.abs(matrix @ moved - pulled(EscherTile(tile), moved).tile.polygon.ravel()).max() < 1e-9
-    )
+    after = pulled(EscherTile(tile), moved).tile.polygon
+    assert np.abs(matrix @ moved - after.ravel()).max() < 1e-9
     # the body fills the tile, its first points are the vertices, and others lie on sides
     points, triangles = (np.array(told["body"][name]) for name in ("points", "triangles"))
     assert np.array_equal(points[: len(ring)], ring)
     pieces = shapely.polygons(points[triangles])
     assert shapely.area(pieces).sum() == pytest.approx(abs(tile.signed_area), rel=1e-9)
-    sides, shares = (
-        np.array(told["body"]["sides"], dtype=int).reshape(-1, 2),
-        np.array(told["body"]["shares"])[:, None],
-    )
+    sides = np.array(told["body"]["sides"], dtype=int).reshape(-1, 2)
+    shares = np.array(told["body"]["shares"])[:, None]
     on_sides = ring[sides[:, 0]] + shares * (ring[sides[:, 1]] - ring[sides[:, 0]])
     assert np.abs(points[len(ring) :][: len(sides)] - on_sides).max(initial=0) < 1e-9 * tile.radius
 
@@ -126,7 +124,7 @@ def test_a_pulled_tile_is_certified(tile: Tile, seed: int, reach: float) -> None
     assert pulled(found, nudged(found, seed + 1, reach)).certificate.valid
 
 
-@pytest.mark.parametrize(("name", "y_down"), [("IH4", True), ("IH6", False), ("IH21", True)])
+@pytest.mark.parametrize(("name", "y_down"), [("IH4", True), ("IH21", False)])
 def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: Path) -> None:
     tile = squirrel(name, y_down=y_down)
     before = PullSpace(tile).first.polygon
@@ -209,8 +207,7 @@ def line_across(tile: EscherTile, colour: str = "#d02030") -> dict:
     return {"strokes": strokes, "eyes": [[*center.tolist(), 2.0], [-900.0, 0.0, 2.0]]}
 
 
-@pytest.mark.parametrize("y_down", [False, True])
-@pytest.mark.parametrize("mapped", [True, False])
+@pytest.mark.parametrize(("mapped", "y_down"), [(True, True), (False, False)])
 def test_drawings_reach_the_export(mapped: bool, y_down: bool, tmp_path: Path) -> None:
     tile = squirrel("IH4", y_down=y_down)
     tile = tile if mapped else with_any_map(EscherTile(tile.tile, y_down=y_down))
@@ -302,16 +299,13 @@ def test_what_cannot_be_is_refused_in_plain_words(
     assert what in answer.json()["error"]
 
 
-@pytest.mark.parametrize(("name", "near"), [("IH4", 0.97), ("IH6", 0.8)])
-def test_a_tile_is_laid_in_another_class(client, address, name: str, near: float) -> None:
-    card = client.post(f"{address}/by-hand/class", json={"name": name}).json()
+def test_a_tile_is_laid_in_another_class(client: Client, address: str) -> None:
+    card = client.post(f"{address}/by-hand/class", json={"name": "IH6"}).json()
     project, number = address.split("/tiles/")
-    assert (card["class_name"], card["parent"], card["certified"]) == (name, int(number), True)
-    before, after = (
-        shapely.Polygon(client.get(f"{own}").json()["polygon"])
-        for own in (address, f"{project}/tiles/{card['id']}")
-    )
-    assert before.intersection(after).area > near * before.union(after).area
+    assert (card["class_name"], card["parent"], card["certified"]) == ("IH6", int(number), True)
+    addresses = address, f"{project}/tiles/{card['id']}"
+    before, after = (shapely.Polygon(client.get(own).json()["polygon"]) for own in addresses)
+    assert before.intersection(after).area > 0.8 * before.union(after).area
 
 
 def test_there_are_no_other_classes(client: Client, address: str) -> None:
