@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from batch.small_batches import QUICK, Here, rows, run_call, write_boot
+from density.quick_fits import quick_fits, quick_pictures
 from orbiflow.batch import dask_cluster, work
 from orbiflow.batch import folder as folder_module
 from orbiflow.errors import OutputError, SettingError
@@ -214,10 +215,12 @@ def test_no_scheduler_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.usefixtures("here")
-def test_a_batch_fits_as_fit_does(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
+def test_a_batch_fits_as_fit_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick_fits(monkeypatch)
+    quick_pictures(monkeypatch)
+    rng, count = np.random.default_rng(0), 24
     rows_of = np.column_stack(
-        [rng.vonmises(0, 3, (40, 2)), rng.uniform(1, 2, 40), np.arange(40) // 4]
+        [rng.vonmises(0, 3, (count, 2)), rng.uniform(1, 2, count), np.arange(count) // 4]
     )
     rows_of[3, 0] = np.nan
     (tmp_path / "in").mkdir()

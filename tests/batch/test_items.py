@@ -79,7 +79,7 @@ entries = st.lists(
         best=st.dictionaries(st.text(), st.floats(allow_nan=False, allow_infinity=False)),
         seconds=st.none() | st.floats(0, 1e6),
     ),
-    max_size=5,
+    max_size=3,
 )
 
 

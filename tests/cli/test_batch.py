@@ -21,6 +21,7 @@ from orbiflow.tiles.run_folder.files import TILE_FILES
 from outlines import FOLDER
 from refusals import names
 from small_pairs import small_pairs
+from small_searches import small_searches
 
 QUICK = ["--classes", "IH4", "--effort", "fast"]
 TESTS = str(Path(__file__).parents[1])
@@ -33,7 +34,7 @@ def test_every_pair_of_a_folder(tmp_path: Path, orbiflow) -> None:
         shutil.copy(FOLDER / name, tmp_path / "in")
     few = ("--effort", "fast", "--ratio", "1")
     command = ("batch", tmp_path / "in", "--pairs", "all", *few)
-    with small_pairs():
+    with small_pairs(), small_searches():
         done = orbiflow(*command, "--out", tmp_path / "out")
     assert done.status == 0, done.err
     found = rows(tmp_path / "out")["dolphin_60.dat + squirrel.dat"]

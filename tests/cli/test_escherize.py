@@ -33,6 +33,7 @@ from orbiflow.tiles.run_folder.files import FIGURE_FILES
 from orbiflow.tiles.search import candidates
 from orbiflow.tiles.search.finished_tiles import best_tiles
 from refusals import names
+from small_searches import small_searches
 
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}
 SHEETS = ("index.html", "overview.png", "read.png", "result.json")
@@ -58,7 +59,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     image.save(folder / "boot.png")
     words = ("escherize", folder / "boot.png", "--out", folder / "new" / "out")
     said = io.StringIO()
-    with redirect_stdout(said):
+    with redirect_stdout(said), small_searches():
         assert call_main(lambda: ("", ""), *words, "--classes", "IH4,ih6", *FEW).status == 0
     names(said.getvalue(), "IH4", "IH6")
     return folder
@@ -92,6 +93,7 @@ def test_tiles_lie_upright_on_the_silhouette(folder: Path, document: dict[str, A
         assert flipped.intersection(drawn).area / flipped.union(drawn).area < own
 
 
+@pytest.mark.usefixtures("small_searches")
 def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow, monkeypatch) -> None:
     monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
     monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 4)

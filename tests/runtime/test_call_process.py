@@ -39,9 +39,8 @@ def test_a_search_in_a_process(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "overview.png").is_file()
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path: Path) -> None:
-    call = boot_call(tmp_path, "IH4", "IH6", workers=workers)
+def test_cancelling_keeps_the_order_and_ends_the_process(tmp_path: Path) -> None:
+    call = boot_call(tmp_path, "IH4", "IH6", workers=2)
     events = []
     with CallProcess(call, modules=[ENDLESS]) as process:
         for event in process.events():
@@ -59,15 +58,14 @@ def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path:
     assert [entry["class"] for entry in document["failed"]] == ["IH4", "IH6"]
 
 
-def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
-    call = boot_call(tmp_path, "IH94")
-    with CallProcess(call) as process:
+def test_a_mistake_is_the_last_event() -> None:
+    with CallProcess(find("classes").call({"classes": ["IH94"]})) as process:
         events = list(process.events())
         assert process.wait() == 1
     check_order(events)
     assert isinstance(events[-1], Failed)
     assert events[-1].failure == "mistake"
-    assert "unknown isohedral class 'IH94'" in events[-1].message
+    assert "IH94" in events[-1].message
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
