@@ -1,4 +1,4 @@
-"""Drawings are rendered in this process, which starts none for each of them."""
+"""Drawings are rendered small and in this process, which starts none for each of them."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 import resvg_py
 
+from orbiflow.tiles.silhouette.readers import svg
 from orbiflow.tiles.silhouette.readers.svg_process import Renderer, RendererFailed
 
 
@@ -21,4 +22,13 @@ def rendered_here_fixture() -> Iterator[None]:
     """To start a process takes as long as all else of a test; `test_svg_bounds` tests the process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Renderer, "png", render)
+        yield
+
+
+@pytest.fixture(name="_small_pictures", scope="module", autouse=True)
+def small_pictures_fixture() -> Iterator[None]:
+    """What is seen of a drawing does not depend on how finely it is traced."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(svg, "LONG_PIXELS", 400)
+        patch.setattr(svg, "SMALL_PIXELS", 150)
         yield

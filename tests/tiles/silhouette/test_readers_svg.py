@@ -12,16 +12,8 @@ from orbiflow.tiles import Reading, hausdorff, iou, read_outline
 from orbiflow.tiles.silhouette.readers import svg
 from refusals import refused
 
-NEAR = 0.13
+NEAR = 0.25
 """Of a page of 100: a pixel of what is traced."""
-
-
-@pytest.fixture(autouse=True)
-def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Trace half as finely."""
-    monkeypatch.setattr(svg, "LONG_PIXELS", 750)
-    monkeypatch.setattr(svg, "SMALL_PIXELS", 300)
-
 
 SQUARE = "M10 20 h30 v30 h-30 z"
 
@@ -91,7 +83,7 @@ def test_curves_are_flattened_within_the_bound(tmp_path: Path) -> None:
     ]
     for body in bodies:
         outline = read(tmp_path, body).outline
-        assert hausdorff(outline, disc) < 60 / 2000
+        assert hausdorff(outline, disc) < 60 / 1000
         assert len(outline) < 200
 
 
@@ -102,7 +94,7 @@ def test_lone_loop(tmp_path: Path) -> None:
     exact = start * ((1 - t) ** 3 + t**3) + 3 * t * (1 - t) ** 2 * a + 3 * t**2 * (1 - t) * b
     assert iou(outline, exact) > 0.995
     quadratic = read(tmp_path, '<path d="M10 90Q50 10 90 90z"/>').outline
-    assert Polygon(quadratic).area == pytest.approx(2 / 3 * 80 * 40, rel=1e-3)
+    assert Polygon(quadratic).area == pytest.approx(2 / 3 * 80 * 40, rel=2e-3)
 
 
 def test_holes_and_components(tmp_path: Path) -> None:
@@ -135,7 +127,7 @@ def test_fill_rules(tmp_path: Path) -> None:
 def test_overlapping_elements_are_united(tmp_path: Path) -> None:
     body = '<rect x="10" y="10" width="40" height="40"/><circle cx="50" cy="30" r="10"/>'
     outline = read(tmp_path, body).outline
-    assert Polygon(outline).area == pytest.approx(1600 + 50 * math.pi, rel=1e-3)
+    assert Polygon(outline).area == pytest.approx(1600 + 50 * math.pi, rel=2e-3)
 
 
 def test_neighbours_that_all_but_share_an_edge_leave_no_crack(tmp_path: Path) -> None:
