@@ -47,7 +47,7 @@ def pytest_collection_finish() -> None:
 class TorchRandom:
     """Torch's own generator, for hypothesis to seed before every example."""
 
-    seed = staticmethod(torch.manual_seed)
+    seed = staticmethod(torch.default_generator.manual_seed)
     getstate = staticmethod(torch.get_rng_state)
     setstate = staticmethod(torch.set_rng_state)
 
@@ -65,7 +65,7 @@ def pytest_collect_file() -> Iterator[Any]:
 
 def pytest_runtest_setup() -> None:
     """A test that draws without a seed draws the same whichever tests went before."""
-    torch.manual_seed(0)
+    torch.default_generator.manual_seed(0)
 
 
 @pytest.fixture(scope="module", name="browser")

@@ -62,7 +62,7 @@ FINDS = {
 DONE = {*FINDS, "escherize examples/silhouettes/barbet.svg --out out/barbet"}
 
 SMALLER = {
-    "art": ("--area", "360x240px"),
+    "art": ("--area", "150x100px"),
     "animate": ("--area", "120x80px"),
     "batch": ("--classes", "IH4"),
     "density cv": ("--folds", "2"),
@@ -75,7 +75,7 @@ SMALLER = {
 
 LARGE = {
     "art": {
-        **{"3000x2000px": "360x240px", "594x420mm": "90x60mm", "300x200mm": "60x40mm"},
+        **{"3000x2000px": "150x100px", "594x420mm": "90x60mm", "300x200mm": "60x40mm"},
         "9cm": "2cm",
     },
     "export": {"300x200mm": "120x80mm", "60": "6"},

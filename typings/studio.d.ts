@@ -129,6 +129,7 @@ interface Silhouette {
   notes: string[];
   left_out?: Point[][];
   coloured?: boolean;
+  clear?: boolean;
   told_apart?: boolean;
   mark?: string;
 }

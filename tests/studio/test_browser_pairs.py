@@ -156,5 +156,5 @@ def test_both_figures_are_shown_pulled_drawn_on_and_taken_away(page, project, st
     page.get_by_role("link", name="Take away").click()
     page.get_by_label("With what you drew on it").wait_for()
     page.get_by_text("the larger one").wait_for()
-    page.get_by_role("button", name="Make it").click()
+    page.get_by_role("button", name="Download").click()
     page.locator(".preview img").wait_for()

@@ -49,11 +49,9 @@ def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_
     page.get_by_role("radio", name="Print or cut").press("Space")
     reach(page, "What is it for?", "Poster")
     reach(page, "Kind of file", "SVG")
-    reach(page, "Make it")
-    page.get_by_role("link", name=re.compile("^beast")).first.wait_for()
-    page.focus("h1")
     with page.expect_download() as caught:
-        reach(page, "beast")
+        reach(page, "Download")
+    page.get_by_role("link", name=re.compile("^beast")).first.wait_for()
     caught.value.save_as(tmp_path / "tiling.svg")
     assert covers_page_once((tmp_path / "tiling.svg").read_text())
     page.reload()
@@ -203,14 +201,14 @@ def test_each_thing_has_three_fields_and_its_own_settings(page, studio, searched
     assert len(titles) == 12
     page.get_by_role("radio", name="Ball or lamp").check()
     page.locator(".wishes").get_by_text("no pattern on a sphere").wait_for()
-    assert page.get_by_role("button", name="Make it").count() == 0
+    assert page.get_by_role("button", name="Download").count() == 0
     page.get_by_role("radio", name="Pieces for a laser").check()
     page.get_by_label("Width of the machine's cut").fill("0.2")
     page.get_by_role("radio", name="Poster").check()
     page.get_by_role("radio", name="Pieces for a laser").check()
     page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
     with page.expect_request("**/tasks") as caught:
-        page.get_by_role("button", name="Make it").click()
+        page.get_by_role("button", name="Download").click()
     page.get_by_text("not now").wait_for()
     page.unroute("**/tasks")
     wanted = {"tile": tile, "purpose": "laser", "cut": "pieces", "kerf": 0.2}
@@ -241,7 +239,7 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     filled.uncheck()
     page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
     with page.expect_request("**/tasks") as caught:
-        page.get_by_role("button", name="Make it").click()
+        page.get_by_role("button", name="Download").click()
     page.get_by_text("not now").wait_for()
     page.unroute("**/tasks")
     wanted = {"tile": tile, "purpose": "web", "clip": False, "palette": "dusk"}
@@ -255,7 +253,7 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     page.get_by_label("What is drawn").select_option("pieces")
     page.get_by_label("Width of the machine's cut").fill("0.2")
     page.get_by_label("How long is one tile?").fill("much")
-    page.get_by_role("button", name="Make it").click()
+    page.get_by_role("button", name="Download").click()
     said = page.locator(".field .error")
     assert "The length of a tile: 'much' is not a length" in said.inner_text()
     size = page.get_by_label("How long is one tile?")
@@ -328,7 +326,7 @@ def test_machines_are_kept_by_name_and_lengths_shown_in_inches(page, studio, sea
     page.get_by_label("How large is your sheet? (in)").fill("12x8")
     page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
     with page.expect_request("**/tasks") as caught:
-        page.get_by_role("button", name="Make it").click()
+        page.get_by_role("button", name="Download").click()
     page.get_by_text("not now").wait_for()
     page.unroute("**/tasks")
     wanted = {"tile": tile, "purpose": "laser", "cut": "pieces", "kerf": 0.2, "tile_size": 50.8}

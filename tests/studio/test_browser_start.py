@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from studio.browser import RunningStudio, area_of
+from studio.browser import RunningStudio, area_of, small_searches
 from studio_checks import serious_issues, untidy_parts
 
 ONE_PAGE = True
@@ -216,7 +216,8 @@ def test_what_is_painted_while_the_picture_is_nearer_is_where_it_was_painted(
 
 
 @pytest.mark.parametrize("how", ["mouse", "keyboard"])
-def test_a_shape_can_be_drawn(page, studio: RunningStudio, how) -> None:
+def test_a_shape_can_be_drawn_and_is_searched_for_at_once(page, studio, how) -> None:
+    small_searches(page, "IH4")
     page.goto("/")
     page.get_by_role("button", name="Draw a shape").click()
     sheet = "dialog canvas"
@@ -228,8 +229,10 @@ def test_a_shape_can_be_drawn(page, studio: RunningStudio, how) -> None:
         for key in [*keys, *["Shift+ArrowLeft"] * 6, "Space"]:
             page.keyboard.press(key)
     page.get_by_role("button", name="Use this shape").click()
-    page.wait_for_selector(READ)
-    assert area_of(studio.project(own_project(page))) > 10_000
+    page.get_by_role("heading", name="Tiles").wait_for()
+    own = studio.project(own_project(page))
+    assert area_of(own) > 10_000
+    assert own["tasks"][0]["operation"] == "search"
 
 
 def test_a_photo_is_taken(page, studio: RunningStudio) -> None:
@@ -306,9 +309,10 @@ def test_a_picture_that_failed_before_says_so_and_leads_back(page, studio) -> No
 
 
 def test_an_animal_is_taken_by_keyboard_and_the_project_renamed(page, studio) -> None:
+    small_searches(page, "IH4")
     page.goto("/")
     page.locator(".animal").first.press("Enter")
-    page.wait_for_selector(READ)
+    page.get_by_role("heading", name="Tiles").wait_for()
     own = own_project(page)
     page.get_by_label("Name of the project").fill("My beast")
     studio.until(lambda: studio.project(own)["name"] == "My beast")

@@ -272,10 +272,13 @@ def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]
     # what the page says of these in other words
     twice = ("kept the largest",) * bool(lost) + ("filled ",) * ("holes were" in "".join(doubted))
     outline = pixels(target.outline)
+    is_coloured = _is_coloured(picture, outline, pixels(read.outline))
+    is_cut_out = target.kind != "image" or picture.mode == "RGBA"
     return {
         "outline": outline,
         "mark": hashlib.sha256(json.dumps(outline).encode()).hexdigest()[:12],
-        "coloured": _is_coloured(picture, outline, pixels(read.outline)),
+        "coloured": is_coloured,
+        "clear": (is_cut_out or not is_coloured) and not (lost or doubted),
         "told_apart": _are_told_apart(picture, outline),
         "width": size[0],
         "height": size[1],

@@ -1,6 +1,6 @@
 /** All ways to bring a picture, a table or a project: choose, drop, paste, photograph, draw. */
 
-import { aside, button, h, put, row } from "../dom.js";
+import { aside, button, h, put, row, toast } from "../dom.js";
 import { Feed } from "../events.js";
 import { alive, bytes, sentence } from "../words.js";
 
@@ -131,12 +131,20 @@ export class Bringing {
     );
   }
 
-  /** Make a project of what `send` puts into it, and go and see what was read. */
+  /** Make a project of what `send` puts into it; search if the picture is clear, or show what was read. */
   begin(name, send) {
     return this.trying(async () => {
       const { id } = await this.api.post("projects", { kind: "tile", name });
-      await this.kept(id, () => send(id));
-      this.go(`p/${id}/picture`);
+      const { silhouette } = await this.kept(id, () => send(id));
+      if (silhouette?.clear) {
+        await this.api.post(`projects/${id}/tasks`, { operation: "search", settings: {} });
+        if (!this.closed) {
+          toast(
+            "Looking for tiles of the shape that was read. Is it not right? Mend it in “Picture”.",
+          );
+        }
+      }
+      this.go(silhouette?.clear ? `p/${id}` : `p/${id}/picture`);
     }, `Reading ${name} …`);
   }
 

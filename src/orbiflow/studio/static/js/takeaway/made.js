@@ -1,4 +1,4 @@
-/** What is made of a tile: the button, files, a picture, words, and what was made before. */
+/** What is made of a tile: the button that makes and saves it, a picture, words, and what was made before. */
 
 import { button, h, icon, put, row, section, soft, trying } from "../dom.js";
 import { LATE } from "../steering.js";
@@ -142,7 +142,7 @@ export class Making {
     this.api = api;
     this.project = project;
     this.on = on;
-    this.make = button("Make it", () => trying(() => this.press()), { kind: "primary big" });
+    this.make = button("Download", () => trying(() => this.press()), { kind: "primary big" });
     this.said = h("div", { class: "stack said", role: "status" });
     this.before = h("div");
     this.earlier = section("earlier", "earlier", "Made before", this.before);
@@ -183,7 +183,7 @@ export class Making {
     const [made, busy] = [isMade(this.task), alive(this.task)];
     const [old, done] = [this.stale && !busy, made && !this.stale ? this.task : null];
     if (busy !== this.busy) [this.busy, this.turned] = [busy, performance.now()];
-    this.make.lastChild.textContent = busy ? "Stop" : made && old ? "Make it again" : "Make it";
+    this.make.lastChild.textContent = busy ? "Stop" : "Download";
     const before = tasks.filter((task) => isMade(task) && task.id !== done?.id);
     const told = JSON.stringify([this.task, old, before.map(({ id }) => id)]);
     if (told === this.told) return; // what has the focus stays
@@ -198,6 +198,7 @@ export class Making {
     this.seen = done?.id;
     if (!done || !this.news) return;
     this.news = false;
+    this.said.querySelector("a").click();
     if (document.activeElement === this.make) this.said.querySelector("a").focus();
   }
 }

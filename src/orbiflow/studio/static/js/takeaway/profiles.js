@@ -2,9 +2,6 @@
 
 import { button, dialog, h, put, row, stack, trying, unique } from "../dom.js";
 
-/** The profile that was chosen last. */
-let chosen = "";
-
 /**
  * The choice of a profile for a form.
  *
@@ -12,6 +9,7 @@ let chosen = "";
  * @param {any} form
  */
 export function profiles(api, form) {
+  let chosen = "";
   const id = unique("profile");
   const list = h("select", { id, onchange: () => take(list.value) });
   const drop = button("Forget it", () => change("remove", chosen), { kind: "quiet" });
@@ -53,13 +51,23 @@ export function profiles(api, form) {
       stack(
         h("p", "Give them a name, such as “my K40, 3 mm birch”. The command line takes it, too."),
         box,
-        h("footer", button("Keep", () => close(box.value.trim()), { kind: "primary" })),
+        h(
+          "footer",
+          button("Keep", () => close(box.value.trim().replace(/\s+/g, " ")), { kind: "primary" }),
+        ),
       ));
-    const values = Object.entries(form.values()).filter(([own]) => told.settings.includes(own));
-    if (name) await change("put", name, Object.fromEntries(values));
+    if (name) await change("put", name, values());
   }
+  const values = () =>
+    Object.fromEntries(
+      Object.entries(form.values()).filter(([own]) => told.settings.includes(own)).sort(),
+    );
   trying(async () => {
     told = await api.get("profiles");
+    const now = JSON.stringify(values());
+    const holds = ([_, kept]) =>
+      JSON.stringify(Object.fromEntries(Object.entries(kept).sort())) === now;
+    chosen = Object.entries(told.kept).find(holds)?.[0] ?? "";
     show();
   });
   return root;
