@@ -14,7 +14,7 @@ from outlines import animal
 
 NAMES = "squirrel.dat", "nagata/dolphin_60.dat"
 FEW: dict[str, Any] = {
-    "ratios": 1, "points": 40, "glues": 10, "placed": 40, "held": 4, "starts": 3, "carved": 2,
+    "ratios": 1, "points": 40, "glues": 10, "placed": 40, "held": 4, "starts": 2, "carved": 1,
     "ranked": 1, "finalists": 1,
 }  # fmt: skip
 STEPS = {"FIRST_STEPS": 6, "LAST_STEPS": 6}

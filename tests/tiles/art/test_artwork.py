@@ -79,7 +79,7 @@ def rgb(colour: str) -> np.ndarray:
     return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
+@pytest.mark.parametrize("name", ["IH5", "IH21"])
 def test_a_flat_picture_covers_the_plane(name: str) -> None:
     tile = squirrel(name)
     made = pixels_of(artwork(tile, PAGE, Over(flat(tile, "#c02040"))))
@@ -87,7 +87,7 @@ def test_a_flat_picture_covers_the_plane(name: str) -> None:
     assert (made == rgb("#c02040")).all()
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
+@pytest.mark.parametrize("name", ["IH5", "IH21"])
 def test_a_pixel_within_a_copy_has_its_colour(name: str) -> None:
     art = artwork(squirrel(name), PAGE)
     made = pixels_of(art)
@@ -102,7 +102,7 @@ def test_a_pixel_within_a_copy_has_its_colour(name: str) -> None:
     assert (seen == fills[colours[copy]]).all(axis=1).mean() > 0.8
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
+@pytest.mark.parametrize("name", ["IH5", "IH21"])
 def test_a_checkerboard_is_carried(name: str) -> None:
     tile = squirrel(name)
     board = checkerboard(tile, 6)
@@ -129,7 +129,7 @@ def test_a_checkerboard_is_carried(name: str) -> None:
     np.testing.assert_allclose(made[row, column][clear], parity[clear], atol=0.02)
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH28"])
+@pytest.mark.parametrize("name", ["IH4", "IH6"])
 def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
     tile = squirrel(name)
     art = artwork(tile, settings(area="480x320px"), Over(face(tile)))
@@ -387,7 +387,7 @@ def test_a_model_of_another_tile_is_refused(tmp_path: Path) -> None:
         with_map(run)
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH7", "IH28"])
 def test_matched_maps_have_no_fold_and_keep_the_outlines(name: str) -> None:
     target, polygon = animal("squirrel.dat"), bent_squirrel(name).tile.polygon
     bending = matched(target.normal, polygon)

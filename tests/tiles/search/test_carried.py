@@ -1,5 +1,6 @@
 """The map from the silhouette to its tile."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from strategies import seeds
 CASES = [("IH4", False), ("IH5", False), ("IH21", False), ("IH4", True), ("IH21", True)]
 
 
+@cache
 def bending(name: str, mirrored: bool = False) -> tuple[BentTile, Bending]:
     case = bent_squirrel(name, mirrored)
     return case, map_of_bent(case.bent, case.factor, case.shift, case.tile)

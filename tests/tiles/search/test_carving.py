@@ -10,7 +10,7 @@ import shapely
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.tiles import CLASSES, Pins, complex_points, isohedral_class, plane_points, signed_area
-from orbiflow.tiles.likeness import Elastic, kept_of
+from orbiflow.tiles.likeness import Elastic, Stiffness, kept_of
 from orbiflow.tiles.search import Goal, TileSpace, bending, best_placements
 from orbiflow.tiles.search.bending import Bent, bent_tiles
 from orbiflow.tiles.search.carving import (
@@ -26,11 +26,10 @@ from orbiflow.tiles.search.co_deformation import BentTiles, held_on_tiles
 from outlines import SMALL, animal, squirrel_orientations
 
 PLAIN = replace(SMALL, carved=0)
-NAMES = ("IH4", "IH7", "IH8", "IH69")  # the last two: a half-turn, a mirror
 
 
 def bend(name: str) -> tuple[Elastic, TileSpace, BentTiles]:
-    kind, body = isohedral_class(name), squirrel_orientations()[0].fine
+    kind, body = isohedral_class(name), squirrel_orientations()[0].made("coarse", Stiffness())
     own = best_placements(kind, body.rest[: body.size], 1)
     space = TileSpace(kind, own)
     return body, space, held_on_tiles(body, space, body.rest[:, None], 8)
@@ -44,9 +43,8 @@ def uncarved(body: Elastic, tiles: BentTiles) -> Carved:
     return Carved(ring, np.arange(body.size), corners, tiles.linear[0], tiles.offset[0])
 
 
-@pytest.mark.parametrize("name", NAMES[3:])
-def test_what_is_carved_is_a_better_tile_of_its_placement(name: str) -> None:
-    body, space, tiles = bend(name)
+def test_what_is_carved_is_a_better_tile_of_its_placement() -> None:
+    body, space, tiles = bend("IH69")  # with a mirror
     bent = uncarved(body, tiles)
     before, (found,) = bent.ring, carved(body, space, [bent])
     check_tile(body, space, before, found)

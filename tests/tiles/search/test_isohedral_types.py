@@ -43,6 +43,7 @@ from orbiflow.tiles.search import (
 from orbiflow.tiles.silhouette import outlines, sampled
 from outlines import animal
 from refusals import refused
+from small_searches import FEW
 from strategies import seeds
 
 MARKED = (19, 35, 48, 60, 63, 65, 70, 75, 80, 87, 89, 92)
@@ -192,7 +193,7 @@ def test_a_silhouette_near_to_symmetric_gets_classes_of_symmetric_tiles(monkeypa
 
 
 def test_the_search_gives_symmetric_tiles_that_are_saved_and_loaded(tmp_path: Path) -> None:
-    quick = LikenessSearch(placements=40, held=8, starts=4, finalists=1, rounds=8)
+    quick = LikenessSearch(**FEW)
     bat = animal("nagata/bat_60.dat")
     tile = escherize_class(bat, "IH13", quick)
     assert isinstance(tile, EscherTile)
@@ -222,7 +223,7 @@ def test_every_class_divides_the_points_of_outlines_that_cross_themselves(
     assert len(sampled(bar, step=step).coarse) == points
 
 
-def test_classes_are_listed_and_drawn_by_name(tmp_path: Path) -> None:
+def test_classes_are_listed_and_drawn_by_name(tmp_path: Path, monkeypatch) -> None:
     done = classes(classes=("26", "ih8"), out=tmp_path / "two.png")
     first, second = done.summary["classes"]
     assert (first["class"], first["tile"]) == ("IH26", "D1")
@@ -230,6 +231,6 @@ def test_classes_are_listed_and_drawn_by_name(tmp_path: Path) -> None:
     assert (second["group"], second["tile"], second["mirrors"]) == ("p2", "C2", "-")
     with Image.open(tmp_path / "two.png") as picture:
         assert picture.width > picture.height > 400
-    assert [row["class"] for row in classes(classes=("all",)).summary["classes"]] == list(
-        ISOHEDRAL_TYPES
-    )
+    some = {name: ISOHEDRAL_TYPES[name] for name in ("IH12", "IH26", "IH93")}
+    monkeypatch.setattr("orbiflow.tiles.tilings.ISOHEDRAL_TYPES", some)
+    assert [row["class"] for row in classes(classes=("all",)).summary["classes"]] == list(some)

@@ -165,6 +165,7 @@ def test_a_background_stays_one_where_silhouettes_are_rounded_off() -> None:
 
 def test_nothing_is_found_where_no_glue_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gluing, "MOST_OVERLAP", -1.0)
+    monkeypatch.setattr(gluing, "LOOKED_AT", 20)
     assert search_pair([Goal(animal(name)) for name in NAMES], SMALL) == []
 
 

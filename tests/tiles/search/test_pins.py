@@ -14,13 +14,12 @@ from orbiflow.tiles import Emphasis, EscherTile, LikenessSearch, OverlapSearch, 
 from outlines import animal, searched
 from refusals import refused
 from runtime.searches import check_order, run
+from small_searches import FEW
 
 SQUIRREL = animal("squirrel.dat")
 HEAD = (230, 190, 140)
 INSIDE = (514, 275, 20)  # a spot far from the outline
-QUICK = LikenessSearch(
-    placements=30, held=6, starts=2, finalists=1, rounds=8, carved=0, multiples=(2,), phases=1
-)
+QUICK = LikenessSearch(**{**FEW, "placements": 30, "held": 6, "rounds": 8})
 CLASSES = ["IH5", "IH7"]
 
 
@@ -131,7 +130,7 @@ def test_emphasis_of_any_strength_can_be_searched_with(
         mask[3:] = 0
     low, high = target.normal.min(axis=0), target.normal.max(axis=0)
     emphasis = Emphasis(mask, (*low.tolist(), *high.tolist()), strength)
-    hasty = LikenessSearch(placements=20, held=4, starts=1, finalists=1, rounds=4, multiples=(2,))
+    hasty = LikenessSearch(**{**FEW, "carved": 1})
     results, _ = searched(target, ["IH7"], hasty, emphasis=emphasis)
     assert all(result.certificate.valid for result in results)
 

@@ -1,6 +1,7 @@
 """From a fit, by any method, to certified polygons, their choice and their stars."""
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -102,6 +103,7 @@ def test_force_prefers_the_certified() -> None:
 BODY = "M10 60 60 60 60 90 10 90Z"
 
 
+@cache
 def target(*others: str) -> Target:
     path = " ".join((BODY, *others))
     svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100"><path d="{path}"/></svg>'

@@ -40,7 +40,7 @@ from small_searches import FEW as SMALL
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 QUICK = OccupancySearch(
-    max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
+    max_frequency=3, turns=2, finalists=2, iterations=8, affine_iterations=20, points=100
 )
 SHORT = replace(QUICK, iterations=2, affine_iterations=1, turns=1)
 BRIEF = OverlapSearch.for_effort(
@@ -62,7 +62,8 @@ def test_the_same_tiles_whatever_the_number_of_workers() -> None:
     here, none = searched(TARGET, ["ih4", "28", "IH4"], QUICK, on_event=events.append)
     assert none == []
     assert sorted(r.name for r in here) == ["IH28", "IH4"]
-    assert here[0].likeness.metrics.iou > here[1].likeness.metrics.iou > 0.7
+    assert here[0].score >= here[1].score
+    assert all(tile.likeness.metrics.iou > 0.7 for tile in here)
     for name in ("IH4", "IH28"):
         *steps, last, outcome = of_class(events, name)
         assert isinstance(outcome, TileFound)
@@ -113,7 +114,7 @@ def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 NAMES = ["IH2", "IH7", "IH3", "IH4"]
-STEADY = replace(QUICK, iterations=6, affine_iterations=3, turns=1, points=100)
+STEADY = replace(QUICK, iterations=4, affine_iterations=2, turns=1, points=50)
 both = pytest.mark.parametrize("workers", [1, 2])
 
 
@@ -158,9 +159,13 @@ def test_events_come_in_order_and_in_this_thread(workers: int) -> None:
     assert len(events) > 2 * len(NAMES)
 
 
-@both
-@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
-@pytest.mark.parametrize("with_outcome", [False, True])
+@pytest.mark.parametrize(
+    ("workers", "error", "with_outcome"),
+    [
+        *((1, KeyboardInterrupt, False), (1, ZeroDivisionError, True)),
+        *((2, ZeroDivisionError, False), (2, KeyboardInterrupt, True)),
+    ],
+)
 def test_what_watch_raises_ends_the_search(
     workers: int, error: type[BaseException], with_outcome: bool
 ) -> None:
@@ -252,7 +257,14 @@ def test_settings_of_no_method_are_refused(wrong: object) -> None:
     "settings",
     [
         LikenessSearch(
-            placements=20, held=6, starts=4, finalists=3, rounds=4, carved=0, multiples=(2,)
+            phases=1,
+            placements=20,
+            held=6,
+            starts=4,
+            finalists=3,
+            rounds=3,
+            carved=0,
+            multiples=(2,),
         ),
         BRIEF,
     ],
@@ -267,9 +279,7 @@ def test_several_of_a_class_differ(settings: LikenessSearch | OverlapSearch) -> 
 
 def test_more_effort_never_scores_less() -> None:
     """In a class, also where several of its tiles are asked for."""
-    least = LikenessSearch(
-        placements=20, held=4, starts=2, finalists=1, rounds=4, carved=0, multiples=(2,), phases=1
-    )
+    least = LikenessSearch(**{**SMALL, "starts": 1})
 
     def score(settings: LikenessSearch, per_class: int) -> float:
         tile = escherize_class(SQUIRREL, "IH7", settings, per_class=per_class)
@@ -283,7 +293,7 @@ def test_more_effort_never_scores_less() -> None:
 
 def test_later_phases_are_of_promising_classes() -> None:
     """A class far behind the best is searched in the first phase alone."""
-    method = replace(LikenessSearch(**SKETCH), multiples=(2,), phases=2)
+    method = replace(LikenessSearch(**SKETCH), placements=20, multiples=(2,), phases=2)
     asked: list[tuple[str, int]] = []
 
     class Watched(type(method)):
