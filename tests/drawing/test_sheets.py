@@ -80,9 +80,7 @@ def test_the_narrowest_figure_has_room() -> None:
         check_inside(density_picture(example(SPACES[0]), settings=settings, sheet=sheet))
 
 
-@pytest.mark.parametrize(
-    ("space", "width"), list(zip(SPACES, ("single", "double", "double", "single"), strict=True))
-)
+@pytest.mark.parametrize(("space", "width"), [(SPACES[0], "single"), (SPACES[2], "double")])
 def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> None:
     density, sheet = example(space), coarse(width)
     names = ("a rather long name of an angle", "ψ") if space.unit else None
@@ -108,7 +106,7 @@ def check_letters(pdf: bytes) -> None:
     assert b"/Type3" not in pdf
 
 
-@pytest.mark.parametrize(("dim", "width"), [(1, "single"), (3, "single"), (4, 85), (8, 120)])
+@pytest.mark.parametrize(("dim", "width"), [(1, "single"), (3, "single"), (8, 120)])
 def test_pairs_of_angles_have_room(dim: int, width: Any) -> None:
     picture = corner(dim, coarse(width))
     check_inside(picture)

@@ -36,7 +36,7 @@ def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:
     return found
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(
     tiles,
     st.sampled_from([0.0, 0.15, 0.4]),
@@ -64,8 +64,7 @@ def diameter(polygon: shapely.Polygon) -> float:
     return float(pdist(shapely.get_coordinates(polygon.convex_hull)).max())
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21", "IH28"])
-@pytest.mark.parametrize("spacing", [0.0, 2.5])
+@pytest.mark.parametrize(("name", "spacing"), [("IH1", 0.0), ("IH5", 2.5), ("IH21", 0.0)])
 def test_pieces_keep_their_distance_and_the_page(name: str, spacing: float) -> None:
     (sheet,) = cut(tile_of(name), spacing=spacing, area=(220.0, 160.0), kerf=0.1)
     page = shapely.box(0, 0, 220, 160)
@@ -192,8 +191,7 @@ def test_a_gap_that_closes_is_a_note_with_its_place() -> None:
     assert offset_ring(gap, 0.4, 1e-3)[1] == ""
 
 
-@pytest.mark.parametrize("offset", [6.0, -1.0])
-@pytest.mark.parametrize("name", ["IH1", "IH5"])
+@pytest.mark.parametrize(("name", "offset"), [("IH1", 6.0), ("IH5", -1.0)])
 def test_pieces_in_the_file(name: str, offset: float) -> None:
     options = {"cut": "pieces", "tile_size": 50, "area": (200, 150), "format": "svg"}
     chosen = ExportSettings(offset=offset, kerf=0.2, copies=2, **options)
@@ -245,7 +243,7 @@ def jigsaw(name: str) -> tuple[Scene, list[shapely.Polygon]]:
     return scene, faces(scene)
 
 
-each = pytest.mark.parametrize("name", ["IH2", "IH6", "IH28", "IH5*"])
+each = pytest.mark.parametrize("name", ["IH2", "IH28", "IH5*"])
 
 
 @each

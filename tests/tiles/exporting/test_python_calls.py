@@ -30,9 +30,10 @@ from orbiflow.tiles import (
 from orbiflow.tiles import write_run as write_folder
 from outlines import animal
 from refusals import refused
+from small_searches import FEW
 
 SMALL = art_settings(area="90x60px", tile_size="40px")
-BARE = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
+BARE = LikenessSearch(**FEW)
 
 
 @pytest.fixture(scope="module")

@@ -232,7 +232,7 @@ def test_a_page_to_colour_is_lines_within_a_border() -> None:
     np.testing.assert_allclose(np.ptp(border.points, axis=0), (190, 277), atol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH5", "IH21"])
+@pytest.mark.parametrize("name", ["IH1", "IH5"])
 def test_a_template_says_which_edges_fit_together(name: str) -> None:
     scene, lines = drawn(squirrel(name), purpose="template", tolerance=0.3)
     layers = {layer.name: layer for layer in scene.layers}

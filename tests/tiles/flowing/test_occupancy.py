@@ -25,7 +25,7 @@ from strategies import random_tensor, seeds
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 QUICK = OccupancySearch(
-    max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
+    max_frequency=3, turns=2, finalists=2, iterations=10, affine_iterations=20, points=100
 )
 
 

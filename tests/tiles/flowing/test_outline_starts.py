@@ -215,7 +215,7 @@ def test_symmetries(name: str) -> None:
     assert template_symmetries(CLASSES[name]) == SYMMETRIES[name]
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH5", "IH28"])
+@pytest.mark.parametrize("name", ["IH1", "IH5"])
 def test_symmetries_by_trying_every_corner(name: str) -> None:
     order, mirrored = SYMMETRIES[name]
     turns = matching_angles(name, mirrored=False)

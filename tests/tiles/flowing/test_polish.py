@@ -57,7 +57,7 @@ def test_gradient_against_differences(seed: int, n: int, m: int, clockwise: bool
     assert (gradient * direction).sum() == pytest.approx((ahead - behind) / (2 * h), abs=1e-4)
 
 
-@pytest.fixture(scope="module", params=["IH4", "IH5", "IH21"])
+@pytest.fixture(scope="module", params=["IH4", "IH5"])
 def rough(request: pytest.FixtureRequest) -> TileModel:
     return trainable(fit_descent(TARGET, isohedral_class(request.param), ROUGH).candidates).take(
         [0]
@@ -77,8 +77,8 @@ def test_polish_improves_and_certifies(rough: TileModel) -> None:
 
 
 def test_polish_never_loses(rough: TileModel) -> None:
-    once = polish(rough, TARGET, 40)
-    twice = polish(once, TARGET, 40)
+    once = polish(rough, TARGET, 20)
+    twice = polish(once, TARGET, 20)
     first, second = (iou(extract_tile(m)[0].polygon, TARGET.normal) for m in (once, twice))
     assert second >= first - 2e-4  # sampled boundary against extracted polygon
 

@@ -46,6 +46,7 @@ from orbiflow.tiles.motion.writers import frame_image, frame_scene
 from orbiflow.tiles.write import scene_image
 from refusals import refused
 from runtime.searches import check_order
+from small_searches import FEW
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
@@ -55,8 +56,7 @@ SMALL = {"seconds": 1.0, "fps": 10.0, "area": "120x80px"}
 
 @pytest.fixture(scope="module", name="bent")
 def bent_fixture() -> EscherTile:
-    small = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
-    found = escherize_class(Target.from_polygon(BOOT, y_down=True), "IH4", small)
+    found = escherize_class(Target.from_polygon(BOOT, y_down=True), "IH4", LikenessSearch(**FEW))
     assert isinstance(found, EscherTile)
     return found
 
@@ -135,7 +135,7 @@ def test_an_svg(bent: EscherTile, kind) -> None:
     assert len(text) < 500_000
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
+@pytest.mark.parametrize("name", ["IH1", "IH5"])
 def test_colours_of_neighbours_differ_throughout(name: str) -> None:
     settings: dict[str, Any] = {"area": "200x134px"}
     moving = motion(as_tile(swirled_tile(name, 3, 0.1)), AnimationSettings(**settings))
@@ -167,7 +167,7 @@ def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:
 
 
 @pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
-@pytest.mark.parametrize("share", [0.2, 0.45, 0.8, 1.0])
+@pytest.mark.parametrize("share", [0.45, 1.0])
 def test_what_lies_on_the_tiles_goes_where_their_bodies_go(bent, kind: Any, share: float) -> None:
     low, high = bent.covered.low, bent.covered.high
     shades = np.stack(np.meshgrid(*[np.linspace(0, 255, 64)] * 2), axis=-1)

@@ -37,7 +37,7 @@ def half_turns(drawn: Any) -> Pattern:
     return Pattern.near(group, np.array([0.1, 0.4]))
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(lattices, st.complex_numbers(min_magnitude=0.1, max_magnitude=3))
 def test_weierstrass_keeps_its_equation_and_its_periods(drawn: Any, z: complex) -> None:
     own = elliptic_of(drawn)
@@ -61,7 +61,7 @@ def test_weierstrass_keeps_its_equation_and_its_periods(drawn: Any, z: complex) 
     assert laurent == pytest.approx(own.series(np.array([small]), np.ones(1))[0, 0], rel=1e-9)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(st.sampled_from(["p3", "p4", "p6"]), triples, st.complex_numbers(max_magnitude=4))
 def test_the_map_is_a_quotient_of_hypergeometric_functions(name, orders, w: complex) -> None:
     assume(w.imag > 0.05)
@@ -109,14 +109,14 @@ def check_turns(found: Development) -> None:
     assert np.abs(corners[0] - (0, 0, 1)).max() < 1e-12
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(st.sampled_from(["p3", "p4", "p6"]), triples)
 def test_turns_about_three_centres(name: str, orders: Any) -> None:
     pattern = Pattern.near(wallpaper_group(name), np.array([0.2, 0.3]))
     check_turns(Development.of(pattern, orders))
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(lattices, quadruples)
 def test_turns_about_four_centres_keep_one_hyperbolic_plane(drawn: Any, orders: Any) -> None:
     pattern = half_turns(drawn)
@@ -130,7 +130,7 @@ def test_turns_about_four_centres_keep_one_hyperbolic_plane(drawn: Any, orders: 
     assert (np.abs(values[:, 0]) < np.abs(values[:, 1])).all()
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(lattices, quadruples, st.floats(0.2, 0.8), st.floats(0.2, 0.8))
 def test_solutions_are_those_of_the_equation(drawn: Any, orders: Any, a: float, b: float) -> None:
     pattern = half_turns(drawn)

@@ -133,7 +133,7 @@ def test_tiles_of_two_classes_do_not_become_each_other() -> None:
 
 def test_drawings_appear_on_the_way(tmp_path: Path) -> None:
     tile = EscherTile(swirled_tile("IH4", 7, 0.15))
-    chosen = ArtSettings(metamorphosis="right", area=(120.0, 60.0), dpi=100, engrave=True)
+    chosen = ArtSettings(metamorphosis="right", area=(120.0, 60.0), dpi=60, engrave=True)
     done = art(tile, tmp_path / "a.png", chosen)
     assert done.summary["world"] == "metamorphosis"
     picture = np.asarray(Image.open(tmp_path / "a.png").convert("L")).astype(float)
@@ -221,9 +221,9 @@ def test_the_tile_whose_image_looks_best_is_drawn(run: Path, tmp_path: Path) -> 
     best = best_in_world(tiles, None, 1)
     assert best is not None
     assert marks[best.isohedral_class] == max(marks.values())
-    done = art(run, tmp_path / "a.svg", ArtSettings(world="sphere", area=(60.0, 60.0)))
+    done = art(run, tmp_path / "a.svg", ArtSettings(world="sphere", area=(30.0, 30.0)))
     assert done.summary["class"] == best.isohedral_class
-    given = art(run, tmp_path / "b.svg", ArtSettings(world="disc", area=(60.0, 60.0)), tile="IH4")
+    given = art(run, tmp_path / "b.svg", ArtSettings(world="disc", area=(30.0, 30.0)), tile="IH4")
     assert given.summary["class"] == "IH4"
 
 

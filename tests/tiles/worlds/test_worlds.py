@@ -68,7 +68,7 @@ def area(found: Unfolding) -> float:
     return float(abs(2 * np.arctan2(volume, 1 + found.sign * sum(dots)).sum()))
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(sound(ORDERS), st.data())
 def test_edges_match_and_areas_add_up(tile: Any, data: Any) -> None:
     name = tile.isohedral_class
@@ -110,7 +110,7 @@ def test_of_vertices_near_a_cone_one_goes_there(along: float, apart: float) -> N
     triangulate(found, near)
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(tiles, st.sampled_from([(2, 3, 3), (2, 3, 4), (2, 3, 5), (3, 3, 4), (2, 3, 7)]))
 def test_neighbours_have_other_colours(tile: Any, orders: Any) -> None:
     check_colours(world(tile, orders))
@@ -143,7 +143,7 @@ def check_colours(found: Unfolding) -> None:
 def test_copies_cover_the_sphere_once(tile: Any, orders: Any, seed: int) -> None:
     found = world(tile, orders)
     motions = copies(found, lambda own: np.ones(len(own), bool), 200)
-    ways = np.random.default_rng(seed).normal(size=(800, 3))
+    ways = np.random.default_rng(seed).normal(size=(300, 3))
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     polygon, place = seen_from_middle(found)
     count, doubtful = np.zeros(len(ways), int), np.zeros(len(ways), bool)
@@ -178,9 +178,8 @@ def escher(name: str) -> EscherTile:
 
 
 SEEN = [
-    ("sphere", "IH28", False), ("disc", "IH28", True), ("half-plane", "IH28", False),
-    ("band", "IH28", True), ("spiral", "IH28", False), ("disc", "IH1", True),
-    ("disc", "IH3", False), ("band", "IH5", False), ("cylinder", "IH4", True),
+    ("sphere", "IH28", False), ("disc", "IH3", True), ("half-plane", "IH28", False),
+    ("band", "IH5", False), ("spiral", "IH28", False), ("cylinder", "IH4", True),
 ]  # fmt: skip
 """Models, classes, and whether y points down: each of these somewhere."""
 
@@ -222,19 +221,13 @@ def test_curves_keep_their_tolerance() -> None:
 
 
 def test_artwork_of_another_world_is_written(tmp_path: Path) -> None:
-    done = art(
-        escher("IH7"),
-        tmp_path / "a.svg",
-        ArtSettings(format="svg", world="disc", area=(60.0, 60.0)),
-    )
+    page: Any = {"area": (30.0, 30.0)}
+    done = art(escher("IH7"), tmp_path / "a.svg", ArtSettings(format="svg", world="disc", **page))
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
     assert done.summary["tiles"] > 20
-    art(
-        escher("IH7"),
-        tmp_path / "b.png",
-        ArtSettings(world="sphere", order=(2, 3, 5), dpi=50, area=(60.0, 60.0)),
-    )
-    art(escher("IH7"), tmp_path / "c.pdf", ArtSettings(world="cylinder", area=(120.0, 60.0)))
+    sphere = ArtSettings(world="sphere", order=(2, 3, 5), dpi=50, **page)
+    art(escher("IH7"), tmp_path / "b.png", sphere)
+    art(escher("IH7"), tmp_path / "c.pdf", ArtSettings(world="cylinder", area=(60.0, 30.0)))
     assert (tmp_path / "c.pdf").read_bytes().startswith(b"%PDF")
     picture = np.asarray(Image.open(tmp_path / "b.png").convert("RGB")).astype(int)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 3
@@ -260,7 +253,7 @@ def test_what_has_no_such_world_says_why(
         art(escher(name), tmp_path / "a.png", ArtSettings(**given_settings))
 
 
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(sound(ORDERS), st.sampled_from([None, (2, 1), (-1, 3), (4, 0)]))
 def test_a_cylinder_meets_itself(tile: Any, arms: Any) -> None:
     chosen = ArtSettings(world="cylinder", area=(200.0, 80.0), arms=arms)
