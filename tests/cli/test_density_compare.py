@@ -154,20 +154,6 @@ def test_masses_have_errors_that_are_not_zero(folder: Path, orbiflow: Any) -> No
     names(said("--level", "1000"), "0.000000 ± 0.0000")
 
 
-def test_geojson_of_directions(tmp_path: Path, orbiflow: Any) -> None:
-    rng = np.random.default_rng(0)
-    rows = np.stack([rng.normal(0, 20, 90).clip(-80, 80), rng.normal(170, 30, 90)], axis=1)
-    data = write(tmp_path / "d.csv", "lat,lon", rows)
-    orbiflow.done("density", "fit", data, "--space", "sphere", *QUICK, "--out", tmp_path / "m")
-    out = tmp_path / "r.geojson"
-    orbiflow.done("density", "region", "-m", tmp_path / "m", "--mass", "0.8", "--out", out)
-    (feature,) = json.loads(out.read_text())["features"]
-    xs = np.concatenate([np.array(rings[0])[:, 0] for rings in feature["geometry"]["coordinates"]])
-    assert xs.max() == 180
-    assert xs.min() == -180
-    assert feature["properties"]["held"] == 0.8
-
-
 def test_score_refuses_other_columns(folder: Path, orbiflow: Any) -> None:
     other = write(folder / "other.csv", "chi1,chi2", angles(4))
     score = ("density", "score", other, "--model", folder / "good", "--out", folder / "s.csv")

@@ -181,6 +181,14 @@ def test_a_mass_gets_the_samples_that_it_needs(folder: Path, tmp_path: Path, orb
         assert json.loads(out.read_text())["samples"] == count
 
 
+def test_geojson_of_directions(folder: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "r.geojson"
+    orbiflow.done("density", "region", "-m", folder / "sphere", "--mass", "0.8", "--out", out)
+    (feature,) = json.loads(out.read_text())["features"]
+    assert feature["geometry"]["type"] == "MultiPolygon"
+    assert feature["properties"]["held"] == 0.8
+
+
 @pytest.mark.parametrize(
     ("words", "about"),
     [

@@ -3,7 +3,6 @@
 Nor do they write a file that its name's ending belies.
 """
 
-import json
 import shutil
 from pathlib import Path
 
@@ -107,12 +106,6 @@ def test_other_places_are_fine(here: Path, orbiflow: Run) -> None:
         "density sample -m copy/density.safetensors --out copy/s.csv",
     ):
         orbiflow.done(*words.split())
-
-
-def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
-    orbiflow.done("density", "plot", "-m", "m", "--out", "m")
-    orbiflow.done("density", "fit", "data.csv", *QUICK, "--out", "m")
-    assert json.loads((here / "m" / "report.json").read_text())["columns"] == ["phi", "psi"]
 
 
 def test_an_ending_of_another_format_is_refused(here: Path, orbiflow: Run) -> None:

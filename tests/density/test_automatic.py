@@ -12,7 +12,6 @@ from density.blends import kernels_of, two_clusters
 from orbiflow.density import (
     DensityEstimator,
     DensitySettings,
-    FlowDensity,
     Mixture,
     Torus,
     density_to_bytes,
@@ -121,13 +120,6 @@ def test_each_part_alone(part: str) -> None:
     assert [p.name for p in estimator.report_.components] == [part]
     assert estimator.score(angles) > -dim * math.log(2 * math.pi) + 0.5
     assert [len(estimator.density_.sample((count,))) for count in (0, 1, 3)] == [0, 1, 3]
-
-
-def test_a_flow_alone_is_a_flow() -> None:
-    small = {"max_frequency": 1, "segments": 1, "iterations": 1}
-    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 3.0, (60, 2))
-    found = DensityEstimator("torus", components="flow", **small).fit(angles).density_  # type: ignore[arg-type]
-    assert type(found) is FlowDensity
 
 
 @pytest.mark.usefixtures("whole_fits")

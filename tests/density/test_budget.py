@@ -70,16 +70,18 @@ def test_a_budget_counts(limit: int, wanted: int) -> None:
 
 def test_the_same_evaluations_give_the_same_density() -> None:
     space, points, values = make_space("sphere"), cluster("sphere", 60), []
-    settings = FlowSettings(**{**SMALL, "segments": 1}, evaluations=12)
-    for _ in range(2):
+    how = {**SMALL, "segments": 1}
+    for seed in (0, 0, 1):
+        settings = FlowSettings(**how, evaluations=12, seed=seed)
         density, report = fit_density(space, points, settings)
         assert report.notes == ("stopped by the budget of 12 evaluations",)
         with torch.no_grad():
             values.append(density.log_prob(points))
-    assert torch.equal(*values)
+    assert torch.equal(*values[:2])
+    assert not torch.equal(*values[1:])
 
 
-@pytest.mark.parametrize("iterations", [1, 4, 5])
+@pytest.mark.parametrize("iterations", [0, 1, 4, 5])
 def test_every_last_iterate_is_scored(iterations: int) -> None:
     points = cluster("torus").float()
     space = make_space("torus")
@@ -90,17 +92,8 @@ def test_every_last_iterate_is_scored(iterations: int) -> None:
     assert len(done.validation) == 1 + math.ceil(iterations / ITERATIONS_PER_SCORE)
     # train and validation are the same points: every iterate is better than the one before
     assert done.best == len(done.validation) - 1
-    assert done.validation[-1] < done.validation[0] - 0.05
-    assert not torch.equal(fields[0].parameters_, before)
-
-
-def test_no_iteration_changes_nothing() -> None:
-    space = make_space("torus")
-    density = FlowDensity(space, Flow([SplineField(space.group, 2)]))
-    rows = Rows(cluster("torus"))
-    done = refine(density, rows, rows, iterations=0)
-    assert (done.best, len(done.validation)) == (0, 1)
-    assert not bool(next(iter(density.flow.parameters())).any())
+    assert torch.equal(fields[0].parameters_, before) is (iterations == 0)
+    assert iterations == 0 or done.validation[-1] < done.validation[0] - 0.05
 
 
 QUICK: dict[str, Any] = {

@@ -45,14 +45,14 @@ def town(rng: np.random.Generator, rows: int, apart: float, wide: float) -> tupl
 @pytest.mark.parametrize(("apart", "wide"), [(640, 100), (6, 1)])
 def test_a_town_is_as_sharp_as_its_rows(apart: float, wide: float) -> None:
     rng = np.random.default_rng(1)
-    rows, _ = town(rng, 400, apart, wide)
+    rows, _ = town(rng, 300, apart, wide)
     fit = DensityEstimator("sphere", components=("kernels",)).fit(rows)
-    new, true = town(rng, 1000, apart, wide)
+    new, true = town(rng, 500, apart, wide)
     assert float((true - fit.score_samples(new)).mean()) < 0.15
     cluster = np.degrees(apart / 2 / EARTH) / math.cos(math.radians(MIDDLE[0]))
     on, between = fit.score_samples([[MIDDLE[0], MIDDLE[1] + cluster], list(MIDDLE)])
     assert on > between + 2
-    drawn = fit.sample(500, random_state=0)
+    drawn = fit.sample(300, random_state=0)
     off = np.radians(drawn - MIDDLE) * EARTH
     off[:, 1] = abs(off[:, 1] * math.cos(math.radians(MIDDLE[0]))) - apart / 2
     assert (np.linalg.norm(off, axis=1) < 4 * wide).mean() > 0.97

@@ -61,7 +61,7 @@ def drawn(count: int, seed: int = 0) -> tuple[Any, dict[str, Any], Any]:
 
 @pytest.fixture(scope="module")
 def fit() -> DensityEstimator:
-    angles, cells, _ = drawn(500)
+    angles, cells, _ = drawn(350)
     whole = {**QUICK, "effort": "normal"}
     return DensityEstimator(**whole, columns={"hour": "cycle:24"}).fit(angles, given=cells)
 
@@ -145,11 +145,11 @@ def test_rows_on_a_sphere_and_beside_a_number_have_densities_too(beside: bool) -
 
 
 def test_truth_is_found_with_numbers_cycles_and_words_together(fit: DensityEstimator) -> None:
-    angles, cells, truth = drawn(1500, seed=1)
+    angles, cells, truth = drawn(600, seed=1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)
         regret = float((truth - fit.score_samples(angles, given=cells)).mean())
-    assert 0 < regret < 0.2
+    assert 0 < regret < 0.25
     assert fit.score(angles) < truth.mean() - 0.8  # without covariates
     report = report_of(fit)
     assert report.gain > 5 * report.error > 0
@@ -193,20 +193,20 @@ def test_a_fast_fit_says_what_it_left_out() -> None:
 @pytest.mark.parametrize("declared", [False, True])
 def test_an_estimator_is_cross_validated(declared: bool) -> None:
     rng = np.random.default_rng(3)
-    x = rng.uniform(-1, 1, 80)
+    x = rng.uniform(-1, 1, 60)
     angles = rng.vonmises(2 * x, 8.0)
     estimator = DensityEstimator(unit="radians", components="kernels", effort="fast")
-    label = np.arange(80) // 2
+    label = np.arange(60) // 2
     if declared:
         frame = pd.DataFrame({"dir": angles, "x": x, "site": label})
         estimator.columns = {"dir": "angle:radians", "site": "group"}
-        found = cross_validate(estimator, frame, {"x": "linear"}, folds=3)
+        found = cross_validate(estimator, frame, {"x": "linear"}, folds=2)
     else:
-        found = cross_validate(estimator, angles[:, None], {"x": x}, folds=3, groups=label)
+        found = cross_validate(estimator, angles[:, None], {"x": x}, folds=2, groups=label)
     assert not hasattr(estimator, "density_")
     assert np.array_equal(found.fold[::2], found.fold[1::2])
-    assert sorted(np.unique(found.fold)) == [0, 1, 2]
-    plain = cross_validate(DensityEstimator(components="kernels"), angles[:, None], folds=3)
+    assert sorted(np.unique(found.fold)) == [0, 1]
+    plain = cross_validate(DensityEstimator(components="kernels"), angles[:, None], folds=2)
     assert found.mean > plain.mean + 0.3
 
 

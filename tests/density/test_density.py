@@ -46,7 +46,7 @@ def make(
         noise = torch.randn(field.size, generator=generator, dtype=torch.float64)
         field.parameters_.data.copy_(strength * noise / noise.norm())  # of rms `strength` at most
         fields.append(field)
-    return FlowDensity(space, Flow(fields, steps=6, warn=False), base(space))
+    return FlowDensity(space, Flow(fields, steps=4, warn=False), base(space))
 
 
 def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
@@ -60,7 +60,7 @@ def on_a_plain_grid(density: Density, side: int = 64) -> float:
 
 
 @every
-@settings(max_examples=2)
+@settings(max_examples=1)
 @given(seed=seeds, base=st.sampled_from([UniformDensity, bump]))
 def test_it_integrates_to_one(space, seed: int, base) -> None:
     density = make(space, seed, base=base)
@@ -69,25 +69,25 @@ def test_it_integrates_to_one(space, seed: int, base) -> None:
 
 
 @every
-@settings(max_examples=2)
+@settings(max_examples=1)
 @given(seed=seeds)
 def test_the_mass_tells_what_the_integrator_lost(space, seed: int) -> None:
     density = make(space, seed, strength=0.2).with_steps(1)
-    plain = on_a_plain_grid(density, 128)
-    assert density.mass(96) == pytest.approx(plain, abs=1e-4 + 0.1 * abs(plain - 1))
+    plain = on_a_plain_grid(density, 96)
+    assert density.mass(64) == pytest.approx(plain, abs=1e-4 + 0.1 * abs(plain - 1))
 
 
 @every
 def test_samples_follow_the_density(space) -> None:
     density = make(space, 7, base=bump, strength=0.12)
-    count, cells = 12_000, 6
+    count, cells = 6_000, 6
     points = density.sample((count,), torch.Generator().manual_seed(1))
     assert bool(((points >= 0) & (points <= 1)).all())
     edges = torch.linspace(0, 1, cells + 1).double()
     observed = torch.histogramdd(points, [edges, edges]).hist.flatten().numpy()
     with torch.no_grad():
-        values = density.log_prob(midpoints(space, 20 * cells)).exp()
-    expected = values.reshape(cells, 20, cells, 20).mean(dim=(1, 3)).flatten().numpy()
+        values = density.log_prob(midpoints(space, 10 * cells)).exp()
+    expected = values.reshape(cells, 10, cells, 10).mean(dim=(1, 3)).flatten().numpy()
     expected *= count / expected.sum()
     assert scipy.stats.chisquare(observed, expected).pvalue > 1e-4
     assert expected.max() > 1.5 * expected.min()  # a test that an even density would fail

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
@@ -22,10 +22,11 @@ def von_mises(turns: float, kappa: float) -> AdaptiveKernels:
 @pytest.fixture(scope="module", name="pair")
 def pair_fixture() -> DensityEstimator:
     rng = np.random.default_rng(0)
-    data = np.concatenate([rng.vonmises([0.5, -2.0], 6, (150, 2)), rng.vonmises(2.5, 9, (90, 2))])
+    data = np.concatenate([rng.vonmises([0.5, -2.0], 6, (90, 2)), rng.vonmises(2.5, 9, (60, 2))])
     return DensityEstimator("torus", components="kernels,mixture,chains").fit(data)
 
 
+@settings(max_examples=4)
 @given(st.floats(0, 1), st.floats(0.1, 5000), st.floats(-0.49, 0.49))
 def test_masses_of_a_von_mises_distribution(turns: float, kappa: float, at: float) -> None:
     density = von_mises(turns, kappa)
@@ -42,6 +43,7 @@ def test_masses_of_a_von_mises_distribution(turns: float, kappa: float, at: floa
     assert abs(apart) < 1e-5
 
 
+@settings(max_examples=4)
 @given(st.floats(0.2, 300))
 def test_entropies_and_divergences_lie_within_their_errors(kappa: float) -> None:
     one, other = von_mises(0.2, kappa), von_mises(0.3, 2.0)
@@ -59,14 +61,14 @@ def test_entropies_and_divergences_lie_within_their_errors(kappa: float) -> None
 
 
 def test_of_data_means_and_modes_are_in_their_units(pair: DensityEstimator) -> None:
-    drawn = pair.sample(10_000, random_state=0)
+    drawn = pair.sample(3_000, random_state=0)
     directions = np.angle(np.exp(1j * drawn).mean(axis=0))
-    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.04
+    assert np.abs(np.angle(np.exp(1j * (pair.mean() - directions)))).max() < 0.06
     top = pair.score_samples(pair.mode()[None])
-    assert top[0] >= pair.score_samples(drawn[:5000]).max() - 1e-9
+    assert top[0] >= pair.score_samples(drawn).max() - 1e-9
     alone = pair.marginal(0)
     shares = np.sort(alone.cdf(drawn[:, :1]))
-    assert np.abs(shares - (np.arange(10_000) + 0.5) / 10_000).max() < 0.02
+    assert np.abs(shares - (np.arange(3_000) + 0.5) / 3_000).max() < 0.03
     assert np.allclose(
         alone.cdf(alone.quantile([0.1, 0.5, 0.9])[:, None]), [0.1, 0.5, 0.9], atol=1e-6
     )

@@ -139,7 +139,7 @@ def share_of_small(
     small: dict[str, int] = {}
     rng = np.random.default_rng(7)
     for _ in range(trials):
-        for one in named_tests(draw(rng), space, NamedTestSettings(permutations=39)).tests:
+        for one in named_tests(draw(rng), space, NamedTestSettings(permutations=19)).tests:
             small[one.name] = small.get(one.name, 0) + (one.p <= 0.05)
     return {name: count / trials for name, count in small.items()}
 

@@ -82,7 +82,7 @@ def mixture() -> Mixture:
     return Mixture(parts, [0.5, 0.2, 0.1, 0.2])
 
 
-def test_it_is_evaluated_and_normalised_beside_others() -> None:
+def test_it_is_evaluated_saved_drawn_and_moved_beside_others(tmp_path: Path) -> None:
     density, grid = mixture(), even_grid(96, 2)
     values = density.log_prob(grid).exp()
     assert float(values.mean()) == pytest.approx(1, abs=1e-6)
@@ -92,20 +92,18 @@ def test_it_is_evaluated_and_normalised_beside_others() -> None:
     assert "wave 50.0%" in repr(density)
     _, slopes = log_density_gradient(density, [[0.3, 0.4]])
     assert slopes.shape == (1, 2)
+    (tmp_path / "density").write_bytes(density_to_bytes(density))
+    assert torch.equal(read_density(tmp_path / "density")[0].log_prob(grid).exp(), values)
+    line = torch.linspace(0.01, 0.99, 30, dtype=torch.float64)
+    assert density_on_grid(density, line, line, "uniform").shape == (30, 30)
+    assert highest_density_region(density, 0.5, samples=2000).size > 0
+    assert density.to(torch.float32).sample(3).dtype == torch.float32
 
 
 def test_its_samples_follow_it() -> None:
     first = Wave(Torus(1), 0.8).sample(4000, torch.Generator().manual_seed(0))[:, 0].numpy()
     cumulative = lambda x: x + 0.8 * torch.tensor(2 * math.pi * x).sin().numpy() / (2 * math.pi)  # noqa: E731
     assert stats.kstest(first, cumulative)[1] > 0.01  # type: ignore[operator]
-
-
-def test_it_is_saved_and_loaded(tmp_path: Path) -> None:
-    density, path = mixture(), tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(density))
-    again, _ = read_density(path)
-    at = even_grid(7, 2)
-    assert torch.equal(again.log_prob(at), density.log_prob(at))
 
 
 def test_it_has_marginal_and_conditional_densities() -> None:
@@ -122,14 +120,6 @@ def test_it_has_marginal_and_conditional_densities() -> None:
     rows = torch.tensor([[0.3, math.nan]], dtype=torch.float64)
     own = marginal(density, 0).log_prob(rows[:, :1])
     torch.testing.assert_close(log_prob_observed(density, rows), own, rtol=1e-4, atol=1e-4)
-
-
-def test_it_is_drawn_and_moved() -> None:
-    density = mixture()
-    line = torch.linspace(0.01, 0.99, 30, dtype=torch.float64)
-    assert density_on_grid(density, line, line, "uniform").shape == (30, 30)
-    assert highest_density_region(density, 0.5, samples=2000).size > 0
-    assert density.to(torch.float32).sample(3).dtype == torch.float32
 
 
 def test_what_is_missing_is_said(tmp_path: Path) -> None:

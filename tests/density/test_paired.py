@@ -14,7 +14,6 @@ from orbiflow.density import (
     ModelComparison,
     compare_models,
     compare_scores,
-    make_space,
 )
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.runtime import to_json
@@ -202,4 +201,3 @@ def test_models_are_compared_in_one_measure() -> None:
     globe = DensityEstimator("sphere", unit="degrees", components="mixture").fit(angles[:80])
     with refused("2", "angles", "globe"):
         compare_models({"flat": good, "globe": globe}, angles)
-    assert make_space("torus").dim == 2

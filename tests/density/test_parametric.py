@@ -43,8 +43,8 @@ SPACES = {
 @pytest.fixture(autouse=True, scope="module")
 def _few_draws() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(parametric, "DRAWS", 2_000)
-        patch.setattr(goodness, "RESAMPLES", 199)
+        patch.setattr(parametric, "DRAWS", 1_000)
+        patch.setattr(goodness, "RESAMPLES", 119)
         yield
 
 

@@ -108,15 +108,15 @@ def place_and_season(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_fit_is_near_the_truth() -> None:
-    rows, _ = place_and_season(1000, 0)
-    unseen, truth = place_and_season(1000, 1)
+    rows, _ = place_and_season(400, 0)
+    unseen, truth = place_and_season(400, 1)
     how: dict[str, Any] = {
         "columns": {3: "linear", 4: "cycle:365"},
         "components": "kernels,mixture",
     }
     fit = DensityEstimator("sphere", **how).fit(rows)
     regret = float((truth - fit.score_samples(unseen)).mean())
-    assert 0 < regret < 0.25
+    assert 0 < regret < 0.35
     # what leaves the day out cannot know where it is
     apart = fit.marginal("x", "y", "z", "beside1").score_samples(unseen[:, :4]) - np.log(365)
     assert float((truth - apart).mean()) > regret + 0.5
@@ -165,8 +165,8 @@ def test_a_period_of_its_own_is_a_unit(period: float, seed: int) -> None:
 
 def test_widths_are_tuned_where_columns_have_nothing_in_common() -> None:
     rng = np.random.default_rng(0)
-    rows, _ = place_and_season(300, 0)
-    rows[:, 3] = rng.integers(0, 5, 300) + 0.01 * rng.normal(size=300)  # five narrow layers
+    rows, _ = place_and_season(200, 0)
+    rows[:, 3] = rng.integers(0, 5, 200) + 0.01 * rng.normal(size=200)  # five narrow layers
     fit = DensityEstimator(
         "sphere", columns={3: "linear", 4: "cycle:365"}, components="kernels"
     ).fit(rows)
@@ -194,13 +194,13 @@ def test_each_conditional_on_the_base_integrates_to_one(name: str, seed: int) ->
     assert isinstance(space, ProductSpace)
     noise = torch.Generator().manual_seed(seed)
     turns = space.beside.uniform(1, noise)
-    own = space.base.uniform(20_000, noise)
+    own = space.base.uniform(5_000, noise)
     points = torch.cat([own, turns.expand(len(own), -1)], dim=1)
     joint = chains.log_prob(points, measure="uniform")
     lines = marginal(chains, range(space.base.chart_dim, space.chart_dim))
     alone = lines.log_prob(turns, measure="uniform")
     ratio = (joint - alone).exp()
-    assert float(ratio.mean()) == pytest.approx(1, abs=6 * float(ratio.std()) / 141 + 1e-9)
+    assert float(ratio.mean()) == pytest.approx(1, abs=6 * float(ratio.std()) / 70 + 1e-9)
 
 
 @given(names, seeds)
@@ -264,10 +264,10 @@ def test_three_columns_beside_a_given_place(tmp_path: Path) -> None:
 
 
 def test_em_finds_a_direction_that_goes_with_the_day() -> None:
-    rows, _ = place_and_season(600, 0)
-    unseen, truth = place_and_season(600, 1)
-    how: Any = {"columns": {3: "linear", 4: "cycle:365"}, "components": "kernels"}
-    space = DensityEstimator("sphere", **how).fit(rows).space_
+    rows, _ = place_and_season(400, 0)
+    unseen, truth = place_and_season(400, 1)
+    how: Any = {"columns": {3: "linear", 4: "cycle:365"}, "components": "mixture"}
+    space = DensityEstimator("sphere", **how).fit(rows[:60]).space_
     points = space.to_chart(rows)
     start = AdaptiveKernels(
         space, points[:1], torch.full((1, 3), 5.0).double(), torch.ones(1).double()
@@ -275,7 +275,7 @@ def test_em_finds_a_direction_that_goes_with_the_day() -> None:
     found = fit_product_chains(start, Rows(points))
     regret = truth - found.log_prob(space.to_chart(unseen), measure="natural").numpy()
     assert 0 < regret.mean() < 0.2
-    heavy = fit_product_chains(start, Rows(points, torch.ones(600).double()))
+    heavy = fit_product_chains(start, Rows(points, torch.ones(400).double()))
     assert torch.allclose(heavy.slopes, found.slopes, atol=1e-8)
     with refused("columns", "3"):
         ProductChains(ProductSpace(space.parts[0], [24.0] * 4), *found.tensors().values())

@@ -31,7 +31,7 @@ def rounded(values: Rows, step: float) -> Rows:
 @pytest.fixture(scope="module", name="plain")
 def plain_fixture() -> tuple[Rows, DensityEstimator]:
     """Weather that was not rounded, and its density."""
-    rows = weather(np.random.default_rng(0), 600)
+    rows = weather(np.random.default_rng(0), 400)
     return rows, DensityEstimator("torus", **HOW).fit(rows)
 
 
@@ -41,7 +41,7 @@ HOW = {"unit": "degrees", "components": ("kernels", "chains"), "seed": 0}
 @pytest.mark.parametrize("step", [1.0, 10.0])
 def test_rounded_weather_has_no_spikes(plain: tuple[Rows, DensityEstimator], step: float) -> None:
     rows, density = plain
-    new = weather(np.random.default_rng(1), 600)
+    new = weather(np.random.default_rng(1), 400)
     with warned(f"{step:g}", kind=DataWarning):
         found = DensityEstimator("torus", **HOW).fit(rounded(rows, step))
     # what rounding loses, and not 3 nats of spikes

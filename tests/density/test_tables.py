@@ -206,11 +206,15 @@ def test_missing_and_infinite_values(tmp_path: Path) -> None:
             rows_of_file(path, columns=("a=angle", "b=angle"), drop_missing="no value" in about)
 
 
-def test_no_file(tmp_path: Path) -> None:
+def test_no_file_or_one_that_is_too_large(tmp_path: Path) -> None:
     refuse(tmp_path / "a.csv", "file")
     refuse(tmp_path, "folder")
     refuse(tmp_path / "a\0.csv", "read")
-    refuse(write(tmp_path, "1,2") / "b.csv", "read")
+    path = write(tmp_path, "1,2")
+    refuse(path / "b.csv", "read")
+    with path.open("r+b") as file:
+        file.truncate(2**31 + 1)  # sparse
+    refuse(path, "2.0 GiB 2")
 
 
 def test_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,22 +227,15 @@ def test_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     refuse(path, "read")
 
 
-def test_size_is_checked_before_reading(tmp_path: Path) -> None:
-    path = write(tmp_path, "1,2\n")
-    with path.open("r+b") as file:
-        file.truncate(2**31 + 1)  # sparse
-    refuse(path, "2.0 GiB 2")
-
-
 def test_memory_is_bounded(tmp_path: Path) -> None:
-    path = write(tmp_path, "lat,lon\n" + "12.3456,65.4321\n" * 100_000)
+    path = write(tmp_path, "lat,lon\n" + "12.3456,65.4321\n" * 30_000)
     size = path.stat().st_size
     assert len(read_table(write(tmp_path, "a\n1\n", "b.csv")).names) == 1  # pandas is imported
     tracemalloc.start()
     table = read_table(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert values_of(table).shape == (100_000, 2)
+    assert values_of(table).shape == (30_000, 2)
     assert peak < 5 * size + 2**20
 
 

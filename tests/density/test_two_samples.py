@@ -134,12 +134,12 @@ def test_whole_groups_are_drawn() -> None:
 
 def test_divergences_are_near_those_of_the_densities() -> None:
     rng = np.random.default_rng(0)
-    kappa, shift, rows = 3.0, 1.2, 700
+    kappa, shift, rows = 3.0, 1.2, 500
     one = rng.vonmises([0.0, 0.0], kappa, (rows, 2))
     other = rng.vonmises([0.0, shift], kappa, (rows, 2))
     found = compare_samples(
         {"a": one, "b": other},
-        settings=DataComparisonSettings(permutations=99, bootstrap=300, divergence=True),
+        settings=DataComparisonSettings(permutations=99, bootstrap=150, divergence=True),
     ).divergence
     assert found is not None
     t = (np.arange(4000) + 0.5) / 4000 * 2 * math.pi - math.pi

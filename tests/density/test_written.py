@@ -43,7 +43,7 @@ def space_of(name: str, values: Array, **how: Any) -> Space:
 
 
 @given(SHIFTS)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_values_come_back_as_they_were(shift: tuple[float, bool, int]) -> None:
     angles, latitudes = column(*shift), np.linspace(1, 80, 201)
     hours = column(*shift, period=24.0)
@@ -63,7 +63,7 @@ def test_values_come_back_as_they_were(shift: tuple[float, bool, int]) -> None:
 
 
 @given(SHIFTS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_means_lie_in_the_turn_of_the_data(shift: tuple[float, bool, int]) -> None:
     angles, first = column(*shift), 0.0 if shift[1] else -180.0
     rows = np.stack([np.full(len(angles), 20.0), angles], axis=1)
@@ -106,8 +106,8 @@ def test_regions_are_written_as_the_data_and_geojson_as_its_standard_says(
         centers = space.to_chart([[lat, lon], [lat, (lon + 40) % 360]])
         kappa, weights = torch.tensor([[20.0], [30.0]]), torch.tensor([0.5, 0.5])
         density = AdaptiveKernels(space, centers, kappa.double(), weights.double())
-        levels = DensityLevels(density, samples=4000)
-        (one,) = outlines(levels, [levels.highest(0.9)], budget=40_000)
+        levels = DensityLevels(density, samples=2000)
+        (one,) = outlines(levels, [levels.highest(0.9)], budget=30_000)
         low, _, high, _ = one.shape.bounds
         first = 0 if from_zero else -180
         assert first <= low < high <= first + 360

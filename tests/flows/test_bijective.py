@@ -135,7 +135,9 @@ def test_it_is_saved(tmp_path: Path) -> None:
     assert not load_flow(plain).bijective
 
 
-def test_a_field_without_a_bound_is_refused() -> None:
+def test_unknown_methods_and_fields_without_a_bound_are_refused() -> None:
+    with refused("leapfrog", "euler"):
+        method("leapfrog")
     with refused("lipschitz_bound()", "FourierField"):
         Flow(torch.sin, bijective=True)
 
@@ -151,7 +153,7 @@ def test_a_field_that_runs_away_is_told(size: float) -> None:
 
 
 STEEP = random_field(space_group("P2_1/c", 0), 2, 0, rms=0.8)
-POINTS = random_tensor(0, 200, 3)
+POINTS = random_tensor(0, 60, 3)
 
 
 def roundtrip(flow: Flow) -> float:
@@ -172,7 +174,7 @@ def test_a_steep_flow_of_few_steps_warns_once_with_steps_that_do():
         warnings.simplefilter("error")
         assert roundtrip(flow) > 0.3  # once is enough
         assert roundtrip(flow.with_steps(int(found[2]))) < 0.05
-        assert roundtrip(flow.with_steps(512)) < 1e-6
+        assert roundtrip(flow.with_steps(256)) < 1e-5
 
 
 @torch.no_grad()
@@ -264,11 +266,6 @@ def test_order_conditions_hold_up_to_the_order(name):
     assert all(met)
     missed = [abs(left - right) for order, left, right in conditions if order == ORDERS[name] + 1]
     assert not missed or max(missed) > 1e-3
-
-
-def test_an_unknown_method_is_refused_with_the_known_ones():
-    with refused("leapfrog", "euler"):
-        method("leapfrog")
 
 
 @pytest.mark.parametrize(

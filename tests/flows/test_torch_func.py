@@ -4,7 +4,6 @@ import warnings
 
 import pytest
 import torch
-from hypothesis import given, settings
 from torch import Tensor
 from torch.func import functional_call, grad, hessian, jacfwd, jacrev, vmap
 
@@ -12,15 +11,7 @@ from orbiflow.errors import CoarseStepsWarning
 from orbiflow.fields import SplineField, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import identification_group, wallpaper_group
-from strategies import (
-    central_difference,
-    gentle_field,
-    groups,
-    neural_field,
-    random_tensor,
-    seeds,
-    several,
-)
+from strategies import central_difference, gentle_field, neural_field, random_tensor, several
 
 # of torch itself, the first time that forward mode is used
 pytestmark = pytest.mark.filterwarnings(
@@ -56,18 +47,6 @@ FLOWS = {
     "function": function_flow,
 }
 every_kind = pytest.mark.parametrize("kind", FLOWS)
-
-
-@settings(max_examples=3)
-@given(groups, seeds)
-def test_jacobians_are_those_of_finite_differences(group, seed):
-    flow = Flow(gentle_field(group, 2, seed), steps=4, warn=False)
-    points = random_tensor(seed, 3, group.dim)
-    with torch.no_grad():
-        numerical = central_difference(flow, points, 1e-5)
-    for transform in (jacrev, jacfwd):
-        found = vmap(transform(flow))(points).detach()
-        torch.testing.assert_close(found, numerical, rtol=1e-6, atol=1e-6)
 
 
 @every_kind
@@ -106,7 +85,7 @@ def test_the_log_determinant_has_a_gradient(kind):
     torch.testing.assert_close(forward, backward, rtol=1e-9, atol=1e-9)
 
 
-@every_kind
+@pytest.mark.parametrize("kind", ["fourier", "spline"])  # which have derivatives of their own
 def test_hessians(kind):
     flow, point = FLOWS[kind](), random_tensor(5, 2)
 

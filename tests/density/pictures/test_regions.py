@@ -69,8 +69,9 @@ def vertices(figure: Any) -> list[np.ndarray]:
     return [np.concatenate([p.vertices for p in one.get_paths()]) for one in sets]
 
 
-@pytest.mark.parametrize("measure", MEASURES)
-@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize(
+    ("name", "measure"), list(zip(SPACES, (*MEASURES, "natural"), strict=True))
+)
 def test_lines_are_where_the_density_is_that_of_the_edge(name: str, measure: str) -> None:
     density = broad(name)
     lines, view = lines_of(density, 0.5, 0.9), view_of(density.space, None, None)
