@@ -40,6 +40,7 @@ EDGE_PIXELS = 7  # of these, twice as wide as what an outline's soft edge takes,
 MIN_COLOURED_SHARE = 0.005  # of a silhouette without its edge: an eye
 SUPERSAMPLING = 3  # along each side of a pixel of what is drawn
 ABOUT_PARTS = ("kept the largest", "filled ")  # how notes on parts and holes begin
+GUESSED = ("photograph:", "only ")  # how notes begin on what may be another part of a picture
 PAPER, INK = (255, 255, 255), (70, 78, 92)
 
 
@@ -274,11 +275,12 @@ def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]
     outline = pixels(target.outline)
     is_coloured = _is_coloured(picture, outline, pixels(read.outline))
     is_cut_out = target.kind != "image" or picture.mode == "RGBA"
+    is_guessed = any(note.startswith(GUESSED) for note in target.notes)
     return {
         "outline": outline,
         "mark": hashlib.sha256(json.dumps(outline).encode()).hexdigest()[:12],
         "coloured": is_coloured,
-        "clear": (is_cut_out or not is_coloured) and not (lost or doubted),
+        "clear": (is_cut_out or not is_coloured) and not (lost or doubted or is_guessed),
         "told_apart": _are_told_apart(picture, outline),
         "width": size[0],
         "height": size[1],

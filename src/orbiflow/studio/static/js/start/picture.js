@@ -108,9 +108,9 @@ class PicturePage {
       "div",
       { class: "stack side" },
       h("div", { class: "go" }, this.find, this.searches, this.wishes.effort),
-      this.both.root,
-      this.controls.root,
       paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]),
+      this.controls.root,
+      this.both.root,
     );
     put(
       root,
