@@ -15,7 +15,7 @@ from PIL import Image
 from artworks import EYE, art_settings, copies_of, flat, motif_on, pixels_of, squirrel
 from orbiflow.drawing import palette
 from orbiflow.errors import InputFileError
-from orbiflow.tiles import Made, Over, Uses, artwork, read_outline, read_over, write_dxf, write_pdf
+from orbiflow.tiles import Made, Over, artwork, read_outline, read_over, write_dxf, write_pdf
 from orbiflow.tiles.page import INK, PathPart
 from refusals import refused
 
@@ -60,56 +60,6 @@ def region(part: PathPart) -> Any:
         ring = shapely.Polygon(curve.pieces[:, 0]).buffer(0)
         found = found.symmetric_difference(ring)
     return found
-
-
-def colours_at(art: Made, points: np.ndarray) -> np.ndarray:
-    """What the scene shows at points of the page in pixels, by shapely; NaN next to any line."""
-    scene = art.scenes[0]
-    unit = 25.4 / art.settings.dpi
-    places = shapely.points(points * unit)
-    chosen = palette(art.settings.palette)
-    found = np.full((len(points), 3), np.nan)
-    tile = shapely.Polygon(scene.symbols["tile"].pieces[:, 0])
-    near = 1.5 * unit
-    for layer in scene.layers:
-        for item in layer.items:
-            if not isinstance(item, Uses):
-                continue
-            for which, offset in zip(item.which, item.offsets, strict=True):
-                move = [*item.linear[which].ravel(), *offset]
-                whole = shapely.affinity.affine_transform(tile, move)
-                own = shapely.contains(whole, places)
-                if item.symbol == "tile":
-                    found[own] = rgb(layer.style.fill or chosen.outline)
-                    found[shapely.distance(whole.exterior, places) < near] = np.nan
-                    continue
-                for part in scene.motifs[item.symbol].parts:
-                    area = region(part)
-                    if part.style.fill is None:
-                        lines = [shapely.LinearRing(curve.pieces[:, 0]) for curve in part.curves]
-                        area = shapely.MultiLineString(lines).buffer(part.style.width / 2)
-                    area = shapely.affinity.affine_transform(area, move)
-                    inside = own & shapely.contains(area, places)
-                    colour = part.style.fill or part.style.stroke or ""
-                    colour = layer.ink if colour == INK else colour
-                    paint = rgb(colour or "")
-                    found[inside] += part.opacity * (paint - found[inside])
-                    found[shapely.distance(area.boundary, places) < near] = np.nan
-    return found
-
-
-@pytest.mark.parametrize("name", ["IH4", "IH21"])
-def test_vector_and_raster_agree(name: str, tmp_path: Path) -> None:
-    art = drawn(name, BODY, tmp_path)
-    made = pixels_of(art).astype(float)
-    rows, columns = np.mgrid[3:200:10, 3:300:10].reshape(2, -1)
-    expected = colours_at(art, np.stack([columns, rows], axis=1) + 0.5)
-    known = np.isfinite(expected).all(axis=1)
-    assert known.mean() > 0.3
-    apart = np.abs(made[rows, columns] - expected)[known]
-    assert np.quantile(apart, 0.995) <= 2.5
-    seen = {tuple(colour) for colour in np.rint(expected[known]).astype(int).tolist()}
-    assert {(16, 48, 192), (255, 204, 0)} <= seen
 
 
 @pytest.mark.parametrize("strokes", ["hatch", "echoes", "feathers"])
@@ -157,12 +107,17 @@ def test_a_picture_in_an_svg_is_one_image() -> None:
     assert (image[..., 3] > 0).mean() > 0.4
 
 
-def test_other_formats_hold_artwork_unless_it_is_pixels(tmp_path: Path) -> None:
-    art = drawn("IH4", BODY, tmp_path)
+@pytest.mark.parametrize("name", ["IH4", "IH21"])
+def test_other_formats_hold_artwork_unless_it_is_pixels(name: str, tmp_path: Path) -> None:
+    art = drawn(name, BODY, tmp_path)
     scene, pixels = art.scenes[0], np.asarray(pixels_of(art), dtype=float)
+    shares = [(pixels == colour).all(axis=2).mean() for colour in ((16, 48, 192), (255, 204, 0))]
+    assert min(shares) > 0.01
     page = pypdfium2.PdfDocument(write_pdf(scene))[0]
     shown = page.render(scale=art.image().width / page.get_width()).to_pil().convert("RGB")
-    assert np.abs(np.asarray(shown.resize(pixels.shape[1::-1])) - pixels).mean() < 3.4
+    apart = np.abs(np.asarray(shown.resize(pixels.shape[1::-1])) - pixels).max(axis=2)
+    assert apart.mean() < 6
+    assert np.median(apart) <= 2
     assert write_dxf(scene, tolerance=0.1).startswith("  0\nSECTION")
     tile = squirrel("IH4")
     with refused("DXF", "SVG"):
@@ -207,17 +162,11 @@ def test_lines_that_no_clip_cuts_stay_lines(tmp_path: Path) -> None:
     assert [part.style.stroke for part in over.drawing.parts] == ["#000000"]
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
-        '<path {0} stroke-width="20"/>'  # wide ones bend with the tile
-    ],
-)
-def test_strokes_that_are_no_plain_lines_are_carried_as_regions(body: str, tmp_path: Path) -> None:
+def test_wide_strokes_are_carried_as_regions(tmp_path: Path) -> None:
     """The same region is carried as when it is drawn as a fill."""
     tile = squirrel("IH4")
     line = 'd="M350 250L620 380" fill="none" stroke="#000000"'
-    over = read_over(svg_of("IH4", body.format(line), tmp_path), tile)
+    over = read_over(svg_of("IH4", f'<path {line} stroke-width="20"/>', tmp_path), tile)
     seen = read_outline(tmp_path / "drawing.svg").seen
     assert seen is not None
     filled = "".join(

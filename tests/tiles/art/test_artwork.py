@@ -16,7 +16,6 @@ from artworks import (
     art_settings,
     checkerboard,
     copies_of,
-    face,
     flat,
     picture,
     pixels_of,
@@ -127,29 +126,6 @@ def test_a_checkerboard_is_carried(name: str) -> None:
     clear &= shapely.distance(shapely.points(points), rings) > 3
     assert clear.sum() > 500
     np.testing.assert_allclose(made[row, column][clear], parity[clear], atol=0.02)
-
-
-@pytest.mark.parametrize("name", ["IH4", "IH6"])
-def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
-    tile = squirrel(name)
-    art = artwork(tile, settings(area="480x320px"), Over(face(tile)))
-    made = pixels_of(art).astype(int)
-    eye = tile.forward(np.array(EYE))[None]
-    symbol = art.scenes[0].symbols["tile"].pieces[:, 0]
-    known = np.column_stack([tile.tile.polygon, np.ones(len(symbol))])
-    at = np.append(eye[0], 1.0) @ np.linalg.lstsq(known, symbol, rcond=None)[0]
-    linear, offsets = copies_of(art)[:2]
-    places = linear @ at + offsets
-    shown = ((places > 4) & (places < (476, 316))).all(axis=1)
-    assert shown.sum() >= 4
-    for x, y in places[shown]:
-        red, green, _ = made[int(y), int(x)]
-        assert red > 200
-        assert green < 60
-    reds = ((made[..., 0] > 200) & (made[..., 1] < 60)).sum()
-    assert reds < 40 * (shown.sum() + 8)
-    mirrored = np.linalg.det(tile.tile.group.linear_parts) < 0
-    assert mirrored.any() == (name in ("IH2", "IH3", "IH5", "IH6"))
 
 
 def test_triangles_and_what_is_around_them() -> None:

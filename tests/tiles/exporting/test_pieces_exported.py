@@ -13,7 +13,6 @@ from shapely.affinity import translate
 
 from artworks import squirrel
 from exported import dxf_lines, polygons, scenes, sheet_content, svg_lines, tile_of, tiles
-from orbiflow.errors import SettingError
 from orbiflow.tiles import ExportSettings, Scene, Tile, as_tile, polygons_in
 from orbiflow.tiles.make import cut_ring
 from orbiflow.tiles.make.jigsaws import LEAST_SHARE
@@ -303,20 +302,6 @@ def test_the_pieces_lie_in_the_tray() -> None:
     assert sum(piece.area for piece in laid) == pytest.approx(
         shapely.union_all(laid).area, rel=1e-4
     )
-
-
-@pytest.mark.parametrize(
-    ("options", "name"),
-    [
-        ({"cut": "pieces", "tray": 10.0}, "tray"),
-        ({"bed": (100.0, 80.0)}, "bed"),
-        ({"kerf": 0.1}, "kerf"),
-        ({"clip": True}, "clip"),
-    ],
-)
-def test_options_that_do_not_go_together(options, name: str) -> None:
-    with refused(name, kind=SettingError):
-        ExportSettings(**{**OPTIONS, **options})
 
 
 def test_a_rectangle_that_is_one_piece() -> None:

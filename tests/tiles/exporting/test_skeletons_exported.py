@@ -103,11 +103,6 @@ def test_the_border_only_where_it_is_asked_for() -> None:
     assert shapely.area(faces).sum() == pytest.approx(AREA[0] * AREA[1], rel=1e-3)
 
 
-def test_a_kerf_is_refused() -> None:
-    with refused("kerf", "cut", "skeleton"):
-        ExportSettings(cut="skeleton", kerf=0.1)
-
-
 def test_edges_that_match_as_curves_alone_have_no_skeleton() -> None:
     brick = Tile(
         np.array([[0, 0], [2, 0], [2, 1], [0, 1]]), wallpaper_group("p1", [[2, 1], [0, 1]])

@@ -19,7 +19,6 @@ from exported import dxf_lines, polygons, scenes, sheet_content, svg_lines, tile
 from orbiflow.tiles import CLASSES, EscherTile, ExportSettings, Tile, colouring
 from orbiflow.tiles.page import longer_side, smallest_rectangle
 from orbiflow.tiles.write import write_scene
-from refusals import refused
 
 INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -73,30 +72,6 @@ def test_a_tiling_is_turned_counterclockwise_on_the_page(cut: Literal["none", "s
     assert first == second  # half turns stay half turns
 
 
-def test_pieces_are_not_turned() -> None:
-    with refused("rotate", "cut", "pieces"):
-        ExportSettings(cut="pieces", rotate=30)
-
-
-@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
-def test_edges_that_tiles_share_are_the_same(name: str) -> None:
-    found = polygons([x for x in svg_lines(text_of(tile_of(name))) if x.layer != "paper"])
-    # every point of a boundary within the tiling lies on a neighbour's
-    tree = shapely.STRtree([polygon.exterior for polygon in found])
-    inner = shapely.union_all(found).buffer(-1.0)
-    worst = 0.0
-    for k, polygon in enumerate(found):
-        points: Any = shapely.points(np.asarray(polygon.exterior.coords))
-        points = points[shapely.contains(inner, points)]
-        own, near = tree.query(points, predicate="dwithin", distance=1.0)
-        others = near != k
-        distance = np.full(len(points), np.inf)
-        rings = tree.geometries[near[others]]
-        np.minimum.at(distance, own[others], shapely.distance(points[own[others]], rings))
-        worst = max(worst, distance.max(initial=0))
-    assert worst < 0.003  # mm: the last of the decimals, of matrix and symbol
-
-
 @pytest.mark.parametrize("name", CLASSES)
 def test_sizes_are_what_was_asked_for(name: str) -> None:
     text = text_of(tile_of(name), tile_size=37.0, area=(210.0, 148.5))
@@ -139,13 +114,6 @@ def test_the_picture_is_the_way_up_that_the_input_has() -> None:
             rings = shapely.LinearRing(moved), shapely.LinearRing(own)
             apart.append(shapely.hausdorff_distance(*rings))
         assert min(apart) < 0.15
-
-
-def test_ten_thousand_tiles_are_a_small_file() -> None:
-    text = text_of(tile_of("IH5"), tile_size=5.0, area=(450.0, 450.0), clip=True)
-    count = text.count("<use ")
-    assert 10_000 < count < 20_000
-    assert len(text) < 110 * count
 
 
 def test_decimals_follow_the_tolerance() -> None:

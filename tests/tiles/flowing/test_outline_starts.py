@@ -10,7 +10,6 @@ import shapely
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
@@ -26,7 +25,6 @@ from orbiflow.tiles.flowing.starts import (
     outline_starts,
     template_starts,
 )
-from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.search import Placements, Prototiles, best_placements, template_symmetries
 from strategies import divided_start
 
@@ -165,64 +163,9 @@ SYMMETRIES = {
 }
 
 
-def placed(name: str, angle: float, mirrored: bool) -> tuple[np.ndarray, CrystallographicGroup]:
-    """Template and group of a start."""
-    model = TileModel(
-        CLASSES[name],
-        torch.tensor([angle], dtype=torch.float64),
-        mirrored=torch.tensor([mirrored]),
-        max_frequency=1,
-    )
-    return model.place(model.template()).detach().numpy()[0], extract_tile(model)[0].group
-
-
-def same_group(a: CrystallographicGroup, b: CrystallographicGroup) -> bool:
-    """Equality as sets of isometries, from lattices and coset representatives alone."""
-    change = np.linalg.solve(a.lattice, b.lattice)
-    if abs(change - change.round()).max() > 1e-9 or abs(abs(np.linalg.det(change)) - 1) > 1e-9:
-        return False
-
-    def within(g, others) -> bool:
-        for h in others:
-            shift = np.linalg.solve(a.lattice, g.translation - h.translation)
-            if abs(g.linear - h.linear).max() < 1e-9 and abs(shift - shift.round()).max() < 1e-9:
-                return True
-        return False
-
-    return len(a.cosets) == len(b.cosets) and all(within(g, b.cosets) for g in a.cosets)
-
-
-def same_start(a: tuple[np.ndarray, CrystallographicGroup], b) -> bool:
-    """Whether two placed templates are the same polygon with the same group."""
-    gaps = np.linalg.norm(a[0][:, None] - b[0][None], axis=-1)
-    return bool(gaps.min(axis=1).max() < 1e-9) and same_group(a[1], b[1])
-
-
-def matching_angles(name: str, mirrored: bool) -> list[float]:
-    """All turns in [0, 2 pi) that bring a start back onto the upright one, by trying every corner."""
-    upright = placed(name, 0.0, False)
-    other, _ = placed(name, 0.0, mirrored)
-    found = []
-    for corner in upright[0]:  # the first corner must land on one of them
-        turn = math.atan2(corner[1], corner[0]) - math.atan2(other[0][1], other[0][0])
-        if same_start(placed(name, turn, mirrored), upright):
-            found.append(turn % (2 * math.pi))
-    return found
-
-
 @pytest.mark.parametrize("name", CLASSES)
 def test_symmetries(name: str) -> None:
     assert template_symmetries(CLASSES[name]) == SYMMETRIES[name]
-
-
-@pytest.mark.parametrize("name", ["IH1", "IH5"])
-def test_symmetries_by_trying_every_corner(name: str) -> None:
-    order, mirrored = SYMMETRIES[name]
-    turns = matching_angles(name, mirrored=False)
-    step = 2 * math.pi / order
-    assert len(turns) == order
-    assert all(abs(t / step - round(t / step)) < 1e-9 for t in turns)
-    assert len(matching_angles(name, mirrored=True)) == (order if mirrored else 0)
 
 
 @pytest.mark.parametrize("turns", [1, 5, 12])

@@ -124,15 +124,6 @@ def test_tiles_that_cross_themselves_are_carved_apart(monkeypatch: pytest.Monkey
         assert shapely.Polygon(plane_points(bent.tile.ring)).is_valid
 
 
-def test_a_search_that_carves_has_better_tiles() -> None:
-    plain, best = (
-        bent_tiles(squirrel_orientations()[:1], CLASSES["IH4"], settings)[0]
-        for settings in (PLAIN, SMALL)
-    )
-    assert best[0].score >= plain[0].score
-    assert best[0].fidelity.mark > plain[0].fidelity.mark + 0.1
-
-
 def test_parts_that_are_pinned_are_not_carved() -> None:
     target = animal("squirrel.dat")
     pins = Pins.at(target, [(400.0, 450.0)])

@@ -68,13 +68,6 @@ def test_bad_json(tmp_path: Path, content: str | bytes, about: str) -> None:
     assert len(str(caught.value)) < len(str(path)) + 300
 
 
-def test_repeated_vertices_are_dropped_and_said(tmp_path: Path) -> None:
-    points = [[0, 0], [2, 0], [2, 0], [2, 0], [2, 2], [0, 2], [0, 0]]
-    reading = read_outline(write(tmp_path, json.dumps(points), "a.json"))
-    assert reading.outline.tolist() == SQUARE
-    assert reading.notes == ("dropped 2 repeated vertices", UP)
-
-
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
 def test_dat(tmp_path: Path, newline: str) -> None:
     lines = ["4 ", "0.0 0.0", " 2.0\t0.0 ", "", "2e0 2.0", "0.0 2.0", "tour 1 2 3", ""]

@@ -85,15 +85,6 @@ def test_smoothing_counts_the_parts_that_it_left_out(picture: np.ndarray, thresh
         assert percent == pytest.approx(100 * outline.area / (outline.area + sum(areas)), abs=0.06)
 
 
-def test_smoothing_that_joins_all_parts_leaves_none_out() -> None:
-    mask = np.zeros((100, 200), bool)
-    mask[20:80, 10:100] = mask[30:70, 104:160] = True
-    target = Target.from_mask(mask)
-    assert any("2 components" in note for note in target.notes)
-    assert not any("components" in note for note in target.smoothed(0.1).notes)
-    assert any("2 components" in note for note in target.smoothed(0.01).notes)
-
-
 def test_smoothing_what_broken_lines_enclose_keeps_it() -> None:
     # an outline drawn with gaps: only its lines were seen, and the silhouette is what they enclose
     turns = np.radians(np.arange(360))

@@ -133,12 +133,6 @@ def test_an_empty_window_of_whole_tiles() -> None:
     assert found.neighbours(edges(tile).across).copy.shape == (0, 6)
 
 
-def test_too_many() -> None:
-    tile = tile_of("IH1")
-    with refused("window", 20000):
-        copies_inside(tile, window_of(tile, (0, 0), (200, 200)))
-
-
 def test_window_inside_one_tile() -> None:
     tile = Tile(isohedral_class("IH7").template(), isohedral_class("IH7").group())
     (only,) = patch(tile, (0.1, 0.1, 0.2, 0.2))
@@ -197,11 +191,6 @@ def test_periodic_and_deterministic(kind: IsohedralClass, make_tile: Any) -> Non
 def test_most_frequent_colour_comes_first(kind: IsohedralClass, make_tile: Any) -> None:
     counts = np.bincount(colouring(make_tile(kind)).table.ravel())
     assert (np.diff(counts) <= 0).all()
-
-
-def test_chessboard() -> None:
-    tile = Tile(SQUARE, CrystallographicGroup.generate(np.eye(2)))
-    assert colouring(tile).count == 2
 
 
 @pytest.mark.parametrize("skew", [0.5, 7.3, 97.25, 5040.5])
