@@ -49,10 +49,17 @@ def random_function(group: CrystallographicGroup, seed: int) -> tuple[Function, 
 
 
 def random_tile(name: str, seed: int, cubes: int = 500) -> tuple[CellTile, Function]:
-    """Return the ball of cells of a random function, and the function."""
+    """Return the ball of cells of a random function, and the function.
+
+    As in a search, another grid is tried where one does not close.
+    """
     group = group_named(name)
     function, middle = random_function(group, seed)
-    return close_tile(function, middle - 1, middle + 1, cell_complex(group, cubes)), function
+    for share in (1.0, 0.8, 0.65):
+        grid = cell_complex(group, round(share * cubes))
+        if (tile := close_tile(function, middle - 1, middle + 1, grid)).is_ball:
+            break
+    return tile, function
 
 
 def dirichlet_solid(group: CrystallographicGroup) -> Mesh:

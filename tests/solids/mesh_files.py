@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from manifold3d import Manifold
-from scipy.spatial import HalfspaceIntersection
 
 from orbiflow.arrays import Array
 from orbiflow.solids import Mesh, reading
@@ -34,7 +33,7 @@ def ball(
     return as_mesh(Manifold.sphere(radius, segments).translate(at))
 
 
-def read_in_this_process(patch: pytest.MonkeyPatch) -> None:
+def bare_reads(patch: pytest.MonkeyPatch) -> None:
     """Read 3MF and glTF without the process that bounds memory and time, which takes a second."""
     patch.setattr(reading, "read_bounded", read_here)
 
@@ -113,25 +112,10 @@ LESS, MORE = slice(None, -1), slice(1, None)
 SQUARE = (LESS, LESS), (MORE, LESS), (MORE, MORE), (LESS, MORE)
 
 
-def dirichlet_cell(group: CrystallographicGroup, place: Array) -> Mesh:
-    """The points that are nearer to a place than to its images: a convex tile."""
-    others = group.elements_near(place, 3 * np.abs(group.lattice).max(), source=place)[1:]
-    images = np.stack([own(place) for own in others])
-    normals = images - place
-    offsets = -np.einsum("ij,ij->i", normals, (images + place) / 2)
-    corners = HalfspaceIntersection(np.column_stack([normals, offsets]), place).intersections
-    return as_mesh(Manifold.hull_points(np.unique(corners.round(9), axis=0)))
-
-
 def space_tile(
     tile: Mesh, group: CrystallographicGroup | None = None, figure: Mesh | None = None
 ) -> Any:
     """What is known of a solid, by default of the cubic group, whose figure is by default itself."""
-    return SimpleNamespace(
-        group=group or cubic_group(),
-        tile=tile,
-        target=figure or tile,
-        bent=figure or tile,
-        millimetres=30.0,
-        upright=np.eye(3),
-    )
+    figure, group = figure or tile, group or cubic_group()
+    known = {"group": group, "tile": tile, "target": figure, "bent": figure}
+    return SimpleNamespace(**known, millimetres=30.0, upright=np.eye(3))

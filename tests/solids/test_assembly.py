@@ -24,8 +24,8 @@ from orbiflow.solids.separable import (
 from orbiflow.solids.stacks import stack_of
 from orbiflow.symmetry import space_group
 from refusals import refused
-from solids.known_solids import ball, creature, group_named, hooked_tile
-from solids.mesh_files import box, bumpy_cell, cubic_group, dirichlet_cell
+from solids.known_solids import ball, creature, dirichlet_solid, group_named, hooked_tile
+from solids.mesh_files import box, bumpy_cell, cubic_group
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -179,7 +179,7 @@ def test_thin_cones(normals: list[list[float]], dimension: int, rays: int) -> No
 
 def test_cells_of_screw_axes_come_apart() -> None:
     group = space_group("P 21 21 21", cell=(1.5, 1.6, 1.7))
-    tile = dirichlet_cell(group, np.array([0.31, 0.22, 0.45]))
+    tile = dirichlet_solid(group)
     assert tile.volume == pytest.approx(group.cell_volume / 4)
     pieces = Pieces(group, tile)
     assert sum(own.area for own in pieces.contacts) == pytest.approx(tile.area)

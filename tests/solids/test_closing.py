@@ -5,7 +5,6 @@ import itertools
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError
 from orbiflow.solids.cell_shapes import cubes, tetrahedra, triangular_prisms
@@ -77,8 +76,7 @@ def test_a_ring_is_cut_so_that_no_handle_is_left():
 def test_a_small_box_is_widened_until_all_orbits_are_in_it():
     group = group_named("P 21 21 21")
     function, middle = random_function(group, 1)
-    tile = close_tile(function, middle - 0.1, middle + 0.1, cell_complex(group, 300))
-    assert tile.is_ball
+    assert close_tile(function, middle - 0.1, middle + 0.1, cell_complex(group, 300)).is_ball
 
 
 def test_what_is_far_from_a_body_is_not_asked():
@@ -100,10 +98,9 @@ def test_what_is_far_from_a_body_is_not_asked():
 
 def test_a_function_that_is_not_a_number_is_refused():
     group = group_named("P 1")
+    nowhere = lambda x: np.full(len(x), np.nan)  # noqa: E731
     with refused("function"):
-        close_tile(
-            lambda x: np.full(len(x), np.nan), -np.ones(3), np.ones(3), cell_complex(group, 200)
-        )
+        close_tile(nowhere, -np.ones(3), np.ones(3), cell_complex(group, 200))
 
 
 def cube_ball(number: int = 6) -> BallOfCells:
@@ -117,16 +114,12 @@ def number_of(ball: BallOfCells, *block: int) -> int:
     return int(ball.box.numbers(np.array([[*block, 0]]))[0])
 
 
-def test_cells_that_touch_in_an_edge_or_corner_are_not_attached():
+def test_cells_touch_in_faces_and_never_close_a_ring():
     ball = cube_ball()
     ball.attach(number_of(ball, 2, 2, 2))
-    assert not ball.can_attach(number_of(ball, 3, 3, 2))
-    assert not ball.can_attach(number_of(ball, 3, 3, 3))
-    assert not ball.can_attach(number_of(ball, 4, 2, 2))
+    reach = [ball.can_attach(number_of(ball, *at)) for at in ((3, 3, 2), (3, 3, 3), (4, 2, 2))]
+    assert reach == [False] * 3
     assert ball.can_attach(number_of(ball, 3, 2, 2))
-
-
-def test_a_ring_of_cells_never_closes():
     ball = cube_ball()
     ring = [(1, 1), (1, 2), (1, 3), (2, 3), (3, 3), (3, 2), (3, 1)]
     for x, y in ring:
@@ -136,10 +129,8 @@ def test_a_ring_of_cells_never_closes():
 
 def test_a_cell_is_not_detached_where_the_hole_would_touch_the_outside():
     ball = cube_ball()
-    for x in (1, 2, 3):
-        for y in (1, 2, 3):
-            for z in (1, 2):
-                ball.attach(number_of(ball, x, y, z))
+    for cell in itertools.product((1, 2, 3), (1, 2, 3), (1, 2)):
+        ball.attach(number_of(ball, *cell))
     middle = number_of(ball, 2, 2, 2)
     assert ball.detach(middle)  # a dent
     ball.attach(middle)
@@ -161,17 +152,13 @@ SHAPES = {"P 21 3": "tetrahedra", "R 3": "triangular prisms", "P 3": "triangular
 
 
 @pytest.mark.parametrize("name", sorted(CELLS))
-def test_the_conventional_group_is_the_same_group(name):
+def test_orbits_have_as_many_cells_as_the_group_has_cosets(name):
     group = group_named(name)
     own = conventional_group(group)
     assert own == group
     assert np.linalg.det(own.lattice) > 0
     assert own.name == group.name
-
-
-@pytest.mark.parametrize("name", sorted(CELLS))
-def test_orbits_have_as_many_cells_as_the_group_has_cosets(name):
-    grid = cell_complex(group_named(name), 400)
+    grid = cell_complex(group, 400)
     counts = np.bincount(grid.orbits.ravel())
     assert len(counts) == grid.cells_per_tile
     assert (counts == grid.group.order).all()
@@ -236,22 +223,15 @@ def test_discs_on_a_cube_are_one_connected_part_with_a_connected_rest():
     assert sum(discs) == 56
 
 
-@given(st.sampled_from(["P 1 m 1", "P n m a", "P 4/m m m", "F d -3 m:1"]))
-@settings(max_examples=4)
-def test_groups_with_mirrors_are_refused(name):
-    with refused(name, "mirrors", kind=GroupError):
-        cell_complex(space_group(name), 500)
-
-
-def test_groups_of_the_plane_are_refused():
-    with refused("dimension", 2, kind=GroupError):
-        cell_complex(wallpaper_group("p1"), 500)
-
-
-def test_a_group_whose_origin_is_off_its_centres_is_refused_with_advice():
-    group = group_named("P -1").conjugate(np.eye(3), [0.123, 0.0456, 0.0789])
-    with refused("P -1", "origin", kind=GroupError):
-        cell_complex(group, 500)
+def test_groups_that_have_no_cells_are_refused():
+    off_its_centres = group_named("P -1").conjugate(np.eye(3), [0.123, 0.0456, 0.0789])
+    cases = [
+        ((name, "mirrors"), space_group(name)) for name in ("P 1 m 1", "P n m a", "F d -3 m:1")
+    ]
+    cases += [(("dimension", 2), wallpaper_group("p1")), (("P -1", "origin"), off_its_centres)]
+    for about, group in cases:
+        with refused(*about, kind=GroupError):
+            cell_complex(group, 500)
 
 
 def test_a_lattice_that_is_not_along_the_axes_is_replaced():

@@ -21,7 +21,7 @@ from orbiflow.solids.settings import EmphasisSphere, FillSettings, Painted
 from orbiflow.solids.soup import Soup
 from refusals import refused
 from solids.known_solids import creature
-from solids.mesh_files import CORE, archive, ball, obj, read_in_this_process, stl
+from solids.mesh_files import CORE, archive, ball, bare_reads, obj, stl
 from solids.small_fills import SMALL, creature_file
 
 GREY, RED = (0.8, 0.8, 0.8), (0.9, 0.1, 0.1)
@@ -48,19 +48,15 @@ def share_of_head(mesh: Mesh) -> float:
     return float(areas @ head_of(mesh)[mesh.faces].mean(axis=1) / areas.sum())
 
 
-def by_trimesh(mesh: Mesh, kind: str, colours: Array) -> bytes:
+def ply(mesh: Mesh, colours: Array, of: str = "vertex_colors") -> bytes:
+    """A PLY with colours of its points or faces."""
     own: Any = trimesh.Trimesh(mesh.points, mesh.faces, process=False)
-    own.visual.vertex_colors = np.rint(255 * colours).astype(np.uint8)
-    found: Any = own.export(file_type=kind)
-    return found if isinstance(found, bytes) else found.encode()
+    setattr(own.visual, of, np.rint(255 * colours).astype(np.uint8))
+    return own.export(file_type="ply")
 
 
 def with_faces_coloured(mesh: Mesh) -> bytes:
-    own: Any = trimesh.Trimesh(mesh.points, mesh.faces, process=False)
-    found = colours_of(mesh)[mesh.faces].mean(axis=1)
-    own.visual.face_colors = np.rint(255 * found).astype(np.uint8)
-    content: Any = own.export(file_type="ply")
-    return content
+    return ply(mesh, colours_of(mesh)[mesh.faces].mean(axis=1), "face_colors")
 
 
 def painted_obj(mesh: Mesh, most: float = 1.0) -> bytes:
@@ -93,15 +89,12 @@ def painted_3mf(mesh: Mesh, by: str) -> bytes:
             paint = 'pid="7" p1="1"' if own.all() else ""
         rows.append(f"<triangle {corners} {paint}/>")
     points = "".join('<vertex x="{:.9g}" y="{:.9g}" z="{:.9g}"/>'.format(*p) for p in mesh.points)
-    grey, head = "#CCCCCC", "#E61A1AFF"
-    palette = (
-        f'<m:colorgroup id="7"><m:color color="{grey}"/><m:color color="{head}"/></m:colorgroup>'
-    )
+    colours = "#CCCCCC", "#E61A1AFF"
+    palette = "".join(f'<m:color color="{own}"/>' for own in colours)
+    palette = f'<m:colorgroup id="7">{palette}</m:colorgroup>'
     if by == "object":
-        palette = (
-            f'<basematerials id="7"><base name="a" displaycolor="{grey}"/>'
-            f'<base name="b" displaycolor="{head}"/></basematerials>'
-        )
+        palette = "".join(f'<base name="{own}" displaycolor="{own}"/>' for own in colours)
+        palette = f'<basematerials id="7">{palette}</basematerials>'
     return archive(
         f'<model unit="millimeter" xmlns="{CORE}" xmlns:m="http://example.org/m"><resources>{palette}'
         f'<object id="1" pid="7" pindex="0"><mesh><vertices>{points}</vertices><triangles>'
@@ -111,7 +104,7 @@ def painted_3mf(mesh: Mesh, by: str) -> bytes:
 
 
 FILES = {
-    "a.ply": lambda mesh: by_trimesh(mesh, "ply", colours_of(mesh)),
+    "a.ply": lambda mesh: ply(mesh, colours_of(mesh)),
     "faces.ply": with_faces_coloured,
     "a.obj": painted_obj,
     "bytes.obj": lambda mesh: painted_obj(mesh, 255.0),
@@ -133,7 +126,7 @@ def painting_of(folder: Path, name: str, content: bytes) -> Painting:
 @pytest.mark.parametrize("name", FILES)
 def test_paint_is_read_in_each_format(name: str, tmp_path: Path, monkeypatch) -> None:
     if name != "a.3mf":
-        read_in_this_process(monkeypatch)
+        bare_reads(monkeypatch)
     mesh = big()
     found = painting_of(tmp_path, name, FILES[name](mesh))
     assert found.share == pytest.approx(share_of_head(mesh), abs=0.015)
@@ -148,18 +141,18 @@ def test_paint_is_kept_where_a_mesh_is_mended(tmp_path: Path) -> None:
     one, other = ball(20.0, segments=40), ball(20.0, (20, 0, 0), segments=40)
     both = joined([one, other])
     colours = np.where(np.arange(len(both.points))[:, None] < len(one.points), GREY, RED)
-    united = painting_of(tmp_path, "a.ply", by_trimesh(both, "ply", colours))
+    united = painting_of(tmp_path, "a.ply", ply(both, colours))
     assert united.share == pytest.approx(0.5, abs=0.02)
     mark = united.weights(5.0, np.array([[-19.9, 0, 0], [39.9, 0, 0]]))
     assert mark.tolist() == [1.0, 5.0]
     # a seam: each side has points of its own
     apart = Mesh(both.points[both.faces].reshape(-1, 3), np.arange(both.faces.size).reshape(-1, 3))
-    again = painting_of(tmp_path, "a.ply", by_trimesh(apart, "ply", colours[both.faces.ravel()]))
+    again = painting_of(tmp_path, "a.ply", ply(apart, colours[both.faces.ravel()]))
     assert again.share == pytest.approx(united.share, abs=1e-9)
     # what is only on a scrap that is left out is nowhere
     scrap = joined([one, ball(2.0, (50, 0, 0))])
     colours = np.where(np.arange(len(scrap.points))[:, None] < len(one.points), GREY, RED)
-    assert painting_of(tmp_path, "a.ply", by_trimesh(scrap, "ply", colours)).share == 0
+    assert painting_of(tmp_path, "a.ply", ply(scrap, colours)).share == 0
 
 
 @settings(max_examples=6, deadline=None)
@@ -225,11 +218,11 @@ def test_what_cannot_be_meant_is_refused(tmp_path: Path) -> None:
     mesh = big()
     grey = np.tile(GREY, (len(mesh.points), 1))
     only = tmp_path / "grey.ply"
-    only.write_bytes(by_trimesh(mesh, "ply", grey))
+    only.write_bytes(ply(mesh, grey))
     with refused("emphasis", "painted", "colour", kind=SettingError):
         fill_operation(only, tmp_path / "out", asked)
     rainbow = (mesh.points - mesh.points.min(axis=0)) / np.ptp(mesh.points, axis=0)
-    found = painting_of(tmp_path, "rainbow.ply", by_trimesh(mesh, "ply", rainbow))
+    found = painting_of(tmp_path, "rainbow.ply", ply(mesh, rainbow))
     with refused("emphasis", "painted", "%", kind=SettingError):
         checked_painting(found)
     assert not (tmp_path / "out").exists()
@@ -242,14 +235,9 @@ def test_it_is_said_how_much_is_painted(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_bytes(painted_obj(big()))
     cancel, told = Cancel(), list[Event]()
     cancel.cancel()
+    asked, out = SMALL.replace(emphasis=("painted,8",)), tmp_path / "out"
     with pytest.raises(Cancelled):
-        fill_operation(
-            tmp_path / "a.obj",
-            tmp_path / "out",
-            SMALL.replace(emphasis=("painted,8",)),
-            on_event=told.append,
-            cancel=cancel,
-        )
+        fill_operation(tmp_path / "a.obj", out, asked, on_event=told.append, cancel=cancel)
     share = 100 * share_of_head(big())
     (text,) = [own.text for own in told if isinstance(own, Note)]
     assert text.startswith("what is painted, ")

@@ -17,10 +17,10 @@ from refusals import refused
 from solids.mesh_files import (
     archive,
     ball,
+    bare_reads,
     box,
     inside_out,
     obj,
-    read_in_this_process,
     stl,
     stl_text,
     three_mf,
@@ -69,7 +69,7 @@ def test_formats(name: str, content: bytes, tmp_path: Path) -> None:
 
 
 def test_gltf_is_in_metres(tmp_path: Path, monkeypatch) -> None:
-    read_in_this_process(monkeypatch)
+    bare_reads(monkeypatch)
     mesh, _ = read(tmp_path, "a.glb", glb(box(0.001, 0.002, 0.003)))
     assert np.ptp(mesh.points, axis=0) == pytest.approx([1, 2, 3])
 
@@ -115,7 +115,7 @@ HOSTILE = {
 @pytest.mark.parametrize("what", HOSTILE)
 def test_gltf_that_is_hostile(what: str, tmp_path: Path, monkeypatch) -> None:
     if what != "many points":
-        read_in_this_process(monkeypatch)
+        bare_reads(monkeypatch)
     start = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]}
     content = json.dumps({**start, **HOSTILE[what]}).encode()
     words = "KHR_draco_mesh_compression" if what == "what is compressed" else ": "
@@ -133,7 +133,7 @@ def test_glb_that_is_cut_off(tmp_path: Path) -> None:
     ("unit", "scale"), [("micron", 1e-3), ("centimeter", 10), ("inch", 25.4), ("meter", 1000)]
 )
 def test_units_of_3mf(unit: str, scale: float, tmp_path: Path, monkeypatch) -> None:
-    read_in_this_process(monkeypatch)
+    bare_reads(monkeypatch)
     mesh, _ = read(tmp_path, "a.3mf", three_mf(box(1, 2, 3), unit))
     assert mesh.volume == pytest.approx(6 * scale**3)
 
@@ -171,7 +171,7 @@ LAUGHS = "".join(f'<!ENTITY b{k + 1} "{f"&b{k};" * 10}">' for k in range(12))
     ],
 )
 def test_3mf_that_is_hostile(content: bytes, words: str, tmp_path: Path, monkeypatch) -> None:
-    read_in_this_process(monkeypatch)
+    bare_reads(monkeypatch)
     check_refused(tmp_path, "a.3mf", content, words)
 
 

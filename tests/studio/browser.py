@@ -109,6 +109,20 @@ class RunningStudio:
         self.until(lambda: self.project(own)["silhouette"])
         return own
 
+    def made(self, own: str, operation: str, tile: int, **settings: Any) -> str:
+        """Return the text of a file that is made of a tile."""
+        body = {"operation": operation, "settings": {"tile": tile, **settings}}
+        number = self.client.post(f"projects/{own}/tasks", json=body).json()["task"]["id"]
+
+        def ended() -> Any:
+            (task,) = [one for one in self.project(own)["tasks"] if one["id"] == number]
+            return task if task["state"] in ("done", "failed") else None
+
+        task = self.until(ended)
+        assert task["state"] == "done", task["error"]
+        [file] = task["result"]["files"]
+        return self.client.get(f"takeaways/{number}/files/{file['name']}").text
+
     def search(self, own: str, *classes: str) -> None:
         """Start a short search."""
         settings = {"effort": "fast", **({"classes": classes} if classes else {})}
@@ -151,6 +165,22 @@ def small_searches(page: Any, *classes: str) -> None:
         route.continue_(post_data=body)
 
     page.route("**/tasks", shorten)
+
+
+def middle(page: Any, selector: str = ".closeup-canvas") -> tuple[float, float]:
+    """Return the middle of what is seen of an element, in pixels of the window."""
+    box = page.locator(selector).bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def drag(page: Any, *places: tuple[float, float], selector: str = ".closeup-canvas") -> None:
+    """Draw along places, given from the middle of an element."""
+    x, y = middle(page, selector)
+    page.mouse.move(x + places[0][0], y + places[0][1])
+    page.mouse.down()
+    for u, v in places[1:]:
+        page.mouse.move(x + u, y + v, steps=4)
+    page.mouse.up()
 
 
 def area_of(project: dict[str, Any]) -> float:

@@ -13,7 +13,7 @@ import httpx
 
 from bent_tiles import bent_tile
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Call, CallProcess, Cancel, Event, Failed, Finished
+from orbiflow.runtime import Call, CallProcess, Cancel, Event, Failed, Finished, ItemDone
 from orbiflow.studio import Limits, Store, WorkQueue, create_app
 from orbiflow.studio.tile_files import put_tile, tile_number
 from orbiflow.tiles import EscherTile
@@ -202,14 +202,28 @@ def new_project(client: Client) -> str:
     return f"/api/projects/{client.post('/api/projects', json={}).json()['id']}"
 
 
-def house_tile(client: Client) -> str:
-    """The address of a tile of a new project, which no search has found."""
+def house_project(client: Client) -> str:
+    """The address of a new project with a silhouette."""
     project = new_project(client)
     done(client, client.put(f"{project}/input?name=house.json", content=SQUARE))
-    store, name = client.studio.store, project.split("/")[-1]
-    number = tile_number(900, 0)
-    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
-    put_tile(store.home(name), number, "final", tile, lambda _: None)
-    folder = store.home(name) / "tiles" / str(number) / "final"
-    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
+    return project
+
+
+def put_card(
+    client: Client, project: str, number: int, tile: EscherTile | None = None, **more: Any
+) -> dict[str, Any]:
+    """Put a tile, which no search has found, into a project as a worker does; return its card."""
+    store, name, told = client.studio.store, project.split("/")[-1], list[Any]()
+    tile = tile or EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
+    put_tile(store.home(name), number, "final", tile, told.append, more)
+    assert told == [ItemDone(f"{number}/final", "done", "tile")]
+    card = json.loads((store.home(name) / f"tiles/{number}/final/card.json").read_text())
+    store.put_card(name, number, card)
+    return card
+
+
+def house_tile(client: Client) -> str:
+    """The address of a tile of a new project."""
+    project, number = house_project(client), tile_number(900, 0)
+    put_card(client, project, number)
     return f"{project}/tiles/{number}"

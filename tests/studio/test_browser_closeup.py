@@ -9,7 +9,7 @@ import shapely
 
 from orbiflow.studio.tile_files import tile_folder
 from orbiflow.tiles import certify, read_result
-from studio.browser import RunningStudio, covers_page_once
+from studio.browser import RunningStudio, covers_page_once, drag, middle
 from studio_checks import serious_issues, untidy_parts
 
 CANVAS, BADGE = ".closeup-canvas", ".badge"
@@ -56,8 +56,7 @@ def choose(page: Any, what: str) -> None:
 
 def place_on_outline(page: Any) -> tuple[float, float]:
     """Return a place of the window where the outline can be taken hold of."""
-    box = page.locator(CANVAS).bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    x, y = middle(page)
     for step in range(100):
         place = x + 3.0 * step, y + 1.0 * step
         page.mouse.move(*place)
@@ -76,23 +75,6 @@ def pulled(page: Any, x: float, y: float) -> None:
     page.mouse.up()
 
 
-def taken_away(studio: RunningStudio, own: str, tile: int, **settings: Any) -> str:
-    """Return the text of a file that is made of a tile."""
-    body = {"operation": "export", "settings": {"tile": tile, "purpose": "web", **settings}}
-    number = studio.client.post(f"projects/{own}/tasks", json=body).json()["task"]["id"]
-
-    def ended() -> Any:
-        tasks = studio.project(own)["tasks"]
-        return next(
-            (t for t in tasks if t["id"] == number and t["state"] in ("done", "failed")), None
-        )
-
-    task = studio.until(ended)
-    assert task["state"] == "done", task["error"]
-    [file] = task["result"]["files"]
-    return studio.client.get(f"takeaways/{number}/files/{file['name']}").text
-
-
 def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, tile) -> None:
     page, first = closeup, tile["id"]
     choose(page, "Pull")
@@ -102,7 +84,7 @@ def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, t
     assert (card["parent"], card["certified"]) == (first, True)
     found = read_result(tile_folder(studio.folder / "projects" / searched, second))
     assert certify(found.tile).valid
-    assert covers_page_once(taken_away(studio, searched, second))
+    assert covers_page_once(studio.made(searched, "export", second, purpose="web"))
     page.keyboard.press("Control+z")
     assert proved(page, second) == first
     page.keyboard.press("Control+Shift+Z")
@@ -136,9 +118,8 @@ def test_by_keyboard_and_too_far_stops_at_the_last_tile(closeup, tile) -> None:
     for _ in range(3):
         page.keyboard.press("ArrowRight")
     assert "Point" in page.locator("[aria-live=polite]").first.inner_text()
-    page.keyboard.press("Shift+ArrowDown")
-    page.keyboard.press("Shift+ArrowDown")
-    page.keyboard.press("Enter")
+    for key in ("Shift+ArrowDown", "Shift+ArrowDown", "Enter"):
+        page.keyboard.press(key)
     second = proved(page, tile["id"])
     page.wait_for_selector("[data-ready=pull]")
     x, y = place_on_outline(page)
@@ -196,12 +177,7 @@ def test_the_inside_is_pulled_and_the_outline_stays(closeup, studio, searched: s
     choose(page, "Pull")
     page.get_by_role("radio", name="The inside").check()
     assert not page.get_by_label("The outline gives way").is_checked()
-    box = page.locator(CANVAS).bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 12, y + 8, steps=3)
-    page.mouse.up()
+    drag(page, (0, 0), (12, 8))
     second = proved(page, first)
     views = [studio.client.get(f"projects/{searched}/tiles/{k}").json() for k in (first, second)]
     one, other = (shapely.Polygon(view["polygon"]) for view in views)
@@ -219,23 +195,15 @@ def test_lines_and_eyes_repeat_and_are_in_the_file(closeup, studio, searched, ti
     before = picture(page)
     choose(page, "Draw")
     page.get_by_role("radio", name="Red").check()
-    box = page.locator(CANVAS).bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x - 40, y)
-    page.mouse.down()
-    for k in range(20):
-        page.mouse.move(x - 40 + 4 * k, y + 12 * math.sin(k / 3))
-    page.mouse.up()
+    drag(page, *[(4 * k - 40, 12 * math.sin(k / 3)) for k in range(20)])
     page.get_by_role("radio", name="Eye").check()
-    page.mouse.click(x, y - 20)
-    drawn = studio.until(lambda: studio.project(searched)["view"].get("drawing"))
-    drawn = studio.until(
-        lambda: found if (found := studio.project(searched)["view"]["drawing"])["eyes"] else None
-    )
+    drag(page, (0, -20))
+    studio.until(lambda: studio.project(searched)["view"].get("drawing", {}).get("eyes"))
+    drawn = studio.project(searched)["view"]["drawing"]
     assert {stroke["colour"] for stroke in drawn["strokes"]} == {"#c8322b"}
     assert picture(page) != before
-    text = taken_away(studio, searched, tile["id"], drawing=True)
-    assert "#c8322b" in text
+    made = studio.made(searched, "export", tile["id"], purpose="web", drawing=True)
+    assert "#c8322b" in made
     # by keyboard: down, three steps, up
     choose(page, "Draw")
     page.get_by_role("radio", name="Pencil").check()
@@ -260,13 +228,8 @@ def test_symmetry_is_said_and_looks_are_kept(closeup, studio: RunningStudio, sea
     page.get_by_role("radio", name="lagoon").check()
     page.get_by_label("Outline").fill("3")
     page.get_by_label("From your picture to the tile").fill("0.5")
-    kept = studio.until(
-        lambda: (
-            look
-            if (look := studio.project(searched)["view"].get("look", {})).get("line") == 3
-            else None
-        )
-    )
+    studio.until(lambda: studio.project(searched)["view"].get("look", {}).get("line") == 3)
+    kept = studio.project(searched)["view"]["look"]
     assert (kept["palette"], kept["signs"], "share" in kept) == ("lagoon", True, False)
     page.reload()
     page.wait_for_selector(".sign")

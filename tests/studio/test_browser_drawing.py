@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from orbiflow.tiles import CLASSES, ISOHEDRAL_TYPES
-from studio.browser import BOOT, RunningStudio
+from studio.browser import BOOT, RunningStudio, drag
 from studio_checks import serious_issues
 
 CANVAS = ".closeup-canvas"
@@ -32,21 +32,6 @@ def pen_fixture(page: Any, studio: RunningStudio, searched: str) -> Iterator[Any
     yield page
     page.close()
     studio.client.patch(f"projects/{searched}", json={"view": {"drawing": {}, "closeup": {}}})
-
-
-def middle(page: Any) -> tuple[float, float]:
-    box = page.locator(CANVAS).bounding_box()
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-def drag(page: Any, *places: tuple[float, float]) -> None:
-    """Draw along places, given from the middle of the canvas."""
-    x, y = middle(page)
-    page.mouse.move(x + places[0][0], y + places[0][1])
-    page.mouse.down()
-    for u, v in places[1:]:
-        page.mouse.move(x + u, y + v, steps=4)
-    page.mouse.up()
 
 
 def colour(page: Any, x: float, y: float) -> list[int]:
@@ -86,20 +71,7 @@ def test_a_box_of_straight_lines_is_filled_to_its_lines(pen, studio, searched) -
     assert [bool(one.get("rings")) for one in strokes] == [True, *[False] * 4]  # under the lines
     # what is filled is in what is made
     tile = studio.project(searched)["tiles"][0]["id"]
-    body = {"operation": "art", "settings": {"tile": tile, "drawing": True, "format": "svg"}}
-    task = studio.client.post(f"projects/{searched}/tasks", json=body).json()["task"]["id"]
-    made = studio.until(
-        lambda: next(
-            (
-                t
-                for t in studio.project(searched)["tasks"]
-                if (t["id"], t["state"]) == (task, "done")
-            ),
-            None,
-        )
-    )
-    name = made["result"]["files"][0]["name"]
-    assert "#c8322b" in studio.client.get(f"takeaways/{task}/files/{name}").text
+    assert "#c8322b" in studio.made(searched, "art", tile, drawing=True, format="svg")
     # the drawing can be hidden
     pen.get_by_label("Show the drawing").uncheck()
     assert colour(pen, 0, 0) == before

@@ -46,10 +46,6 @@ def pair_fixture() -> EscherTile:
 @pytest.fixture(name="project")
 def project_fixture(studio: RunningStudio, pair: EscherTile, tmp_path: Path) -> dict[str, Any]:
     """A project of two pictures with a tile of both."""
-    return with_pair(studio, pair, tmp_path)
-
-
-def with_pair(studio: RunningStudio, pair: EscherTile, tmp_path: Path) -> dict[str, Any]:
     inputs = dict(zip(("input.dat", "input-2.dat"), NAMES, strict=True))
     for file, name in inputs.items():
         (tmp_path / file).write_bytes((FOLDER / name).read_bytes())

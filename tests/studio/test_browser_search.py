@@ -34,6 +34,23 @@ def reach(page: Any, name: str, typed: str = "") -> None:
     raise AssertionError(f"the Tab key never reaches {name}")
 
 
+def asked_for(page: Any) -> dict[str, Any]:
+    """Return the settings with which a page asks for what it is to make; nothing is made."""
+    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name="Download").click()
+    page.get_by_text("not now").wait_for()
+    page.unroute("**/tasks")
+    return caught.value.post_data_json["settings"]
+
+
+def taking(page: Any, studio: RunningStudio, own: str) -> int:
+    """Go to where the first tile of a project is taken away; return its number."""
+    tile = studio.project(own)["tiles"][0]["id"]
+    page.goto(f"/#/p/{own}/take/{tile}")
+    return tile
+
+
 def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_path) -> None:
     small_searches(page, "IH4")
     page.goto("/")
@@ -185,8 +202,7 @@ def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio) -> No
 
 
 def test_each_thing_has_three_fields_and_its_own_settings(page, studio, searched) -> None:
-    tile = studio.project(searched)["tiles"][0]["id"]
-    page.goto(f"/#/p/{searched}/take/{tile}")
+    tile = taking(page, studio, searched)
     fields = page.locator(".form > .field:not([hidden])")
     page.wait_for_selector(".form")
     titles = {}
@@ -206,20 +222,13 @@ def test_each_thing_has_three_fields_and_its_own_settings(page, studio, searched
     page.get_by_label("Width of the machine's cut").fill("0.2")
     page.get_by_role("radio", name="Poster").check()
     page.get_by_role("radio", name="Pieces for a laser").check()
-    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
-    with page.expect_request("**/tasks") as caught:
-        page.get_by_role("button", name="Download").click()
-    page.get_by_text("not now").wait_for()
-    page.unroute("**/tasks")
     wanted = {"tile": tile, "purpose": "laser", "cut": "pieces", "kerf": 0.2}
-    assert caught.value.post_data_json["settings"] == wanted
+    assert asked_for(page) == wanted
 
 
 def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched) -> None:
-    tile = studio.project(searched)["tiles"][0]["id"]
-    view = {"look": {"palette": "dusk"}}
-    studio.client.patch(f"projects/{searched}", json={"view": view})
-    page.goto(f"/#/p/{searched}/take/{tile}")
+    studio.client.patch(f"projects/{searched}", json={"view": {"look": {"palette": "dusk"}}})
+    tile = taking(page, studio, searched)
     page.get_by_role("radio", name="Print or cut").check()
     page.locator(".form summary").click()
     purpose, drawn = page.get_by_label("What is it for?"), page.get_by_label("What is drawn")
@@ -237,13 +246,8 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     purpose.select_option("web")
     assert filled.is_checked()  # a purpose sets everything anew
     filled.uncheck()
-    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
-    with page.expect_request("**/tasks") as caught:
-        page.get_by_role("button", name="Download").click()
-    page.get_by_text("not now").wait_for()
-    page.unroute("**/tasks")
     wanted = {"tile": tile, "purpose": "web", "clip": False, "palette": "dusk"}
-    assert caught.value.post_data_json["settings"] == wanted
+    assert asked_for(page) == wanted
     assert drawn.input_value() == "none"
     assert not page.get_by_label("Width of the machine's cut").is_visible()
     assert page.get_by_label("Colours").input_value() == "dusk"
@@ -305,8 +309,7 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, searched) -> None:
 
 
 def test_machines_are_kept_by_name_and_lengths_shown_in_inches(page, studio, searched) -> None:
-    tile = studio.project(searched)["tiles"][0]["id"]
-    page.goto(f"/#/p/{searched}/take/{tile}")
+    tile = taking(page, studio, searched)
     page.get_by_role("radio", name="Pieces for a laser").check()
     kerf = page.get_by_label("Width of the machine's cut")
     kerf.fill("0.2")
@@ -324,13 +327,8 @@ def test_machines_are_kept_by_name_and_lengths_shown_in_inches(page, studio, sea
     assert size.input_value() == "1.575"
     size.fill("2")
     page.get_by_label("How large is your sheet? (in)").fill("12x8")
-    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
-    with page.expect_request("**/tasks") as caught:
-        page.get_by_role("button", name="Download").click()
-    page.get_by_text("not now").wait_for()
-    page.unroute("**/tasks")
     wanted = {"tile": tile, "purpose": "laser", "cut": "pieces", "kerf": 0.2, "tile_size": 50.8}
-    wanted["area"] = "12x8in"
-    assert caught.value.post_data_json["settings"] == wanted
+    wanted |= {"area": "12x8in"}
+    assert asked_for(page) == wanted
     page.get_by_role("button", name="Forget it").click()
     machine.locator("option", has_text="my K40").wait_for(state="detached")

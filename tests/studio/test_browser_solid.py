@@ -92,20 +92,16 @@ def test_it_is_turned_and_opened_by_keys_and_fits_a_phone(page: Any, made: list[
     several = page.locator(".solids li").count()
     page.locator(".solids li:has([aria-current]) button").click()
     page.get_by_role("button", name="Remove it").click()
-    page.wait_for_function(
-        "few => document.querySelectorAll('.solids li').length === few", arg=several - 1
-    )
+    fewer = "few => document.querySelectorAll('.solids li').length === few"
+    page.wait_for_function(fewer, arg=several - 1)
     assert shown.count() == 1
 
 
 def test_what_cannot_be_read_is_said_on_the_first_page(page: Any, studio: RunningStudio) -> None:
     before = len(studio.client.get("projects").json())
     page.goto("/")
-    mesh = {
-        "name": "sheet.obj",
-        "mimeType": "model/obj",
-        "buffer": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
-    }
+    sheet = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    mesh = {"name": "sheet.obj", "mimeType": "model/obj", "buffer": sheet}
     page.set_input_files("input[accept*='.stl']", mesh)
     said = page.locator(".told .error")
     said.wait_for()

@@ -12,10 +12,9 @@ from PIL import Image
 
 from bent_tiles import bent_tile
 from orbiflow.errors import SettingError
-from orbiflow.runtime import ignore
-from orbiflow.studio.tile_files import put_tile, tile_number
+from orbiflow.studio.tile_files import tile_number
 from orbiflow.tiles import ArtSettings, EscherTile, why_not_in
-from studio.served import Client, done, house_tile, new_project, worked
+from studio.served import Client, house_tile, new_project, put_card, worked
 
 CLASSES = ["IH1", "IH2", "IH4", "IH6", "IH7", "IH21", "IH28"]
 
@@ -23,14 +22,10 @@ CLASSES = ["IH1", "IH2", "IH4", "IH6", "IH7", "IH21", "IH28"]
 @pytest.fixture(scope="module", name="tiles")
 def tiles_fixture(client: Client) -> dict[str, str]:
     """The addresses of tiles of a project, by class."""
-    project = new_project(client)
-    store, own = client.studio.store, project.split("/")[-1]
-    found = dict[str, str]()
+    project, found = new_project(client), dict[str, str]()
     for place, name in enumerate(CLASSES):
         number = tile_number(900, place)
-        put_tile(store.home(own), number, "final", EscherTile(bent_tile(name, 40.0)), ignore)
-        folder = store.home(own) / "tiles" / str(number) / "final"
-        store.put_card(own, number, json.loads((folder / "card.json").read_text()))
+        put_card(client, project, number, EscherTile(bent_tile(name, 40.0)))
         found[name] = f"{project}/tiles/{number}"
     return found
 
@@ -119,13 +114,11 @@ def image_of(answer: Any) -> Image.Image:
 def test_it_is_what_is_made_and_nothing_is_left_of_it(client: Client, address: str) -> None:
     project, number = address.split("/tiles/")
     known = client.get(project).json()["tasks"]
-    settings = {
-        **{"drawing": True, "purpose": "print", "area": "120x80mm", "format": "png", "dpi": 100}
-    }
+    settings: dict[str, Any] = {"drawing": True, "purpose": "print", "area": "120x80mm"}
+    settings |= {"format": "png", "dpi": 100}
     shown = np.asarray(image_of(preview(client, address, "export", **settings)).convert("RGB"))
     assert client.get(project).json()["tasks"] == known
-    body = {"operation": "export", "settings": {"tile": int(number), **settings}}
-    task = done(client, client.post(f"{project}/tasks", json=body))
+    task = worked(client, project, "export", tile=int(number), **settings)
     [file] = task["result"]["files"]
     made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").content
     wanted = np.asarray(Image.open(io.BytesIO(made)).convert("RGB"))
@@ -156,11 +149,7 @@ def test_all_that_can_be_made_is_shown_small(
 
 def test_a_world_is_made_to_be_turned(client: Client, address: str) -> None:
     project, _, number = address.rpartition("/tiles/")
-    body = {
-        "operation": "art",
-        "settings": {"tile": int(number), "world": "disc", "format": "html"},
-    }
-    task = done(client, client.post(f"{project}/tasks", json=body))
+    task = worked(client, project, "art", tile=int(number), world="disc", format="html")
     [file] = task["result"]["files"]
     assert file["name"].endswith(".html")
     made = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}")
@@ -192,9 +181,8 @@ def test_several_sheets_are_one_archive(client: Client) -> None:
     sheets = {"purpose": "laser", "area": "300x200mm", "bed": "160x110mm"}
     task = worked(client, own, "export", tile=int(number), format="svg", **sheets)
     (file,) = task["result"]["files"]
-    content = client.get(
-        f"/api/takeaways/{task['result']['takeaway']}/files/{file['name']}"
-    ).content
+    made = f"/api/takeaways/{task['result']['takeaway']}/files/{file['name']}"
+    content = client.get(made).content
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         assert len(archive.namelist()) == 5
         assert all(archive.read(name).startswith(b"<?xml") for name in archive.namelist())

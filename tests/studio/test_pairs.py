@@ -14,20 +14,20 @@ from PIL import Image
 from scipy.sparse import csr_matrix
 
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import Event, ItemDone, ignore
+from orbiflow.runtime import Event, ItemDone
 from orbiflow.studio import open_project, tasks
 from orbiflow.studio.pulled_tiles import PullSpace, pulled, space_json
 from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.taking import with_drawing
 from orbiflow.studio.tasks import read, search
-from orbiflow.studio.tile_files import best_stage, put_tile, tile_folder
+from orbiflow.studio.tile_files import best_stage, tile_folder
 from orbiflow.studio.tile_view import tile_card, tile_view
 from orbiflow.studio.words import is_outdated
 from orbiflow.tiles import EscherTile, colouring, read_result, save_tiles
 from outlines import FOLDER
 from small_pairs import NAMES, pair_result, small_pairs
 from strategies import seeds
-from studio.served import SQUARE, Client, done, new_project
+from studio.served import SQUARE, Client, done, house_project, new_project, put_card, worked
 from studio.test_pull_module import FOLLOW, run_in_node
 
 BOOT = b"[[0, 0], [60, 0], [60, 20], [30, 25], [28, 70], [0, 70]]"
@@ -55,8 +55,7 @@ def mask() -> bytes:
 
 
 def test_each_picture_is_read_as_its_own_settings_and_masks_say(client: Client) -> None:
-    address = new_project(client)
-    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
+    address = house_project(client)
     done(client, client.put(f"{address}/input?name=boot.json&number=1", content=BOOT))
     before = client.get(address).json()
     assert (before["name"], before["second"]["input"]["name"]) == ("house", "boot.json")
@@ -67,9 +66,8 @@ def test_each_picture_is_read_as_its_own_settings_and_masks_say(client: Client) 
     assert found["second"]["reading"]["smooth"] == 0.05
     outlines = [own["second"]["silhouette"]["outline"] for own in (before, found)]
     assert shapely.Polygon(outlines[1]).area > 1.2 * shapely.Polygon(outlines[0]).area
-    assert (
-        client.get(found["second"]["silhouette"]["backdrop"]).headers["content-type"] == "image/png"
-    )
+    backdrop = client.get(found["second"]["silhouette"]["backdrop"])
+    assert backdrop.headers["content-type"] == "image/png"
     done(client, client.delete(f"{address}/mend?number=1"))
     assert client.get(address).json()["second"]["mend"] is None
     client.delete(f"{address}/second")
@@ -160,10 +158,7 @@ def saved(client: Client, home: Path, pair: EscherTile) -> bytes:
     for number, file in enumerate(("backdrop.png", "backdrop-2.png")):
         query, content = f"name={file}&number={number}", (home / file).read_bytes()
         done(client, client.put(f"{address}/input?{query}", content=content))
-    store, name = client.studio.store, address.split("/")[-1]
-    put_tile(store.home(name), 7000, "final", pair, ignore)
-    file = store.home(name) / "tiles/7000/final/card.json"
-    store.put_card(name, 7000, json.loads(file.read_text()))
+    put_card(client, address, 7000, pair)
     return client.get(f"{address}/file").content
 
 
@@ -192,9 +187,7 @@ def test_a_project_of_two_is_saved_opened_and_taken_away(client, home, pair, tmp
     ]
     texts = list[bytes]()
     for operation, wish in wishes:
-        settings = {"tile": own["tiles"][0]["id"], **wish}
-        ask = {"operation": operation, "settings": settings}
-        task = done(client, client.post(f"{address}/tasks", json=ask))
+        task = worked(client, address, operation, tile=own["tiles"][0]["id"], **wish)
         assert task["state"] == "done", task["error"]
         name = task["result"]["files"][0]["name"]
         texts.append(client.get(f"/api/takeaways/{task['id']}/files/{name}").content)

@@ -1,7 +1,6 @@
 """The way of a project through the server: from an upload to what is taken away."""
 
 import io
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,48 +10,30 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
-from bent_tiles import bent_tile
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import ItemDone, ignore
 from orbiflow.studio.silhouette_file import load_target
-from orbiflow.studio.tile_files import put_tile, tile_number
+from orbiflow.studio.tile_files import tile_number
 from orbiflow.studio.words import is_outdated
-from orbiflow.tiles import Emphasis, EscherTile, Pins, certify, read_result
-from studio.served import SQUARE, Client, done, join_tasks, new_project, studio
+from orbiflow.tiles import Emphasis, Pins, certify, read_result
+from studio.served import (
+    SQUARE,
+    Client,
+    done,
+    house_project,
+    join_tasks,
+    new_project,
+    put_card,
+    studio,
+    worked,
+)
 
 
 @pytest.fixture(scope="module")
 def project(client: Client) -> str:
     """A project with a silhouette and a tile."""
-    address = new_project(client)
-    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
-    put_card(client, address, 900)
+    address = house_project(client)
+    put_card(client, address, tile_number(900, 0))
     return address
-
-
-@pytest.fixture(scope="module")
-def house(client: Client) -> str:
-    """A project with a silhouette."""
-    address = new_project(client)
-    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
-    return address
-
-
-def put_card(client: Client, address: str, task: int) -> int:
-    """Put a tile into a project as a worker does; return its number."""
-    store, name = client.studio.store, address.split("/")[-1]
-    number, told = tile_number(task, 0), list[Any]()
-    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
-    put_tile(store.home(name), number, "final", tile, told.append)
-    assert told == [ItemDone(f"{number}/final", "done", "tile")]
-    folder = store.home(name) / "tiles" / str(number) / "final"
-    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
-    return number
-
-
-def make(client: Client, address: str, operation: str, **settings: Any) -> dict[str, Any]:
-    ask = {"operation": operation, "settings": settings}
-    return done(client, client.post(f"{address}/tasks", json=ask))
 
 
 def test_about(client: Client) -> None:
@@ -102,8 +83,7 @@ def test_an_upload_becomes_a_silhouette(client: Client, project: str) -> None:
 
 
 def test_a_polygon_stays_in_its_picture_when_it_is_mended(client: Client) -> None:
-    address = new_project(client)
-    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
+    address = house_project(client)
     before = client.get(address).json()["silhouette"]
     size = before["width"], before["height"]
     brush = Image.new("RGBA", size)
@@ -131,15 +111,15 @@ def test_what_is_refused_is_in_the_pages_words(client: Client) -> None:
 @settings(max_examples=3, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(radius=st.sampled_from([0, 1, 2, 4, 8, 30, 120, 2000]), at=st.tuples(*[st.floats(0, 1)] * 2))
 def test_what_a_search_would_not_take_is_said_where_it_is_painted(
-    client: Client, house: str, mask: str, radius: int, at: tuple[float, float]
+    client: Client, project: str, mask: str, radius: int, at: tuple[float, float]
 ) -> None:
-    own = client.get(house).json()["silhouette"]
+    own = client.get(project).json()["silhouette"]
     size = own["width"], own["height"]
     x, y = np.array(at) * size
     brush = Image.new("L", size)
     ImageDraw.Draw(brush).ellipse((x - radius, y - radius, x + radius, y + radius), fill=255)
-    refused = client.put(f"{house}/{mask}", content=painted(brush)).json()["refused"]
-    home = client.studio.store.home(house.split("/")[-1])
+    refused = client.put(f"{project}/{mask}", content=painted(brush)).json()["refused"]
+    home = client.studio.store.home(project.split("/")[-1])
     target = load_target(home)
     read = {"pins": lambda: Pins.read([home / "pins.png"], target)}.get(
         mask, lambda: Emphasis.read(home / "emphasis.png", target)
@@ -148,11 +128,11 @@ def test_what_a_search_would_not_take_is_said_where_it_is_painted(
         with pytest.raises(OrbiflowError):
             read()
         body = {"operation": "search", "settings": {"effort": "fast", "classes": ["IH4"]}}
-        answer = client.post(f"{house}/tasks", json=body)
+        answer = client.post(f"{project}/tasks", json=body)
         assert (answer.status_code, answer.json()["error"]) == (422, refused)
     else:
         read()
-    assert client.delete(f"{house}/{mask}").json() == {"mask": None, "refused": ""}
+    assert client.delete(f"{project}/{mask}").json() == {"mask": None, "refused": ""}
 
 
 def painted(shape: Any) -> bytes:
@@ -212,17 +192,15 @@ def test_a_new_picture_ends_the_search_of_the_old_one(tmp_path: Path) -> None:
         assert states == {"read": "done", "search": "cancelled"}
 
 
+SMALL = {"area": "80x60mm"}
+
+
 @pytest.mark.parametrize(
     ("operation", "settings", "name"),
     [
-        ("export", {"area": "80x60mm", "cut": "skeleton"}, "house-skeleton-40mm.svg"),
-        ("export", {"area": "80x60mm", "purpose": "laser"}, "house-laser-40mm.svg"),
-        (
-            "export",
-            {"area": "80x60mm", "purpose": "laser", "cut": "jigsaw"},
-            "house-laser-jigsaw-40mm.svg",
-        ),
-        ("export", {"area": "80x60mm", "purpose": "print"}, "house-print-40mm.pdf"),
+        ("export", {**SMALL, "cut": "skeleton"}, "house-skeleton-40mm.svg"),
+        ("export", {**SMALL, "purpose": "laser", "cut": "jigsaw"}, "house-laser-jigsaw-40mm.svg"),
+        ("export", {**SMALL, "purpose": "print"}, "house-print-40mm.pdf"),
         ("art", {"area": "60x40px"}, "house-picture.png"),
         ("art", {"area": "60x40px", "format": "svg"}, "house-picture.svg"),
         ("solid", {"kind": "stamp"}, "house-stamp.stl"),
@@ -232,7 +210,7 @@ def test_a_new_picture_ends_the_search_of_the_old_one(tmp_path: Path) -> None:
 def test_what_is_taken_away(
     client: Client, project: str, operation: str, settings: dict[str, Any], name: str
 ) -> None:
-    task = make(client, project, operation, tile=tile_number(900, 0), **settings)
+    task = worked(client, project, operation, tile=tile_number(900, 0), **settings)
     assert task["state"] == "done", task["error"]
     (file,) = task["result"]["files"]
     assert file["name"] == name
@@ -248,11 +226,11 @@ def test_what_is_taken_away(
 
 
 def test_a_tile_that_is_gone_cannot_be_taken_away(client: Client, project: str) -> None:
-    tile = put_card(client, project, 901)
+    tile = put_card(client, project, tile_number(901, 0))["id"]
     assert client.get(f"{project}/tiles/{tile}").json()["id"] == tile
     assert client.delete(f"{project}/tiles/{tile}").status_code == 200
     assert client.get(f"{project}/tiles/{tile}").status_code == 404
-    assert "no such tile" in make(client, project, "export", tile=tile)["error"]
+    assert "no such tile" in worked(client, project, "export", tile=tile)["error"]
 
 
 def test_views_are_merged_and_say_who_changed_them(client: Client, project: str) -> None:
@@ -289,14 +267,10 @@ def test_a_project_goes_into_a_file_and_comes_back(client: Client, project: str)
 
 
 def test_tiles_of_an_outline_since_mended_are_known_as_such_in_a_file_too(client: Client) -> None:
-    address = new_project(client)
-    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
+    address = house_project(client)
     store, name = client.studio.store, address.split("/")[-1]
     mark = client.get(address).json()["silhouette"]["mark"]
-    tile, number = EscherTile(bent_tile("IH4", 40.0), name="house-IH4"), tile_number(901, 0)
-    put_tile(store.home(name), number, "final", tile, ignore, {"found_for": [mark]})
-    card = json.loads((store.home(name) / f"tiles/{number}/final/card.json").read_text())
-    store.put_card(name, number, card)
+    card = put_card(client, address, tile_number(901, 0), found_for=[mark])
     assert not is_outdated(card, store.project(name))
 
     def saved_and_opened() -> dict[str, Any]:

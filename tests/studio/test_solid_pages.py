@@ -18,17 +18,8 @@ from orbiflow.solids.reading import READERS
 from orbiflow.studio.settings import Job
 from orbiflow.studio.solid_routes import FILES
 from orbiflow.studio.solid_tasks import ENDINGS, put_solid
-from solids.mesh_files import (
-    ball,
-    box,
-    bumpy_cell,
-    cubic_group,
-    inside_out,
-    obj,
-    read_in_this_process,
-    stl,
-    three_mf,
-)
+from solids.mesh_files import ball, bare_reads, box, bumpy_cell, cubic_group, inside_out, obj, stl
+from solids.mesh_files import three_mf as packed
 from studio.served import Client, done, new_project, studio, worked
 
 BUMPY = bumpy_cell(steps=4)
@@ -111,7 +102,7 @@ def filled_fixture(client: Client) -> str:
 
 @pytest.mark.parametrize(
     ("name", "data", "up"),
-    [("a.stl", stl(ball()), "z"), ("a.OBJ", obj(ball()), "y"), ("a.3mf", three_mf(ball()), "z")],
+    [("a.stl", stl(ball()), "z"), ("a.OBJ", obj(ball()), "y"), ("a.3mf", packed(ball()), "z")],
 )
 def test_a_mesh_is_read_and_drawn(client: Client, name: str, data: bytes, up: str) -> None:
     own, task = uploaded(client, data, name)
@@ -154,7 +145,7 @@ HOSTILE = {
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_meshes_are_refused_in_words(client: Client, name: str, monkeypatch) -> None:
     if name != "parts.gltf":
-        read_in_this_process(monkeypatch)
+        bare_reads(monkeypatch)
     own, task = uploaded(client, HOSTILE[name], name)
     assert task["state"] == "failed"
     assert not re.search("inside orbiflow|codec|File|No such", task["error"])

@@ -52,8 +52,8 @@ def test_what_somebody_waits_for_waits_for_no_search(bench: Bench) -> None:
     assert bench.states(*long, quick) == ["running", "waiting", "running"]
 
 
-def test_the_newest_reading_is_the_last_to_end(tmp_path: Path) -> None:
-    bench = Bench(tmp_path, quick=2)
+def test_the_newest_reading_is_the_last_to_end(bench: Bench) -> None:
+    bench.queue.slots["quick"] = 2
     project, other = bench.project(), bench.project()
     tasks = [bench.queue.submit(project, "read", {}) for _ in range(2)]
     assert bench.states(*tasks) == ["running", "waiting"]  # not side by side
@@ -67,12 +67,10 @@ def test_the_newest_reading_is_the_last_to_end(tmp_path: Path) -> None:
     assert len(bench.made) == 2
     bench.made[0].finish()
     bench.made[1].finish()
-    bench.queue.close()
-    bench.store.close()
 
 
-def test_what_uses_a_reading_waits_for_it(tmp_path: Path) -> None:
-    bench = Bench(tmp_path / "data", long=2, quick=2)
+def test_what_uses_a_reading_waits_for_it(bench: Bench) -> None:
+    bench.queue.slots.update(long=2, quick=2)
     project, other = bench.project(), bench.project()
     table = bench.queue.submit(project, "density table", {})
     angles = {"space": "torus", "columns": ["phi", "psi"]}
@@ -84,8 +82,6 @@ def test_what_uses_a_reading_waits_for_it(tmp_path: Path) -> None:
     for process in bench.made:
         if process.alive:
             process.finish()
-    bench.queue.close()
-    bench.store.close()
 
 
 def test_old_tasks_that_are_not_done_are_listed(bench: Bench) -> None:
@@ -376,12 +372,8 @@ def test_a_folder_of_the_version_before_is_taken_over(tmp_path: Path) -> None:
     store.close()
 
 
-ACTIONS = st.lists(
-    st.tuples(
-        st.sampled_from(["submit", "pause", "resume", "cancel", "finish"]), st.integers(0, 5)
-    ),
-    max_size=30,
-)
+NAMES = ["submit", "pause", "resume", "cancel", "finish"]
+ACTIONS = st.lists(st.tuples(st.sampled_from(NAMES), st.integers(0, 5)), max_size=30)
 
 
 @settings(max_examples=15, deadline=None)
