@@ -43,10 +43,6 @@ KINDS = {
 }
 
 
-def test_there_are_80_layer_and_75_rod_groups():
-    assert [len(set(names)) for names in KINDS.values()] == [80, 75]
-
-
 def whole(name: str):
     """The space group of the same name, on a cell that all groups of its name fit."""
     sides = (

@@ -81,13 +81,6 @@ def test_triangles_fill_the_polygon(name: str) -> None:
     assert shapely.covers(shapely.Polygon(ring).buffer(1e-9), pieces).all()
 
 
-@settings(max_examples=30)
-@given(dyadic_rings())
-def test_any_star_shaped_polygon(ring: Array) -> None:
-    ring = unit(orient(ring))
-    assert_fills(triangulate(ring), ring)
-
-
 @given(dyadic_rings())
 def test_finer_inside_where_asked(ring: Array) -> None:
     ring = unit(orient(ring))

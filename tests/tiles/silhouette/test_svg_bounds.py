@@ -163,19 +163,9 @@ def test_texts_are_seen_and_a_font_that_stood_in_is_said() -> None:
         # values that would grow without end, or refer to each other in a circle
         f'<g style="{";".join(f"--a{k}:var(--a{k + 1})var(--a{k + 1})" for k in range(30))}">'
         f'<path style="fill:var(--a0)" d="M10 10h50v50h-50z"/></g>',
-        '<g style="--a:var(--b);--b:var(--a)"><path style="fill:var(--a)" d="M10 10h50v50h-50z"/></g>',
         f'<path style="fill:{"var(--a," * 40}red{")" * 40}" d="M10 10h50v50h-50z"/>',
         f'<path style="fill:{"(" * 9000}" d="M10 10h50v50h-50z"/>',
         f"<style>{'g ' * 450}path{{fill:none}}</style>{SQUARE}",
-        "<style>}}}}{{;;@@@ <!-- --> !important{} a{:;:::!important;fill:!important} \\ url( </style>"
-        + SQUARE,
-        "<style>@namespace;@namespace a b c;@media;@import;@;[*|a]{fill:none}*|*{fill:red}</style>"
-        + SQUARE,
-        f'<linearGradient id="a" href="#b"/><linearGradient id="b" href="#a"/>{SQUARE}',
-        f'{SQUARE}<rect fill="rgb(1e999 0 0)"/><rect fill="color()"/><rect fill="lab(nan% 1e300 0)"/>',
-        f'<linearGradient id="g" gradientTransform="scale(0)"><stop/><stop/></linearGradient>{SQUARE}'
-        '<rect width="9" height="9" fill="url(#g)"/>',
-        f'<g style="font-size:1e308em"><g style="font-size:1e308em">{SQUARE}</g></g>',
     ],
 )
 def test_what_makes_no_sense_is_passed_over(text: str) -> None:

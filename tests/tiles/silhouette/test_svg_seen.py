@@ -176,14 +176,6 @@ def test_a_badge_is_the_shape_and_said(drawn: str, is_said: bool) -> None:
 CARD = '<rect x="{0}" y="{0}" width="{1}" height="{1}" rx="{2}" fill="#28c"/>'
 
 
-@pytest.mark.parametrize(("at", "corner"), [(0, 0), (0, 22), (-5, 0)])
-def test_a_background_of_any_colour_is_left_out(at: int, corner: int) -> None:
-    reading = read(CARD.format(at, 100 - 2 * at, corner) + FISH + ' fill="#e33"/>')
-    area = shapely.Polygon(read(FISH + "/>").outline).area
-    assert shapely.Polygon(reading.outline).area == pytest.approx(area, rel=5e-3)
-    assert any("background" in note for note in reading.notes)
-
-
 @pytest.mark.parametrize("drawn", ["", INNER.format("#fff"), INNER.format("#e33")])
 def test_a_card_within_the_page_is_the_shape_and_doubted(drawn: str) -> None:
     target = Target(**vars(read(CARD.format(5, 90, 9) + drawn)))

@@ -194,14 +194,6 @@ def run_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-def test_a_run_gives_the_best_tile_of_each_class(run: Path) -> None:
-    tiles = read_tiles(run)
-    names = [own.isohedral_class for own in tiles]
-    assert len(set(names)) == len(names)
-    assert [own.score for own in tiles] == sorted((own.score for own in tiles), reverse=True)
-    assert [own.name for own in read_tiles(run / names[-1])] == [tiles[-1].name]
-
-
 def test_centres_get_their_orders_as_the_tile_looks_best(run: Path) -> None:
     tile = read_result(run, "IH28")
     seen, (found, notes) = WorldLikeness(tile), in_world(tile, (2, 4, 5), -1)
