@@ -382,7 +382,7 @@ def test_a_shape_that_hardly_shows_is_warned_of() -> None:
 
 
 def test_a_photograph_of_nothing() -> None:
-    ground = gradient((0.2, 0.3, 0.5), (0.8, 0.7, 0.6))
+    ground = gradient((0.2, 0.6, 0.9), (0.9, 0.4, 0.1))
     try:
         reading = read_outline(photograph(ground, ground, 0.0))
     except InputFileError:
