@@ -134,19 +134,6 @@ def test_whole_tiles_on_every_sheet() -> None:
     for sheet in sheets:
         assert (sheet.width, sheet.height) == (100.0, 100.0)
         assert all(own.whole for own in sheet.tiles)
-        lines = shapely.union_all(
-            [
-                shapely.LineString(curve.flattened(0.01))
-                if not curve.closed
-                else shapely.LinearRing(curve.flattened(0.01))
-                for curve in sheet.curves(sheet.layers[0])
-            ]
-        )
-        # all tiles drop out, and nothing else
-        faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines, grid_size=1e-4)]))
-        areas = shapely.area(faces)
-        (ring,) = {id(own): own for own in sheet.prototiles}.values()
-        assert np.isclose(areas, shapely.Polygon(ring).area, rtol=0.02).sum() == len(sheet.tiles)
 
 
 def polyline(seed: int, count: int, rough: float) -> np.ndarray:

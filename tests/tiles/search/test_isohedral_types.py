@@ -33,13 +33,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.finding import classes
 from orbiflow.tiles.flowing import OverlapSearch
-from orbiflow.tiles.search import (
-    EscherizeSettings,
-    LikenessSearch,
-    Placements,
-    TileSpace,
-    best_placements,
-)
+from orbiflow.tiles.search import EscherizeSettings, LikenessSearch, Placements, TileSpace
 from orbiflow.tiles.silhouette import outlines, sampled
 from outlines import animal
 from refusals import refused
@@ -47,7 +41,6 @@ from small_searches import FEW
 from strategies import seeds
 
 MARKED = (19, 35, 48, 60, 63, 65, 70, 75, 80, 87, 89, 92)
-SYMMETRIC = [name for name, kind in ISOHEDRAL_TYPES.items() if len(kind.stabiliser) > 1]
 PER_EDGE = 4
 NEAR = {"bat_60": "D1", "penguin_60": "C1", "camel_60": "C1", "spider_120": "C1"}
 
@@ -127,27 +120,6 @@ def test_random_tiles_are_certified_with_their_stabiliser(name: str, seed: int) 
     assert len(tile.tiling.aspects) * order == kind.group().order
     whole = signed_area(tile.polygon) * kind.group().order / order
     assert whole == pytest.approx(tile.group.cell_volume, rel=1e-12)
-
-
-@pytest.mark.parametrize("name", SYMMETRIC)
-@settings(max_examples=2)
-@given(seed=seeds)
-def test_the_nearest_symmetric_tile_is_the_projection(name: str, seed: int) -> None:
-    kind = ISOHEDRAL_TYPES[name]
-    outline = complex_points(random_tile(kind, seed).polygon)
-    outline = np.repeat(outline, 12 // np.gcd(12, len(outline)))
-    outline += 0.05 * np.exp(1j * np.random.default_rng(seed).uniform(0, 7, len(outline)))
-    space = TileSpace(kind, best_placements(kind, outline, 4))
-    goals = np.tile(outline, (space.count, 1))
-    space.turn(space.best_turns(goals))
-    found = space.nearest(goals)
-    for k, ring in enumerate(space.in_order(found.vertices)):
-        real, imaginary = space.matrices(k)
-        stacked = np.concatenate([real, imaginary])
-        goal = np.concatenate([outline.real, outline.imag])
-        parameters = np.linalg.lstsq(stacked, goal, rcond=None)[0]
-        assert abs(real @ parameters + 1j * (imaginary @ parameters) - ring).max() < 1e-6
-        assert found.distance[k] == pytest.approx((abs(ring - outline) ** 2).sum(), rel=1e-6)
 
 
 def test_symmetric_silhouettes_are_told_from_others() -> None:

@@ -104,19 +104,6 @@ def test_polygons_lie_on_the_input(case: tuple[Target, dict[str, Any]]) -> None:
         assert metrics["iou"] > 0.6
         common = tile.intersection(goal).area
         assert metrics["iou"] == pytest.approx(common / tile.union(goal).area, abs=1e-12)
-        assert metrics["dice"] == pytest.approx(2 * common / (tile.area + goal.area), abs=1e-12)
-        window = shapely.box(*metrics["window"])
-        xmin, ymin, xmax, ymax = goal.bounds
-        dx, dy = 0.1 * (xmax - xmin), 0.1 * (ymax - ymin)
-        expected = (xmin - dx, ymin - dy, xmax + dx, ymax + dy)
-        assert window.bounds == pytest.approx(expected, abs=1e-9)
-        wrong = tile.symmetric_difference(goal).intersection(window).area
-        assert metrics["pixel_accuracy"] == pytest.approx(1 - wrong / window.area, abs=1e-12)
-        # shapely samples the curves here: a lower bound, short by at most half a sample's spacing
-        distance = shapely.hausdorff_distance(tile.exterior, goal.exterior, densify=0.002)
-        length = max(tile.exterior.length, goal.exterior.length)
-        scaled = metrics["hausdorff"] * goal.area**0.5
-        assert distance - 1e-3 <= scaled <= distance + 0.002 * length
 
 
 def test_certificates_are_of_the_stated_polygon(case: tuple[Target, dict[str, Any]]) -> None:

@@ -167,11 +167,6 @@ def test_prototiles_have_colours_of_their_own(seed: int, name: str) -> None:
     numbers, kinds = colours.colours(copies), copies.prototiles
     first, second = (set(numbers[kinds == k].tolist()) for k in (0, 1))
     assert not first & second
-    rings = [shapely.Polygon(ring) for ring in copies.rings()]
-    tree = shapely.STRtree(rings)
-    for a, b in tree.query(rings, predicate="intersects").T.tolist():
-        shared = rings[a].intersection(rings[b]).length if a < b else 0.0
-        assert shared < 1e-6 or numbers[a] != numbers[b]
 
 
 def _flat(figure: EscherTile, colour: str) -> Over:

@@ -83,20 +83,3 @@ def test_smoothing_counts_the_parts_that_it_left_out(picture: np.ndarray, thresh
         count, percent = map(float, said[0][:2])
         assert count == len(areas) + 1
         assert percent == pytest.approx(100 * outline.area / (outline.area + sum(areas)), abs=0.06)
-
-
-def test_smoothing_what_broken_lines_enclose_keeps_it() -> None:
-    # an outline drawn with gaps: only its lines were seen, and the silhouette is what they enclose
-    turns = np.radians(np.arange(360))
-    ring = np.stack([200 + 150 * np.cos(turns), 200 + 100 * np.sin(turns)], axis=1)
-    lines = "".join(
-        f"M{'L'.join(f'{x:.2f} {y:.2f}' for x, y in ring[start : start + 118])}"
-        for start in (0, 120, 240)
-    )
-    svg = (
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 400">'
-        f'<path d="{lines}" fill="none" stroke="black" stroke-width="4"/></svg>'
-    )
-    target = Target.from_bytes(svg.encode(), "a.svg")
-    assert target.area == pytest.approx(np.pi * 150 * 100, rel=0.06)
-    assert target.smoothed(0.03).area == pytest.approx(target.area, rel=0.02)
