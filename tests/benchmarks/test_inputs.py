@@ -6,7 +6,9 @@ import json
 import math
 import runpy
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,16 +27,21 @@ WANTING = {
 }
 
 
-@pytest.fixture(name="common")
-def common_fixture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+@pytest.fixture(name="module")
+def module_fixture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
+    """Benchmarks by name, read anew and forgotten, as in a process of its own."""
     monkeypatch.setenv("ORBIFLOW_DATA", str(tmp_path))
     monkeypatch.syspath_prepend(str(BENCHMARKS))
-    monkeypatch.delitem(sys.modules, "common", raising=False)
-    yield importlib.import_module("common")
-    monkeypatch.delitem(sys.modules, "common", raising=False)
+    for path in BENCHMARKS.glob("*.py"):
+        monkeypatch.setitem(sys.modules, path.stem, sys)
+        monkeypatch.delitem(sys.modules, path.stem)
+    yield importlib.import_module
+    for path in BENCHMARKS.glob("*.py"):
+        sys.modules.pop(path.stem, None)
 
 
-def test_the_nine_goals_and_their_figures_are_in_the_repository(common) -> None:
+def test_the_nine_goals_and_their_figures_are_in_the_repository(module) -> None:
+    common = module("common")
     figures = common.published("nine_goals")
     assert tuple(figures) == common.GOALS
     for name in common.GOALS:
@@ -47,29 +54,19 @@ def test_the_nine_goals_and_their_figures_are_in_the_repository(common) -> None:
             assert all(0 < value < 1 for value in figures[name][method].values())
     licence = (ROOT / "examples" / "silhouettes" / "nagata" / "LICENSE").read_text()
     assert licence.startswith("MIT License\n\nCopyright (c) 2022 Yuichi Nagata")
-
-
-def test_every_figure_says_where_it_comes_from() -> None:
     document = json.loads((BENCHMARKS / "data" / "published.json").read_text())
-    assert all(section["note"] for section in document.values())
-
-
-def test_the_best_similarity_undoes_one(common) -> None:
+    assert all(section["note"] for section in document.values())  # where they come from
+    # the best similarity undoes one
     outline = common.goal("bat_60").outline
     turned = 3 * outline @ np.array([[0.6, -0.8], [0.8, 0.6]]) * (1, -1) + (5, 7)
     assert common.aligned(turned, outline) == pytest.approx(outline, abs=2.0)
 
 
 @pytest.mark.parametrize("name", WANTING)
-def test_what_is_missing_is_said_in_one_line(name: str, tmp_path, monkeypatch, capsys) -> None:
+@pytest.mark.usefixtures("module")
+def test_what_is_missing_is_said_in_one_line(name: str, monkeypatch, capsys) -> None:
     arguments = ["--distorted"] if name == "escherization.py" else ["narrow", "--data", "proline"]
-    monkeypatch.setenv("ORBIFLOW_DATA", str(tmp_path))
     monkeypatch.setattr(sys, "argv", [str(BENCHMARKS / name), *arguments])
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    # as in a process of its own: what benchmarks import of each other is read anew, and forgotten
-    for path in BENCHMARKS.glob("*.py"):
-        monkeypatch.setitem(sys.modules, path.stem, sys)
-        monkeypatch.delitem(sys.modules, path.stem)
     with pytest.raises(SystemExit) as left:
         runpy.run_path(str(BENCHMARKS / name), run_name="__main__")
     assert left.value.code == 2
@@ -88,18 +85,6 @@ def test_the_page_names_every_benchmark() -> None:
         assert path.stem in helpers or f"benchmarks/{path.name}" in page
 
 
-RIVALS_BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-MODULES = ("rivals", "density_known", "density_data", "common")
-
-
-@pytest.fixture(autouse=True)
-def _modules(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.syspath_prepend(str(RIVALS_BENCHMARKS))
-    yield
-    for name in MODULES:
-        sys.modules.pop(name, None)
-
-
 def uniform_rows(space: str, count: int) -> np.ndarray:
     rng = np.random.default_rng(0)
     if space == "torus":
@@ -114,9 +99,8 @@ def uniform_rows(space: str, count: int) -> np.ndarray:
     ("space", "volume"),
     [("torus", (2 * math.pi) ** 3), ("sphere", 4 * math.pi), ("rotation-space", 1.0)],
 )
-def test_what_is_even_is_even_in_the_box(space: str, volume: float) -> None:
-    rivals = importlib.import_module("rivals")
-    box = rivals.box_of(space, 3)
+def test_what_is_even_is_even_in_the_box(module, space: str, volume: float) -> None:
+    box = module("rivals").box_of(space, 3)
     rows = box.lay(uniform_rows(space, 4000))
     assert rows.shape == (4000, box.dim)
     assert (abs(rows) <= math.pi + 1e-12).all()
@@ -128,9 +112,9 @@ def test_what_is_even_is_even_in_the_box(space: str, volume: float) -> None:
     assert box.shift - box.dim * math.log(2 * math.pi) == pytest.approx(-math.log(volume))
 
 
-def test_the_true_density_of_mixtures_of_rotations_has_the_mean_one() -> None:
-    rows, _, log_density, *_ = importlib.import_module("density_known").turned(16, 2000)
-    other = Rotation.random(50_000, rng=np.random.default_rng(1)).as_quat()
+def test_the_true_density_of_mixtures_of_rotations_has_the_mean_one(module) -> None:
+    rows, _, log_density, *_ = module("density_known").turned(16, 2000)
+    other = Rotation.random(20_000, rng=np.random.default_rng(1)).as_quat()
     ratio = np.exp(log_density(other))
     assert ratio.mean() == pytest.approx(1, abs=5 * ratio.std() / len(ratio) ** 0.5)
     assert log_density(rows) == pytest.approx(log_density(-rows))
@@ -139,8 +123,7 @@ def test_the_true_density_of_mixtures_of_rotations_has_the_mean_one() -> None:
 
 
 @pytest.mark.parametrize("space", ["torus", "sphere", "rotation-space"])
-def test_kernels_of_scikit_learn_integrate_to_one(space: str) -> None:
-    rivals = importlib.import_module("rivals")
+def test_kernels_of_scikit_learn_integrate_to_one(module, space: str) -> None:
     rng = np.random.default_rng(2)
     if space == "torus":
         angle = rng.normal(0, 0.6, (60, 2))
@@ -158,28 +141,19 @@ def test_kernels_of_scikit_learn_integrate_to_one(space: str) -> None:
         rows[:, 0] = 2 * abs(rows[:, 0])
         rows, points = (own / np.linalg.norm(own, axis=1, keepdims=True) for own in (rows, points))
         volume = 4 * math.pi if space == "sphere" else 1.0
-    log, _ = rivals.scikit_learn(rows[:40], rows[40:], signed=space != "rotation-space")
+    log, _ = module("rivals").scikit_learn(rows[:40], rows[40:], signed=space != "rotation-space")
     density = np.exp(log(points)) * volume
     error = 0 if space == "torus" else density.std() / len(density) ** 0.5
     assert density.mean() == pytest.approx(1, abs=5 * error + 2e-3)
 
 
-LIMITS_BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-
-
-@pytest.fixture(name="module")
-def module_fixture(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.syspath_prepend(str(LIMITS_BENCHMARKS))
-    return importlib.import_module
-
-
-@pytest.mark.parametrize("dim", range(4, 15))
-def test_side_chains_of_all_dimensions_are_in_the_repository(module, dim: int) -> None:
-    drawn = module("density_data").sidechains(dim)
-    assert drawn.data.shape[1] == dim
-    assert len(drawn.data) == len(drawn.group) > 1_000
-    assert abs(drawn.data).max() <= math.pi
-    assert len(np.unique(drawn.data, axis=0)) > 0.99 * len(drawn.data)
+def test_side_chains_of_all_dimensions_are_in_the_repository(module) -> None:
+    for dim in range(4, 15):
+        drawn = module("density_data").sidechains(dim)
+        assert drawn.data.shape[1] == dim
+        assert len(drawn.data) == len(drawn.group) > 1_000
+        assert abs(drawn.data).max() <= math.pi
+        assert len(np.unique(drawn.data, axis=0)) > 0.99 * len(drawn.data)
 
 
 def test_the_known_density_is_a_sum_over_paths(module) -> None:
@@ -192,15 +166,15 @@ def test_the_known_density_is_a_sum_over_paths(module) -> None:
     assert abs(shares / shares.sum() - counts / counts.sum()).sum() < 0.2
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_groups_stay_on_one_side(module, seed: int) -> None:
+def test_groups_stay_on_one_side(module) -> None:
     halves, drawn = module("density_default").halves, module("density_data").Drawn
-    group = np.random.default_rng(seed).integers(60, size=900)
-    rows = np.stack([np.arange(900.0), group], axis=1)
-    train, test = halves(drawn(rows, "torus"), seed, group)
-    assert len(train) + len(test) == 900
-    assert 90 <= len(test) < 150
-    assert not set(train[:, 1]) & set(test[:, 1])
+    for seed in range(5):
+        group = np.random.default_rng(seed).integers(60, size=900)
+        rows = np.stack([np.arange(900.0), group], axis=1)
+        train, test = halves(drawn(rows, "torus"), seed, group)
+        assert len(train) + len(test) == 900
+        assert 90 <= len(test) < 150
+        assert not set(train[:, 1]) & set(test[:, 1])
 
 
 def test_narrow_kernels_are_those_of_the_kernel_estimate(module) -> None:
@@ -208,10 +182,8 @@ def test_narrow_kernels_are_those_of_the_kernel_estimate(module) -> None:
     rng = np.random.default_rng(0)
     train = rng.vonmises(0.0, 3e4, (400, 3))
     test = rng.vonmises(0.0, 3e4, (50, 3))
-    for round_, rows, places in (
-        (False, train, test),
-        (True, np.degrees(train[:, :2]), np.degrees(test[:, :2])),
-    ):
+    globe = np.degrees(train[:, :2]), np.degrees(test[:, :2])
+    for round_, rows, places in ((False, train, test), (True, *globe)):
         own = limits.narrow_log_density(rows, places, 1e5, round_=round_)
         other = kde.KernelDensity(rows, 1e5, round_=round_).score_samples(places)
         assert own == pytest.approx(other, abs=1e-3)
@@ -244,9 +216,8 @@ def test_the_integral_is_seen_from_values(module, monkeypatch) -> None:
     rng = np.random.default_rng(4)
     rows = rng.vonmises(rng.uniform(-3, 3, (3, 2))[rng.integers(3, size=240)], 20.0)
     rows[:40] = rows[40:80]  # so that there are narrow kernels
-    density = (
-        DensityEstimator("torus", components="kernels,mixture,chains", seed=0).fit(rows).density_
-    )
+    estimator = DensityEstimator("torus", components="kernels,mixture,chains", seed=0)
+    density = estimator.fit(rows).density_
     assert isinstance(density, Mixture)
     found = integral(density)
     assert found.value == pytest.approx(1, abs=1e-4)

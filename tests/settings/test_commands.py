@@ -125,13 +125,10 @@ def test_a_list_of_commands_imports_none_and_says_what_they_say() -> None:
     assert done.stderr.splitlines()[-1] == "['orbiflow.runtime.operations']"
 
 
-@pytest.mark.parametrize("words", [["--help", "export"], ["density", "--help", "plot"]])
-def test_help_may_be_asked_for_first(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert app.run(words) == 0
-    assert "--out" in capsys.readouterr().out
-
-
-def test_alone_it_prints_its_help(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_may_be_asked_for_first_or_by_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["--help", "export"], ["density", "--help", "plot"]):
+        assert app.run(words) == 0
+        assert "--out" in capsys.readouterr().out
     assert app.run([]) == 0
     text = capsys.readouterr().out
     assert all(name in text for name in ("escherize", "export", "density", "--install-completion"))
@@ -151,9 +148,11 @@ def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
     assert app.run(["export", "X"]) == 130
 
 
-def test_completion_knows_commands_and_choices() -> None:
+def test_completion_knows_commands_and_choices_and_others_are_refused() -> None:
     script = app.app_for(["--install-completion"]).generate_completion(shell="bash")
     assert all(word in script for word in ("escherize", "--tile-size", "skeleton"))
+    with refused("exprot", kind=ValueError):
+        find("exprot")
 
 
 def test_mistakes_and_help_need_no_numerical_library() -> None:
@@ -171,8 +170,3 @@ def test_mistakes_and_help_need_no_numerical_library() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     shown = done.stderr.splitlines()
     assert not [line for line in lines if f"{line} set()" not in shown], shown
-
-
-def test_an_unknown_operation_is_refused() -> None:
-    with refused("exprot", kind=ValueError):
-        find("exprot")

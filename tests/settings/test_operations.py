@@ -78,23 +78,16 @@ def test_a_call_from_python_is_checked_and_told() -> None:
         greet("you", {"volume": 3})  # pyright: ignore[reportArgumentType]
 
 
-def test_failures_are_told() -> None:
-    told: list[Event] = []
+def test_failures_and_stops_are_told_and_what_a_sink_raises_comes_out() -> None:
+    told, cancel = list[Event](), Cancel()
     with pytest.raises(SettingError):
         greet("nobody", on_event=told.append)
     assert told[-1] == Failed("name must be somebody", "mistake")
-
-
-def test_a_stop_is_told() -> None:
-    told: list[Event] = []
-    cancel = Cancel()
     cancel.cancel()
     with pytest.raises(Cancelled):
         greet("you", on_event=told.append, cancel=cancel)
     assert told[-1] == Finished("cancelled", {})
 
-
-def test_what_a_sink_raises_comes_out() -> None:
     def sink(event: Event) -> None:
         if isinstance(event, Note):
             raise OSError("full")

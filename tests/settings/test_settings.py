@@ -108,9 +108,7 @@ def values_of(kind: Kind) -> st.SearchStrategy[Any]:
             low = allowed.least if allowed.least is not None else allowed.above
             high = allowed.most if allowed.most is not None else allowed.below
             if whole:
-                return st.integers(
-                    None if low is None else int(low), None if high is None else int(high)
-                )
+                return st.integers(*(None if end is None else int(end) for end in (low, high)))
             numbers = st.floats(low, high, allow_nan=False, allow_infinity=False)
             return numbers.filter(lambda number: number in allowed)
         case ChoiceKind(choices=choices):
@@ -247,12 +245,6 @@ def test_mistakes_name_the_setting_and_the_value(name: str) -> None:
     assert all("--" + field in error.value.named(lambda field: "--" + field) for field in names)
 
 
-def test_a_required_setting_is_missed_by_name() -> None:
-    with pytest.raises(SettingError) as error:
-        Point(y=1)  # pyright: ignore[reportCallIssue]
-    assert names_in(error.value) == ("x",)
-
-
 def test_rules_are_about_what_was_given() -> None:
     assert Sheet(kerf=0.0).kerf == 0  # no effect, no offence
     assert Sheet(cut="pieces", kerf="1.5mm").kerf == 1.5  # pyright: ignore[reportArgumentType]
@@ -260,11 +252,14 @@ def test_rules_are_about_what_was_given() -> None:
         Sheet(cut="pieces", kerf=1.0).replace(cut="none")
 
 
-def test_settings_are_frozen_and_hashable() -> None:
+def test_settings_are_frozen_and_hashable_and_a_required_one_is_missed_by_name() -> None:
     made = Sheet(names=("a",))
     with pytest.raises(AttributeError):
         made.cut = "none"  # pyright: ignore[reportAttributeAccessIssue]
     assert hash(made) == hash(Sheet(names=("a",)))
+    with pytest.raises(SettingError) as error:
+        Point(y=1)  # pyright: ignore[reportCallIssue]
+    assert names_in(error.value) == ("x",)
 
 
 def test_what_fields_say_of_themselves() -> None:
@@ -283,11 +278,8 @@ def test_a_tuple_from_the_command_line() -> None:
     assert FIELDS["width"].parse(["3"]) == 3.0
 
 
-def test_a_field_cannot_hide_a_method() -> None:
+def test_a_field_cannot_hide_a_method_and_a_kind_raises_no_setting_error() -> None:
     with refused("replace", kind=TypeError):
         type("Wrong", (Settings,), {"__annotations__": {"replace": int}, "replace": 1})
-
-
-def test_a_refusal_is_no_setting_error_of_its_own() -> None:
     with pytest.raises(RefusedValue):
         FIELDS["size"].kind.read("40")
