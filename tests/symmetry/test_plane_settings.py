@@ -148,18 +148,6 @@ def test_lines_that_are_none_are_refused(point, direction, match):
         Line(point, direction)
 
 
-# counted by hand from the diagrams of the International Tables: largest rotation, then whether the
-# point group holds a reflection, and whether some mirror line exists (pg and pgg only glide)
-POINT_GROUPS = {
-    **{"p1": (1, False, False), "p2": (2, False, False), "pm": (1, True, True)},
-    **{"pg": (1, True, False), "cm": (1, True, True), "pmm": (2, True, True)},
-    **{"pmg": (2, True, True), "pgg": (2, True, False), "cmm": (2, True, True)},
-    **{"p4": (4, False, False), "p4m": (4, True, True), "p4g": (4, True, True)},
-    **{"p3": (3, False, False), "p3m1": (3, True, True), "p31m": (3, True, True)},
-    **{"p6": (6, False, False), "p6m": (6, True, True)},
-}
-
-
 def mirror_exists(group):
     """Whether some element reverses orientation and has no glide component modulo the lattice."""
     for g in group.elements_near(group.lattice.sum(axis=1) / 2, 3 * np.abs(group.lattice).sum()):
@@ -209,9 +197,6 @@ def test_orbifolds_have_the_cones_corners_and_mirrors_of_their_symbols(symbol):
     cost += sum((int(n) - 1) / (2 * int(n)) for n in corners if n.isdigit())
     assert cost + symbol.count("*") + symbol.count("×") + 2 * symbol.count("o") == 2
     assert mirror_exists(group) == ("*" in symbol)
-    assert (group.order > 1 and max(map(int, filter(str.isdigit, symbol)), default=1)) == (
-        group.order > 1 and POINT_GROUPS[group.name][0]
-    )
 
 
 def test_unknown_names_are_refused_with_the_known_ones():

@@ -44,9 +44,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.make.repeats import rectangle, repeating_page
 from orbiflow.tiles.page import Box
-from orbiflow.tiles.page.rastering import NOWHERE, region_sides, runs
 from orbiflow.tiles.search import matched
-from orbiflow.tiles.silhouette import triangulate
 from outlines import FOLDER, animal, bent_squirrel
 from refusals import refused
 
@@ -126,21 +124,6 @@ def test_a_checkerboard_is_carried(name: str) -> None:
     clear &= shapely.distance(shapely.points(points), rings) > 3
     assert clear.sum() > 500
     np.testing.assert_allclose(made[row, column][clear], parity[clear], atol=0.02)
-
-
-def test_triangles_and_what_is_around_them() -> None:
-    mesh = triangulate(np.array([[2.0, 2.0], [30.0, 5.0], [26.0, 28.0], [15.0, 12.0], [4.0, 25.0]]))
-    found = runs(region_sides(mesh.points, mesh.triangles), 0, 32, 32)
-    label = found.spread(found.label).reshape(32, 32)
-    rows, columns = np.indices((32, 32))
-    inside = shapely.contains_xy(
-        shapely.Polygon(mesh.points[: mesh.size]), columns.ravel() + 0.5, rows.ravel() + 0.5
-    )
-    np.testing.assert_array_equal(label.ravel() != NOWHERE, inside)
-    for triangle in np.unique(label[label >= 0]):
-        polygon = shapely.Polygon(mesh.points[mesh.triangles[triangle]]).buffer(1e-5)
-        own = label == triangle
-        assert shapely.contains_xy(polygon, columns[own] + 0.5, rows[own] + 0.5).all()
 
 
 def test_the_fringe_of_a_cut_out_does_not_show() -> None:

@@ -99,23 +99,6 @@ def test_one_symbol_and_a_short_line_a_tile_in_layers() -> None:
     assert "C" in next(root.iter(f"{SVG}path")).attrib["d"]
 
 
-def test_the_picture_is_the_way_up_that_the_input_has() -> None:
-    tile = tile_of("IH4")
-    for y_down in (False, True):
-        text = text_of(EscherTile(tile, y_down=y_down), area=(60.0, 60.0))
-        (line, *_) = [x for x in svg_lines(text) if x.layer != "paper"]
-        scale = 40 / longer_side(tile.polygon)
-        flip = np.array([1.0, 1.0 if y_down else -1.0])
-        images = [g(tile.polygon) * flip * scale for g in tile.group.cosets]
-        apart = []
-        for image in images:
-            moved = image - (image.min(axis=0) + image.max(axis=0)) / 2
-            own = line.points - (line.points.min(axis=0) + line.points.max(axis=0)) / 2
-            rings = shapely.LinearRing(moved), shapely.LinearRing(own)
-            apart.append(shapely.hausdorff_distance(*rings))
-        assert min(apart) < 0.15
-
-
 def test_decimals_follow_the_tolerance() -> None:
     tile = tile_of("IH7")
     coarse, fine = (text_of(tile, tolerance=t) for t in (0.5, 0.0005))

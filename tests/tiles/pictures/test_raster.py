@@ -189,13 +189,6 @@ def test_holes_show_what_is_below() -> None:
     assert tuple(image[50, 100 + 30]) == (0xC0, 0x30, 0x20)
 
 
-def test_y_goes_up_or_down() -> None:
-    for y_down, row in ((False, 10), (True, 90)):
-        sketch = Sketch(WINDOW, Sheet.screen(200), y_down=y_down)
-        sketch.fill(np.array([[-2, 0.5], [2, 0.5], [2, 1.0], [-2, 1.0]]), RED)
-        assert tuple(np.asarray(sketch.picture().image(200))[row, 100]) == (0xC0, 0x30, 0x20)
-
-
 @given(st.lists(st.from_regex("#[0-9a-f]{6}", fullmatch=True), min_size=1, max_size=24))
 def test_a_palette_keeps_the_colours_that_were_used(colours: list[str]) -> None:
     values = [[module.rgb(colour)] * 8 for colour in colours]

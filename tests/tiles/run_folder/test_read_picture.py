@@ -46,7 +46,7 @@ def test_outline_parts_and_holes_are_marked(picture: Path) -> None:
     assert (pixels[100 * scale, 40 * scale] < 10).all()
 
 
-@pytest.mark.parametrize("height", [199, 200, 201, 203, 211])
+@pytest.mark.parametrize("height", [200, 203])
 def test_nothing_is_marked_below_the_words(height: int, tmp_path: Path) -> None:
     image = Image.new("L", (307, height), 255)
     ImageDraw.Draw(image).ellipse((20, 20, 180, 180), fill=0)
