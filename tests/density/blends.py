@@ -1,5 +1,7 @@
 """Random densities on tori, of all parts that a fit may find."""
 
+from pathlib import Path
+
 import numpy as np
 import torch
 
@@ -15,6 +17,8 @@ from orbiflow.density import (
     UniformDensity,
     VonMisesChains,
     VonMisesNetwork,
+    density_to_bytes,
+    read_density,
 )
 from orbiflow.density.models import SCALES, ProductChains, chained
 from orbiflow.fields import SplineField
@@ -103,6 +107,13 @@ def blended(
     shares = [w for w in weights.tolist() if w > 0 or flow is not None]
     kept = [(part, w) for part, w in zip(there, shares, strict=True) if w > 0]
     return Mixture([part for part, _ in kept], [w for _, w in kept])
+
+
+def stored(density: Density, folder: Path) -> Density:
+    """The same, from a file in the folder."""
+    path = folder / "density.safetensors"
+    path.write_bytes(density_to_bytes(density))
+    return read_density(path)[0]
 
 
 def flow_of(density: Density) -> FlowDensity:

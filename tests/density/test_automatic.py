@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from density.blends import kernels_of, two_clusters
+from density.blends import kernels_of, stored, two_clusters
 from orbiflow.density import (
     DensityEstimator,
     DensitySettings,
     Mixture,
     Torus,
-    density_to_bytes,
     fit_automatic,
     make_space,
-    read_density,
 )
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.models import midpoints
@@ -61,9 +59,7 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path, monkeypatch) -> None:
     assert report.notes[0].startswith(f"chosen by {rows} rows held out, in {folds} parts")
     assert [done for done, _ in said] == sorted(done for done, _ in said)
     assert any(f"held-out part 2 of {folds}: mixture" in what for _, what in said)
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(density))
-    back, _ = read_density(path)
+    back = stored(density, tmp_path)
     with torch.no_grad():
         assert torch.equal(back.log_prob(grid), values)
     draws = [d.sample((50,), torch.Generator().manual_seed(0)) for d in (density, back)]

@@ -21,6 +21,7 @@ from density.blends import (
     random_kernels,
     random_network,
     random_product_chains,
+    stored,
 )
 from orbiflow.density import (
     MEASURES,
@@ -34,10 +35,8 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
     VonMisesSine,
-    density_to_bytes,
     log_density_gradient,
     make_space,
-    read_density,
 )
 from orbiflow.density.models import flow_obstacle
 from orbiflow.density.spaces import RoundSpace, UnitVectorSpace
@@ -236,10 +235,8 @@ def test_gradients_in_points_and_parameters(name: str, seed: int, measure: str) 
 
 @pytest.mark.parametrize("name", DENSITIES)
 def test_a_file_gives_the_same_density_back(name: str, tmp_path: Path) -> None:
-    density, path = DENSITIES[name](3), tmp_path / "density.safetensors"
-    space = density.space
-    path.write_bytes(density_to_bytes(density))
-    again, _ = read_density(path)
+    density = DENSITIES[name](3)
+    again, space = stored(density, tmp_path), density.space
     points = space.uniform(20, torch.Generator().manual_seed(0))
     assert again.space == space
     assert sum(again.space == other for other in SPACES.values()) <= 1

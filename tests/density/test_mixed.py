@@ -10,16 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from orbiflow.density import (
-    DensityEstimator,
-    Role,
-    Torus,
-    UniformDensity,
-    conditional,
-    density_to_bytes,
-    marginal,
-    read_density,
-)
+from density.blends import stored
+from orbiflow.density import DensityEstimator, Role, Torus, UniformDensity, conditional, marginal
 from orbiflow.density.spaces import Line
 from orbiflow.errors import OrbiflowError, SettingError
 from refusals import refused, warned
@@ -80,8 +72,7 @@ def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
     whole = DensityEstimator(space, components="chains").fit(data).density_
     for part in (whole, marginal(whole, [1, 2, 4]), conditional(whole, {0: 0.1})):
         points = part.space.to_chart(np.full((3, part.space.dim), 0.3))
-        (tmp_path / "d").write_bytes(density_to_bytes(part))
-        again, _ = read_density(tmp_path / "d")
+        again = stored(part, tmp_path)
         assert again.space == part.space
         assert not again.space.is_of_angles
         assert torch.allclose(again.log_prob(points), part.log_prob(points))

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from density.blends import flow_of
+from density.blends import flow_of, stored
 from orbiflow.density import (
     DensityEstimator,
     FlowDensity,
     FlowSettings,
     UniformDensity,
-    density_to_bytes,
     fit_density,
     make_space,
-    read_density,
 )
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
@@ -92,10 +90,9 @@ def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: Any) -> None:
 
 @pytest.mark.parametrize("name", ["torus", "projective-plane"])
 def test_no_cache_is_poisoned_when_it_is_first_filled_under_inference(name: str, tmp_path) -> None:
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(DensityEstimator(name, **QUICK).fit(DATA).density_))
+    fit = DensityEstimator(name, components="flow,mixture", **QUICK).fit(DATA)
     with torch.inference_mode():  # everything is made and evaluated here first
-        density, _ = read_density(path)
+        density = stored(fit.density_, tmp_path)
         space = make_space(name)
         own = FlowDensity(space, Flow([SplineField(space.group, 3, smoothness=0.7)]))
         at = torch.rand(3, 2, dtype=torch.float64)

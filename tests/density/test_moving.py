@@ -12,19 +12,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from density.blends import blended, flow_of
+from density.blends import blended, flow_of, stored
 from density.blends import random_kernels as kernels_on
 from density.test_every_density import DENSITIES
 from elsewhere import DEVICE, a_device
-from orbiflow.density import (
-    Density,
-    Mixture,
-    Space,
-    UniformDensity,
-    density_to_bytes,
-    make_space,
-    read_density,
-)
+from orbiflow.density import Density, Mixture, Space, UniformDensity, make_space
 from orbiflow.fields import FourierField, SplineField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import group_by_name
@@ -71,8 +63,7 @@ def test_files_and_figures_elsewhere(tmp_path: Path) -> None:
             d.entropy(20, generator=g) for d, g in zip((moved, density), generators, strict=True)
         ]
         torch.testing.assert_close(entropies[0].cpu(), entropies[1])
-        (tmp_path / "moved").write_bytes(density_to_bytes(moved))
-    again, _ = read_density(tmp_path / "moved")
+        again = stored(moved, tmp_path)
     assert torch.equal(again.log_prob(points), density.log_prob(points))
 
 

@@ -11,7 +11,7 @@ import torch
 from scipy import stats
 from torch import Tensor
 
-from density.blends import even_grid, random_chains, random_kernels
+from density.blends import even_grid, random_chains, random_kernels, stored
 from orbiflow.density import (
     Density,
     Mixture,
@@ -92,8 +92,7 @@ def test_it_is_evaluated_saved_drawn_and_moved_beside_others(tmp_path: Path) -> 
     assert "wave 50.0%" in repr(density)
     _, slopes = log_density_gradient(density, [[0.3, 0.4]])
     assert slopes.shape == (1, 2)
-    (tmp_path / "density").write_bytes(density_to_bytes(density))
-    assert torch.equal(read_density(tmp_path / "density")[0].log_prob(grid).exp(), values)
+    assert torch.equal(stored(density, tmp_path).log_prob(grid).exp(), values)
     line = torch.linspace(0.01, 0.99, 30, dtype=torch.float64)
     assert density_on_grid(density, line, line, "uniform").shape == (30, 30)
     assert highest_density_region(density, 0.5, samples=2000).size > 0

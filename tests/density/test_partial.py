@@ -16,6 +16,7 @@ from density.blends import (
     random_blend,
     random_chains,
     random_network,
+    stored,
 )
 from orbiflow.density import (
     Density,
@@ -24,10 +25,8 @@ from orbiflow.density import (
     Torus,
     VonMisesChains,
     conditional,
-    density_to_bytes,
     make_space,
     marginal,
-    read_density,
 )
 from orbiflow.density.inference import log_prob_observed
 from orbiflow.density.models import LEVELS, Split, kernels_for
@@ -307,8 +306,7 @@ def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:
     assert other.error > 0.01
     assert one.largest_error >= 0.03
     assert other.largest_error >= 0.06  # of the joint density and of what is given
-    (tmp_path / "d").write_bytes(density_to_bytes(first))
-    again, _ = read_density(tmp_path / "d")
+    again = stored(first, tmp_path)
     assert (again.error, again.largest_error) == (0.02, 0.03)
     assert again.space == first.space
 
@@ -317,8 +315,7 @@ def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:
 def test_three_angles_ask_the_whole(tmp_path: Path, given: dict[int, float] | None) -> None:
     density = random_blend(2, 4, network=True)
     found = marginal(density, [0, 2, 3]) if given is None else conditional(density, given)
-    (tmp_path / "d").write_bytes(density_to_bytes(found))
-    again = read_density(tmp_path / "d")[0]
+    again = stored(found, tmp_path)
     drawn = again.sample(200, torch.Generator().manual_seed(0))
     assert torch.equal(again.log_prob(drawn[:5]), found.log_prob(drawn[:5]))
     assert drawn.shape == (200, 3)

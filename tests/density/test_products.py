@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from density.blends import random_kernels as kernels_on
-from density.blends import random_product_chains
+from density.blends import random_product_chains, stored
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
@@ -21,10 +21,8 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
     conditional,
-    density_to_bytes,
     make_space,
     marginal,
-    read_density,
 )
 from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.kernels import fit_mixture
@@ -257,9 +255,7 @@ def test_three_columns_beside_a_given_place(tmp_path: Path) -> None:
         [(2 * np.pi * drawn).cos().mean(dim=0), (2 * np.pi * drawn).sin().mean(dim=0)]
     )
     np.testing.assert_allclose(own, wave / 4000, atol=0.15)
-    path = tmp_path / "part.safetensors"
-    path.write_bytes(density_to_bytes(part))
-    again, _ = read_density(path)
+    again = stored(part, tmp_path)
     np.testing.assert_allclose(again.log_prob(even[:9]), part.log_prob(even[:9]))
 
 

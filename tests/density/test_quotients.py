@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from density.blends import random_kernels
+from density.blends import random_kernels, stored
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
@@ -25,13 +25,11 @@ from orbiflow.density import (
     QuotientSpace,
     Space,
     UniformDensity,
-    density_to_bytes,
     log_density_gradient,
     make_space,
     marginal,
     outlines,
     plot_density,
-    read_density,
 )
 from orbiflow.density.models import midpoints
 from orbiflow.density.pictures import density_thumbnail
@@ -157,9 +155,7 @@ def test_a_density_is_saved_by_its_group_alone(tmp_path: Path) -> None:
         space = QuotientSpace(group)
         both = [some_kernels(space), FlowDensity(space, some_flow(space))]
         density = Mixture(both, [0.6, 0.4])
-        path = tmp_path / "density.safetensors"
-        path.write_bytes(density_to_bytes(density))
-        again, _ = read_density(path)
+        again = stored(density, tmp_path)
         assert again.space == space
         assert again.space.settings()["group"]["name"] == group.name
         at = points_of(space, 1)
@@ -243,9 +239,7 @@ def test_a_space_of_your_own_is_fitted_and_saved(tmp_path: Path) -> None:
     estimator = DensityEstimator(space, components="mixture").fit(data)
     grid = midpoints(space, 64)
     assert float(estimator.density_.log_prob(grid).exp().mean()) == pytest.approx(1, abs=1e-6)
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(estimator.density_))
-    again, _ = read_density(path)
+    again = stored(estimator.density_, tmp_path)
     assert again.space == space
     assert make_space("test-moebius", length=2.0) == space
     with refused("name"):

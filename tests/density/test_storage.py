@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from density.blends import blended, bump
+from density.blends import blended, bump, stored
 from orbiflow.density import (
     AdaptiveKernels,
     Density,
@@ -41,12 +41,6 @@ def filled(field: InvariantField, seed: int, size: float = 0.05) -> InvariantFie
     return field
 
 
-def back(density: Density, folder: Path) -> Density:
-    path = folder / "density.safetensors"
-    path.write_bytes(density_to_bytes(density))
-    return read_density(path)[0]
-
-
 def plain(*fields: InvariantField, space=None, base=None) -> Density:
     return FlowDensity(space or Torus(2), Flow(fields, steps=2, warn=False), base)
 
@@ -72,7 +66,7 @@ def test_what_is_read_is_what_was_saved(
     base = bump(space, 1.5) if von_mises else None
     density = plain(*fields, space=space, base=base)
     at = space.uniform(20, torch.Generator().manual_seed(seed))
-    again = back(density, tmp_path_factory.mktemp("saved"))
+    again = stored(density, tmp_path_factory.mktemp("saved"))
     with torch.no_grad():
         assert torch.equal(again.log_prob(at), density.log_prob(at))
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
-from density.blends import kernels_of, random_kernels
+from density.blends import kernels_of, random_kernels, stored
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
@@ -28,7 +28,6 @@ from orbiflow.density import (
     Sphere,
     UndeclaredError,
     density_picture,
-    density_to_bytes,
     make_space,
     read_density,
 )
@@ -156,13 +155,12 @@ class HalfTurns(UnitVectorSpace):
 
 
 def test_the_quotient_by_a_group_of_ones_own_is_fitted_and_saved(tmp_path: Path) -> None:
-    truth, path = kernels(HalfTurns(), 1), tmp_path / "density.safetensors"
+    truth = kernels(HalfTurns(), 1)
     data = truth.sample(60, source(0)).numpy()
     fit = DensityEstimator("half-turns", components="mixture").fit(data)
     scores = fit.score_samples(data)
     assert fit.score_samples(data * [-1, -1, 1]) == pytest.approx(scores)
-    path.write_bytes(density_to_bytes(fit.density_))
-    again = DensityEstimator.fitted(read_density(path)[0])
+    again = DensityEstimator.fitted(stored(fit.density_, tmp_path))
     assert isinstance(again.space_, HalfTurns)
     assert (again.score_samples(data) == scores).all()
 
