@@ -148,12 +148,10 @@ def test_missing_values_of_rows_that_are_read_are_refused_and_of_others_not(summ
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ("phase=", "--where phase=1"),
-        ("phase=7", "phase 7 1 2 3 --where"),
-        ("colour=red", "colour"),
-        ("site=north,phase=2", "site=north phase=2 --where"),
+        ("phase=", "--where phase=1"), ("phase=7", "phase 7 1 2 3 --where"),
+        ("colour=red", "colour"), ("site=north,phase=2", "site=north phase=2 --where"),
     ],
-)
+)  # fmt: skip
 def test_what_chooses_no_row_is_refused(summary, where: str, words: str) -> None:
     done, _ = summary("--columns", "angle", "--where", where)
     assert done.status != 0

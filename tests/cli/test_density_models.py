@@ -42,14 +42,11 @@ def write(path: Path, header: str, values: np.ndarray) -> None:
 @pytest.mark.parametrize(
     ("command", "model", "about"),
     [
-        ("score", "nowhere", "nowhere"),
-        ("sample", "empty", "empty density.safetensors"),
-        ("plot", "damaged", "damaged"),
-        ("region", "torus.csv", "torus.csv"),
-        ("marginal", "nowhere", "nowhere"),
-        ("compare", "nowhere", "nowhere"),
+        ("score", "nowhere", "nowhere"), ("sample", "empty", "empty density.safetensors"),
+        ("plot", "damaged", "damaged"), ("region", "torus.csv", "torus.csv"),
+        ("marginal", "nowhere", "nowhere"), ("compare", "nowhere", "nowhere"),
     ],
-)
+)  # fmt: skip
 def test_models_that_are_none(
     command: str, model: str, about: str, folder: Path, tmp_path: Path, orbiflow
 ) -> None:

@@ -1,5 +1,6 @@
 """Random densities on tori, of all parts that a fit may find."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +26,12 @@ from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
 
-def bump(space: Space, kappa: float = 1.0) -> AdaptiveKernels:
-    """One kernel about the middle of the chart."""
-    middle = torch.full((1, space.chart_dim), 0.5, dtype=torch.float64)
+def bump(space: Space, kappa: float = 1.0, at: Sequence[float] = ()) -> AdaptiveKernels:
+    """One kernel about a place of the chart, its middle if there is none."""
+    center = torch.tensor([list(at) or [0.5] * space.chart_dim], dtype=torch.float64)
     width = 1 if space.is_round else space.dim
-    return AdaptiveKernels(space, middle, torch.full((1, width), kappa), torch.ones(1))
+    sharp = torch.full((1, width), kappa, dtype=torch.float64)
+    return AdaptiveKernels(space, center, sharp, torch.ones(1, dtype=torch.float64))
 
 
 def identity_flow(space: Space) -> Flow:

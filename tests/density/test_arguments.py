@@ -28,42 +28,28 @@ def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> Any:
 
 POINTS = torch.rand(30, 2, dtype=torch.float64)
 HALVES = torch.full((4,), 0.25)
+FLOW = Flow(lambda x: x)
 od: Any = density  # its arguments are wrong on purpose
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
-    "a name for a space": (
-        lambda: od.FlowDensity("torus", Flow(lambda x: x)),
-        "torus `make_space`",
-    ),
+    "a name for a space": (lambda: od.FlowDensity("torus", FLOW), "torus `make_space`"),
     "no flow": (lambda: od.FlowDensity(torus, None), "flow Flow"),
-    "no base": (lambda: od.FlowDensity(torus, Flow(lambda x: x), "uniform"), "base Density"),
+    "no base": (lambda: od.FlowDensity(torus, FLOW, "uniform"), "base Density"),
     "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), ""),
     "text": (lambda: a_density().log_prob("points"), "points"),
-    "complex": (
-        lambda: a_density().log_prob(torch.rand(2, 2, dtype=torch.complex64)),
-        "points numbers",
-    ),
-    "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points finite"),
+    "complex": (lambda: a_density().log_prob(POINTS * 1j), "points numbers"),
+    "nan": (lambda: a_density().log_prob(POINTS * torch.nan), "points finite"),
     "measure": (lambda: a_density().log_prob(POINTS, measure=3), "measure"),
     "sample text": (lambda: a_density().sample("five"), "number samples"),
     "midpoints": (lambda: midpoints(torus, 2.5), "resolution number"),  # type: ignore[arg-type]
     "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), "3 4"),
     "a base's space": (lambda: od.UniformDensity("sphere"), "space Space"),
-    "kernels": (
-        lambda: od.AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),
-        "centers numbers",
-    ),
+    "kernels": (lambda: od.AdaptiveKernels(torus, "a", HALVES, HALVES), "centers numbers"),
     "chains": (lambda: od.VonMisesChains(sphere, HALVES, HALVES, HALVES), "Mises chains"),
     "chains' shapes": (lambda: od.VonMisesChains(torus, [0.0], HALVES, HALVES), "log_weights"),
-    "a mixture of nothing": (
-        lambda: od.Mixture([a_density(), None], [0.5, 0.5]),
-        "components Density",
-    ),
+    "a mixture of nothing": (lambda: od.Mixture([None], [1.0]), "components Density"),
     "fit: a name": (lambda: od.fit_density("torus", POINTS), "space Space"),
     "fit: columns": (lambda: od.fit_density(sphere, torch.rand(30, 3)), "2 30 3"),
-    "fit: other settings": (
-        lambda: od.fit_density(sphere, POINTS, od.DensitySettings()),
-        "FlowSettings",
-    ),
+    "fit: settings": (lambda: od.fit_density(sphere, POINTS, od.DensitySettings()), "FlowSettings"),
     "fit: four angles": (lambda: od.fit_density(od.Torus(4), torch.rand(30, 4)), "dimensions 3"),
     "dim": (lambda: od.Torus("2"), "number 1 64"),
     "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "RoundSpace"),

@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 import torch
 
+import orbiflow.density as od
 from density.blends import kernels_of, stored, two_clusters
-from orbiflow.density import (
-    DensityEstimator,
-    DensitySettings,
-    Mixture,
-    Torus,
-    fit_automatic,
-    make_space,
-)
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.models import midpoints
 from refusals import refused
@@ -27,7 +20,7 @@ QUICK: dict[str, Any] = {
 
 
 def smooth(name: str, count: int = 300, seed: int = 0) -> torch.Tensor:
-    return two_clusters(make_space(name), count, seed)
+    return two_clusters(od.make_space(name), count, seed)
 
 
 @pytest.mark.parametrize("name", ["torus", "projective-plane"])
@@ -35,12 +28,12 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path, monkeypatch) -> None:
     rows, folds = (300, 10) if name == "torus" else (60, 2)
     if name == "torus":
         monkeypatch.setattr("orbiflow.density.fitting.held_out.USED", ((600, 10),))
-    space, said = make_space(name), []
-    settings = DensitySettings(**QUICK)
-    density, report = fit_automatic(
+    space, said = od.make_space(name), []
+    settings = od.DensitySettings(**QUICK)
+    density, report = od.fit_automatic(
         space, smooth(name), settings, progress=lambda done, what: said.append((done, what))
     )
-    assert isinstance(density, Mixture)
+    assert isinstance(density, od.Mixture)
     grid = midpoints(space, 80)
     with torch.no_grad():
         values = density.log_prob(grid)
@@ -70,12 +63,12 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path, monkeypatch) -> None:
 
 
 def test_the_same_seed_gives_the_same_density() -> None:
-    space, at = make_space("sphere"), smooth("sphere", 9, 9)
+    space, at = od.make_space("sphere"), smooth("sphere", 9, 9)
     parts: Any = ("kernels", "mixture")
-    settings = [DensitySettings(components=parts, seed=seed) for seed in (1, 1, 2)]
+    settings = [od.DensitySettings(components=parts, seed=seed) for seed in (1, 1, 2)]
     with torch.no_grad():
         one, same, other = (
-            fit_automatic(space, smooth("sphere", 40), s)[0].log_prob(at) for s in settings
+            od.fit_automatic(space, smooth("sphere", 40), s)[0].log_prob(at) for s in settings
         )
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
@@ -83,13 +76,13 @@ def test_the_same_seed_gives_the_same_density() -> None:
 
 def test_repeated_places_are_mass_unless_said_otherwise() -> None:
     rng = np.random.default_rng(0)
-    space, points = make_space("torus"), smooth("torus", 300)
+    space, points = od.make_space("torus"), smooth("torus", 300)
     points = torch.cat([points, points[torch.tensor(rng.integers(0, 10, 200))]])
     at = points[300:]
     values = {}
     for repeats in ("places", "rounding"):
-        settings = DensitySettings(components=("kernels",), repeats=repeats)
-        density, report = fit_automatic(space, points, settings)
+        settings = od.DensitySettings(components=("kernels",), repeats=repeats)
+        density, report = od.fit_automatic(space, points, settings)
         with torch.no_grad():
             values[repeats] = float(density.log_prob(at).mean())
         assert "repeat an earlier one" in report.notes[-1]
@@ -98,18 +91,18 @@ def test_repeated_places_are_mass_unless_said_otherwise() -> None:
 
 @pytest.mark.parametrize(("close", "spiky"), [(2, False), (60, True)])
 def test_spikes_are_of_places_and_not_of_accidents(close: int, spiky: bool) -> None:
-    rng, space = np.random.default_rng(7), make_space("klein-bottle")
+    rng, space = np.random.default_rng(7), od.make_space("klein-bottle")
     rows = np.stack([rng.vonmises(0.3, 4.0, 400), rng.vonmises(1.0, 3.0, 400)], axis=1)
     rows[1:close:2] = rows[0:close:2] + 1e-4
-    chosen = DensitySettings(components=("kernels", "mixture"))
-    density, _ = fit_automatic(space, space.to_chart(rows), chosen)
+    chosen = od.DensitySettings(components=("kernels", "mixture"))
+    density, _ = od.fit_automatic(space, space.to_chart(rows), chosen)
     narrow = kernels_of(density).concentrations.amax(dim=1) > 1e5
     assert (int(narrow.sum()) > 20) == spiky  # some follow the distance to the nearest row
 
 
 @pytest.mark.parametrize("part", COMPONENTS[1:])
 def test_each_part_alone(part: str) -> None:
-    estimator = DensityEstimator("torus", components=part)
+    estimator = od.DensityEstimator("torus", components=part)
     dim = 4 if part == "network" else 3
     angles = np.random.default_rng(0).vonmises([0.0, 1.0, 2.0, 3.0][:dim], 3.0, (200, dim))
     estimator.fit(angles)
@@ -122,7 +115,7 @@ def test_each_part_alone(part: str) -> None:
 def test_few_points() -> None:
     count = 10
     points = smooth("torus", count)
-    density, report = fit_automatic(Torus(2), points)
+    density, report = od.fit_automatic(od.Torus(2), points)
     assert report.validation == count
     assert report.notes[0].startswith("chosen by 10 rows held out, in 10 parts")
     with torch.no_grad():
@@ -131,30 +124,30 @@ def test_few_points() -> None:
 
 def test_what_cannot_be_chosen_is_refused() -> None:
     with refused("components"):
-        DensitySettings(components=("trees",))  # type: ignore[arg-type]
+        od.DensitySettings(components=("trees",))  # type: ignore[arg-type]
     with refused("repeats"):
-        DensitySettings(repeats="noise")  # type: ignore[arg-type]
+        od.DensitySettings(repeats="noise")  # type: ignore[arg-type]
     with refused("chains"):
-        fit_automatic(
-            make_space("sphere"), smooth("sphere"), DensitySettings(components=("chains",))
+        od.fit_automatic(
+            od.make_space("sphere"), smooth("sphere"), od.DensitySettings(components=("chains",))
         )
     with refused("flow", "3"):
-        DensityEstimator("torus", unit="degrees", components="flow,chains").fit(
+        od.DensityEstimator("torus", unit="degrees", components="flow,chains").fit(
             np.random.default_rng(0).uniform(0, 360, (50, 5))
         )
     with refused("different", "10", "3", "30"):
-        fit_automatic(make_space("torus"), torch.rand(3, 2).repeat(10, 1))
+        od.fit_automatic(od.make_space("torus"), torch.rand(3, 2).repeat(10, 1))
 
 
 def test_parts_for_new_groups() -> None:
     """Rows of a group lie within a degree: narrow kernels are right for its rows, not for others."""
-    rng, space = np.random.default_rng(3), make_space("torus")
+    rng, space = np.random.default_rng(3), od.make_space("torus")
     middles = rng.vonmises(0.0, 2.0, (60, 2))
     label = np.repeat(np.arange(60), 8)
     points = space.to_chart(middles[label] + 0.01 * rng.normal(size=(480, 2)))
     new = space.to_chart(rng.vonmises(0.0, 2.0, (2000, 2)))
-    chosen = DensitySettings(components=("kernels", "mixture"))
-    alone, _ = fit_automatic(space, points, chosen)
-    grouped, report = fit_automatic(space, points, chosen, groups=label)
+    chosen = od.DensitySettings(components=("kernels", "mixture"))
+    alone, _ = od.fit_automatic(space, points, chosen)
+    grouped, report = od.fit_automatic(space, points, chosen, groups=label)
     assert "of whole groups, of which there are 60" in " ".join(report.notes)
     assert float(grouped.log_prob(new).mean()) > float(alone.log_prob(new).mean()) + 0.5

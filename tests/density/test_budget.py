@@ -10,17 +10,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+import orbiflow.density as od
 from density.blends import two_clusters
-from orbiflow.density import (
-    DensitySettings,
-    FlowDensity,
-    FlowSettings,
-    Torus,
-    fit_automatic,
-    fit_density,
-    make_space,
-    weighed,
-)
 from orbiflow.density.fitting import Folds, Rows, folds_of, stacked
 from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.evidence import Candidates, Course, candidates_of, judged
@@ -51,7 +42,7 @@ def cluster(name: str, count: int = 200) -> torch.Tensor:
     rng = np.random.default_rng(0)
     unit = {"unit": "degrees"} if name in ("torus", "klein-bottle") else {}
     table = rng.normal([20.0, 60.0], 15.0, (count, 2)).clip(-89, 89)
-    return make_space(name, **unit).to_chart(table)
+    return od.make_space(name, **unit).to_chart(table)
 
 
 @given(st.integers(0, 20), st.integers(0, 20))
@@ -69,11 +60,11 @@ def test_a_budget_counts(limit: int, wanted: int) -> None:
 
 
 def test_the_same_evaluations_give_the_same_density() -> None:
-    space, points, values = make_space("sphere"), cluster("sphere", 60), []
+    space, points, values = od.make_space("sphere"), cluster("sphere", 60), []
     how = {**SMALL, "segments": 1}
     for seed in (0, 0, 1):
-        settings = FlowSettings(**how, evaluations=12, seed=seed)
-        density, report = fit_density(space, points, settings)
+        settings = od.FlowSettings(**how, evaluations=12, seed=seed)
+        density, report = od.fit_density(space, points, settings)
         assert report.notes == ("stopped by the budget of 12 evaluations",)
         with torch.no_grad():
             values.append(density.log_prob(points))
@@ -84,9 +75,9 @@ def test_the_same_evaluations_give_the_same_density() -> None:
 @pytest.mark.parametrize("iterations", [0, 1, 4, 5])
 def test_every_last_iterate_is_scored(iterations: int) -> None:
     points = cluster("torus").float()
-    space = make_space("torus")
+    space = od.make_space("torus")
     fields = [SplineField(space.group, 2, smoothness=2.0, dtype=torch.float32)]
-    density = FlowDensity(space, Flow(fields, steps=2, warn=False))
+    density = od.FlowDensity(space, Flow(fields, steps=2, warn=False))
     before = fields[0].parameters_.detach().clone()
     done = refine(density, Rows(points), Rows(points), iterations=iterations)
     assert len(done.validation) == 1 + math.ceil(iterations / ITERATIONS_PER_SCORE)
@@ -99,13 +90,13 @@ def test_every_last_iterate_is_scored(iterations: int) -> None:
 QUICK: dict[str, Any] = {
     "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)
 }  # fmt: skip
-SPACE = Torus(2)
+SPACE = od.Torus(2)
 
 
 def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torch.Tensor]:
     """Kernels of two broad clusters, judged by a fifth of 700 rows."""
     folds = folds_of(
-        weighed(two_clusters(SPACE, 700), weights),
+        od.weighed(two_clusters(SPACE, 700), weights),
         together=False,
         generator=torch.Generator().manual_seed(0),
     )
@@ -124,7 +115,7 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
 def tried(
     folds: Folds, candidates: Candidates, weights: torch.Tensor, told=lambda *_: None
 ) -> TriedFlow:
-    settings = FlowSettings(**QUICK)
+    settings = od.FlowSettings(**QUICK)
     return try_flow(
         folds, candidates, weights, lambda k: flow_beside(SPACE, folds, k, settings, None, told)
     )
@@ -149,8 +140,8 @@ def test_no_step_of_a_fit_is_half_of_it() -> None:
     parts: tuple[Component, ...] = ("flow", "kernels", "mixture")
     rng, shares = np.random.default_rng(0), [0.0]
     points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(120, 2))))
-    settings = DensitySettings(components=parts, **QUICK)
-    fit_automatic(SPACE, points, settings, progress=lambda done, _: shares.append(done))
+    settings = od.DensitySettings(components=parts, **QUICK)
+    od.fit_automatic(SPACE, points, settings, progress=lambda done, _: shares.append(done))
     assert shares == sorted(shares)
     assert shares[-1] == BEFORE_END
     assert max(np.diff(shares)) < 0.35
@@ -187,7 +178,9 @@ def test_a_flow_is_outdone_that_gains_nothing_and_cannot_catch_up(
     folds, _, _ = evidence()
     held = folds.held(0)
     even = torch.zeros(len(held), dtype=torch.float64)
-    flow = FlowDensity(SPACE, Flow([SplineField(SPACE.group, 1)], steps=1))  # which moves nothing
+    flow = od.FlowDensity(
+        SPACE, Flow([SplineField(SPACE.group, 1)], steps=1)
+    )  # which moves nothing
     with Rivals() as rivals:
         rivals.meet(even + above, even, held)
         assert rivals.outdo(flow, hope) is given_up
@@ -196,10 +189,10 @@ def test_a_flow_is_outdone_that_gains_nothing_and_cannot_catch_up(
 def test_an_outdone_flow_is_refined_no_further() -> None:
     points = SPACE.project(0.1 * torch.randn(50, 2, generator=torch.Generator().manual_seed(0)))
     small = {"max_frequency": 1, "segments": 1, "iterations": 8, "roughness": (1e-3, 1e-4)}
-    settings = FlowSettings(**small)  # type: ignore[arg-type]
+    settings = od.FlowSettings(**small)  # type: ignore[arg-type]
 
     def fitted(outdone) -> list[tuple[str, int]]:
-        stages = fit_density(SPACE, points.double(), settings, outdone=outdone)[1].stages
+        stages = od.fit_density(SPACE, points.double(), settings, outdone=outdone)[1].stages
         return [(stage.stopped, len(stage.validation)) for stage in stages]
 
     for times in (1, 2):  # after a quarter of the first stage, and halfway
@@ -219,6 +212,6 @@ def test_who_waits_for_rivals_that_fail_waits_no_longer(count: int, monkeypatch)
     monkeypatch.setattr("orbiflow.runtime.side_by_side.cores", lambda: count)
     monkeypatch.setattr(KernelFamily, "fitted", failing)
     points = SPACE.project(0.1 * torch.randn(400, 2, generator=torch.Generator().manual_seed(0)))
-    settings = DensitySettings(components=("flow", "kernels"), **QUICK)
+    settings = od.DensitySettings(components=("flow", "kernels"), **QUICK)
     with refused("kernels", "today"):
-        fit_automatic(SPACE, points.double(), settings)
+        od.fit_automatic(SPACE, points.double(), settings)

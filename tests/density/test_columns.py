@@ -67,12 +67,10 @@ def test_euler_angles_are_read_by_name(names: str) -> None:
 
 
 MUST_BE_CONVERTED = {
-    ("sphere", "colatitude,longitude"): "90",
-    ("sphere", "zenith,azimuth"): "90",
-    ("sphere", "lat_rad,lon_rad"): "radians degrees",
-    ("sphere", "dec,ra_hours"): "ra_hours 24",
+    ("sphere", "colatitude,longitude"): "90", ("sphere", "zenith,azimuth"): "90",
+    ("sphere", "lat_rad,lon_rad"): "radians degrees", ("sphere", "dec,ra_hours"): "ra_hours 24",
     ("sphere", "lat,lon,mag"): "lat,lon",
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("space", "names"), MUST_BE_CONVERTED)

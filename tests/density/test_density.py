@@ -9,24 +9,14 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import orbiflow.density as od
 from density.blends import bump
-from orbiflow.density import (
-    MEASURES,
-    Density,
-    FlowDensity,
-    KleinBottle,
-    ProjectivePlane,
-    Space,
-    Sphere,
-    Torus,
-    UniformDensity,
-)
 from orbiflow.density.models import midpoints
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from refusals import refused
 
-SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
+SPACES = (od.Torus(2), od.Sphere(), od.KleinBottle(), od.ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**32 - 1)
 
@@ -35,7 +25,7 @@ def make(
     space,
     seed: int = 0,
     *,
-    base: Callable[[Space], Density] = UniformDensity,
+    base: Callable[[od.Space], od.Density] = od.UniformDensity,
     segments: int = 2,
     strength: float = 0.1,
 ):
@@ -46,7 +36,7 @@ def make(
         noise = torch.randn(field.size, generator=generator, dtype=torch.float64)
         field.parameters_.data.copy_(strength * noise / noise.norm())  # of rms `strength` at most
         fields.append(field)
-    return FlowDensity(space, Flow(fields, steps=4, warn=False), base(space))
+    return od.FlowDensity(space, Flow(fields, steps=4, warn=False), base(space))
 
 
 def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
@@ -54,14 +44,14 @@ def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
 
 
 @torch.no_grad()
-def on_a_plain_grid(density: Density, side: int = 64) -> float:
+def on_a_plain_grid(density: od.Density, side: int = 64) -> float:
     # of what `make` gives by itself, 160 points a side change it by less than 1e-6
     return float(density.log_prob(midpoints(density.space, side)).exp().mean())
 
 
 @every
 @settings(max_examples=1)
-@given(seed=seeds, base=st.sampled_from([UniformDensity, bump]))
+@given(seed=seeds, base=st.sampled_from([od.UniformDensity, bump]))
 def test_it_integrates_to_one(space, seed: int, base) -> None:
     density = make(space, seed, base=base)
     assert on_a_plain_grid(density) == pytest.approx(1.0, abs=1e-3)
@@ -94,13 +84,13 @@ def test_samples_follow_the_density(space) -> None:
 
 
 def test_gradients_reach_the_parameters() -> None:
-    density = make(Sphere(), 3)
+    density = make(od.Sphere(), 3)
     parameters = list(density.flow.parameters())
     loss = -density.log_prob(square(0)).mean() + density.rsample((20,)).square().mean()
     assert all(float(g.norm()) > 0 for g in torch.autograd.grad(loss, parameters))
 
 
-@pytest.mark.parametrize(("space", "measure"), list(zip(SPACES, MEASURES, strict=False)))
+@pytest.mark.parametrize(("space", "measure"), list(zip(SPACES, od.MEASURES, strict=False)))
 def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str) -> None:
     density, named = make(space, 1), {"measure": measure}
     found = density.entropy(200, generator=torch.Generator().manual_seed(5), **named)
@@ -115,7 +105,7 @@ def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str) -> None:
 
 
 def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
-    density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
+    density, points = make(od.KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points)
         monkeypatch.setattr("orbiflow.density.models.flow.BLOCK_POINTS", 7)
@@ -127,7 +117,7 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_many_points_are_the_same_on_any_number_of_cores(count: int, monkeypatch) -> None:
-    density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
+    density, points = make(od.KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points, measure="natural")
         monkeypatch.setattr("orbiflow.density.models.density.BLOCK_POINTS", 7)
@@ -140,6 +130,6 @@ def test_many_points_are_the_same_on_any_number_of_cores(count: int, monkeypatch
 
 def test_what_is_refused() -> None:
     with refused("points", "5", "3"):
-        make(Torus(2)).log_prob(torch.zeros(5, 3))
+        make(od.Torus(2)).log_prob(torch.zeros(5, 3))
     with refused("resolution", "21"):
-        FlowDensity(Torus(6), Flow(lambda x: 0 * x)).mass()
+        od.FlowDensity(od.Torus(6), Flow(lambda x: 0 * x)).mass()

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
+import orbiflow.density as od
 from density.blends import (
     bump,
     flow_of,
@@ -23,21 +24,6 @@ from density.blends import (
     random_product_chains,
     stored,
 )
-from orbiflow.density import (
-    MEASURES,
-    AngularCentralGaussian,
-    Density,
-    FisherBingham,
-    FlowDensity,
-    Mixture,
-    ProductSpace,
-    Space,
-    Torus,
-    UniformDensity,
-    VonMisesSine,
-    log_density_gradient,
-    make_space,
-)
 from orbiflow.density.models import flow_obstacle
 from orbiflow.density.spaces import RoundSpace, UnitVectorSpace
 from orbiflow.errors import OrbiflowError
@@ -47,82 +33,84 @@ from strategies import central_difference, random_field, seeds
 
 TURN = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 BESIDE = [(3.0, 2.0), 24.0]
-SPACES: dict[str, Space] = {
-    "angle": Torus(1),
-    "angles in degrees": Torus(2, unit="degrees"),
-    "angles in turns": Torus(3, unit="turns"),
-    "an angle, a length, hours": Torus([None, *BESIDE], unit="degrees"),
-    "latitude and longitude": make_space("sphere", rotation=TURN),
-    "directions": make_space("sphere", form="vector", rotation=TURN),
-    "bottle": make_space("klein-bottle", unit="turns"),
-    "axes": make_space("projective-plane", rotation=TURN),
-    "axes as vectors": make_space("projective-plane", form="vector"),
-    "circle": make_space("hypersphere", dim=1),
-    "hypersphere": make_space("hypersphere", dim=9),
-    "lines": make_space("projective-space", dim=4),
-    "rotations": make_space("rotation-space"),
-    "orientations": make_space("rotation-space", symmetry="O", specimen="222"),
-    "turned pattern": make_space(
+SPACES: dict[str, od.Space] = {
+    "angle": od.Torus(1),
+    "angles in degrees": od.Torus(2, unit="degrees"),
+    "angles in turns": od.Torus(3, unit="turns"),
+    "an angle, a length, hours": od.Torus([None, *BESIDE], unit="degrees"),
+    "latitude and longitude": od.make_space("sphere", rotation=TURN),
+    "directions": od.make_space("sphere", form="vector", rotation=TURN),
+    "bottle": od.make_space("klein-bottle", unit="turns"),
+    "axes": od.make_space("projective-plane", rotation=TURN),
+    "axes as vectors": od.make_space("projective-plane", form="vector"),
+    "circle": od.make_space("hypersphere", dim=1),
+    "hypersphere": od.make_space("hypersphere", dim=9),
+    "lines": od.make_space("projective-space", dim=4),
+    "rotations": od.make_space("rotation-space"),
+    "orientations": od.make_space("rotation-space", symmetry="O", specimen="222"),
+    "turned pattern": od.make_space(
         "quotient", group=wallpaper_group("cm").conjugate(2.5 * rotation_matrix(0.4), [0.3, 0.7])
     ),
-    **{name: make_space(name) for name in ("p3", "p4g", "tricosm", "second-amphicosm")},
-    "directions and times": ProductSpace(make_space("sphere", form="vector"), BESIDE),
-    "bottle and times": ProductSpace(make_space("klein-bottle", unit="degrees"), BESIDE),
-    "orientations and times": ProductSpace(make_space("rotation-space", symmetry="222"), BESIDE),
-    "pattern and times": ProductSpace(make_space("p4"), BESIDE),
+    **{name: od.make_space(name) for name in ("p3", "p4g", "tricosm", "second-amphicosm")},
+    "directions and times": od.ProductSpace(od.make_space("sphere", form="vector"), BESIDE),
+    "bottle and times": od.ProductSpace(od.make_space("klein-bottle", unit="degrees"), BESIDE),
+    "orientations and times": od.ProductSpace(
+        od.make_space("rotation-space", symmetry="222"), BESIDE
+    ),
+    "pattern and times": od.ProductSpace(od.make_space("p4"), BESIDE),
 }
 
 
-def density_on(space: Space, seed: int) -> Density:
+def density_on(space: od.Space, seed: int) -> od.Density:
     """Kernels, a uniform part and, where there may be one, a flow of waves."""
     kernels = random_kernels(np.random.default_rng(seed), space, 5, 1.0, 9.0)
-    parts: list[Density] = [kernels, UniformDensity(space)]
+    parts: list[od.Density] = [kernels, od.UniformDensity(space)]
     if not flow_obstacle(space) and space.dim < 4:
         # a spline's divergence has kinks, where numerical derivatives are off
         field = random_field(space.group, 2, seed % 2**31, rms=0.05)
-        parts.append(FlowDensity(space, Flow(field, steps=4, warn=False), bump(space)))
-    return Mixture(parts, [0.6, 0.2, 0.2] if len(parts) == 3 else [0.8, 0.2])
+        parts.append(od.FlowDensity(space, Flow(field, steps=4, warn=False), bump(space)))
+    return od.Mixture(parts, [0.6, 0.2, 0.2] if len(parts) == 3 else [0.8, 0.2])
 
 
-def parametric(kind: type[AngularCentralGaussian | FisherBingham], name: str) -> Density:
+def parametric(kind: type[od.AngularCentralGaussian | od.FisherBingham], name: str) -> od.Density:
     """A density of a family whose axes are not those of the space."""
     turn = torch.tensor(TURN)
-    if kind is AngularCentralGaussian:
-        return AngularCentralGaussian(
-            make_space(name), turn.mT @ turn.new_tensor([3, 1, 0.4]).diag() @ turn
+    if kind is od.AngularCentralGaussian:
+        return od.AngularCentralGaussian(
+            od.make_space(name), turn.mT @ turn.new_tensor([3, 1, 0.4]).diag() @ turn
         )
     oval = turn.mT @ turn.new_tensor([1.5, -1, 0]).diag() @ turn
-    return FisherBingham(make_space(name), 2 * turn[0] * (name == "sphere"), oval)
+    return od.FisherBingham(od.make_space(name), 2 * turn[0] * (name == "sphere"), oval)
 
 
-DENSITIES: dict[str, Callable[[int], Density]] = {
+DENSITIES: dict[str, Callable[[int], od.Density]] = {
     **{name: partial(density_on, space) for name, space in SPACES.items()},
     **{
         f"chains of {dim}": lambda seed, dim=dim: random_chains(
-            np.random.default_rng(seed), Torus(dim, unit="degrees")
+            np.random.default_rng(seed), od.Torus(dim, unit="degrees")
         )
         for dim in (1, 2, 4)
     },
     "chains of an angle, a length, hours": lambda seed: random_chains(
-        np.random.default_rng(seed), Torus([None, *BESIDE])
+        np.random.default_rng(seed), od.Torus([None, *BESIDE])
     ),
-    "network": lambda seed: random_network(np.random.default_rng(seed), Torus(4)),
-    "sine": lambda _: VonMisesSine(make_space("torus"), numbers(0.2, 0.9), numbers(2, 3, 3)),
-    "Fisher-Bingham": lambda _: parametric(FisherBingham, "sphere"),
-    "Bingham": lambda _: parametric(FisherBingham, "projective-plane"),
-    "angular central Gaussian": lambda _: parametric(AngularCentralGaussian, "projective-plane"),
+    "network": lambda seed: random_network(np.random.default_rng(seed), od.Torus(4)),
+    "sine": lambda _: od.VonMisesSine(od.make_space("torus"), numbers(0.2, 0.9), numbers(2, 3, 3)),
+    "Fisher-Bingham": lambda _: parametric(od.FisherBingham, "sphere"),
+    "Bingham": lambda _: parametric(od.FisherBingham, "projective-plane"),
+    "angular central Gaussian": lambda _: parametric(od.AngularCentralGaussian, "projective-plane"),
     **{
         f"chains on {name}": partial(random_product_chains, space)
         for name, space in SPACES.items()
-        if isinstance(space, ProductSpace)
+        if isinstance(space, od.ProductSpace)
     },
 }
 names = st.sampled_from(sorted(DENSITIES))
 
 
-def images_of(space: Space, points: Tensor, rng: np.random.Generator) -> Tensor:
+def images_of(space: od.Space, points: Tensor, rng: np.random.Generator) -> Tensor:
     """Points (E, N, d) that are the same as these (N, d), by each element of the group."""
-    if isinstance(space, ProductSpace):
+    if isinstance(space, od.ProductSpace):
         base, rest = space.split(points)
         images = images_of(space.base, base, rng)
         steps = torch.tensor(rng.integers(-3, 4, (len(images), 1, rest.shape[-1])))
@@ -195,18 +183,18 @@ def test_gradients_are_slopes_in_the_data(name: str, seed: int) -> None:
     density, rng = DENSITIES[name](seed), np.random.default_rng(seed)
     space = density.space
     data = space.from_chart(space.uniform(9, torch.Generator().manual_seed(seed)))
-    base = space.base if isinstance(space, ProductSpace) else space
+    base = space.base if isinstance(space, od.ProductSpace) else space
     own = slice(data.shape[1] - space.dim + base.dim)
     if isinstance(base, RoundSpace):  # next to a cone point the chart's own digits are few
         vectors = base.vectors(base.to_chart(data[:, own]))
         data = data[abs(vectors @ base.cone_vectors().T).max(axis=1) < 0.999]
-    values, slopes = log_density_gradient(density, data)
+    values, slopes = od.log_density_gradient(density, data)
     step = 1e-6 * np.ptp(data, axis=0) * rng.normal(size=data.shape)
     if isinstance(base, UnitVectorSpace) or base.settings().get("form") == "vector":
         along = (step[:, own] * data[:, own]).sum(axis=1, keepdims=True)
         step[:, own] -= along * data[:, own]
         assert (slopes[:, own] * data[:, own]).sum(axis=1) == pytest.approx(0, abs=1e-9)
-    ahead, behind = (log_density_gradient(density, data + s)[0] for s in (step, -step))
+    ahead, behind = (od.log_density_gradient(density, data + s)[0] for s in (step, -step))
     np.testing.assert_allclose((slopes * step).sum(axis=1), (ahead - behind) / 2, atol=1e-9)
     at = space.to_chart(data)
     logs = density.log_prob(at, measure="natural").detach().numpy()
@@ -215,7 +203,7 @@ def test_gradients_are_slopes_in_the_data(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", ["angles in degrees", "directions", "bottle", "axes"])
 @settings(max_examples=3)
-@given(seed=seeds, measure=st.sampled_from(MEASURES))
+@given(seed=seeds, measure=st.sampled_from(od.MEASURES))
 def test_gradients_in_points_and_parameters(name: str, seed: int, measure: str) -> None:
     density = density_on(SPACES[name], seed)
     # off edges and cone points, where the projection has its seams
@@ -245,7 +233,7 @@ def test_a_file_gives_the_same_density_back(name: str, tmp_path: Path) -> None:
         assert torch.equal(again.log_prob(points), density.log_prob(points))
 
 
-def first_part(name: str, seed: int) -> Density:
+def first_part(name: str, seed: int) -> od.Density:
     """What a density is made of, the first of them."""
     return next(iter(DENSITIES[name](seed).parts()))[1]
 
@@ -276,5 +264,5 @@ def test_several_of_a_kind_are_one(name: str) -> None:
     both = type(parts[0]).joined(parts, torch.tensor([1.0, 3.0]))
     assert both is not None
     at = both.space.uniform(50, torch.Generator().manual_seed(0))
-    expected = Mixture(parts, [0.25, 0.75]).log_prob(at)
+    expected = od.Mixture(parts, [0.25, 0.75]).log_prob(at)
     torch.testing.assert_close(both.log_prob(at), expected, rtol=0, atol=1e-9)

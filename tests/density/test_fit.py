@@ -8,18 +8,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import orbiflow.density as od
 from density.blends import two_clusters
-from orbiflow.density import (
-    FlowDensity,
-    FlowSettings,
-    KleinBottle,
-    ProjectivePlane,
-    Sphere,
-    Torus,
-    UniformDensity,
-    fit_density,
-    make_space,
-)
 from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.flow import conjugate_gradients, coupled, match_flow
 from orbiflow.density.fitting.likelihood import MAX_HALVINGS, Objective, merged
@@ -28,10 +18,10 @@ from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from refusals import refused
 
-SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
+SPACES = (od.Torus(2), od.Sphere(), od.KleinBottle(), od.ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**31 - 1)
-QUICK = FlowSettings(max_frequency=3, segments=2, iterations=8, roughness=(1e-3,))
+QUICK = od.FlowSettings(max_frequency=3, segments=2, iterations=8, roughness=(1e-3,))
 
 
 @every
@@ -72,9 +62,9 @@ def test_matching_recovers_a_field(space) -> None:
 @settings(max_examples=5, deadline=None)
 @given(seeds)
 def test_the_gradient_of_the_objective(seed: int) -> None:
-    space = Sphere()
+    space = od.Sphere()
     fields = [FourierField(space.group, 3, smoothness=1.0) for _ in range(2)]
-    density = FlowDensity(space, Flow(fields, steps=2, warn=False), UniformDensity(space))
+    density = od.FlowDensity(space, Flow(fields, steps=2, warn=False), od.UniformDensity(space))
     objective = Objective(density, Rows(two_clusters(space, 30)), roughness=1e-3)
     rng = np.random.default_rng(seed)
     at, along = 0.05 * rng.normal(size=(2, len(objective.get())))
@@ -86,7 +76,7 @@ def test_the_gradient_of_the_objective(seed: int) -> None:
 
 @every
 def test_a_fit_is_no_worse_than_its_start_and_normalised(space) -> None:
-    density, report = fit_density(space, two_clusters(space, 600), QUICK)
+    density, report = od.fit_density(space, two_clusters(space, 600), QUICK)
     assert report.validation_nll < report.start_nll + 0.01
     assert report.validation_nll < -0.5  # 0 is the even density of the square
     assert report.mass == pytest.approx(1.0, abs=1e-3)
@@ -101,10 +91,10 @@ def test_a_fit_is_no_worse_than_its_start_and_normalised(space) -> None:
 
 def test_what_only_the_integrators_error_gained_is_undone() -> None:
     rng = np.random.default_rng(0)
-    space = make_space("klein-bottle", unit="degrees")
+    space = od.make_space("klein-bottle", unit="degrees")
     points = space.to_chart(rng.normal([20.0, 60.0], 15.0, (200, 2)).clip(-89, 89))
-    settings = FlowSettings(max_frequency=2, segments=2, roughness=(1e-4,))
-    _, report = fit_density(space, points, settings)
+    settings = od.FlowSettings(max_frequency=2, segments=2, roughness=(1e-4,))
+    _, report = od.fit_density(space, points, settings)
     # with one step a segment, refinement tore the flow: 3.7 nats worse than its start
     assert report.validation_nll < report.start_nll + 0.01
     assert report.train_nll < -2.5
@@ -113,7 +103,7 @@ def test_what_only_the_integrators_error_gained_is_undone() -> None:
 
 
 def test_equal_points_stay_on_one_side_and_are_said() -> None:
-    points = two_clusters(Torus(2), 300)[
+    points = two_clusters(od.Torus(2), 300)[
         torch.randint(0, 60, (300,), generator=torch.manual_seed(0))
     ]
     order, out, repeats = sides(points, 0.2, torch.Generator().manual_seed(0))
@@ -122,14 +112,14 @@ def test_equal_points_stay_on_one_side_and_are_said() -> None:
     assert repeats == 300 - len(torch.unique(points, dim=0))
     both = torch.cat([torch.unique(train, dim=0), torch.unique(held, dim=0)])
     assert len(torch.unique(both, dim=0)) == len(both)
-    _, report = fit_density(Torus(2), points, QUICK)
+    _, report = od.fit_density(od.Torus(2), points, QUICK)
     assert f"{repeats} of 300 points repeat another" in report.notes[0]
 
 
 def test_few_or_equal_points_are_refused() -> None:
     for points in (torch.rand(9, 2), torch.full((500, 2), 0.3)):
         with refused("10", "points"):
-            fit_density(Torus(2), points, QUICK)
+            od.fit_density(od.Torus(2), points, QUICK)
 
 
 @given(seeds, st.integers(1, 20), st.integers(1, 8), st.integers(1, 3))
@@ -151,8 +141,8 @@ def test_merging_keeps_mean_and_mass(seed: int, cells: int, crowd: int, dim: int
 def test_held_out_scores_are_of_the_points_themselves() -> None:
     rng = np.random.default_rng(3)
     sharp = np.where(rng.random((700, 1)) < 0.5, 0.3, 0.7) + 0.01 * rng.normal(size=(700, 2))
-    settings = FlowSettings(max_frequency=3, segments=2, iterations=8, roughness=(1e-3, 1e-4))
-    _, report = fit_density(Torus(2), torch.tensor(sharp), settings)
+    settings = od.FlowSettings(max_frequency=3, segments=2, iterations=8, roughness=(1e-3, 1e-4))
+    _, report = od.fit_density(od.Torus(2), torch.tensor(sharp), settings)
     stage = report.stages[-1]
     assert stage.validation[stage.best] == pytest.approx(report.validation_nll, abs=0.01)
 
@@ -166,4 +156,4 @@ def test_held_out_scores_are_of_the_points_themselves() -> None:
 )  # fmt: skip
 def test_settings_out_of_range(changes) -> None:
     with refused(*changes):
-        FlowSettings(**changes)
+        od.FlowSettings(**changes)

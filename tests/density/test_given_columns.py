@@ -88,14 +88,12 @@ HOURS = RNG.uniform(0, 24, ROWS)
 @pytest.mark.parametrize(
     ("name", "values", "role"),
     [
-        ("hour", HOURS, "cycle:24"),
-        ("month", RNG.integers(1, 13, ROWS), "cycle:12"),
+        ("hour", HOURS, "cycle:24"), ("month", RNG.integers(1, 13, ROWS), "cycle:12"),
         ("weekday", RNG.integers(0, 7, ROWS), "cycle:7"),
-        ("heading", RNG.uniform(0, 360, ROWS), "angle:degrees"),
-        ("warm", HOURS, None),
+        ("heading", RNG.uniform(0, 360, ROWS), "angle:degrees"), ("warm", HOURS, None),
         ("hour", HOURS * 20, None),
     ],
-)
+)  # fmt: skip
 def test_numbers_have_the_role_of_their_name_or_are_asked_for(
     name: str, values: np.ndarray, role: str | None
 ) -> None:

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+import orbiflow.density as od
 from density.blends import flow_of, stored
-from orbiflow.density import (
-    DensityEstimator,
-    FlowDensity,
-    FlowSettings,
-    UniformDensity,
-    fit_density,
-    make_space,
-)
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
@@ -32,7 +25,7 @@ def three_threads_fixture():
     torch.set_num_threads(before)
 
 
-class Watched(UniformDensity):
+class Watched(od.UniformDensity):
     """Notes how many threads it is evaluated on."""
 
     def __init__(self, space) -> None:
@@ -50,9 +43,9 @@ class Watched(UniformDensity):
 
 @pytest.mark.usefixtures("three_threads")
 def test_densities_work_on_one_thread_and_give_the_others_back() -> None:
-    space = make_space("torus")
+    space = od.make_space("torus")
     base = Watched(space)
-    density = FlowDensity(space, Flow([SplineField(space.group, 1)]), base)
+    density = od.FlowDensity(space, Flow([SplineField(space.group, 1)]), base)
     points = torch.rand(5, 2, dtype=torch.float64)
     density.log_prob(points)
     density.sample((3,))
@@ -65,7 +58,7 @@ def test_densities_work_on_one_thread_and_give_the_others_back() -> None:
 @pytest.mark.usefixtures("three_threads")
 def test_fits_work_on_one_thread_and_give_the_others_back() -> None:
     seen: set[int] = set()
-    estimator = DensityEstimator("sphere", **QUICK)
+    estimator = od.DensityEstimator("sphere", **QUICK)
     estimator.fit(DATA, progress=lambda *_: seen.add(torch.get_num_threads()))
     assert seen == {1}
     estimator.score(DATA)
@@ -77,8 +70,8 @@ def test_fits_work_on_one_thread_and_give_the_others_back() -> None:
     ("name", "mode"), [("torus", torch.inference_mode), ("sphere", torch.no_grad)]
 )
 def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: Any) -> None:
-    estimator = DensityEstimator(name, components=("flow",), **QUICK)
-    plain = DensityEstimator(name, components=("flow",), **QUICK).fit(DATA)
+    estimator = od.DensityEstimator(name, components=("flow",), **QUICK)
+    plain = od.DensityEstimator(name, components=("flow",), **QUICK).fit(DATA)
     with mode():
         estimator.fit(DATA)
     assert estimator.score(DATA) == plain.score(DATA)
@@ -90,19 +83,21 @@ def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: Any) -> None:
 
 @pytest.mark.parametrize("name", ["torus", "projective-plane"])
 def test_no_cache_is_poisoned_when_it_is_first_filled_under_inference(name: str, tmp_path) -> None:
-    fit = DensityEstimator(name, components="flow,mixture", **QUICK).fit(DATA)
+    fit = od.DensityEstimator(name, components="flow,mixture", **QUICK).fit(DATA)
     with torch.inference_mode():  # everything is made and evaluated here first
         density = stored(fit.density_, tmp_path)
-        space = make_space(name)
-        own = FlowDensity(space, Flow([SplineField(space.group, 3, smoothness=0.7)]))
+        space = od.make_space(name)
+        own = od.FlowDensity(space, Flow([SplineField(space.group, 3, smoothness=0.7)]))
         at = torch.rand(3, 2, dtype=torch.float64)
         for each in (density, own):
             each.log_prob(at, measure="natural")
             each.sample((2,))
             space.displacement(at, at.flip(0))
-    fresh = make_space(name)
+    fresh = od.make_space(name)
     points = fresh.uniform(60, torch.Generator().manual_seed(0))
-    found, _ = fit_density(fresh, points, FlowSettings(max_frequency=1, segments=1, iterations=1))
+    found, _ = od.fit_density(
+        fresh, points, od.FlowSettings(max_frequency=1, segments=1, iterations=1)
+    )
     found.log_prob(points.requires_grad_()).sum().backward()
     assert points.grad is not None
     points.grad = None

@@ -142,14 +142,10 @@ class Checked(NamedTuple):
 @pytest.mark.parametrize(
     "name",
     [
-        "bottle",
-        "axes",
-        "chains of 4",
-        "network",
-        "orientations and times",
+        "bottle", "axes", "chains of 4", "network", "orientations and times",
         "chains on pattern and times",
     ],
-)
+)  # fmt: skip
 def test_elsewhere_all_is_the_same(name: str) -> None:
     """Not all of them: every operation passes through Python, which is slow."""
     density = DENSITIES[name](3)

@@ -11,16 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import vonmises
 
+import orbiflow.density as od
 from density.blends import even_grid, random_chains, random_network
-from orbiflow.density import (
-    DensityEstimator,
-    Factor,
-    Torus,
-    VonMisesChains,
-    VonMisesNetwork,
-    make_space,
-    marginal,
-)
 from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.chains import Screen, fit_network, network_shapes
 from orbiflow.density.models import averaged_networks, log_conditional
@@ -32,8 +24,8 @@ seeds = st.integers(0, 2**31)
 few = settings(deadline=None, max_examples=4)
 
 
-def network_of(seed: int, dim: int, parents: int = 2) -> VonMisesNetwork:
-    return random_network(np.random.default_rng(seed), Torus(dim), parents)
+def network_of(seed: int, dim: int, parents: int = 2) -> od.VonMisesNetwork:
+    return random_network(np.random.default_rng(seed), od.Torus(dim), parents)
 
 
 def at_random(seed: int, count: int, dim: int) -> torch.Tensor:
@@ -43,7 +35,7 @@ def at_random(seed: int, count: int, dim: int) -> torch.Tensor:
 @given(seeds, st.integers(2, 4))
 @few
 def test_a_factor_is_the_joint_density_over_that_of_the_parents(seed: int, dim: int) -> None:
-    chains = random_chains(np.random.default_rng(seed), Torus(dim), natural=True)
+    chains = random_chains(np.random.default_rng(seed), od.Torus(dim), natural=True)
     points = at_random(seed, 9, dim)
     others = points[:, None].repeat(1, 400, 1)
     others[..., -1] = torch.arange(400) / 400
@@ -75,27 +67,30 @@ BROKEN: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
 def test_damaged_headers_are_refused(case: str) -> None:
     network = network_of(0, 3)
     with pytest.raises(OrbiflowError):
-        VonMisesNetwork.from_header(Torus(3), BROKEN[case](network.header()), network.tensors())
+        od.VonMisesNetwork.from_header(
+            od.Torus(3), BROKEN[case](network.header()), network.tensors()
+        )
 
 
 def test_what_is_no_network_is_refused() -> None:
-    rng, space = np.random.default_rng(0), Torus(2)
-    one, two = (random_chains(rng, Torus(d), natural=True) for d in (1, 2))
-    backwards = random_chains(rng, Torus(2), natural=True)
+    rng, space = np.random.default_rng(0), od.Torus(2)
+    one, two = (random_chains(rng, od.Torus(d), natural=True) for d in (1, 2))
+    backwards = random_chains(rng, od.Torus(2), natural=True)
     backwards.order = backwards.order.flip(1)
     with refused("sphere"):
-        VonMisesNetwork(make_space("sphere"), [])
+        od.VonMisesNetwork(od.make_space("sphere"), [])
     for factors, message in (
-        ([Factor((0,), one)], "angles 2"),
-        ([Factor((0, 1), two), Factor((0,), one)], "before parents"),
-        ([Factor((0,), one), Factor((0,), one)], "second angle"),
-        ([Factor((0,), two), Factor((1,), one)], "chains 2"),
-        ([Factor((0,), one), Factor((0, 1), backwards)], "end angle"),
+        ([od.Factor((0,), one)], "angles 2"),
+        ([od.Factor((0, 1), two), od.Factor((0,), one)], "before parents"),
+        ([od.Factor((0,), one), od.Factor((0,), one)], "second angle"),
+        ([od.Factor((0,), two), od.Factor((1,), one)], "chains 2"),
+        ([od.Factor((0,), one), od.Factor((0, 1), backwards)], "end angle"),
     ):
         with refused(*message.split()):
-            VonMisesNetwork(space, factors)
+            od.VonMisesNetwork(space, factors)
     first, second = (
-        VonMisesNetwork(space, [Factor((a,), one), Factor((a, 1 - a), two)]) for a in (0, 1)
+        od.VonMisesNetwork(space, [od.Factor((a,), one), od.Factor((a, 1 - a), two)])
+        for a in (0, 1)
     )
     with refused("arrows"):
         averaged_networks([first, second])
@@ -131,26 +126,28 @@ def test_hidden_parents_are_integrated_by_draws(seed: int, dim: int, data: st.Da
     assert torch.equal(found[0], network.log_marginal(points, list(seen), seed=0))
 
 
-def sharp_links(sharpness: float) -> tuple[VonMisesChains, VonMisesChains, VonMisesNetwork]:
+def sharp_links(
+    sharpness: float,
+) -> tuple[od.VonMisesChains, od.VonMisesChains, od.VonMisesNetwork]:
     """A first angle, a link, and four angles, each of which is linked to the one before."""
-    pair = Torus(2)
+    pair = od.Torus(2)
     means = torch.zeros(1, 2, 5, dtype=torch.float64)
     means[0, 1, 1] = 1.0
     weights = torch.tensor([[0.0, -math.inf, -math.inf]], dtype=torch.float64)
-    link = VonMisesChains(
+    link = od.VonMisesChains(
         pair, weights, means, torch.tensor([[0.1, sharpness]], dtype=torch.float64)
     )
-    first = VonMisesChains(
-        Torus(1), weights, means[:, :1, [0, 1, 3]] * 0, torch.full((1, 1), 0.1).double()
+    first = od.VonMisesChains(
+        od.Torus(1), weights, means[:, :1, [0, 1, 3]] * 0, torch.full((1, 1), 0.1).double()
     )
-    links = [Factor((k, k + 1), link) for k in range(3)]
-    return first, link, VonMisesNetwork(Torus(4), [Factor((0,), first), *links])
+    links = [od.Factor((k, k + 1), link) for k in range(3)]
+    return first, link, od.VonMisesNetwork(od.Torus(4), [od.Factor((0,), first), *links])
 
 
 def test_sharp_links_are_eliminated() -> None:
     """Both hidden angles are sharp, given those before them."""
     first, link, network = sharp_links(3000.0)
-    found = marginal(network, [0, 3])
+    found = od.marginal(network, [0, 3])
     assert found.error < 0.01
     # the same by products of matrices on a grid that is no part of its own
     line, points = even_grid(500, 1), found.sample(20, torch.Generator().manual_seed(0))
@@ -170,8 +167,8 @@ def test_what_cannot_be_had_well_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(drawing, "DRAWS", 16)  # all of them do little better, and take seconds
     network = sharp_links(3e7)[2]
     with refused("better", "angle"):
-        marginal(network, [0, 3])
-    assert marginal(network, 0).error < 0.01
+        od.marginal(network, [0, 3])
+    assert od.marginal(network, 0).error < 0.01
 
 
 def states(seed: int, count: int, dim: int) -> np.ndarray:
@@ -194,14 +191,14 @@ def test_arrows_are_along_the_chain() -> None:
     assert sorted(shape.axes[-1] for shape in shapes) == list(range(6))
     ends = [(shape.axes[0], shape.axes[-1]) for shape in shapes if len(shape.axes) > 1]
     assert [abs(int(shuffled[a]) - int(shuffled[b])) for a, b in ends] == [1] * 5
-    network = fit_network(Torus(6), rows[:500], rows[500:], shapes, generator)
+    network = fit_network(od.Torus(6), rows[:500], rows[500:], shapes, generator)
     alone = math.log(2 * math.pi / 3) - vonmises.entropy(12.0)  # an angle of three states
     assert float(network.log_prob(rows.points[500:]).mean()) > 6 * alone + 5 * 0.4
 
 
 def test_the_default_takes_a_network_where_states_multiply() -> None:
     angles = states(5, 150, 6)
-    fit = DensityEstimator("torus", seed=1).fit(angles[:120])
+    fit = od.DensityEstimator("torus", seed=1).fit(angles[:120])
     evidence = {part.name: part for part in fit.report_.components}
     assert evidence.keys() == {"kernels", "mixture", "chains", "network"}
     best = max(part.alone for name, part in evidence.items() if name != "network")
@@ -209,7 +206,7 @@ def test_the_default_takes_a_network_where_states_multiply() -> None:
     assert evidence["network"].share > 0.5
     small = np.random.default_rng(0).vonmises(0, 2, (50, 2))
     with refused("network"):
-        DensityEstimator("torus", components="network").fit(small)
+        od.DensityEstimator("torus", components="network").fit(small)
 
 
 @given(seeds)

@@ -11,20 +11,8 @@ import torch
 from scipy import stats
 from torch import Tensor
 
+import orbiflow.density as od
 from density.blends import even_grid, random_chains, random_kernels, stored
-from orbiflow.density import (
-    Density,
-    Mixture,
-    Space,
-    Torus,
-    UniformDensity,
-    conditional,
-    density_to_bytes,
-    highest_density_region,
-    log_density_gradient,
-    marginal,
-    read_density,
-)
 from orbiflow.density.inference import log_prob_observed
 from orbiflow.density.pictures import density_on_grid
 from orbiflow.errors import InputFileError
@@ -33,10 +21,10 @@ from sealed import sealed
 
 
 # The walk: from here ...
-class Wave(Density, kind="wave"):
+class Wave(od.Density, kind="wave"):
     """1 + a cos(2 pi x) in the first angle of a torus."""
 
-    def __init__(self, space: Space, height: float) -> None:
+    def __init__(self, space: od.Space, height: float) -> None:
         super().__init__(space)
         self.height = height
 
@@ -59,7 +47,7 @@ class Wave(Density, kind="wave"):
 
     @classmethod
     def from_header(
-        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+        cls, space: od.Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
     ) -> Self:
         del tensors
         return cls(space, float(header["height"]))
@@ -67,19 +55,19 @@ class Wave(Density, kind="wave"):
 
 # ... to here: one file, some 30 lines, and nothing else.
 
-TORUS = Torus(2)
+TORUS = od.Torus(2)
 
 
-def mixture() -> Mixture:
+def mixture() -> od.Mixture:
     """With a wave, and components of three other kinds."""
     rng = np.random.default_rng(0)
     parts = [
         Wave(TORUS, 0.8),
         random_kernels(rng, TORUS),
-        UniformDensity(TORUS),
+        od.UniformDensity(TORUS),
         random_chains(rng, TORUS),
     ]
-    return Mixture(parts, [0.5, 0.2, 0.1, 0.2])
+    return od.Mixture(parts, [0.5, 0.2, 0.1, 0.2])
 
 
 def test_it_is_evaluated_saved_drawn_and_moved_beside_others(tmp_path: Path) -> None:
@@ -90,17 +78,17 @@ def test_it_is_evaluated_saved_drawn_and_moved_beside_others(tmp_path: Path) -> 
     torch.testing.assert_close(values, sum(w * own.log_prob(grid).exp() for w, own in pairs))
     assert density.weight_of_kind["wave"] == 0.5
     assert "wave 50.0%" in repr(density)
-    _, slopes = log_density_gradient(density, [[0.3, 0.4]])
+    _, slopes = od.log_density_gradient(density, [[0.3, 0.4]])
     assert slopes.shape == (1, 2)
     assert torch.equal(stored(density, tmp_path).log_prob(grid).exp(), values)
     line = torch.linspace(0.01, 0.99, 30, dtype=torch.float64)
     assert density_on_grid(density, line, line, "uniform").shape == (30, 30)
-    assert highest_density_region(density, 0.5, samples=2000).size > 0
+    assert od.highest_density_region(density, 0.5, samples=2000).size > 0
     assert density.to(torch.float32).sample(3).dtype == torch.float32
 
 
 def test_its_samples_follow_it() -> None:
-    first = Wave(Torus(1), 0.8).sample(4000, torch.Generator().manual_seed(0))[:, 0].numpy()
+    first = Wave(od.Torus(1), 0.8).sample(4000, torch.Generator().manual_seed(0))[:, 0].numpy()
     cumulative = lambda x: x + 0.8 * torch.tensor(2 * math.pi * x).sin().numpy() / (2 * math.pi)  # noqa: E731
     assert stats.kstest(first, cumulative)[1] > 0.01  # type: ignore[operator]
 
@@ -109,15 +97,15 @@ def test_it_has_marginal_and_conditional_densities() -> None:
     density, line = mixture(), even_grid(64, 1)
     joint = density.log_prob(even_grid(64, 2)).exp().reshape(64, 64)
     for axis in (0, 1):
-        found = marginal(density, axis)
+        found = od.marginal(density, axis)
         torch.testing.assert_close(
             found.log_prob(line).exp(), joint.mean(dim=1 - axis), rtol=1e-4, atol=1e-4
         )
-    given = conditional(density, {1: 0.25}).log_prob(line).exp()
+    given = od.conditional(density, {1: 0.25}).log_prob(line).exp()
     expected = joint[:, 16] / joint[:, 16].mean()
     torch.testing.assert_close(given, expected, rtol=1e-3, atol=1e-3)
     rows = torch.tensor([[0.3, math.nan]], dtype=torch.float64)
-    own = marginal(density, 0).log_prob(rows[:, :1])
+    own = od.marginal(density, 0).log_prob(rows[:, :1])
     torch.testing.assert_close(log_prob_observed(density, rows), own, rtol=1e-4, atol=1e-4)
 
 
@@ -126,26 +114,26 @@ def test_what_is_missing_is_said(tmp_path: Path) -> None:
         """Of no kind of its own."""
 
     with refused("Bare"):
-        density_to_bytes(Mixture([Bare(TORUS, 0.1)], [1.0]))
+        od.density_to_bytes(od.Mixture([Bare(TORUS, 0.1)], [1.0]))
     path = tmp_path / "density.safetensors"
-    path.write_bytes(sealed(density_to_bytes(Wave(TORUS, 0.1)).replace(b"wave", b"wove")))
+    path.write_bytes(sealed(od.density_to_bytes(Wave(TORUS, 0.1)).replace(b"wave", b"wove")))
     with refused("wove", kind=InputFileError):
-        read_density(path)
+        od.read_density(path)
     with refused("taken"):
 
-        class Second(Density, kind="wave"):  # pyright: ignore[reportUnusedClass]
+        class Second(od.Density, kind="wave"):  # pyright: ignore[reportUnusedClass]
             """Another class of the same kind."""
 
-    class Silent(Density):
+    class Silent(od.Density):
         """Without marginals."""
 
     with refused("integrated"):
-        marginal(Silent(TORUS), 0)
+        od.marginal(Silent(TORUS), 0)
 
 
 def test_its_parts_are_walked_through_mixtures_of_mixtures() -> None:
     inner = mixture()
-    outer = Mixture([inner, UniformDensity(TORUS)], [0.5, 0.5])
+    outer = od.Mixture([inner, od.UniformDensity(TORUS)], [0.5, 0.5])
     found = [(weight, part.kind) for weight, part in outer.parts()]
     kinds = ("wave", "kernels", "uniform", "chains", "uniform")
     assert found == list(zip((0.25, 0.1, 0.05, 0.1, 0.5), kinds, strict=True))

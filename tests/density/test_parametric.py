@@ -14,15 +14,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import special_ortho_group, vonmises, vonmises_fisher
 
 import orbiflow
-from orbiflow.density import (
-    DensityEstimator,
-    FitReport,
-    Parameter,
-    ParametricFit,
-    Space,
-    fit_parametric,
-    make_space,
-)
+import orbiflow.density as od
 from orbiflow.density.fitting import goodness, parametric
 from orbiflow.density.fitting.forms import FORMS, Cloud, Start
 from orbiflow.density.fitting.intervals import concentration_interval
@@ -48,24 +40,24 @@ def _few_draws() -> Iterator[None]:
         yield
 
 
-def parametric_of(report: FitReport) -> ParametricFit:
+def parametric_of(report: od.FitReport) -> od.ParametricFit:
     """Return what a report says of a family."""
     assert report.parametric is not None
     return report.parametric
 
 
-def found_by(space: Space, points: torch.Tensor, name: str, **how: Any) -> ParametricFit:
+def found_by(space: od.Space, points: torch.Tensor, name: str, **how: Any) -> od.ParametricFit:
     """Fit a family and return its parameters."""
-    return parametric_of(fit_parametric(space, points, name, **how)[1])
+    return parametric_of(od.fit_parametric(space, points, name, **how)[1])
 
 
-def p_of(found: ParametricFit) -> float:
+def p_of(found: od.ParametricFit) -> float:
     """Return p of the smooth test."""
     assert found.goodness is not None
     return found.goodness.p
 
 
-def spread(one: Parameter) -> tuple[float, float, float]:
+def spread(one: od.Parameter) -> tuple[float, float, float]:
     """Return an estimate's standard error and the ends of its interval."""
     assert one.error is not None
     assert one.low is not None
@@ -87,10 +79,10 @@ def shape_of(name: str, width: int, rng: np.random.Generator) -> list[float]:
     return sorted(-rng.uniform(3, 12, width - 1).cumsum())[::-1]
 
 
-def drawn(name: str, space_name: str, rows: int, seed: int) -> tuple[Space, torch.Tensor, Start]:
+def drawn(name: str, space_name: str, rows: int, seed: int) -> tuple[od.Space, torch.Tensor, Start]:
     """Return a space, points from a random density of a family there, and its frame and shape."""
     rng = np.random.default_rng(seed)
-    space = make_space(
+    space = od.make_space(
         space_name, **({"dim": 4} if space_name in ("hypersphere", "projective-space") else {})
     )
     width = space.dim + 1
@@ -109,7 +101,7 @@ def drawn(name: str, space_name: str, rows: int, seed: int) -> tuple[Space, torc
 def test_parameters_are_found_again(which: tuple[str, str], seed: int) -> None:
     name, where = which
     space, points, truth = drawn(name, where, 800, seed)
-    density, report = fit_parametric(space, points, name)
+    density, report = od.fit_parametric(space, points, name)
     found, form = parametric_of(report), FORMS[name]
     reported = form.reported(truth.shape, truth.frame).tolist()
     for own, exact in zip(found.parameters[-len(reported) :], reported, strict=True):
@@ -127,7 +119,7 @@ def test_parameters_are_found_again(which: tuple[str, str], seed: int) -> None:
 def test_agrees_with_scipy() -> None:
     rng = np.random.default_rng(3)
     angles = rng.vonmises(2.0, 1.5, 400)
-    own = DensityEstimator("torus", components="von-mises").fit(angles[:, None])
+    own = od.DensityEstimator("torus", components="von-mises").fit(angles[:, None])
     kappa, mean, _ = vonmises.fit(angles, fscale=1)
     assert own.parameters()["mean_angle1"].value == pytest.approx(mean, abs=1e-6)
     assert own.parameters()["concentration_angle1"].value == pytest.approx(kappa, rel=1e-4)
@@ -136,7 +128,7 @@ def test_agrees_with_scipy() -> None:
     assert own.score_samples(at[:, None]) == pytest.approx(logs, abs=1e-4)
     vectors = vonmises_fisher([0, 0.6, 0.8], 20).rvs(300, random_state=rng)
     mean, kappa = vonmises_fisher.fit(vectors)
-    found = DensityEstimator("sphere", components="von-mises-fisher").fit(vectors)
+    found = od.DensityEstimator("sphere", components="von-mises-fisher").fit(vectors)
     three = [found.parameters()[f"mean_{axis}"].value for axis in "xyz"]
     assert three == pytest.approx(mean, abs=1e-9)
     assert found.parameters()["concentration"].value == pytest.approx(kappa, rel=1e-6)
@@ -144,7 +136,7 @@ def test_agrees_with_scipy() -> None:
 
 def test_matrix_fisher_is_the_trace_of_a_matrix_times_a_rotation() -> None:
     space, points, _ = drawn("matrix-fisher", "rotation-space", 200, 1)
-    density, report = fit_parametric(space, points, "matrix-fisher")
+    density, report = od.fit_parametric(space, points, "matrix-fisher")
     found = parametric_of(report)
     f = np.array([found[f"f{i}{j}"].value for i in "123" for j in "123"]).reshape(3, 3)
     turns = Rotation.random(20, random_state=0)
@@ -200,7 +192,7 @@ def test_smooth_test_sees_what_is_not_of_the_family() -> None:
     rng = np.random.default_rng(0)
     both = rng.vonmises(0, 4, 300)
     pair = np.stack([both, both + rng.vonmises(0, 8, 300)], axis=1)  # they go together
-    fit = DensityEstimator("torus", components="von-mises").fit(pair)
+    fit = od.DensityEstimator("torus", components="von-mises").fit(pair)
     assert p_of(parametric_of(fit.report_)) < 0.01
 
 
@@ -225,7 +217,7 @@ def test_weights_count_rows_and_groups_widen_intervals() -> None:
 def test_beside_others_it_is_a_candidate() -> None:
     rng = np.random.default_rng(1)
     angles = rng.vonmises([0.5, 1.0], [2.0, 6.0], (400, 2))
-    fit = DensityEstimator("torus", components=("kernels", "von-mises")).fit(angles)
+    fit = od.DensityEstimator("torus", components=("kernels", "von-mises")).fit(angles)
     shares = {one.name: one.share for one in fit.report_.components}
     assert shares["von-mises"] > 0.8
     with refused("parametric", "family"):
@@ -234,10 +226,10 @@ def test_beside_others_it_is_a_candidate() -> None:
 
 def test_a_saved_fit_keeps_its_parameters(tmp_path: Path) -> None:
     angles = np.random.default_rng(0).vonmises([0.2, -1.0], 3.0, (80, 2))
-    fit = DensityEstimator(columns="phi,psi", components="von-mises").fit(angles)
+    fit = od.DensityEstimator(columns="phi,psi", components="von-mises").fit(angles)
     orbiflow.save(fit, tmp_path / "fit")
     again = orbiflow.load(tmp_path / "fit")
-    assert isinstance(again, DensityEstimator)
+    assert isinstance(again, od.DensityEstimator)
     assert again.parameters() == fit.parameters()
     assert list(again.parameters())[:2] == ["mean_phi", "concentration_phi"]
 
@@ -251,11 +243,11 @@ def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_two_modes_and_very_close_rows() -> None:
-    rng, sphere = np.random.default_rng(0), make_space("hypersphere", dim=2)
+    rng, sphere = np.random.default_rng(0), od.make_space("hypersphere", dim=2)
     both = rng.normal(0, 0.1, (200, 3)) + np.where(np.arange(200) < 100, 1, -1)[:, None] * [1, 0, 0]
     both[:, 2] += 0.3
     both /= np.linalg.norm(both, axis=1, keepdims=True)
-    density, report = fit_parametric(sphere, torch.tensor(both), "kent")
+    density, report = od.fit_parametric(sphere, torch.tensor(both), "kent")
     assert any("two modes" in note for note in parametric_of(report).notes)
     drawn_ones = density.sample((2000,), torch.Generator().manual_seed(0)).numpy()
     assert np.abs(drawn_ones.T @ drawn_ones / 2000 - both.T @ both / 200).max() < 0.05
@@ -267,7 +259,7 @@ def test_two_modes_and_very_close_rows() -> None:
     assert error == pytest.approx(found["concentration"].value / 10, rel=1e-6)  # k sqrt(2 / (2 n))
     assert spread(found["mean_x1"])[0] == pytest.approx(1e-6, rel=0.2)
     with refused("few", "digits"):
-        fit_parametric(sphere, torch.tensor(close), "kent")
+        od.fit_parametric(sphere, torch.tensor(close), "kent")
 
 
 def test_too_few_groups_have_no_intervals() -> None:
@@ -278,23 +270,23 @@ def test_too_few_groups_have_no_intervals() -> None:
 
 
 def test_refusals() -> None:
-    sphere = make_space("sphere")
+    sphere = od.make_space("sphere")
     same = sphere.to_chart([[10.0, 20.0]] * 9)
     with refused("rows", "direction"):
-        fit_parametric(sphere, same, "von-mises-fisher")
+        od.fit_parametric(sphere, same, "von-mises-fisher")
     flat = sphere.to_chart([[0.0, 20.0 * k] for k in range(9)])
     for name in ("bingham", "angular-central-gaussian", "watson"):
         with refused("through", "origin"):
-            fit_parametric(sphere, flat, name)
+            od.fit_parametric(sphere, flat, name)
     with refused("kent"):
-        fit_parametric(sphere, flat[:3], "kent")
+        od.fit_parametric(sphere, flat[:3], "kent")
     with refused("bingham"):
-        fit_parametric(make_space("projective-plane"), flat, "von-mises-fisher")
+        od.fit_parametric(od.make_space("projective-plane"), flat, "von-mises-fisher")
     with refused("coordinates", "16"):
-        fit_parametric(make_space("projective-space", dim=16), torch.eye(17), "bingham")
+        od.fit_parametric(od.make_space("projective-space", dim=16), torch.eye(17), "bingham")
     with refused("parametric", "family"):
-        fit_parametric(make_space("klein-bottle"), flat, "von-mises")
+        od.fit_parametric(od.make_space("klein-bottle"), flat, "von-mises")
     angles = np.random.default_rng(0).vonmises(0, 1, (50, 2))
     angles[0, 0] = np.nan
     with refused("angles", kind=SettingError):
-        DensityEstimator("torus", components="von-mises", missing="marginalise").fit(angles)
+        od.DensityEstimator("torus", components="von-mises", missing="marginalise").fit(angles)

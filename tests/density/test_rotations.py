@@ -204,12 +204,9 @@ def test_names_say_the_form(names: str) -> None:
 
 
 OPEN = {
-    "q1,q2,q3,q4": "scalar form quaternion",
-    "a,b,c,d": "scalar",
-    "r1,r2,r3": "form bunge",
-    "alpha,beta,gamma": "form bunge",
-    "roll,pitch,yaw": "Euler form axes",
-}
+    "q1,q2,q3,q4": "scalar form quaternion", "a,b,c,d": "scalar", "r1,r2,r3": "form bunge",
+    "alpha,beta,gamma": "form bunge", "roll,pitch,yaw": "Euler form axes",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("names", OPEN)

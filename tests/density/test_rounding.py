@@ -65,11 +65,9 @@ def test_what_is_asked_for_is_done_without_a_warning() -> None:
 
 
 STEPS = {
-    "torus": (1.0, 5.0, 10.0, 22.5, 1 / 4),
-    "sphere": (1.0, 5.0, 10.0, 22.5, 1 / 60),
-    "klein-bottle": (1.0, 10.0, 22.5),
-    "projective-plane": (1.0, 10.0),
-}
+    "torus": (1.0, 5.0, 10.0, 22.5, 1 / 4), "sphere": (1.0, 5.0, 10.0, 22.5, 1 / 60),
+    "klein-bottle": (1.0, 10.0, 22.5), "projective-plane": (1.0, 10.0),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "step"), [(n, s) for n, steps in STEPS.items() for s in steps])

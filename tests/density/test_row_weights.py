@@ -10,27 +10,9 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import orbiflow.density as od
 from density.blends import flow_of
-from orbiflow.density import (
-    AngleRegressor,
-    DataComparisonSettings,
-    DensityEstimator,
-    FlowDensity,
-    NamedTestSettings,
-    RotationSpace,
-    compare_models,
-    compare_samples,
-    compare_scores,
-    density_to_bytes,
-    fit_automatic,
-    make_space,
-    named_tests,
-    summarize_angles,
-    summarize_axes,
-    summarize_directions,
-    summarize_orientations,
-    weighed,
-)
+from orbiflow.density import weighed
 from orbiflow.density.fitting import (
     Rows,
     gain_of,
@@ -53,7 +35,7 @@ few = settings(deadline=None, max_examples=7)
 def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Points on the torus, integer weights, and each point as often as its weight says."""
     rng = np.random.default_rng(seed)
-    points = make_space("torus").project(torch.tensor(0.5 + 0.15 * rng.normal(size=(count, 2))))
+    points = od.make_space("torus").project(torch.tensor(0.5 + 0.15 * rng.normal(size=(count, 2))))
     weights = torch.tensor(rng.integers(1, 5, count))
     return points, weights.double(), points.repeat_interleave(weights, dim=0)
 
@@ -62,7 +44,7 @@ def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.T
 @few
 def test_kernels_of_weighted_rows_are_those_of_repeated_ones(seed: int) -> None:
     points, weights, rows = repeated(seed, 40)
-    space = make_space("torus")
+    space = od.make_space("torus")
     found = kernel_estimates(space, Rows(points, weights), repeats=False)
     expected = kernel_estimates(space, Rows(rows), repeats=False)
     at = space.uniform(30, torch.Generator().manual_seed(seed))
@@ -95,7 +77,7 @@ def test_stacking_of_weighted_rows_is_that_of_repeated_ones(seed: int) -> None:
 @few
 def test_mixtures_of_one_component_are_those_of_repeated_rows(seed: int) -> None:
     points, weights, rows = repeated(seed, 60)
-    space = make_space("torus")
+    space = od.make_space("torus")
     at = space.uniform(30, torch.Generator().manual_seed(seed))
 
     def generator() -> torch.Generator:
@@ -110,7 +92,7 @@ def test_mixtures_of_one_component_are_those_of_repeated_rows(seed: int) -> None
 @few
 def test_chains_from_one_start_are_those_of_repeated_rows(seed: int, count: int) -> None:
     points, weights, repeats = repeated(seed, 60)
-    space = make_space("torus")
+    space = od.make_space("torus")
     generator = torch.Generator().manual_seed(seed)
     order = torch.randperm(2, generator=generator)
     start = spread_chains(space, Rows(points, weights), count, order, generator)
@@ -129,7 +111,7 @@ def test_chains_start_at_rows_that_weigh_something(seed: int, count: int) -> Non
     weights = (torch.arange(20) % 3 == 0).double()
     generator = torch.Generator().manual_seed(seed)
     start = spread_chains(
-        make_space("torus"), Rows(points, weights), count, torch.arange(2), generator
+        od.make_space("torus"), Rows(points, weights), count, torch.arange(2), generator
     )
     means = start.means[1:, :, 0] / (2 * math.pi)
     away = (means[:, None] - points[weights > 0]).abs().amax(dim=2).amin(dim=1)
@@ -150,11 +132,11 @@ def test_merged_points_carry_their_weights(seed: int, cells: int) -> None:
 
 def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     points, weights, rows = repeated(0, 90)
-    estimator = DensityEstimator(
+    estimator = od.DensityEstimator(
         "torus", components="flow", max_frequency=2, segments=1, iterations=2
     )
     density = estimator.fit(points.numpy() * 2 * math.pi, sample_weight=weights.numpy()).density_
-    assert type(density) is FlowDensity  # with nothing beside it
+    assert type(density) is od.FlowDensity  # with nothing beside it
     both = [
         Objective(flow_of(density), own, roughness=1e-3)
         for own in (Rows(points, weights / weights.sum()), Rows(rows))
@@ -174,10 +156,10 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
 def test_equal_weights_are_none(options: dict[str, object]) -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (90, 2))
     first, second = (
-        DensityEstimator("torus", **options).fit(angles, sample_weight=weight)  # type: ignore[arg-type]
+        od.DensityEstimator("torus", **options).fit(angles, sample_weight=weight)  # type: ignore[arg-type]
         for weight in (None, np.full(90, 0.3))
     )
-    assert density_to_bytes(first.density_) == density_to_bytes(second.density_)
+    assert od.density_to_bytes(first.density_) == od.density_to_bytes(second.density_)
     assert first.report_.effective is second.report_.effective is None
 
 
@@ -186,18 +168,18 @@ def test_a_fit_follows_its_weights(space: str) -> None:
     """Of two clusters, one weighs nine times the other; and rows of weight 0 are not there."""
     rng = np.random.default_rng(1)
     chart = np.repeat(PLACES, 50, axis=0) + 0.02 * rng.normal(size=(100, 2))
-    made = make_space(space)
+    made = od.make_space(space)
     data = made.from_chart(torch.tensor(chart))
     weights = np.repeat([0.9, 0.1], 50)
-    some = DensityEstimator(made, components="kernels").fit(data, sample_weight=weights)
+    some = od.DensityEstimator(made, components="kernels").fit(data, sample_weight=weights)
     drawn = some.density_.sample((3000,), torch.Generator().manual_seed(0))
     near, far = (made.distance(torch.tensor(at).expand(3000, 2), drawn) for at in PLACES)
     assert float((near < far).double().mean()) == pytest.approx(0.9, abs=0.05)
     assert some.report_.effective == pytest.approx(effective_rows(torch.tensor(weights)))
     assert any("100 rows say as much as" in note for note in some.report_.notes)
     ghosts = np.concatenate([data, data[::-1]]), np.concatenate([weights, np.zeros(100)])
-    again = DensityEstimator(made, components="kernels").fit(ghosts[0], sample_weight=ghosts[1])
-    assert density_to_bytes(again.density_) == density_to_bytes(some.density_)
+    again = od.DensityEstimator(made, components="kernels").fit(ghosts[0], sample_weight=ghosts[1])
+    assert od.density_to_bytes(again.density_) == od.density_to_bytes(some.density_)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +193,7 @@ def test_a_fit_follows_its_weights(space: str) -> None:
 def test_weights_that_are_none_are_refused(weights: object, message: str) -> None:
     points = np.random.default_rng(0).uniform(size=(60, 2))
     with refused(*message.split()):
-        DensityEstimator("torus").fit(points, sample_weight=weights)  # type: ignore[arg-type]
+        od.DensityEstimator("torus").fit(points, sample_weight=weights)  # type: ignore[arg-type]
 
 
 @given(st.lists(st.floats(1e-3, 1e3), min_size=2, max_size=30), st.floats(1e-100, 1e100))
@@ -239,41 +221,41 @@ TURNS = pandas.DataFrame(RNG.normal(0, 0.5, (ROWS, 3)), NAMES, ["rx", "ry", "rz"
 WEIGHTS = pandas.Series(RNG.uniform(0, 3, ROWS), NAMES)
 GROUPS = pandas.Series(RNG.integers(0, 12, ROWS), NAMES)
 KIND: Any = {"unit": "degrees", "components": "mixture", "effort": "fast"}
-TORUS = make_space("torus", axes=2, unit="degrees")
+TORUS = od.make_space("torus", axes=2, unit="degrees")
 POINTS = pandas.DataFrame(TORUS.to_chart(ANGLES).numpy(), NAMES)
 
 
 def summarized(weights: Any, groups: Any) -> Any:
     both = {"weights": weights, "groups": groups}
-    space = RotationSpace(form="vector")
+    space = od.RotationSpace(form="vector")
     return [
-        summarize_angles(ANGLES, unit="degrees", **both),
-        summarize_directions(LABELS_PLACES, **both),
-        summarize_axes(LABELS_PLACES, **both),
-        summarize_orientations(space, TURNS, **both),
+        od.summarize_angles(ANGLES, unit="degrees", **both),
+        od.summarize_directions(LABELS_PLACES, **both),
+        od.summarize_axes(LABELS_PLACES, **both),
+        od.summarize_orientations(space, TURNS, **both),
     ]
 
 
 def fitted(weights: Any, groups: Any) -> Any:
-    model = DensityEstimator(**KIND).fit(ANGLES, sample_weight=weights, groups=groups)
+    model = od.DensityEstimator(**KIND).fit(ANGLES, sample_weight=weights, groups=groups)
     return model.score(ANGLES, sample_weight=weights)
 
 
 def fitted_in_the_chart(weights: Any, groups: Any) -> Any:
-    found, _ = fit_automatic(TORUS, POINTS, weights=weights, groups=groups)
+    found, _ = od.fit_automatic(TORUS, POINTS, weights=weights, groups=groups)
     return found.log_prob(TORUS.to_chart(ANGLES)).sum().item()
 
 
 @cache
-def models() -> dict[str, DensityEstimator]:
-    return {name: DensityEstimator(**KIND).fit(ANGLES + k) for name, k in (("a", 0), ("b", 30))}
+def models() -> dict[str, od.DensityEstimator]:
+    return {name: od.DensityEstimator(**KIND).fit(ANGLES + k) for name, k in (("a", 0), ("b", 30))}
 
 
 def compared(weights: Any, groups: Any) -> Any:
     scores = {k: pandas.Series(m.score_samples(ANGLES), NAMES) for k, m in models().items()}
     scores["b"] = scores["b"][weights.index]
-    found = compare_scores(scores, weights=weights + 0.1, groups=groups)
-    return found, compare_models(models(), ANGLES, groups=groups)
+    found = od.compare_scores(scores, weights=weights + 0.1, groups=groups)
+    return found, od.compare_models(models(), ANGLES, groups=groups)
 
 
 def sampled(weights: Any, groups: Any) -> Any:
@@ -283,8 +265,8 @@ def sampled(weights: Any, groups: Any) -> Any:
     samples["b"] = samples["b"].set_axis(["phi"], axis=1)
     how: Any = {"unit": "degrees", "groups": labels}
     return (
-        compare_samples(samples, settings=DataComparisonSettings(permutations=99), **how),
-        named_tests(samples, settings=NamedTestSettings(permutations=99), **how),
+        od.compare_samples(samples, settings=od.DataComparisonSettings(permutations=99), **how),
+        od.named_tests(samples, settings=od.NamedTestSettings(permutations=99), **how),
     )
 
 
@@ -317,7 +299,7 @@ def test_rows_without_a_group_are_refused(call: Any, gap: Any) -> None:
 def test_what_has_no_labels_goes_by_place() -> None:
     right = fitted(WEIGHTS, GROUPS)
     assert fitted(WEIGHTS.to_numpy(), GROUPS.tolist()) == right
-    bare = DensityEstimator(**KIND).fit(ANGLES.to_numpy(), sample_weight=WEIGHTS, groups=GROUPS)
+    bare = od.DensityEstimator(**KIND).fit(ANGLES.to_numpy(), sample_weight=WEIGHTS, groups=GROUPS)
     assert bare.score(ANGLES.to_numpy(), sample_weight=WEIGHTS) == right
     polars = pytest.importorskip("polars")
     by_place = polars.Series(WEIGHTS.to_numpy()), polars.Series(GROUPS.to_numpy())
@@ -330,7 +312,7 @@ def test_labels_of_xarray() -> None:
     weights = xarray.DataArray(WEIGHTS.to_numpy(), {"row": NAMES}, "row")
     assert fitted(weights[SHUFFLED], GROUPS) == right
     rows = ANGLES.rename_axis("row").to_xarray()
-    model = DensityEstimator(**KIND).fit(
+    model = od.DensityEstimator(**KIND).fit(
         rows, sample_weight=weights[SHUFFLED], groups=GROUPS.iloc[SHUFFLED]
     )
     assert model.score(rows, sample_weight=weights[SHUFFLED]) == right
@@ -341,14 +323,14 @@ def test_covariates_have_labels() -> None:
     y = pandas.DataFrame({"phi": np.degrees(RNG.vonmises(np.radians(x["warm"]), 9))}, NAMES)
     mixed = x.iloc[SHUFFLED]
     real: Any = {**KIND, "columns": {"warm": "linear"}}
-    model = DensityEstimator(**real).fit(y, given=x)
+    model = od.DensityEstimator(**real).fit(y, given=x)
     right = model.score_samples(y, given=x)
     columns = {"warm": mixed["warm"], "side": x["side"]}
     for covariates in (mixed, columns):
         assert np.array_equal(model.score_samples(y, given=covariates), right)
         assert model.score(y, given=covariates) == pytest.approx(right.mean())
     assert np.array_equal(
-        DensityEstimator(**real).fit(y, given=columns).score_samples(y, given=x), right
+        od.DensityEstimator(**real).fit(y, given=columns).score_samples(y, given=x), right
     )
     weighed = model.score(y, None, WEIGHTS.iloc[SHUFFLED], given=mixed)
     assert weighed == pytest.approx(np.average(right, weights=WEIGHTS))
@@ -361,7 +343,7 @@ def test_targets_of_regressions_have_labels() -> None:
     x = pandas.DataFrame({"x": RNG.uniform(0, 90, ROWS)}, NAMES)
     y = pandas.Series(np.degrees(RNG.vonmises(np.radians(x["x"]), 9)), NAMES, name="phi")
     real: Any = {**KIND, "columns": {"x": "linear"}}
-    one, other = (AngleRegressor(**real).fit(x, own) for own in (y, y.iloc[SHUFFLED]))
+    one, other = (od.AngleRegressor(**real).fit(x, own) for own in (y, y.iloc[SHUFFLED]))
     assert np.array_equal(one.predict(x), other.predict(x))
     assert one.predict(x).shape == (ROWS,)
     assert one.score(x, y.iloc[SHUFFLED], WEIGHTS.iloc[SHUFFLED]) == one.score(x, y, WEIGHTS)
@@ -373,4 +355,4 @@ def test_a_time_that_is_none_is_no_group() -> None:
     days = pandas.Series(pandas.date_range("2020-01-01", periods=ROWS))
     days[3] = pandas.NaT
     with refused("groups", "row 4"):
-        DensityEstimator(**KIND).fit(RNG.uniform(0, 90, (ROWS, 1)), groups=days)
+        od.DensityEstimator(**KIND).fit(RNG.uniform(0, 90, (ROWS, 1)), groups=days)

@@ -148,12 +148,10 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
 @pytest.mark.parametrize(
     ("labels", "said"),
     [
-        ([0] * 40, "different 0"),
-        ([0] * 37 + [1, 2, 3], "different 3"),
-        ([0] * 20, "label 40"),
+        ([0] * 40, "different 0"), ([0] * 37 + [1, 2, 3], "different 3"), ([0] * 20, "label 40"),
         ([None] * 40, "without 40"),
     ],
-)
+)  # fmt: skip
 def test_groups_that_cannot_be_held_out(labels: list[object], said: str) -> None:
     space, points = make_space("torus"), torch.rand(40, 2, dtype=torch.float64)
     chosen = DensitySettings(components=("kernels", "mixture", "chains"))

@@ -10,19 +10,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+import orbiflow.density as od
 from density.blends import blended, bump, stored
-from orbiflow.density import (
-    AdaptiveKernels,
-    Density,
-    DensityEstimator,
-    FlowDensity,
-    Sphere,
-    Torus,
-    UniformDensity,
-    density_to_bytes,
-    make_space,
-    read_density,
-)
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import FourierField, InvariantField, SplineField
 from orbiflow.flows import Flow
@@ -41,8 +30,8 @@ def filled(field: InvariantField, seed: int, size: float = 0.05) -> InvariantFie
     return field
 
 
-def plain(*fields: InvariantField, space=None, base=None) -> Density:
-    return FlowDensity(space or Torus(2), Flow(fields, steps=2, warn=False), base)
+def plain(*fields: InvariantField, space=None, base=None) -> od.Density:
+    return od.FlowDensity(space or od.Torus(2), Flow(fields, steps=2, warn=False), base)
 
 
 @given(
@@ -58,7 +47,7 @@ def plain(*fields: InvariantField, space=None, base=None) -> Density:
 def test_what_is_read_is_what_was_saved(
     name: str, seed: int, segments, von_mises: bool, tmp_path_factory
 ) -> None:
-    space = make_space(name)
+    space = od.make_space(name)
     fields = [
         filled(kind(space.group, frequency, smoothness=smoothness), seed + k)
         for k, (kind, frequency, smoothness) in enumerate(segments)
@@ -71,7 +60,7 @@ def test_what_is_read_is_what_was_saved(
         assert torch.equal(again.log_prob(at), density.log_prob(at))
 
 
-class Tilted(Density):
+class Tilted(od.Density):
     """Not one of orbiflow's."""
 
     def log_chart(self, points):
@@ -81,35 +70,35 @@ class Tilted(Density):
         return torch.rand(count, 2, dtype=torch.float64, generator=generator)
 
 
-class TiltedUniform(UniformDensity, Tilted):
+class TiltedUniform(od.UniformDensity, Tilted):
     """Looks like one of orbiflow's."""
 
 
-class Doubled(FlowDensity):
+class Doubled(od.FlowDensity):
     """Another density than its flow's."""
 
 
-class OtherTorus(Torus):
+class OtherTorus(od.Torus):
     """A space of the same name."""
 
 
-torus = Torus(2)
+torus = od.Torus(2)
 REFUSED = {
     "density Doubled": lambda: Doubled(torus, Flow(FourierField(torus.group, 1))),
     "base Tilted,": lambda: plain(FourierField(torus.group, 1), base=Tilted(torus)),
     "base TiltedUniform": lambda: plain(FourierField(torus.group, 1), base=TiltedUniform(torus)),
-    "base Sphere": lambda: plain(FourierField(torus.group, 1), base=UniformDensity(Sphere())),
+    "base Sphere": lambda: plain(FourierField(torus.group, 1), base=od.UniformDensity(od.Sphere())),
     "space OtherTorus": lambda: plain(FourierField(torus.group, 1), space=OtherTorus(2)),
-    "segments.0 flow function": lambda: FlowDensity(torus, Flow(lambda x: 0 * x)),
+    "segments.0 flow function": lambda: od.FlowDensity(torus, Flow(lambda x: 0 * x)),
     "finite": lambda: plain(filled(FourierField(torus.group, 1), 0, math.nan)),
-    "segments 2000000": lambda: FlowDensity(
+    "segments 2000000": lambda: od.FlowDensity(
         torus, Flow(FourierField(torus.group, 1), steps=2_000_000)
     ),
     "kernels Torus": lambda: blended(
-        Sphere(),
-        Flow(FourierField(Sphere().group, 1)),
-        UniformDensity(Sphere()),
-        AdaptiveKernels(torus, torch.rand(1, 2), torch.ones(1, 2), torch.ones(1)),
+        od.Sphere(),
+        Flow(FourierField(od.Sphere().group, 1)),
+        od.UniformDensity(od.Sphere()),
+        od.AdaptiveKernels(torus, torch.rand(1, 2), torch.ones(1, 2), torch.ones(1)),
         torch.full((3,), 1 / 3),
     ),
 }
@@ -118,7 +107,7 @@ REFUSED = {
 @pytest.mark.parametrize("message", REFUSED)
 def test_what_cannot_be_saved_is_refused_by_name(message: str) -> None:
     with refused(*message.split()):
-        density_to_bytes(REFUSED[message]())
+        od.density_to_bytes(REFUSED[message]())
 
 
 @pytest.mark.parametrize(
@@ -128,12 +117,12 @@ def test_what_cannot_be_saved_is_refused_by_name(message: str) -> None:
 )
 def test_extras_that_would_not_be_read_again(extra) -> None:
     with pytest.raises(OrbiflowError, match=r"JSON|header"):
-        density_to_bytes(plain(FourierField(torus.group, 1)), **extra)
+        od.density_to_bytes(plain(FourierField(torus.group, 1)), **extra)
 
 
 FORMS = {
     "flow": lambda: plain(filled(FourierField(torus.group, 2), 1)),
-    "kernels": lambda: AdaptiveKernels(
+    "kernels": lambda: od.AdaptiveKernels(
         torus, torch.rand(5, 2).double(), 9 * torch.ones(5, 2).double(), torch.ones(5).double() / 5
     ),
 }
@@ -141,16 +130,16 @@ FORMS = {
 
 @pytest.mark.parametrize("form", FORMS)
 def test_every_flipped_bit_is_found(form: str, tmp_path: Path) -> None:
-    whole = density_to_bytes(FORMS[form](), columns=["a", "b"])
+    whole = od.density_to_bytes(FORMS[form](), columns=["a", "b"])
     path = tmp_path / "density.safetensors"
     path.write_bytes(whole)
-    assert read_density(path)[1] == {"columns": ["a", "b"]}
+    assert od.read_density(path)[1] == {"columns": ["a", "b"]}
     for bit in np.random.default_rng(0).integers(0, 8 * len(whole), 400).tolist():
         data = bytearray(whole)
         data[bit // 8] ^= 1 << bit % 8
         path.write_bytes(data)
         with pytest.raises(InputFileError, match=r"damaged|checksum"):
-            read_density(path)
+            od.read_density(path)
 
 
 DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
@@ -159,11 +148,11 @@ DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
 def test_files_that_are_no_density(tmp_path) -> None:
     path = tmp_path / "density.safetensors"
     with refused("read", kind=InputFileError):
-        read_density(path)
-    estimator = DensityEstimator(
+        od.read_density(path)
+    estimator = od.DensityEstimator(
         "torus", unit="degrees", components="flow", max_frequency=1, segments=1, iterations=0
     ).fit(DATA)
-    good = density_to_bytes(estimator.density_)
+    good = od.density_to_bytes(estimator.density_)
     length = int.from_bytes(good[:8], "little")
     outer = json.loads(good[8 : 8 + length])
 
@@ -194,4 +183,4 @@ def test_files_that_are_no_density(tmp_path) -> None:
     for content in bad:
         path.write_bytes(content)
         with refused("density", "orbiflow", kind=InputFileError):
-            read_density(path)
+            od.read_density(path)

@@ -185,13 +185,10 @@ def test_what_cannot_be_told() -> None:
 @pytest.mark.parametrize(
     ("given_", "message"),
     [
-        ({"weights": [1, -1]}, "weights 2 0"),
-        ({"weights": [0, 0]}, "value weight"),
-        ({"groups": ["a"]}, "groups 2"),
-        ({"level": 2}, "level"),
-        ({"unit": "hours"}, "unit"),
+        ({"weights": [1, -1]}, "weights 2 0"), ({"weights": [0, 0]}, "value weight"),
+        ({"groups": ["a"]}, "groups 2"), ({"level": 2}, "level"), ({"unit": "hours"}, "unit"),
     ],
-)
+)  # fmt: skip
 def test_mistakes(given_: dict, message: str) -> None:
     with refused(*message.split()):
         summarize_angles([0.0, 1.0], **given_)

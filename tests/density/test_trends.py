@@ -42,12 +42,10 @@ def test_it_is_what_conditional_densities_say(fit: DensityEstimator) -> None:
 @pytest.mark.parametrize(
     ("of", "along", "at", "levels", "words"),
     [
-        (0, 0, [1.0], (0.5,), "twice"),
-        (0, 1, [], (0.5,), "1 1000"),
-        (0, 1, [1.5], (1.0,), "masses 0 1"),
-        (0, 7, [1.5], (0.5,), "column 7"),
+        (0, 0, [1.0], (0.5,), "twice"), (0, 1, [], (0.5,), "1 1000"),
+        (0, 1, [1.5], (1.0,), "masses 0 1"), (0, 7, [1.5], (0.5,), "column 7"),
     ],
-)
+)  # fmt: skip
 def test_trends_that_there_are_not(fit, of, along, at, levels, words) -> None:
     with refused(*words.split()):
         fit.trend(of, along, at, levels=levels)

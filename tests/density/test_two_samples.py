@@ -9,14 +9,7 @@ import pytest
 import torch
 from scipy.stats import binom, vonmises
 
-from orbiflow.density import (
-    DataComparisonSettings,
-    NamedTestSettings,
-    Sphere,
-    compare_samples,
-    make_space,
-    named_tests,
-)
+import orbiflow.density as od
 from orbiflow.density.comparing import RowSketch, mmd_test
 from orbiflow.density.comparing.resampling import Groups, chosen_rows
 from orbiflow.runtime import from_json, to_json
@@ -33,12 +26,12 @@ def _fewer_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def p_of(space: str, points: torch.Tensor, first: np.ndarray, labels: Any, seed: int) -> float:
     groups = Groups.of(labels, len(points))
-    return mmd_test(make_space(space), points, first, groups, permutations=99, seed=seed).p
+    return mmd_test(od.make_space(space), points, first, groups, permutations=99, seed=seed).p
 
 
 @pytest.mark.parametrize("space", SPACES)
 def test_p_is_even_without_a_difference_and_small_with_one(space: str) -> None:
-    made = make_space(space)
+    made = od.make_space(space)
     none, some = [], []
     for trial in range(16):
         torch.manual_seed(trial)
@@ -67,7 +60,7 @@ def test_the_level_holds_whatever_the_sizes_of_groups(design: str) -> None:
     sizes, exact = DESIGNS[design]
     labels = np.repeat(np.arange(len(sizes)), np.sum(sizes, axis=1))
     first = np.concatenate([np.arange(own + other) < own for own, other in sizes])
-    groups, space, wrong, trials = Groups.of(labels, len(labels)), make_space("torus"), 0, 30
+    groups, space, wrong, trials = Groups.of(labels, len(labels)), od.make_space("torus"), 0, 30
     for trial in range(trials):
         rng = np.random.default_rng(trial)
         normal = rng.normal(size=(len(labels), 2)), rng.normal(size=(len(sizes), 2))
@@ -111,15 +104,9 @@ def test_too_few_groups_are_refused(
         return
     # far apart, and as clearly as so few can tell
     assert p_of("torus", points, first, labels, 0) <= 0.06
+    space, none = od.make_space("torus"), Groups.of(None, len(first))
     with refused("99", "permutations"):
-        mmd_test(
-            make_space("torus"),
-            points,
-            first,
-            Groups.of(None, len(first)),
-            permutations=99,
-            level=0.999,
-        )
+        mmd_test(space, points, first, none, permutations=99, level=0.999)
 
 
 def test_whole_groups_are_drawn() -> None:
@@ -137,9 +124,9 @@ def test_divergences_are_near_those_of_the_densities() -> None:
     kappa, shift, rows = 3.0, 1.2, 500
     one = rng.vonmises([0.0, 0.0], kappa, (rows, 2))
     other = rng.vonmises([0.0, shift], kappa, (rows, 2))
-    found = compare_samples(
+    found = od.compare_samples(
         {"a": one, "b": other},
-        settings=DataComparisonSettings(permutations=99, bootstrap=150, divergence=True),
+        settings=od.DataComparisonSettings(permutations=99, bootstrap=150, divergence=True),
     ).divergence
     assert found is not None
     t = (np.arange(4000) + 0.5) / 4000 * 2 * math.pi - math.pi
@@ -157,24 +144,24 @@ def test_divergences_are_near_those_of_the_densities() -> None:
 
 def test_data_far_apart_and_few_rows() -> None:
     rng = np.random.default_rng(1)
-    far = compare_samples(
+    far = od.compare_samples(
         {"a": rng.vonmises(0, 50, (60, 2)), "b": rng.vonmises(3, 50, (60, 2))},
-        settings=DataComparisonSettings(bootstrap=100, divergence=True),
+        settings=od.DataComparisonSettings(bootstrap=100, divergence=True),
     )
     assert far.differ
     assert far.divergence is not None
     assert far.divergence.jensen_shannon.value == pytest.approx(math.log(2), abs=0.05)
     assert far.divergence.accuracy.value > 0.98
-    few = compare_samples(
+    few = od.compare_samples(
         {"a": rng.vonmises(0, 1, (8, 2)), "b": rng.vonmises(0, 1, (9, 2))},
-        settings=DataComparisonSettings(divergence=True),
+        settings=od.DataComparisonSettings(divergence=True),
     )
     assert few.divergence is None
     assert any("not estimated" in note for note in few.notes)
     assert json.loads(json.dumps(to_json(few), allow_nan=False))["divergence"] is None
     same = rng.vonmises(0, 1, (30, 2))
-    alike = compare_samples(
-        {"a": same, "b": same}, settings=DataComparisonSettings(permutations=99)
+    alike = od.compare_samples(
+        {"a": same, "b": same}, settings=od.DataComparisonSettings(permutations=99)
     )
     assert (alike.differ, alike.divergence, alike.notes) == (False, None, ())  # nobody asked
 
@@ -182,19 +169,19 @@ def test_data_far_apart_and_few_rows() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda a: compare_samples({"a": a}), "data sets"),
-        (lambda a: compare_samples({"a": a, "b": a[:, :1]}), "columns 2 1"),
-        (lambda a: compare_samples({"a": a, "b": a[:2]}), "their"),
-        (lambda a: compare_samples({"a": a, "b": a}, "cube"), "unknown space"),
-        (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1], "b": [2]}), "rows 20"),
+        (lambda a: od.compare_samples({"a": a}), "data sets"),
+        (lambda a: od.compare_samples({"a": a, "b": a[:, :1]}), "columns 2 1"),
+        (lambda a: od.compare_samples({"a": a, "b": a[:2]}), "their"),
+        (lambda a: od.compare_samples({"a": a, "b": a}, "cube"), "unknown space"),
+        (lambda a: od.compare_samples({"a": a, "b": a}, groups={"a": [1], "b": [2]}), "rows 20"),
         (
-            lambda a: compare_samples(
-                {"a": a, "b": a}, settings=DataComparisonSettings(permutations=3)
+            lambda a: od.compare_samples(
+                {"a": a, "b": a}, settings=od.DataComparisonSettings(permutations=3)
             ),
             "permutations",
         ),
         (
-            lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1] * 20, "b": [2] * 20}),
+            lambda a: od.compare_samples({"a": a, "b": a}, groups={"a": [1] * 20, "b": [2] * 20}),
             "2 groups",
         ),
     ],
@@ -204,7 +191,7 @@ def test_mistakes(call: Any, message: str) -> None:
         call(np.random.default_rng(0).vonmises(0, 1, (20, 2)))
 
 
-@pytest.mark.parametrize("test", [compare_samples, named_tests])
+@pytest.mark.parametrize("test", [od.compare_samples, od.named_tests])
 def test_what_columns_declare_of_rows_counts(test: Any) -> None:
     rng, nests = np.random.default_rng(0), np.repeat(np.arange(8), 5)
     rows = {
@@ -213,7 +200,7 @@ def test_what_columns_declare_of_rows_counts(test: Any) -> None:
     }
     angles = {name: own[:, :1] for name, own in rows.items()}
     labels = {name: own[:, 1] for name, own in rows.items()}
-    kind = DataComparisonSettings if test is compare_samples else NamedTestSettings
+    kind = od.DataComparisonSettings if test is od.compare_samples else od.NamedTestSettings
     how = {"settings": kind(permutations=99)}
     declared = test(rows, columns="phi=angle,nest=group", **how)
     assert declared == test(angles, columns="phi=angle", groups=labels, **how)
@@ -223,7 +210,7 @@ def test_what_columns_declare_of_rows_counts(test: Any) -> None:
         test(rows, columns="phi=angle,nest=weight")
 
 
-@pytest.mark.parametrize("test", [compare_samples, named_tests])
+@pytest.mark.parametrize("test", [od.compare_samples, od.named_tests])
 def test_columns_of_data_sets_are_found_by_name(test: Any) -> None:
     pandas = pytest.importorskip("pandas")
     rng = np.random.default_rng(0)
@@ -240,7 +227,7 @@ def test_columns_of_data_sets_are_found_by_name(test: Any) -> None:
 @pytest.mark.parametrize("name", ["klein-bottle", "projective-plane"])
 def test_rows_are_known_again_however_they_are_written(name: str) -> None:
     rng = np.random.default_rng(0)
-    space, data = make_space(name), rng.uniform(-1, 1, (5000, 2)).round(4)
+    space, data = od.make_space(name), rng.uniform(-1, 1, (5000, 2)).round(4)
     sketch = from_json(RowSketch, json.loads(json.dumps(to_json(RowSketch.of(space, data)))))
     new = rng.uniform(-1, 1, (3000, 2))
     known, looked_up = sketch.known(space, np.concatenate([data[:1000], new]))
@@ -256,9 +243,9 @@ def test_directions_are_known_in_another_form_and_frame() -> None:
     rng = np.random.default_rng(0)
     data = np.degrees(rng.uniform(-1, 1, (500, 2)))
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    sketch = RowSketch.of(Sphere(), data)
-    other = Sphere(form="vector", rotation=turn)
-    vectors = Sphere(form="vector").from_chart(Sphere().to_chart(data))
+    sketch = RowSketch.of(od.Sphere(), data)
+    other = od.Sphere(form="vector", rotation=turn)
+    vectors = od.Sphere(form="vector").from_chart(od.Sphere().to_chart(data))
     assert sketch.known(other, vectors)[0] >= 0.99 * 500
     for hashes in ([3, 2], [], [-1], [2**53], [0.5]):
         with refused("hashes"):

@@ -16,21 +16,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
+import orbiflow.density as od
 from density.blends import kernels_of, random_kernels, stored
-from orbiflow.density import (
-    AdaptiveKernels,
-    DensityEstimator,
-    Hypersphere,
-    ProjectivePlane,
-    ProjectiveSpace,
-    RotationSpace,
-    Space,
-    Sphere,
-    UndeclaredError,
-    density_picture,
-    make_space,
-    read_density,
-)
 from orbiflow.density.fitting import Rows
 from orbiflow.density.fitting.chains import concentration
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
@@ -41,9 +28,9 @@ from refusals import refused
 from strategies import seeds
 
 SPACES: tuple[UnitVectorSpace, ...] = (
-    Hypersphere(1), Hypersphere(2), Hypersphere(3), Hypersphere(9), ProjectiveSpace(1),
-    ProjectiveSpace(4), RotationSpace(), RotationSpace(form="ZXZ", unit="degrees", symmetry="D6"),
-    RotationSpace(form="vector", symmetry="O"),
+    *map(od.Hypersphere, (1, 2, 3, 9)), *map(od.ProjectiveSpace, (1, 4)), od.RotationSpace(),
+    od.RotationSpace(form="ZXZ", unit="degrees", symmetry="D6"),
+    od.RotationSpace(form="vector", symmetry="O"),
 )  # fmt: skip
 every = pytest.mark.parametrize("space", SPACES, ids=repr)
 dims = st.integers(1, 64)
@@ -53,15 +40,15 @@ def source(seed: int) -> torch.Generator:
     return torch.Generator().manual_seed(seed)
 
 
-def kernels(space: Space, seed: int, low: float = 1.0, high: float = 60.0) -> AdaptiveKernels:
+def kernels(space: od.Space, seed: int, low: float = 1.0, high: float = 60.0) -> od.AdaptiveKernels:
     return random_kernels(np.random.default_rng(seed), space, 4, low, high)
 
 
-def one_kernel(dim: int, kappa: float) -> AdaptiveKernels:
-    space = Hypersphere(dim)
+def one_kernel(dim: int, kappa: float) -> od.AdaptiveKernels:
+    space = od.Hypersphere(dim)
     pole = torch.eye(dim + 1, dtype=torch.float64)[-1:]
     one = torch.ones(1, dtype=torch.float64)
-    return AdaptiveKernels(space, pole, kappa * one[:, None], one)
+    return od.AdaptiveKernels(space, pole, kappa * one[:, None], one)
 
 
 @every
@@ -104,10 +91,10 @@ def test_two_dimensions_are_the_sphere_and_rotations_are_projective_space() -> N
     noise = np.random.default_rng(0).normal(size=(60, 4)) + np.array([1.5, 0.0, 0.5, 1.0])
     four = noise / np.linalg.norm(noise, axis=1, keepdims=True)
     three = noise[:, :3] / np.linalg.norm(noise[:, :3], axis=1, keepdims=True)
-    pairs: list[tuple[Space, Space, np.ndarray]] = [
-        (Hypersphere(2), Sphere(form="vector"), three),
-        (ProjectiveSpace(2), ProjectivePlane(form="vector"), three),
-        (ProjectiveSpace(3), RotationSpace(), four),
+    pairs: list[tuple[od.Space, od.Space, np.ndarray]] = [
+        (od.Hypersphere(2), od.Sphere(form="vector"), three),
+        (od.ProjectiveSpace(2), od.ProjectivePlane(form="vector"), three),
+        (od.ProjectiveSpace(3), od.RotationSpace(), four),
     ]
     for one, other, data in pairs:
         scores: list[torch.Tensor] = []
@@ -125,7 +112,7 @@ def test_two_dimensions_are_the_sphere_and_rotations_are_projective_space() -> N
 def test_kernels_are_neither_spikes_nor_flat_in_any_dimension(dim: int) -> None:
     truth = one_kernel(dim, 8.0 * dim)
     data, fresh = truth.sample(300, source(dim)), truth.sample(500, source(99))
-    fit = DensityEstimator(truth.space, components="kernels").fit(data.numpy())
+    fit = od.DensityEstimator(truth.space, components="kernels").fit(data.numpy())
     gain = float(truth.log_prob(fresh, measure="uniform").mean())
     found = float(fit.density_.log_prob(fresh, measure="uniform").mean())
     assert 0.8 * gain < found < gain
@@ -157,10 +144,10 @@ class HalfTurns(UnitVectorSpace):
 def test_the_quotient_by_a_group_of_ones_own_is_fitted_and_saved(tmp_path: Path) -> None:
     truth = kernels(HalfTurns(), 1)
     data = truth.sample(60, source(0)).numpy()
-    fit = DensityEstimator("half-turns", components="mixture").fit(data)
+    fit = od.DensityEstimator("half-turns", components="mixture").fit(data)
     scores = fit.score_samples(data)
     assert fit.score_samples(data * [-1, -1, 1]) == pytest.approx(scores)
-    again = DensityEstimator.fitted(stored(fit.density_, tmp_path))
+    again = od.DensityEstimator.fitted(stored(fit.density_, tmp_path))
     assert isinstance(again.space_, HalfTurns)
     assert (again.score_samples(data) == scores).all()
 
@@ -195,27 +182,31 @@ def test_hostile_files_are_refused(options: dict[str, object], message: str, tmp
     path = tmp_path / "x.safetensors"
     path.write_bytes(tensor_bytes(header, {k: v.double() for k, v in tensors.items()}, "a density"))
     with refused(*message.split(), kind=InputFileError):
-        read_density(path)
+        od.read_density(path)
 
 
-space3, quarter = Hypersphere(3), [[0.0, 0.0, math.pi / 2]]
+space3, quarter = od.Hypersphere(3), [[0.0, 0.0, math.pi / 2]]
 REFUSED = {
     "row 2 length": lambda: space3.to_chart([[0, 0, 0, 1.0], [0, 0, 0, 2.0]]),
     "array 4": lambda: space3.to_chart([[0.0, 0.0, 1.0]]),
     "unit vectors": lambda: kernels(space3, 0).log_prob(torch.zeros(1, 4)),
-    "1 latitude longitude": lambda: Hypersphere(1).to_chart([[31.1, 35.5]]),
-    "row 1 matrix": lambda: RotationSpace().to_chart([[1.0] * 9]),
-    "row 1 turn radians": lambda: RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
-    "turn degrees": lambda: RotationSpace(form="ZXZ", unit="degrees").to_chart([[400.0, 0.0, 0.0]]),
-    "gradients quaternions": lambda: DensityEstimator.fitted(
-        kernels(RotationSpace(), 0)
+    "1 latitude longitude": lambda: od.Hypersphere(1).to_chart([[31.1, 35.5]]),
+    "row 1 matrix": lambda: od.RotationSpace().to_chart([[1.0] * 9]),
+    "row 1 turn radians": lambda: od.RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
+    "turn degrees": lambda: od.RotationSpace(form="ZXZ", unit="degrees").to_chart(
+        [[400.0, 0.0, 0.0]]
+    ),
+    "gradients quaternions": lambda: od.DensityEstimator.fitted(
+        kernels(od.RotationSpace(), 0)
     ).score_gradient(quarter),
-    "flow hypersphere 3": lambda: DensityEstimator(space3, components=("flow", "kernels")).fit(
+    "flow hypersphere 3": lambda: od.DensityEstimator(space3, components=("flow", "kernels")).fit(
         space3.uniform(20, source(0))
     ),
-    "max_frequency hypersphere": lambda: DensityEstimator(space3, max_frequency=3).fit(np.eye(4)),
-    "picture hypersphere": lambda: density_picture(kernels(Hypersphere(2), 0)),
-    "hypersphere option": lambda: make_space("hypersphere", unit="degrees"),
+    "max_frequency hypersphere": lambda: od.DensityEstimator(space3, max_frequency=3).fit(
+        np.eye(4)
+    ),
+    "picture hypersphere": lambda: od.density_picture(kernels(od.Hypersphere(2), 0)),
+    "hypersphere option": lambda: od.make_space("hypersphere", unit="degrees"),
 }
 
 
@@ -235,12 +226,12 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(tmp_path: P
         return dict(call.run().summary)
 
     where = {"space": "rotation-space", "data": table}
-    with refused("rx", "angle:degrees", kind=UndeclaredError):
+    with refused("rx", "angle:degrees", kind=od.UndeclaredError):
         run("fit", **where, out=folder)
     run("fit", **where, unit="degrees", out=folder, picture=True)
     assert (folder / "thumbnail.png").exists()
     scored = run("score", data=table, model=folder, out=tmp_path / "scores.csv")
-    density, extra = read_density(folder / "density.safetensors")
+    density, extra = od.read_density(folder / "density.safetensors")
     assert extra["columns"] == ["rx", "ry", "rz"]
     points = density.space.to_chart(turns.as_quat())
     assert scored["mean"] == pytest.approx(float(density.log_prob(points).mean()))

@@ -16,11 +16,9 @@ from strategies import groups, neural_field, random_tensor
 P4 = wallpaper_group("p4")
 THREE = random_tensor(0, 4, 3)
 PLANAR = {
-    "fourier": FourierField(P4, 2),
-    "spline": SplineField(P4, 2),
-    "network": neural_field(P4, hidden=(4,)),
-    "symmetrized": symmetrize(torch.tanh, P4),
-}
+    "fourier": FourierField(P4, 2), "spline": SplineField(P4, 2),
+    "network": neural_field(P4, hidden=(4,)), "symmetrized": symmetrize(torch.tanh, P4),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", PLANAR)
@@ -75,14 +73,12 @@ def test_fields_that_are_none():
 @pytest.mark.parametrize(
     "make",
     [
-        lambda group: FourierField(group, 3),
-        lambda group: SplineField(group, 3),
-        lambda group: symmetrize(torch.tanh, group),
-        lambda group: PeriodicFeatures(group),
+        lambda group: FourierField(group, 3), lambda group: SplineField(group, 3),
+        lambda group: symmetrize(torch.tanh, group), lambda group: PeriodicFeatures(group),
         lambda group: neural_field(group),
     ],
     ids=["fourier", "spline", "symmetrize", "features", "network"],
-)
+)  # fmt: skip
 def test_a_groups_name_in_place_of_a_group(make):
     with refused("CrystallographicGroup", "p6m", kind=GroupError):
         make("p6m")

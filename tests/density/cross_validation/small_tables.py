@@ -12,11 +12,8 @@ import numpy as np
 from orbiflow.runtime import Call, find
 
 QUICK: dict[str, Any] = {
-    "space": "torus",
-    "components": ["mixture"],
-    "against": ["chains"],
-    "folds": 3,
-}
+    "space": "torus", "components": ["mixture"], "against": ["chains"], "folds": 3,
+}  # fmt: skip
 
 
 def angles(rows: int, seed: int = 0) -> np.ndarray:

@@ -29,6 +29,14 @@ def shape(kind: str, coordinates: Any) -> dict[str, Any]:
     return {"type": kind, "coordinates": coordinates}
 
 
+def feature(geometry: Any) -> dict[str, Any]:
+    return {"type": "Feature", "geometry": geometry}
+
+
+POINT = shape("Point", [0, 0])
+COLLECTION = {"type": "GeometryCollection", "geometries": [shape("LineString", SQUARE)]}
+
+
 @pytest.mark.parametrize(
     ("item", "count"),
     [
@@ -38,22 +46,7 @@ def shape(kind: str, coordinates: Any) -> dict[str, Any]:
         (shape("Polygon", [SQUARE, SQUARE]), 2),
         (shape("MultiPolygon", [[SQUARE], [SQUARE, SQUARE]]), 3),
         ({"type": "Feature", "geometry": shape("LineString", SQUARE), "properties": None}, 1),
-        (
-            {
-                "type": "FeatureCollection",
-                "features": [
-                    {"type": "Feature", "geometry": shape("Point", [0, 0])},
-                    {
-                        "type": "Feature",
-                        "geometry": {
-                            "type": "GeometryCollection",
-                            "geometries": [shape("LineString", SQUARE)],
-                        },
-                    },
-                ],
-            },
-            1,
-        ),
+        ({"type": "FeatureCollection", "features": [feature(POINT), feature(COLLECTION)]}, 1),
     ],
 )
 def test_all_geometries_with_lines_are_read(tmp_path: Path, item: Any, count: int) -> None:
@@ -153,15 +146,12 @@ def test_the_earth() -> None:
 @pytest.mark.parametrize(
     ("space", "names", "drawn"),
     [
-        (Sphere(), None, True),
-        (Sphere(), ("Latitude (deg)", "Longitude (deg)"), True),
-        (Sphere(), ("column1", "column2"), True),
-        (Sphere(), ("dec", "ra"), False),
-        (Sphere(), ("inclination", "declination"), False),
-        (Sphere(form="vector"), None, False),
+        (Sphere(), None, True), (Sphere(), ("Latitude (deg)", "Longitude (deg)"), True),
+        (Sphere(), ("column1", "column2"), True), (Sphere(), ("dec", "ra"), False),
+        (Sphere(), ("inclination", "declination"), False), (Sphere(form="vector"), None, False),
         (make_space("projective-plane"), None, False),
     ],
-)
+)  # fmt: skip
 def test_where_the_earth_is_drawn(space: Space, names: tuple | None, drawn: bool) -> None:
     assert bool(coastlines.coastlines_for(space, PlotSettings(names=names))) == drawn
     assert coastlines.coastlines_for(space, PlotSettings(names=names, earth=False)) == []

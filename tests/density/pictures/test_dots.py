@@ -13,16 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from density.blends import blended, identity_flow
-from orbiflow.density import (
-    AdaptiveKernels,
-    Mixture,
-    PlotSettings,
-    UniformDensity,
-    density_page,
-    density_picture,
-    make_space,
-)
+import orbiflow.density as od
+from density.blends import bump
 from orbiflow.density.pictures.grounds import MAX_COVER, uncrowded
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import chosen_map
@@ -55,17 +47,10 @@ def test_few_dots(count: int) -> None:
     assert (widths > 0).all()
 
 
-def peaked(name: str) -> Mixture:
+def peaked(name: str) -> od.Mixture:
     """One narrow peak on an even floor."""
-    space = make_space(name)
-    kernels = AdaptiveKernels(
-        space,
-        torch.tensor([[0.4, 0.3]]).double(),
-        torch.full((1, 1 if space.is_round else 2), 60.0).double(),
-        torch.ones(1).double(),
-    )
-    shares = torch.tensor([0.0, 0.9, 0.1]).double()
-    return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
+    space = od.make_space(name)
+    return od.Mixture([bump(space, 60.0, (0.4, 0.3)), od.UniformDensity(space)], [0.9, 0.1])
 
 
 def pixels(picture: Picture) -> np.ndarray:
@@ -88,14 +73,14 @@ def test_a_peak_is_seen_through_its_dots(name: str, count: int, monkeypatch) -> 
     density = peaked(name)
     drawn = density.sample((count,), torch.Generator().manual_seed(0))
     sheet = replace(Sheet.column("single", "png"), dpi=300)
-    settings = PlotSettings(samples=count, scale="linear")
+    settings = od.PlotSettings(samples=count, scale="linear")
 
     def picture(dots: torch.Tensor | None) -> np.ndarray:
         if density.space.is_round:
             drawn_map = Map(density.space, chosen_map(density.space, drawn))
-            made = density_picture(density, dots, settings, sheet=sheet, ground=drawn_map)
+            made = od.density_picture(density, dots, settings, sheet=sheet, ground=drawn_map)
         else:
-            made = density_picture(density, dots, settings, sheet=sheet)
+            made = od.density_picture(density, dots, settings, sheet=sheet)
         return pixels(made)
 
     bare, dotted = picture(None), picture(drawn)
@@ -111,7 +96,7 @@ def test_a_peak_is_seen_through_its_dots(name: str, count: int, monkeypatch) -> 
 def test_the_page_has_the_dots_widths(name: str) -> None:
     density = peaked(name)
     drawn = density.sample((200,), torch.Generator().manual_seed(0))
-    page = density_page(density, resolution=8, samples=torch.cat([drawn, drawn[:50]]))
+    page = od.density_page(density, resolution=8, samples=torch.cat([drawn, drawn[:50]]))
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
     assert found
     data = json.loads(found[1])
@@ -125,4 +110,4 @@ def test_the_page_has_the_dots_widths(name: str) -> None:
     )
     assert np.median(widths[crowded[:50]]) < np.median(widths[crowded[-20:]]) / 2
     assert "Dots are smaller where they crowd." in page
-    assert "crowd" not in density_page(density, resolution=8)
+    assert "crowd" not in od.density_page(density, resolution=8)

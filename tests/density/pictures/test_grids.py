@@ -95,13 +95,10 @@ AXES_SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(), ProjectivePlan
 @pytest.mark.parametrize(
     ("turns", "unit", "text"),
     [
-        (0.5, "radians", "π"),
-        (-0.25, "radians", "−π/2"),
-        (0, "radians", "0"),
-        (0.125, "degrees", "45°"),
-        (0.25, "turns", "0.25"),
+        (0.5, "radians", "π"), (-0.25, "radians", "−π/2"), (0, "radians", "0"),
+        (0.125, "degrees", "45°"), (0.25, "turns", "0.25"),
     ],
-)
+)  # fmt: skip
 def test_angles_are_written_in_their_unit(turns, unit, text):
     assert angle_text(turns, unit) == text
 

@@ -9,21 +9,8 @@ import torch
 from matplotlib.contour import QuadContourSet
 from matplotlib.path import Path as MapPath
 
+import orbiflow.density as od
 from density.blends import blended, identity_flow
-from orbiflow.density import (
-    AdaptiveKernels,
-    Density,
-    DensityLevels,
-    DensityRegion,
-    FlowDensity,
-    Mixture,
-    PlotSettings,
-    UniformDensity,
-    density_picture,
-    make_space,
-    plot_density,
-    to_vectors,
-)
 from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.projections import EqualEarth
 from refusals import refused
@@ -39,27 +26,27 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @functools.cache
-def broad(name: str) -> Mixture:
+def broad(name: str) -> od.Mixture:
     """Some broad kernels."""
-    space, rng = make_space(name), np.random.default_rng(5)
-    kernels = AdaptiveKernels(
+    space, rng = od.make_space(name), np.random.default_rng(5)
+    kernels = od.AdaptiveKernels(
         space,
         space.uniform(4, torch.Generator().manual_seed(2)),
         torch.tensor(rng.uniform(4, 20, (4, 1 if space.is_round else 2))),
         torch.full((4,), 0.25).double(),
     )
     shares = torch.tensor([0.0, 0.8, 0.2]).double()
-    return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
+    return blended(space, identity_flow(space), od.UniformDensity(space), kernels, shares)
 
 
 @functools.cache
-def lines_of(density: Mixture, *masses: float) -> list[DensityRegion]:
-    levels = DensityLevels(density, samples=4000)
+def lines_of(density: od.Mixture, *masses: float) -> list[od.DensityRegion]:
+    levels = od.DensityLevels(density, samples=4000)
     return [levels.highest(mass) for mass in masses]
 
 
-def with_regions(*masses: float, **options: Any) -> PlotSettings:
-    return PlotSettings(regions=masses, region_samples=4000, **options)
+def with_regions(*masses: float, **options: Any) -> od.PlotSettings:
+    return od.PlotSettings(regions=masses, region_samples=4000, **options)
 
 
 def vertices(figure: Any) -> list[np.ndarray]:
@@ -76,7 +63,7 @@ def test_lines_are_where_the_density_is_that_of_the_edge(name: str, measure: str
     density = broad(name)
     lines, view = lines_of(density, 0.5, 0.9), view_of(density.space, None, None)
     settings = with_regions(0.9, 0.5, measure=measure)
-    picture = density_picture(density, settings=settings)
+    picture = od.density_picture(density, settings=settings)
     found = vertices(picture.figure)
     assert len(found) == 2
     for line, places in zip(lines, found, strict=True):  # the smallest first
@@ -94,11 +81,11 @@ def test_lines_on_a_map(measure: str) -> None:
     lines, projection = lines_of(density, 0.9), EqualEarth((0.0, 40.0))
     asked: dict[str, Any] = {"projection": "equal-earth", "center": (40.0,)}
     settings = with_regions(0.9, measure=measure, **asked)
-    picture = density_picture(density, settings=settings, ground="map")
+    picture = od.density_picture(density, settings=settings, ground="map")
     (places,) = vertices(picture.figure)
     # beyond the outline they are cut off
     places = places[MapPath(projection.outline()).contains_points(places, radius=-0.02)]
-    points = density.space.vectors_to_chart(to_vectors(projection.inverse(places)))  # type: ignore[attr-defined]
+    points = density.space.vectors_to_chart(od.to_vectors(projection.inverse(places)))  # type: ignore[attr-defined]
     logs = density.log_prob(points, measure="natural")
     assert float((logs - lines[0].log_prob).abs().quantile(0.95)) < 0.05
     assert "The line is about the smallest region that holds 90 %." in picture.caption
@@ -108,7 +95,7 @@ def test_lines_on_a_map(measure: str) -> None:
 def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     called: list[int] = []
 
-    def counted(_: Density, values: np.ndarray, *_rest: object) -> np.ndarray:
+    def counted(_: od.Density, values: np.ndarray, *_rest: object) -> np.ndarray:
         called.append(len(values))
         return np.log(values)
 
@@ -117,7 +104,7 @@ def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(f"{pictures}.square._FINE_GRID", 30)
     monkeypatch.setattr(f"{pictures}.maps._PIXELS", 2000)
     density = broad(name)
-    draw = functools.partial(density_picture, ground="square" if name == "torus" else "map")
+    draw = functools.partial(od.density_picture, ground="square" if name == "torus" else "map")
     draw(density)
     assert not called
     draw(density, settings=with_regions(0.5, 0.9))
@@ -131,8 +118,8 @@ def test_masses_that_cannot_be_drawn(tmp_path: Any) -> None:
         ((1.0,), "above 0 1"),
     ):
         with refused(*said.split()):
-            PlotSettings(regions=masses)
-    space = make_space("torus", axes=3)
-    flat = FlowDensity(space, identity_flow(space))
+            od.PlotSettings(regions=masses)
+    space = od.make_space("torus", axes=3)
+    flat = od.FlowDensity(space, identity_flow(space))
     with refused("regions"):
-        plot_density(flat, tmp_path / "out", PlotSettings(regions=(0.5,)))
+        od.plot_density(flat, tmp_path / "out", od.PlotSettings(regions=(0.5,)))
