@@ -41,9 +41,12 @@ def test_arrays(kind: str) -> None:
     same(as_data(ARRAYS[kind]), [[1, 2], [3, NAN]], None)
 
 
-def test_structured_arrays_have_names() -> None:
+def test_columns_with_names() -> None:
     rows = np.array([(1, 2.0), (3, NAN)], dtype=[("phi", "i4"), ("psi", "f8")])
     same(as_data(rows), [[1, 2], [3, NAN]], ("phi", "psi"))
+    arrow = pytest.importorskip("pyarrow")
+    table = arrow.table({"phi": [1, 3], "psi": [2, None]})
+    same(as_data(table), [[1, 2], [3, NAN]], ("phi", "psi"))
 
 
 def test_pandas() -> None:
@@ -80,13 +83,6 @@ def test_polars() -> None:
         as_data(polars.DataFrame({"phi": ["x"]}))
     with refused("call", "collect"):
         as_data(polars.DataFrame({"phi": [1]}).lazy())
-
-
-def test_pyarrow() -> None:
-    arrow = pytest.importorskip("pyarrow")
-    same(
-        as_data(arrow.table({"phi": [1, 3], "psi": [2, None]})), [[1, 2], [3, NAN]], ("phi", "psi")
-    )
 
 
 def test_xarray() -> None:

@@ -42,7 +42,14 @@ class Watched(od.UniformDensity):
 
 
 @pytest.mark.usefixtures("three_threads")
-def test_densities_work_on_one_thread_and_give_the_others_back() -> None:
+def test_fits_and_densities_work_on_one_thread_and_give_the_others_back() -> None:
+    seen: set[int] = set()
+    estimator = od.DensityEstimator("sphere", components="flow,mixture", **QUICK)
+    estimator.fit(DATA, progress=lambda *_: seen.add(torch.get_num_threads()))
+    assert seen == {1}
+    estimator.score(DATA)
+    estimator.sample(3)
+    assert torch.get_num_threads() == 3
     space = od.make_space("torus")
     base = Watched(space)
     density = od.FlowDensity(space, Flow([SplineField(space.group, 1)]), base)
@@ -52,17 +59,6 @@ def test_densities_work_on_one_thread_and_give_the_others_back() -> None:
     density.mass(8)
     density.entropy(10)
     assert base.seen == {1}
-    assert torch.get_num_threads() == 3
-
-
-@pytest.mark.usefixtures("three_threads")
-def test_fits_work_on_one_thread_and_give_the_others_back() -> None:
-    seen: set[int] = set()
-    estimator = od.DensityEstimator("sphere", **QUICK)
-    estimator.fit(DATA, progress=lambda *_: seen.add(torch.get_num_threads()))
-    assert seen == {1}
-    estimator.score(DATA)
-    estimator.sample(3)
     assert torch.get_num_threads() == 3
 
 

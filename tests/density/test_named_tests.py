@@ -1,6 +1,7 @@
 """Tests by name of several samples: published examples, other formulas, levels, refusals."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -145,24 +146,17 @@ def share_of_small(
 
 
 def test_levels_and_power_on_the_circle() -> None:
-    levels = share_of_small(
-        lambda rng: {"a": rng.vonmises(1, 2, (30, 1)), "b": rng.vonmises(1, 2, (40, 1))},
-        "torus",
-        30,
-    )
+    def two(means: tuple[float, float], kappas: tuple[float, float]) -> Any:
+        sizes = [(30, 1), (40, 1)]
+        own = list(zip(means, kappas, sizes, strict=True))
+        return lambda rng: {name: rng.vonmises(*one) for name, one in zip("ab", own, strict=True)}
+
+    levels = share_of_small(two((1, 1), (2, 2)), "torus", 30)
     assert len(levels) == 8
     assert all(share <= 0.15 for share in levels.values()), levels  # 0.05 and 3.5 standard errors
-    power = share_of_small(
-        lambda rng: {"a": rng.vonmises(1, 2, (30, 1)), "b": rng.vonmises(2, 2, (40, 1))},
-        "torus",
-        20,
-    )
+    power = share_of_small(two((1, 2), (2, 2)), "torus", 20)
     assert all(power[name] >= 0.8 for name in power if name != "common-concentration"), power
-    wider = share_of_small(
-        lambda rng: {"a": rng.vonmises(1, 8, (40, 1)), "b": rng.vonmises(1, 1, (40, 1))},
-        "torus",
-        10,
-    )
+    wider = share_of_small(two((1, 1), (8, 1)), "torus", 10)
     assert wider["common-concentration"] >= 0.8
 
 

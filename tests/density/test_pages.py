@@ -25,6 +25,19 @@ def test_the_snippets(capsys: pytest.CaptureFixture[str]) -> None:
     assert p < 0.05
 
 
+DENSITIES = (Path(__file__).parents[2] / "docs" / "densities.md").read_text(encoding="utf-8")
+
+
+def test_families_and_orientations(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {}
+    for word in ("von-mises-fisher", "RotationSpace"):
+        (snippet,) = re.findall(rf"```python\n([^`]*{word}[^`]*)```", DENSITIES)
+        exec(compile(snippet, "densities.md", "exec"), names)
+    value, low, high, *_ = map(float, capsys.readouterr().out.split())
+    assert low < value < high
+    assert names["orientations"].space_.symmetry == "D2"
+
+
 PAGE = Path(__file__).parents[2] / "docs" / "examples" / "image-patches.md"
 
 

@@ -22,6 +22,10 @@ from refusals import names, refused
 seeds = st.integers(0, 2**31)
 
 
+def few(bootstrap: int, seed: int = 0) -> ComparisonSettings:
+    return ComparisonSettings(bootstrap=bootstrap, seed=seed)
+
+
 def scores(rng: np.random.Generator, rows: int, *shifts: float) -> dict[str, np.ndarray]:
     base = 3 * rng.normal(size=rows)
     return {f"m{k}": base + shift + rng.normal(size=rows) for k, shift in enumerate(shifts)}
@@ -31,7 +35,7 @@ def scores(rng: np.random.Generator, rows: int, *shifts: float) -> dict[str, np.
 @settings(max_examples=15, deadline=None)
 def test_the_standard_error_is_that_of_the_paired_differences(seed: int, rows: int) -> None:
     table = scores(np.random.default_rng(seed), rows, 0.0, 0.3)
-    found = compare_scores(table, settings=ComparisonSettings(bootstrap=100))
+    found = compare_scores(table, settings=few(100))
     one = found.differences[0]
     difference = table[one.first] - table[one.second]
     assert one.mean == pytest.approx(difference.mean())
@@ -46,11 +50,11 @@ def test_the_standard_error_is_that_of_the_paired_differences(seed: int, rows: i
 def test_copies_of_rows_in_one_group_add_no_evidence(seed: int, rows: int, copies: int) -> None:
     table = scores(np.random.default_rng(seed), rows, 0.0, 0.3)
     labels = [f"group {k}" for k in range(rows)] * copies
-    alone = compare_scores(table, settings=ComparisonSettings(bootstrap=200, seed=seed))
+    alone = compare_scores(table, settings=few(200, seed))
     copied = compare_scores(
         {name: np.tile(value, copies) for name, value in table.items()},
         groups=labels,
-        settings=ComparisonSettings(bootstrap=200, seed=seed),
+        settings=few(200, seed),
     )
     assert copied.groups == rows
     one, other = alone.differences[0], copied.differences[0]
@@ -64,9 +68,7 @@ def test_intervals_hold_what_they_promise() -> None:
     held = 0
     for trial in range(150):
         table = {"a": rng.exponential(size=30) ** 1.5, "b": np.zeros(30)}
-        one = compare_scores(
-            table, settings=ComparisonSettings(bootstrap=200, seed=trial)
-        ).differences[0]
+        one = compare_scores(table, few(200, trial)).differences[0]
         truth = 1.3293403881791372 * (1 if one.first == "a" else -1)  # gamma(2.5)
         held += one.low <= truth <= one.high
     # a skewed density and 30 rows: short of 95 %, as any bootstrap
@@ -77,9 +79,7 @@ def test_all_intervals_hold_at_once() -> None:
     rng = np.random.default_rng(1)
     wrong = 0
     for trial in range(120):
-        found = compare_scores(
-            scores(rng, 40, 0, 0, 0, 0), settings=ComparisonSettings(bootstrap=200, seed=trial)
-        )
+        found = compare_scores(scores(rng, 40, 0, 0, 0, 0), few(200, trial))
         wrong += any(d.better for d in found.differences)
     assert 1 <= wrong <= 14  # 6 expected; six intervals of their own would give about 24
 
@@ -91,16 +91,8 @@ def test_groups_keep_chance_from_being_taken_for_a_difference() -> None:
     for trial in range(30):
         shared = 0.5 * rng.normal(size=12)[labels]
         table = {"a": shared + 0.1 * rng.normal(size=240), "b": np.zeros(240)}
-        fooled += (
-            compare_scores(table, settings=ComparisonSettings(bootstrap=100, seed=trial)).best
-            is not None
-        )
-        kept += (
-            compare_scores(
-                table, groups=labels, settings=ComparisonSettings(bootstrap=100, seed=trial)
-            ).best
-            is None
-        )
+        fooled += compare_scores(table, few(100, trial)).best is not None
+        kept += compare_scores(table, few(100, trial), groups=labels).best is None
     assert fooled > 15
     assert kept > 24
 
@@ -111,7 +103,7 @@ def test_notes_on_groups_that_are_few_unequal_or_of_single_rows() -> None:
     groups = {name: np.repeat(np.arange(len(own)), own) for name, own in sizes.items()}
     groups |= {"lone": np.arange(200), "none": None}
     notes = {
-        name: compare_scores(table, ComparisonSettings(bootstrap=100), groups=labels).notes
+        name: compare_scores(table, few(100), groups=labels).notes
         for name, labels in groups.items()
     }
     assert notes["equal"] == notes["none"] == ()

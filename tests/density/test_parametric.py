@@ -1,6 +1,5 @@
 """Parametric families as fits: parameters, their intervals, the test of the family, what is refused."""
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -232,14 +231,6 @@ def test_a_saved_fit_keeps_its_parameters(tmp_path: Path) -> None:
     assert isinstance(again, od.DensityEstimator)
     assert again.parameters() == fit.parameters()
     assert list(again.parameters())[:2] == ["mean_phi", "concentration_phi"]
-
-
-def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "densities.md").read_text(encoding="utf-8")
-    (snippet,) = re.findall(r"```python\n([^`]*von-mises-fisher[^`]*)```", page)
-    exec(compile(snippet, "densities.md", "exec"), {})
-    value, low, high, _ = map(float, capsys.readouterr().out.split())
-    assert low < value < high
 
 
 def test_two_modes_and_very_close_rows() -> None:

@@ -229,7 +229,9 @@ def test_a_space_of_another_form_than_the_names_is_refused() -> None:
         DensityEstimator(RotationSpace(form="scalar-first")).fit(frame)
 
 
-def test_families_without_the_symmetry_are_refused() -> None:
+def test_weights_that_do_not_fit_and_families_without_the_symmetry_are_refused() -> None:
+    with refused("weights", "4"):
+        summarize_orientations(RotationSpace(), np.eye(4), weights=[1.0])
     from orbiflow.density.models import images_of
 
     assert images_of(RotationSpace()) == 2
@@ -319,8 +321,3 @@ def test_rows_of_a_group_count_once_and_weights_as_repeats() -> None:
     repeated = summarize_orientations(space, np.repeat(rows, weights, axis=0))
     assert weighed.mean == pytest.approx(repeated.mean, abs=1e-9)
     assert weighed.spread == pytest.approx(repeated.spread)
-
-
-def test_weights_that_do_not_fit_are_refused() -> None:
-    with refused("weights", "4"):
-        summarize_orientations(RotationSpace(), np.eye(4), weights=[1.0])

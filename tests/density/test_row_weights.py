@@ -71,6 +71,8 @@ def test_stacking_of_weighted_rows_is_that_of_repeated_ones(seed: int) -> None:
     assert gain_of(table[0], table[1], own).nats == pytest.approx(
         gain_of(whole[0], whole[1]).nats, abs=1e-9
     )
+    gain = gain_of(torch.tensor([1.0, 2.0, 3.0, 4.0]), torch.zeros(4))
+    assert (gain.nats, gain.error) == (2.5, pytest.approx(np.std([1, 2, 3, 4], ddof=1) / 2))
 
 
 @given(seeds)

@@ -8,14 +8,7 @@ from hypothesis import strategies as st
 
 from orbiflow.density import DensitySettings, fit_automatic, make_space
 from orbiflow.density.data import group_numbers
-from orbiflow.density.fitting import (
-    Rows,
-    folds_of,
-    gain_of,
-    sparse_weights,
-    stacked,
-    stacking_weights,
-)
+from orbiflow.density.fitting import Rows, folds_of, sparse_weights, stacked, stacking_weights
 from orbiflow.density.fitting.held_out import FOLDS, TOLERANCE_NATS, supported_weights
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
 from refusals import refused
@@ -71,13 +64,6 @@ def test_spikes_need_more_rows_than_a_close_pair(seed: int, pairs: int) -> None:
     if pairs >= 10:
         assert torch.equal(weights, sparse_weights(table, always))
         assert float(weights[1]) > 0.01
-
-
-def test_a_gain_has_its_standard_error() -> None:
-    better = torch.tensor([1.0, 2.0, 3.0, 4.0])
-    gain = gain_of(better, torch.zeros(4))
-    assert gain.nats == 2.5
-    assert gain.error == pytest.approx(float(better.std()) / 2)
 
 
 @pytest.mark.parametrize("name", SPACES)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -150,14 +149,6 @@ def test_the_quotient_by_a_group_of_ones_own_is_fitted_and_saved(tmp_path: Path)
     again = od.DensityEstimator.fitted(stored(fit.density_, tmp_path))
     assert isinstance(again.space_, HalfTurns)
     assert (again.score_samples(data) == scores).all()
-
-
-def test_the_example_of_the_page_runs() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "densities.md").read_text(encoding="utf-8")
-    (snippet,) = re.findall(r"```python\n([^`]*RotationSpace[^`]*)```", page)
-    names: dict[str, Any] = {}
-    exec(compile(snippet, "densities.md", "exec"), names)
-    assert names["orientations"].space_.symmetry == "D2"
 
 
 @pytest.mark.parametrize(

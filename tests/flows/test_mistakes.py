@@ -48,20 +48,14 @@ def test_a_float32_field_at_float64_points(kind):
     assert flow.double()(points).dtype == torch.float64
 
 
-@pytest.mark.parametrize(
-    ("points", "about"),
-    [
+def test_points_and_fields_that_are_none():
+    for points, about in (
         (np.zeros((3, 2)), "ndarray"),
         (torch.zeros(3, 2, dtype=torch.int64), "torch.int64"),
         (torch.tensor(1.0), "()"),
-    ],
-)
-def test_points_that_are_none(points, about):
-    with refused(about):
-        Flow(torch.sin)(points)
-
-
-def test_fields_that_are_none():
+    ):
+        with refused(about):
+            Flow(torch.sin)(points)
     with refused("p6m"):
         Flow(["p6m"])  # type: ignore[list-item]
     with refused("(4, 3)", "(4, 1)"):

@@ -10,6 +10,7 @@ import torch
 
 import orbiflow.density as od
 from density.blends import bump
+from density.quick_fits import quick_pictures
 from orbiflow.density.operations.drawing import plot
 from orbiflow.density.pictures.plots import refuse_foreign_files
 from orbiflow.errors import OrbiflowError, OutputError
@@ -22,13 +23,7 @@ DATA = np.random.default_rng(0).uniform(-3, 3, (40, 2))
 
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 12)
-    monkeypatch.setattr("orbiflow.density.pictures.surfaces._CELLS", 8)
-    monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 900)
-    monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 12)
-    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 20)
-    monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 2)
-    monkeypatch.setattr("orbiflow.density.pictures.surfaces._RESOLUTION", 30)
+    quick_pictures(monkeypatch)
     monkeypatch.setattr("orbiflow.density.pictures.plots.SAMPLES", 50)
     monkeypatch.setattr("orbiflow.density.pictures.figures.few_colours", lambda png: png)
 
