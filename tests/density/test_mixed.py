@@ -81,13 +81,8 @@ def test_a_part_of_many_columns_is_saved_with_its_lines(tmp_path: Path) -> None:
 def test_rows_that_lack_a_value_count_by_the_others() -> None:
     data = data_of(300)
     data[::3, 1], data[1::3, 2] = np.nan, np.nan
-    settings = {
-        "unit": "degrees",
-        "columns": {1: "linear", 2: "linear"},
-        "missing": "marginalise",
-        "seed": 0,
-    }
-    fit = DensityEstimator("torus", components="kernels,mixture", **settings).fit(data)
+    how: Any = {"unit": "degrees", "missing": "marginalise", "components": "kernels,mixture"}
+    fit = DensityEstimator("torus", columns={1: "linear", 2: "linear"}, **how).fit(data)
     some = data[:6].copy()
     scores = fit.score_samples(some)
     alone = fit.marginal(0, 2).score_samples(some[[0]][:, [0, 2]])

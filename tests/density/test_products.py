@@ -97,10 +97,7 @@ def place_and_season(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 def test_a_fit_is_near_the_truth() -> None:
     rows, _ = place_and_season(400, 0)
     unseen, truth = place_and_season(400, 1)
-    how: dict[str, Any] = {
-        "columns": {3: "linear", 4: "cycle:365"},
-        "components": "kernels,mixture",
-    }
+    how: Any = {"columns": {3: "linear", 4: "cycle:365"}, "components": "kernels,mixture"}
     fit = od.DensityEstimator("sphere", **how).fit(rows)
     regret = float((truth - fit.score_samples(unseen)).mean())
     assert 0 < regret < 0.35

@@ -9,25 +9,16 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import (
-    MEASURES,
-    KleinBottle,
-    ProjectivePlane,
-    Sphere,
-    Torus,
-    make_space,
-    to_latlon,
-    to_vectors,
-)
+import orbiflow.density as od
 from orbiflow.density.spaces import clear_rotation
 from orbiflow.density.spaces.round import NULL3, K, log_area, thetas, to_sphere
 from refusals import refused
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
 SPACES = (
-    Torus(2), Torus(2, unit="degrees"), KleinBottle(), KleinBottle(unit="turns"), Sphere(),
-    Sphere(form="vector", rotation=TURN), ProjectivePlane(rotation=TURN),
-    ProjectivePlane(form="vector"),
+    od.Torus(2), od.Torus(2, unit="degrees"), od.KleinBottle(), od.KleinBottle(unit="turns"),
+    od.Sphere(), od.Sphere(form="vector", rotation=TURN), od.ProjectivePlane(rotation=TURN),
+    od.ProjectivePlane(form="vector"),
 )  # fmt: skip
 seeds = st.integers(0, 2**32 - 1)
 every = pytest.mark.parametrize("space", SPACES, ids=repr)
@@ -54,7 +45,7 @@ def test_data_and_chart_there_and_back(space, seed: int) -> None:
 def test_densities_of_the_uniform_distribution(space) -> None:
     points = square(0)
     natural = space.log_area(points) - math.log(space.volume)  # of the square, uniform in nature
-    factor = {m: space.log_density_factor(points, m) for m in MEASURES}
+    factor = {m: space.log_density_factor(points, m) for m in od.MEASURES}
     assert torch.allclose(
         natural + factor["natural"], torch.tensor(-math.log(space.volume)).double()
     )
@@ -77,7 +68,7 @@ def test_uniform_points_are_even(space) -> None:
 
 @given(st.floats(-400, 400), st.floats(-400, 400))
 def test_the_klein_identification(theta: float, phi: float) -> None:
-    space = KleinBottle(unit="degrees")
+    space = od.KleinBottle(unit="degrees")
     images = [[theta, phi], [theta + 180, 180 - phi], [theta + 360, phi], [theta, phi - 360]]
     points = space.to_chart(images)
     assert float(space.distance(points[:1].expand(4, -1), points).max()) < 1e-9
@@ -85,14 +76,14 @@ def test_the_klein_identification(theta: float, phi: float) -> None:
 
 @given(st.floats(-90, 90), st.floats(-180, 179.99))
 def test_latitude_and_longitude(lat: float, lon: float) -> None:
-    again = to_latlon(to_vectors([[lat, lon]]))
-    assert np.allclose(to_vectors(again), to_vectors([[lat, lon]]), atol=1e-12)
+    again = od.to_latlon(od.to_vectors([[lat, lon]]))
+    assert np.allclose(od.to_vectors(again), od.to_vectors([[lat, lon]]), atol=1e-12)
     assert again[0, 0] == pytest.approx(lat, abs=1e-9)
     assert -180 <= again[0, 1] < 180
 
 
 def test_a_torus_of_any_dimension() -> None:
-    space = Torus(7, unit="degrees")
+    space = od.Torus(7, unit="degrees")
     data = np.random.default_rng(0).uniform(-180, 180, (20, 7))
     assert np.allclose(space.from_chart(space.to_chart(data)), data)
     assert space.volume == 360.0**7
@@ -100,7 +91,7 @@ def test_a_torus_of_any_dimension() -> None:
     assert float(space.distance(a, b).max()) <= math.sqrt(7) / 2
 
 
-@pytest.mark.parametrize("kind", [Sphere, ProjectivePlane])
+@pytest.mark.parametrize("kind", [od.Sphere, od.ProjectivePlane])
 def test_clear_rotation_moves_the_cone_points_away(kind) -> None:
     rng = np.random.default_rng(0)
     vectors = rng.normal(size=(500, 3)) * 0.2 + kind().cone_vectors()[0]
@@ -112,15 +103,15 @@ def test_clear_rotation_moves_the_cone_points_away(kind) -> None:
 
 
 BAD = {
-    "latitude": (Sphere(), [[10, 0], [95, 0], [-91, 3]], "latitude 2 95"),
-    "longitude": (Sphere(), [[0, 1000.0]], "1 1000 360"),
-    "length": (ProjectivePlane(), [[1, 0, 0], [1, 1, 0]], "2 1.414"),
-    "columns": (Torus(3), [[1.0, 2.0]], "angles 3 1 2"),
-    "one row, flat": (Sphere(), [1.0, 2.0], "shape 2"),
-    "nan": (KleinBottle(), [[0, 0], [0, math.nan]], "infinite 2"),
-    "inf": (Torus(1), [[math.inf]], "infinite 1"),
-    "text": (Torus(2), [["a", "b"]], "numbers"),
-    "ragged": (Torus(2), [[1, 2], [3]], "numbers"),
+    "latitude": (od.Sphere(), [[10, 0], [95, 0], [-91, 3]], "latitude 2 95"),
+    "longitude": (od.Sphere(), [[0, 1000.0]], "1 1000 360"),
+    "length": (od.ProjectivePlane(), [[1, 0, 0], [1, 1, 0]], "2 1.414"),
+    "columns": (od.Torus(3), [[1.0, 2.0]], "angles 3 1 2"),
+    "one row, flat": (od.Sphere(), [1.0, 2.0], "shape 2"),
+    "nan": (od.KleinBottle(), [[0, 0], [0, math.nan]], "infinite 2"),
+    "inf": (od.Torus(1), [[math.inf]], "infinite 1"),
+    "text": (od.Torus(2), [["a", "b"]], "numbers"),
+    "ragged": (od.Torus(2), [[1, 2], [3]], "numbers"),
 }
 
 
@@ -133,18 +124,18 @@ def test_data_that_are_not_of_the_space(case: str) -> None:
 
 def test_options_that_are_none() -> None:
     for make, message in (
-        (lambda: Torus(0), "1 64"),
-        (lambda: Torus(2, unit="grad"), "unit"),
-        (lambda: Sphere(form="utm"), "form"),
-        (lambda: Sphere(rotation=2 * np.eye(3)), "orthogonal"),
-        (lambda: make_space("moebius"), "moebius"),
-        (lambda: make_space("sphere", unit="degrees"), "sphere unit"),
+        (lambda: od.Torus(0), "1 64"),
+        (lambda: od.Torus(2, unit="grad"), "unit"),
+        (lambda: od.Sphere(form="utm"), "form"),
+        (lambda: od.Sphere(rotation=2 * np.eye(3)), "orthogonal"),
+        (lambda: od.make_space("moebius"), "moebius"),
+        (lambda: od.make_space("sphere", unit="degrees"), "sphere unit"),
     ):
         with refused(*message.split()):
             make()
 
 
-ROUND_SPACES = (Sphere(), ProjectivePlane())
+ROUND_SPACES = (od.Sphere(), od.ProjectivePlane())
 
 
 def gap(one: torch.Tensor, other: torch.Tensor, power: int) -> float:

@@ -221,7 +221,8 @@ def test_what_is_no_flow_is_refused() -> None:
     for value in wrong:
         with refused("duration"):
             Flow(torch.sin, duration=value)
-    for value in (*wrong, 0, -3, 2.5):
+    counts: tuple[Any, ...] = (*wrong, 0, -3, 2.5)
+    for value in counts:
         with refused("steps"):
             Flow(torch.sin, steps=value)
         with refused("steps"):
