@@ -1,366 +1,386 @@
 """What the tests protect: how many of N random changes of the source make a test fail.
 
-    python benchmarks/mutations.py RECORD [--count 200] [--seed 0] [--rooms symmetry tiles/search ...]
-        [--again FILE] [--out FILE] [--seconds 40] [--processes 1]
+    python benchmarks/mutations.py [--count 200] [--seed 0] [--seconds 40] [--processes 2]
+        [--before CHECKOUT] [--keep FOLDER]
 
-RECORD is a folder of what each test reaches and how long it takes. If it is not there, the whole
-suite runs once to make it, which needs the package coverage (`pip install coverage`) and about twice
-the time of the suite; later runs read it. Printed first are the shares of lines and of branches that
-tests reach.
+A mutation is one change of one place in a function: a comparison, a sign, a number, `and` for `or`, a
+condition turned round, a call left out. The whole suite runs once in a copy of the checkout that marks
+the chosen places, so that it is known which tests reach each. Then each change is made in a copy, and
+those tests run, the quickest first, `--seconds` of them and a dozen others at most, until one fails.
+Printed are the numbers of changes that were caught, survived, or lie where no test goes, and then each
+survivor, so that a person can see whether it matters: some change nothing.
 
-A mutation is one change of one place: a comparison, a sign, a number, `and` for `or`, a condition that
-always holds or never does, an argument left out, a result that is None. Those tests that reach its line
-run in a copy of the checkout, the quickest of its own room first, `--seconds` of them at most by the
-record's clock, until one fails. Printed are each room's numbers of mutations that were caught,
-survived, or lie where no test goes, and then each survivor, so that a person can see whether it
-matters: some change nothing. What processes of their own reach is not seen by the record.
-
-`--out` keeps the mutations as JSON, and `--again` takes those of an earlier run instead of random ones,
-for instance after tests have changed. Where the source of one has changed since, another of its room is
-drawn.
+With `--before`, only places are chosen whose function reads the same in that other checkout, such as
+one from before tests were changed, and of what survived here the tests of its room there are tried,
+too: what x that a run which was ended goes on.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
-import contextlib
-import copy
 import json
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections import Counter
-from collections.abc import Generator, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
-from functools import cache
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from queue import Queue
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
-coverage: Any = import_module("coverage") if find_spec("coverage") else None
 ROOT = Path(__file__).resolve().parents[1]
-SOURCE = ROOT / "src" / "orbiflow"
-OTHER: dict[type[ast.AST], type[ast.AST]] = {
+MARKS = "ORBIFLOW_MARKS"
+"""The variable that names the folder of what is marked."""
+
+OTHER: dict[type[ast.AST], Any] = {
     **{ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq},
     **{ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn},
     **{ast.NotIn: ast.In, ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div},
-    **{ast.Div: ast.Mult, ast.FloorDiv: ast.Mult, ast.And: ast.Or, ast.Or: ast.And},
+    **{ast.Div: ast.Mult, ast.Pow: ast.Mult, ast.And: ast.Or, ast.Or: ast.And},
 }
 """What stands instead of an operator."""
 
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+SKIPPED = (
+    Function | ast.ClassDef | ast.Raise | ast.Assert | ast.JoinedStr | ast.Import | ast.ImportFrom
+)
+"""What holds no place: other functions have places of their own, and messages are words."""
 
-@dataclass(frozen=True)
-class Mutation:
-    """One change: in `line`, the `place`-th of its file that reads so, `text` from `start` to `end`."""
 
-    file: str
-    number: int
-    line: str
-    place: int
-    start: int
-    end: int
+class Place(NamedTuple):
+    """A node that can be changed: the statement that holds it, and where its parent keeps it."""
+
+    statement: ast.stmt
+    parent: ast.AST
+    field: str
+    number: int | None
+    node: Any
+
+
+class Mutation(NamedTuple):
+    """A change of a function, by its text and the number of the place."""
+
     text: str
-    result: str = ""
-
-    @property
-    def room(self) -> str:
-        parts = Path(self.file).parts
-        return "/".join(parts[: min(2, len(parts) - 1)]) or "root"
-
-    def changed(self) -> str | None:
-        """The whole text of its file after the change, or None where its line is no longer there."""
-        path = SOURCE / self.file
-        lines = path.read_text().splitlines(keepends=True) if path.exists() else []
-        places = [i for i, line in enumerate(lines) if line == self.line]
-        if len(places) <= self.place:
-            return None
-        encoded = self.line.encode()
-        whole = encoded[: self.start] + self.text.encode() + encoded[self.end :]
-        lines[places[self.place]] = whole.decode()
-        return "".join(lines)
-
-    def __str__(self) -> str:
-        encoded = self.line.encode()
-        before, old = encoded[: self.start].decode(), encoded[self.start : self.end].decode()
-        code = f"{before}[{old} -> {self.text}]{encoded[self.end :].decode()}"
-        return f"{self.file}:{self.number}: {code.strip()}"
+    place: int
 
 
-def other_node(node: ast.AST, rng: random.Random) -> ast.expr | None:
-    """The node that stands instead of this one, if there is one."""
-    new: Any = copy.deepcopy(node)
+def can_change(node: ast.AST) -> bool:
+    """Return whether there is something that stands instead of a node."""
     match node:
-        case ast.Compare(ops=[operator]) if type(operator) in OTHER:
-            new.ops = [OTHER[type(operator)]()]
-        case ast.BinOp(op=operator) | ast.BoolOp(op=operator) if type(operator) in OTHER:
-            new.op = OTHER[type(operator)]()
-        case ast.UnaryOp(op=ast.Not() | ast.USub()):
-            new = new.operand
-        case ast.Constant(value=bool()):
-            new.value = not node.value
-        case ast.Constant(value=int(number)):
-            new.value = number + 1
-        case ast.Constant(value=float(number)):
-            new.value = 2 * number or 1.0
-        case ast.Call(args=arguments, keywords=keywords) if arguments or keywords:
-            place = rng.randrange(len(arguments) + len(keywords))
-            del (new.args if place < len(arguments) else new.keywords)[
-                place if place < len(arguments) else place - len(arguments)
-            ]
+        case ast.Compare(ops=[operator]):
+            return type(operator) in OTHER
+        case ast.BinOp(op=operator):  # texts are not subtracted
+            return type(operator) in OTHER and not re.search("['\"]", ast.unparse(node))
+        case ast.UnaryOp(op=ast.Not() | ast.USub(), operand=operand):
+            return not isinstance(operand, ast.Constant)
+        case ast.Constant(value=bool() | int() | float()) | ast.Expr(value=ast.Call()):
+            return True
         case _:
-            return None
-    return new
+            return isinstance(node, ast.BoolOp | ast.If)
 
 
-def expressions(tree: ast.AST, rng: random.Random) -> Iterator[tuple[ast.expr, ast.expr]]:
-    """Pairs of an expression and what can stand instead; not in annotations nor in messages."""
-    for field, value in ast.iter_fields(tree):
-        if field in ("annotation", "returns", "decorator_list", "type_comment"):
-            continue
-        for node in value if isinstance(value, list) else [value]:
-            if not isinstance(node, ast.AST) or isinstance(node, ast.JoinedStr | ast.Import):
+def places(function: ast.stmt) -> list[Place]:
+    """Return what can be changed in a function, in order."""
+
+    def within(node: ast.AST, statement: ast.stmt | None) -> Iterator[Place]:
+        for field, value in ast.iter_fields(node):
+            if field in ("annotation", "returns", "decorator_list", "args"):
                 continue
-            if isinstance(node, ast.expr) and (new := other_node(node, rng)):
-                yield node, new
-            if isinstance(node, ast.Return) and node.value and ast.unparse(node.value) != "None":
-                yield node.value, ast.Constant(None)
-            if isinstance(node, ast.If | ast.IfExp | ast.While):
-                answer = False if isinstance(node, ast.While) else rng.random() < 0.5
-                yield node.test, ast.Constant(answer)
-            yield from expressions(node, rng)
+            for number, child in enumerate(value if isinstance(value, list) else [value]):
+                if not isinstance(child, ast.AST) or isinstance(child, SKIPPED):
+                    continue
+                holder = child if isinstance(child, ast.stmt) else statement
+                if holder is not None and can_change(child):
+                    place = number if isinstance(value, list) else None
+                    yield Place(holder, node, field, place, child)
+                yield from within(child, holder)
+
+    return list(within(function, None))
 
 
-def mutations(rooms: list[str], seed: int) -> Iterator[Mutation]:
-    """All changes of these rooms (all rooms without any), each once, in random order."""
-    rng = random.Random(seed)
-    places: list[Mutation] = []
-    for path in sorted(SOURCE.rglob("*.py")):
-        file, lines = (
-            path.relative_to(SOURCE).as_posix(),
-            path.read_text().splitlines(keepends=True),
-        )
-        if rooms and not any(file.startswith(f"{room}/") or file == room for room in rooms):
-            continue
-        for node, new in expressions(ast.parse(path.read_text()), rng):
-            if node.end_lineno == node.lineno and node.end_col_offset is not None:
-                line, number = lines[node.lineno - 1], node.lineno
-                place = lines[: number - 1].count(line)
-                bounds = node.col_offset, node.end_col_offset
-                places.append(Mutation(file, number, line, place, *bounds, f"({ast.unparse(new)})"))
-    rng.shuffle(places)
-    yield from places
+def functions(path: Path) -> tuple[ast.Module, list[Function]]:
+    """Return a module and its functions."""
+    module = ast.parse(path.read_text("utf-8"))
+    return module, [node for node in ast.walk(module) if isinstance(node, Function)]
 
 
-class Record:
-    """What each test function reaches, and its seconds."""
-
-    def __init__(self, folder: Path) -> None:
-        if not folder.exists():
-            environment = os.environ | {"ORBIFLOW_RECORD": str(folder.resolve())}
-            environment["PYTHONPATH"] = os.pathsep.join(
-                [str(SOURCE.parent), str(ROOT / "benchmarks"), os.environ.get("PYTHONPATH", "")]
-            )
-            command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal"]
-            subprocess.run([*command, "-p", "mutations"], cwd=ROOT, env=environment, check=False)
-        self.data = coverage.CoverageData(str(folder / "whole"))
-        if not (folder / "whole").exists():
-            for path in sorted(folder.glob("data.*")):
-                part = coverage.CoverageData(str(path))
-                part.read()
-                self.data.update(part)
-            self.data.write()
-        self.data.read()
-        self.base = next(f for f in self.data.measured_files() if f.endswith("orbiflow/errors.py"))
-        self.seconds: Counter[str] = Counter()
-        for path in folder.glob("seconds-*.json"):
-            for name, seconds in json.loads(path.read_text()).items():
-                self.seconds[name.split("[")[0]] += seconds
-
-    @cache  # noqa: B019 (one record a run)
-    def by_line(self, file: str) -> dict[int, set[str]]:
-        """The test functions that reach each line of a file."""
-        path = str(Path(self.base).parent / file)
-        tests = self.data.contexts_by_lineno(path)
-        return {line: set(names) & self.seconds.keys() for line, names in tests.items()}
-
-    def tests(self, mutation: Mutation, limit: float) -> list[str]:
-        """The tests of a mutation in their order; of what is run at import, those of the whole file."""
-        lines = self.by_line(mutation.file)
-        names = lines.get(mutation.number, set())
-        if mutation.number in lines and not names:
-            names = set().union(*lines.values())
-        room = f"tests/{mutation.room}/"
-        order = sorted(
-            names, key=lambda name: (not name.startswith(room), self.seconds[name], name)
-        )
-        kept, total = [], 0.0
-        for name in order:
-            if (ROOT / name.split("::")[0]).exists() and (not kept or total < limit):
-                kept.append(name)
-                total += self.seconds[name]
-        return kept
-
-    def totals(self) -> str:
-        """The shares of lines and of branches that are reached."""
-        measure = coverage.Coverage(
-            data_file=self.data.data_filename(), branch=True, config_file=False
-        )
-        measure.load()
-        counts = Counter()
-        for file in self.data.measured_files():
-            with contextlib.suppress(coverage.exceptions.CoverageException):
-                numbers = measure._analyze(file).numbers  # pyright: ignore[reportPrivateUsage]
-                counts["lines"] += numbers.n_statements
-                counts["missing"] += numbers.n_missing
-                counts["branches"] += numbers.n_branches
-                counts["not taken"] += numbers.n_missing_branches
-        lines, branches = counts["lines"], counts["branches"]
-        return (
-            f"{len(self.seconds)} test functions, {lines - counts['missing']} of {lines} lines "
-            f"({1 - counts['missing'] / lines:.1%}), {branches - counts['not taken']} of {branches} "
-            f"branches ({1 - counts['not taken'] / branches:.1%})"
-        )
+def homes(checkout: Path) -> dict[str, list[Path]]:
+    """Return in which files of a checkout there is a function, by its text."""
+    found: dict[str, list[Path]] = defaultdict(list)
+    for path in sorted((checkout / "src").rglob("*.py")):
+        for function in functions(path)[1]:
+            found[ast.unparse(function)].append(path.relative_to(checkout))
+    return found
 
 
-def outcome(mutation: Mutation, tests: list[str], limit: float, folder: Path) -> str:
-    """Whether one of the tests fails in a copy of the checkout with this change."""
-    if not tests:
-        return "not reached"
-    path = folder / "src" / "orbiflow" / mutation.file
-    text = path.read_text()
-    path.write_text(mutation.changed() or text)
-    environment = os.environ | {"PYTHONPATH": str(folder / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    run = subprocess.Popen(
-        command,
+def change(place: Place) -> str:
+    """Change a place, and say how."""
+    node, before = place.node, ast.unparse(place.node).splitlines()[0]
+    new = node
+    match node:
+        case ast.Compare():
+            node.ops = [OTHER[type(node.ops[0])]()]
+        case ast.BinOp() | ast.BoolOp():
+            node.op = OTHER[type(node.op)]()
+        case ast.UnaryOp():
+            new = node.operand
+        case ast.Constant(value=bool()):
+            new = ast.Constant(not node.value)
+        case ast.Constant(value=int(number) | float(number)):
+            new = ast.Constant(number + 1)
+        case ast.If():
+            node.test = ast.UnaryOp(ast.Not(), node.test)
+        case _:
+            new = ast.Pass()
+    if place.number is None:
+        setattr(place.parent, place.field, new)
+    else:
+        getattr(place.parent, place.field)[place.number] = new
+    return f"{before}  ->  {ast.unparse(ast.fix_missing_locations(new)).splitlines()[0]}"
+
+
+class Marking(ast.NodeTransformer):
+    """Puts a mark before each of some statements, by their identity."""
+
+    def __init__(self, marks: dict[int, list[int]]) -> None:
+        self.marks = marks
+
+    def visit(self, node: ast.AST) -> Any:
+        self.generic_visit(node)
+        numbers = self.marks.get(id(node), [])
+        calls = (f"__import__('mutations').mark({number})" for number in numbers)
+        return [*(ast.parse(call).body[0] for call in calls), node] if numbers else node
+
+
+MET: set[tuple[int, str]] = set()
+"""The places that tests were seen to reach."""
+
+
+def note(*words: object) -> None:
+    """Append a line to this process's file, where marks are kept."""
+    if MARKS in os.environ:
+        with Path(os.environ[MARKS], str(os.getpid())).open("a") as file:
+            file.write("\t".join(map(str, words)) + "\n")
+
+
+def mark(number: int) -> None:
+    """Note that a test, or a process of it, reaches a place."""
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" (")[0]
+    if test and (number, test) not in MET:
+        MET.add((number, test))
+        note("met", number, test)
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Note how long tests take, and which fail unchanged; pytest calls this."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        note("failed" if report.failed else "took", report.duration, report.nodeid)
+
+
+def copied(checkout: Path, folder: Path) -> Path:
+    """Return a copy of a checkout."""
+    shutil.rmtree(folder, ignore_errors=True)
+    left = shutil.ignore_patterns(".git", ".venv", "out", "__pycache__", ".*_cache")
+    shutil.copytree(checkout, folder, ignore=left, symlinks=True)
+    subprocess.run(
+        ["git", "init", "-q", folder], check=True
+    )  # tests ask for the files that are kept
+    subprocess.run(["git", "-C", folder, "add", "-A"], check=True, capture_output=True)
+    return folder
+
+
+def environment(folder: Path, **more: str) -> dict[str, str]:
+    """Return the environment of tests in a copy."""
+    paths = map(str, (folder / "src", folder / "tests", Path(__file__).parent))
+    return os.environ | {"PYTHONPATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1", **more}
+
+
+class Record(NamedTuple):
+    """Which tests reach each of some places, how long tests take, and which fail unchanged."""
+
+    met: dict[int, list[str]]
+    seconds: dict[str, float]
+    failed: list[str]
+
+
+def record(chosen: list[Mutation], work: Path, processes: int) -> Record:
+    """Run the suite in a copy whose chosen places are marked."""
+    folder, marks, where = copied(ROOT, work / "marked"), work / "marks", homes(ROOT)
+    shutil.rmtree(marks, ignore_errors=True)
+    marks.mkdir()
+    by_file: dict[Path, list[int]] = defaultdict(list)
+    for number, mutation in enumerate(chosen):
+        by_file[where[mutation.text][0]].append(number)
+    for file, numbers in by_file.items():
+        module, own = functions(folder / file)
+        of_text = {ast.unparse(function): function for function in own}
+        statements: dict[int, list[int]] = defaultdict(list)
+        for number in numbers:
+            mutation = chosen[number]
+            statement = places(of_text[mutation.text])[mutation.place].statement
+            statements[id(statement)].append(number)
+        marked = ast.fix_missing_locations(Marking(statements).visit(module))
+        (folder / file).write_text(ast.unparse(marked), "utf-8")
+    command = [sys.executable, "-m", "pytest", "-q", "-n", str(processes), "--dist", "worksteal"]
+    subprocess.run(
+        [*command, "-p", "mutations"],
         cwd=folder,
-        env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
+        env=environment(folder, **{MARKS: str(marks)}),
+        check=False,
     )
+    found = Record({number: [] for number in range(len(chosen))}, {}, [])
+    for file in marks.iterdir():
+        for line in file.read_text().splitlines():
+            kind, value, test = line.split("\t")
+            if kind == "met":
+                found.met[int(value)].append(test)
+                continue
+            found.seconds[test] = found.seconds.get(test, 0.0) + float(value)
+            found.failed.extend([test] * (kind == "failed"))
+    return found
+
+
+def tests_of(number: int, found: Record, seconds: float) -> list[str]:
+    """Return the tests that reach a place, the quickest first, and some of those that take longer."""
+    known = {test for test in found.met[number] if test in found.seconds} - {*found.failed}
+    tests, total, kept = sorted(known, key=lambda test: found.seconds[test]), 0.0, 0
+    while kept < len(tests) and (not kept or total < seconds):
+        total += found.seconds[tests[kept]]
+        kept += 1
+    rest = tests[kept:]
+    return tests[:kept] + random.Random(number).sample(rest, min(12, len(rest)))
+
+
+def failing(tests: list[str], folder: Path, limit: float, *more: str) -> list[str] | None:
+    """Return which tests fail in a copy of the checkout, None if they do not end."""
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-rfE",
+        "-p",
+        "no:cacheprovider",
+        *more,
+        *tests,
+    ]
     try:
-        return "survived" if run.wait(60 + 5 * limit) in (0, 5) else "caught"
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env=environment(folder),
+            timeout=limit,
+            capture_output=True,
+            text=True,
+        )
     except subprocess.TimeoutExpired:
-        return "caught"  # it does not end, as a loop that counts wrongly
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(run.pid, 9)
-        path.write_text(text)
+        return None
+    lines = [line.split(" - ")[0].split(maxsplit=1) for line in done.stdout.splitlines()]
+    named = [words[1] for words in lines if words[:1] in (["FAILED"], ["ERROR"]) and len(words) > 1]
+    return named or ([] if done.returncode in (0, 5) else tests)
 
 
-def measured(
-    chosen: list[Mutation], record: Record, seconds: float, processes: int
-) -> list[Mutation]:
-    """The mutations with their results; each process has a copy of the checkout."""
-    with tempfile.TemporaryDirectory() as top, ThreadPoolExecutor(processes) as pool:
-        copies: Queue[Path] = Queue()
-        for i in range(processes):
-            kept = shutil.ignore_patterns(".git", ".venv", "out", "__pycache__", ".*_cache")
-            copies.put(Path(shutil.copytree(ROOT, Path(top) / str(i), ignore=kept)))
+def outcome(
+    mutation: Mutation, home: Path, tests: list[str], folder: Path, limit: float, *, sure: bool
+) -> dict[str, str]:
+    """Return whether a test fails in a copy of the checkout with a change, and what that is.
 
-        def one(mutation: Mutation) -> Mutation:
-            folder = copies.get()
-            result = outcome(mutation, record.tests(mutation, seconds), seconds, folder)
-            copies.put(folder)
-            print(f"{result:12} {mutation}", file=sys.stderr, flush=True)
-            return Mutation(**{**asdict(mutation), "result": result})
+    Unless it is `sure` that all tests pass without the change, those that fail are tried without it.
+    """
+    file = folder / home
+    text, (module, own) = file.read_text("utf-8"), functions(file)
+    function = next(one for one in own if ast.unparse(one) == mutation.text)
+    how = change(places(function)[mutation.place])
+    said = {"file": str(home), "function": function.name, "change": how}
+    if not tests:
+        return said | {"result": "not reached"}
+    file.write_text(ast.unparse(ast.fix_missing_locations(module)), "utf-8")
+    failed = failing(tests, folder, limit, *["-x"] * sure)
+    file.write_text(text, "utf-8")
+    if failed and not sure:
+        also = failing(failed, folder, limit)
+        failed = [] if also is None else sorted({*failed} - {*also})
+    # what does not end is caught, too: a loop that counts wrongly
+    return said | {
+        "result": "survived" if failed == [] else "caught",
+        "by": str((failed or [""])[0]),
+    }
 
-        for mutation in chosen:
-            record.by_line(mutation.file)  # SQLite's connections are of one thread
-        return list(pool.map(one, chosen))
+
+def tests_of_room(file: str, checkout: Path) -> list[str]:
+    """Return the tests in another checkout of the room that a file is in."""
+    folders = [checkout / "tests" / own for own in Path(*Path(file).parts[2:]).parents]
+    return [str(next(own for own in folders if own.is_dir()))]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("record", type=Path)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--rooms", nargs="*", default=[])
-    parser.add_argument("--again", type=Path)
-    parser.add_argument("--out", type=Path)
     parser.add_argument("--seconds", type=float, default=40.0)
-    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--before", type=Path)
+    parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
-    if coverage is None:
-        parser.error("it needs the package coverage; run pip install coverage")
+    work = options.keep or Path(tempfile.mkdtemp())
+    work.mkdir(parents=True, exist_ok=True)
 
-    fresh = mutations(options.rooms, options.seed)
-    if options.again:
-        chosen: list[Mutation] = []
-        for mutation in (Mutation(**values) for values in json.loads(options.again.read_text())):
-            if mutation.changed() is None:
-                mutation = next((m for m in fresh if m.room == mutation.room), next(fresh))
-            chosen.append(mutation)
-    else:
-        chosen = [mutation for mutation, _ in zip(fresh, range(options.count), strict=False)]
-    record = Record(options.record)
-    print(record.totals())
-    results = measured(chosen, record, options.seconds, options.processes)
-    counts = Counter((mutation.room, mutation.result) for mutation in results)
-    print("| room | caught | survived | not reached |\n|---|---|---|---|")
-    for room in (*sorted({mutation.room for mutation in results}), "all"):
-        row = [
-            sum(
-                n
-                for (place, result), n in counts.items()
-                if result == kind and room in (place, "all")
-            )
-            for kind in ("caught", "survived", "not reached")
-        ]
-        print(f"| {room} | {' | '.join(map(str, row))} |")
-    print(*sorted(f"{m.result}: {m}" for m in results if m.result != "caught"), sep="\n")
-    if options.out:
-        options.out.write_text(json.dumps([asdict(mutation) for mutation in results], indent=1))
+    here, there = homes(ROOT), homes(options.before) if options.before else None
+    sites = [
+        Mutation(text, place)
+        for text, files in sorted(here.items())
+        if len(files) == 1 and (there is None or len(there.get(text, [])) == 1)
+        for place in range(len(places(ast.parse(text).body[0])))
+    ]
+    chosen = random.Random(options.seed).sample(sites, options.count)
+    stored = work / "record.json"
+    if not stored.exists():
+        stored.write_text(json.dumps(record(chosen, work, options.processes)))
+    met, seconds, failed = json.loads(stored.read_text())
+    found = Record({int(number): tests for number, tests in met.items()}, seconds, failed)
 
+    def results(name: str, checkout: Path, tests: dict[int, list[str]], limit: float) -> Any:
+        """Make the changes in copies of a checkout, some side by side, and keep what came of them."""
+        file, copies, where = work / f"{name}.json", Queue[Path](), homes(checkout)
+        done: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+        for number in range(options.processes):
+            copies.put(copied(checkout, work / f"{name}-{number}"))
 
-class Recorder:
-    """A plugin of pytest that keeps what each test function reaches."""
+        def one(number: int) -> None:
+            folder = copies.get()
+            own = [test.replace(str(checkout), str(folder)) for test in tests[number]]
+            home = where[chosen[number].text][0]
+            sure = checkout == ROOT
+            done[str(number)] = outcome(chosen[number], home, own, folder, limit, sure=sure)
+            copies.put(folder)
+            file.write_text(json.dumps(done, indent=1))
 
-    def __init__(self, folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        self.folder, self.process, self.seconds = folder, os.getpid(), {}
-        self.measure = coverage.Coverage(
-            data_file=str(folder / "data"),
-            data_suffix=str(self.process),
-            branch=True,
-            source=[str(SOURCE)],
-            config_file=False,
-        )
-        self.measure.start()
+        with ThreadPoolExecutor(options.processes) as pool:
+            list(pool.map(one, [number for number in tests if str(number) not in done]))
+        return done
 
-    @pytest.hookimpl(wrapper=True, tryfirst=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:
-        self.measure.switch_context(item.nodeid.split("[")[0])
-        start = time.perf_counter()
-        try:
-            return (yield)
-        finally:
-            self.seconds[item.nodeid] = time.perf_counter() - start
-            self.measure.switch_context("")
-
-    def pytest_sessionfinish(self) -> None:
-        if os.getpid() == self.process:
-            self.measure.stop()
-            self.measure.save()
-            (self.folder / f"seconds-{self.process}.json").write_text(json.dumps(self.seconds))
+    every = {number: tests_of(number, found, options.seconds) for number in range(len(chosen))}
+    now = results("now", ROOT, every, 90 + 5 * options.seconds)
+    print(dict(Counter(one["result"] for one in now.values())))
+    open_ = {int(number): one["file"] for number, one in now.items() if one["result"] != "caught"}
+    if options.before:
+        rooms = {number: tests_of_room(file, options.before) for number, file in open_.items()}
+        before = results("before", options.before, rooms, 600.0)
+        lost = [number for number in open_ if before[str(number)]["result"] == "caught"]
+        print(f"caught before, and not now: {len(lost)}")
+        print(*(before[str(number)] for number in lost), sep="\n")
+    print(*(now[str(number)] for number in open_), sep="\n")
 
 
 if __name__ == "__main__":
     main()
-elif "ORBIFLOW_RECORD" in os.environ and "PYTEST_XDIST_WORKER" in os.environ:
-
-    def pytest_configure(config: pytest.Config) -> None:
-        config.pluginmanager.register(Recorder(Path(os.environ["ORBIFLOW_RECORD"])))
