@@ -5,14 +5,13 @@
 
 A mutation is one change of one place in a function: a comparison, a sign, a number, `and` for `or`, a
 condition turned round, a call left out. The whole suite runs once in a copy of the checkout that marks
-the chosen places, so that it is known which tests reach each. Then each change is made in a copy, and
-those tests run, the quickest first, `--seconds` of them and a dozen others at most, until one fails.
-Printed are the numbers of changes that were caught, survived, or lie where no test goes, and then each
-survivor, so that a person can see whether it matters: some change nothing.
+the chosen places, to know which tests reach them. Then each change is made in a copy, and those tests
+run, the quickest first, `--seconds` of them and a dozen others at most, until one fails. Printed are how
+many changes were caught, survived, or lie where no test goes, and all but the first: some change nothing.
 
-With `--before`, only places are chosen whose function reads the same in that other checkout, such as
-one from before tests were changed, and of what survived here the tests of its room there are tried,
-too: what x that a run which was ended goes on.
+With `--before`, only places are chosen whose function reads the same in that other checkout, and of what
+survived here the tests of its room there are tried, too: what they catch is what newer tests have lost.
+`--keep` is a folder that keeps what was done, so that a run which was ended goes on.
 """
 
 from __future__ import annotations
@@ -161,7 +160,6 @@ class Marking(ast.NodeTransformer):
 
 
 MET: set[tuple[int, str]] = set()
-"""The places that tests were seen to reach."""
 
 
 def note(*words: object) -> None:
@@ -332,14 +330,14 @@ def main() -> None:
     parser.add_argument("--before", type=Path)
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
-    work = options.keep or Path(tempfile.mkdtemp())
+    work: Path = options.keep or Path(tempfile.mkdtemp())
     work.mkdir(parents=True, exist_ok=True)
 
-    here, there = homes(ROOT), homes(options.before) if options.before else None
+    here, there = homes(ROOT), homes(options.before or ROOT)
     sites = [
         Mutation(text, place)
         for text, files in sorted(here.items())
-        if len(files) == 1 and (there is None or len(there.get(text, [])) == 1)
+        if len(files) == 1 == len(there.get(text, []))
         for place in range(len(places(ast.parse(text).body[0])))
     ]
     chosen = random.Random(options.seed).sample(sites, options.count)
