@@ -6,11 +6,11 @@
 A mutation is one change of one place in a function: a comparison, a sign, a number, `and` for `or`, a
 condition turned round, a call left out. The whole suite runs once in a copy of the checkout that marks
 the chosen places, to know which tests reach them. Then each change is made in a copy, and those tests
-run, the quickest first, `--seconds` of them and a dozen others at most, until one fails. Printed are how
-many changes were caught, survived, or lie where no test goes, and all but the first: some change nothing.
+run, the quickest first, `--seconds` of them and a dozen others at most, until one fails. Printed are
+how many were caught, survived, or lie where no test goes, and all but the first: some change nothing.
 
-With `--before`, only places are chosen whose function reads the same in that other checkout, and of what
-survived here the tests of its room there are tried, too: what they catch is what newer tests have lost.
+With `--before`, only places are chosen whose function reads the same in that other checkout, and of
+what survived here the tests of its room there are tried, too: what they catch is what was lost since.
 `--keep` is a folder that keeps what was done, so that a run which was ended goes on.
 """
 
@@ -341,8 +341,7 @@ def main() -> None:
         for place in range(len(places(ast.parse(text).body[0])))
     ]
     chosen = random.Random(options.seed).sample(sites, options.count)
-    stored = work / "record.json"
-    if not stored.exists():
+    if not (stored := work / "record.json").exists():
         stored.write_text(json.dumps(record(chosen, work, options.processes)))
     met, seconds, failed = json.loads(stored.read_text())
     found = Record({int(number): tests for number, tests in met.items()}, seconds, failed)
