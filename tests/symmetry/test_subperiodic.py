@@ -90,9 +90,7 @@ def test_friezes_are_plane_groups_along_one_axis(name):
         assert_equivariant(flow, group, kind="map")
 
 
-@pytest.mark.parametrize(
-    "name", ["1", "-1", "m", "2/m", "m m 2", "-4 2 m", "3 2 1", "6/m m m", "m -3 m"]
-)
+@pytest.mark.parametrize("name", ["1", "-1", "m m 2", "3 2 1", "m -3 m"])
 def test_point_groups_are_space_groups_without_translations(name):
     group = space_group(f"P {name}")
     field = symmetrize(wild, group, along="")

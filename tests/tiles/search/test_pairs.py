@@ -173,7 +173,7 @@ def test_a_pair_search_can_be_cancelled() -> None:
     cancel = Cancel()
     cancel.cancel()
     with pytest.raises(Cancelled):
-        search_pair([Goal(animal(name)) for name in NAMES], SMALL, cancel=cancel)
+        search_pair([Goal(animal(name)) for name in NAMES], SMALL.replace(ratios=2), cancel=cancel)
 
 
 @cache
