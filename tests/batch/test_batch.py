@@ -102,15 +102,9 @@ def test_what_is_done_again(here: Here, call: Call) -> None:
     assert again(changed(call, seed=1, workers=3)) == []
 
 
-def test_another_version_does_all_again(here: Here, call: Call, monkeypatch) -> None:
-    run_call(call)
-    here.done.clear()
-    monkeypatch.setattr(work, "__version__", "999")
-    run_call(call)
-    assert len(here.done) == 3
-
-
-def test_files_that_have_gone_keep_their_results(here: Here, call: Call) -> None:
+def test_files_that_have_gone_keep_their_results_in_another_version(
+    here: Here, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out, folder = call.flat["out"], call.flat["folder"]
     run_call(call)
     (folder / "boot.json").unlink()
@@ -120,6 +114,10 @@ def test_files_that_have_gone_keep_their_results(here: Here, call: Call) -> None
     notes = [event.text for event in events if isinstance(event, Note)]
     assert any("1 earlier results are of files that are not in" in text for text in notes)
     assert len(here.done) == 3
+    here.done.clear()
+    monkeypatch.setattr(work, "__version__", "999")
+    run_call(call)
+    assert here.done == ["broken.svg", "sub/boot.json"]  # which does all again
 
 
 def test_stopping_keeps_what_was_finished(here: Here, call: Call) -> None:

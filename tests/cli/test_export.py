@@ -38,18 +38,15 @@ def test_a_figure_for_a_paper_is_as_wide_as_its_column(
 
 def test_numbered_sheets_and_their_events(result: Path, tmp_path: Path) -> None:
     events: list[Any] = []
-    given = {"cut": "pieces", "copies": 30, "bed": "12x9cm", "calibrate": True}
-    outcome = (
-        find("export")
-        .call({"result": result, "out": tmp_path / "cut.svg", **given})
-        .run(events.append)
-    )
+    given = {"cut": "pieces", "copies": 12, "bed": "12x9cm", "calibrate": True}
+    call = find("export").call({"result": result, "out": tmp_path / "cut.svg", **given})
+    outcome = call.run(events.append)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == [f"cut-{k}.svg" for k in range(1, len(names) + 1)]
     assert [e.path.name for e in events if isinstance(e, Written)] == names
     assert isinstance(events[-1], Finished)
     assert outcome.summary == events[-1].summary
-    assert outcome.summary["tiles"] == 30
+    assert outcome.summary["tiles"] == 12
     assert all("calibration" in (tmp_path / name).read_text() for name in names)
 
 
@@ -76,12 +73,8 @@ def test_mistakes(case: str, result: Path, tmp_path: Path, orbiflow) -> None:
 
 
 def damaged(**changes: Any) -> str:
-    document = {
-        "schema_version": 2,
-        "input": {"source": "boot.png", "y_down": True},
-        "tiles": [{**entry("IH6"), **changes}],
-    }
-    return json.dumps(document)
+    document = {"schema_version": 2, "input": {"source": "boot.png", "y_down": True}}
+    return json.dumps({**document, "tiles": [{**entry("IH6"), **changes}]})
 
 
 BAD_RESULTS: dict[str, tuple[str | None, str]] = {
@@ -130,15 +123,12 @@ def test_the_folder_of_a_tile(place: str, tile: str | None, runs: Path, orbiflow
     assert own.read_bytes() == whole.read_bytes()
 
 
-SILHOUETTES = {"picture.png": b"\x89PNG\r\n\x1a\n", "polygon.dat": b"3\n0 0\n1 0\n0 1\n"}
-
-
-@pytest.mark.parametrize("name", SILHOUETTES)
-def test_a_silhouette_is_escherized_first(name: str, tmp_path: Path, orbiflow) -> None:
-    file = tmp_path / name
-    file.write_bytes(SILHOUETTES[name])
-    outcome = orbiflow.refused("export", file, "--out", tmp_path / "a.svg")
-    names(outcome.err, f"orbiflow escherize {file}")
+def test_a_silhouette_is_escherized_first(tmp_path: Path, orbiflow) -> None:
+    silhouettes = {"a.png": b"\x89PNG\r\n\x1a\n", "polygon.dat": b"3\n0 0\n1 0\n0 1\n"}
+    for name, content in silhouettes.items():
+        (tmp_path / name).write_bytes(content)
+        outcome = orbiflow.refused("export", tmp_path / name, "--out", tmp_path / "a.svg")
+        names(outcome.err, f"orbiflow escherize {tmp_path / name}")
 
 
 @pytest.mark.parametrize(
@@ -158,14 +148,11 @@ def test_folders_in_which_no_tile_is_meant(
     names(outcome.err, *about.format(runs).split())
 
 
-@pytest.mark.parametrize("where", ["", "none/a.svg"])
-def test_places_that_cannot_be_written(where: str, result: Path, tmp_path: Path, orbiflow) -> None:
-    outcome = orbiflow.refused("export", result, "--out", tmp_path / where)
-    names(outcome.err, where or tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_ending_of_no_format_needs_the_format(result: Path, tmp_path: Path, orbiflow) -> None:
+def test_places_and_endings_that_cannot_be_written(result: Path, tmp_path: Path, orbiflow) -> None:
+    for where in ("", "none/a.svg"):
+        outcome = orbiflow.refused("export", result, "--out", tmp_path / where)
+        names(outcome.err, where or tmp_path)
+        assert not list(tmp_path.iterdir())
     outcome = orbiflow.refused("export", result, "--out", tmp_path / "boot.eps")
     names(outcome.err, "--out", ".eps", "--format", ".svg")
     assert not list(tmp_path.glob("boot*"))
@@ -189,19 +176,11 @@ SMALL = ("--area", "120x80px", "--tile-size", "60px")
 
 def test_a_picture(result_of_art: Path, picture: Path, tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "tiles.png"
-    outcome = orbiflow.done(
-        "art", result_of_art, "--picture", picture, "--outline", "none", *SMALL, "-o", out
-    )
-    names(outcome.out, out, 120, 80)
+    options = ("--picture", picture, "--outline", "none", *SMALL, "-o", out)
+    names(orbiflow.done("art", result_of_art, *options).out, out, 120, 80)
     with Image.open(out) as made:
         assert made.info["dpi"] == pytest.approx((300, 300), abs=0.1)
         assert (np.asarray(made) == (0xC0, 0x20, 0x40)).all()
-
-
-def test_the_default_name(result_of_art: Path, tmp_path: Path, orbiflow, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    orbiflow.done("art", result_of_art, *SMALL)
-    assert [path.name for path in tmp_path.iterdir()] == ["squirrel-IH6.png"]
 
 
 @pytest.mark.parametrize(
@@ -224,10 +203,15 @@ def test_mistakes_of_art(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("out", ["tiles.tiff", "tiles"])
-def test_other_endings(out: str, result_of_art: Path, tmp_path: Path, orbiflow) -> None:
-    outcome = orbiflow.refused("art", result_of_art, "-o", tmp_path / out)
-    names(outcome.err, "--out", ".html", ".pdf", ".png", ".svg", out)
+def test_other_endings_and_the_default_name(
+    result_of_art: Path, tmp_path: Path, orbiflow, monkeypatch
+) -> None:
+    for out in ("tiles.tiff", "tiles"):
+        outcome = orbiflow.refused("art", result_of_art, "-o", tmp_path / out)
+        names(outcome.err, "--out", ".html", ".pdf", ".png", ".svg", out)
+    monkeypatch.chdir(tmp_path)
+    orbiflow.done("art", result_of_art, *SMALL)
+    assert [path.name for path in tmp_path.iterdir()] == ["squirrel-IH6.png"]
 
 
 def test_the_example_lies_over_its_silhouette() -> None:

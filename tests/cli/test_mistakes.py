@@ -15,25 +15,20 @@ def disc(folder: Path) -> Path:
     return folder / "disc.png"
 
 
+OCCUPANCY = ["--method", "occupancy"]
 BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "class": (["--classes", "IH4,IH98"], "IH98"),
     "no class": (["--classes", " , "], "--classes IH4"),
     "frequency of likeness": (["--max-frequency", "5"], "--max-frequency --objective"),
-    "objective of occupancy": (
-        ["--method", "occupancy", "--objective", "likeness"],
-        "--objective --method",
-    ),
+    "objective of occupancy": ([*OCCUPANCY, "--objective", "likeness"], "--objective --method"),
     "other method's option": (["--turns", "3"], "--turns --method occupancy"),
     "emphasis": (["--emphasis", "nowhere.png"], "nowhere.png"),
-    "emphasis for occupancy": (
-        ["--method", "occupancy", "--emphasis", "m.png"],
-        "--emphasis --method",
-    ),
-    "effort of occupancy": (["--method", "occupancy", "--effort", "fast"], "--effort --method"),
+    "emphasis for occupancy": ([*OCCUPANCY, "--emphasis", "m.png"], "--emphasis --method"),
+    "effort of occupancy": ([*OCCUPANCY, "--effort", "fast"], "--effort --method"),
     "pin outside": (["--pin", "5000,5000"], "5000,5000"),
     "pin that is no file": (["--pin", "head.png"], "head.png"),
     "pins of overlap": (["--objective", "overlap", "--pin", "9,9"], "--pin --objective"),
-    "pins of occupancy": (["--method", "occupancy", "--pin", "9,9"], "--pin --method"),
+    "pins of occupancy": ([*OCCUPANCY, "--pin", "9,9"], "--pin --method"),
     "angle of nothing": (["--pin-angle"], "--pin-angle --pin"),
     "ratio of one": (["--ratio", "1"], "--ratio"),
     "second pin of one": (["--second-pin", "9,9"], "--second-pin"),
@@ -54,10 +49,8 @@ def test_bad_options(case: str, tmp_path: Path, orbiflow) -> None:
 def test_a_file_in_the_way_of_the_folder(below: str, tmp_path: Path, orbiflow) -> None:
     wall = tmp_path / "wall"
     wall.write_text("keep me")
-    outcome = orbiflow.refused(
-        "escherize", disc(tmp_path), "--out", wall / below, "--classes", "IH4"
-    )
-    names(outcome.err, wall / below)
+    command = ("escherize", disc(tmp_path), "--out", wall / below, "--classes", "IH4")
+    names(orbiflow.refused(*command).err, wall / below)
     assert wall.read_text() == "keep me"
 
 
@@ -74,13 +67,9 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, orbiflow_process) -> 
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_argument(orbiflow) -> None:
-    outcome = orbiflow.refused("escherize")
-    names(outcome.err, "IMAGE")
-
-
 @pytest.mark.parametrize("words", ["--out --force", "--seed --out x", "--for -o x.svg"])
 def test_an_option_is_not_taken_for_the_value_of_another(words: str, orbiflow) -> None:
     command = "export" if words.startswith("--for") else "escherize"
     outcome = orbiflow.refused(command, "silhouette.png", *words.split())
     assert outcome.err.startswith(f"error: {words.split()[0]} needs a value; give ")
+    names(orbiflow.refused("escherize").err, "IMAGE")

@@ -75,11 +75,8 @@ def test_an_answer_is_written_as_names_end_and_told(tmp_path: Path) -> None:
     document = json.loads(files[0].read_text())
     assert (document["kind"], document["most"]) == ("heights", None)
     assert set(document) == {"kind", "parts", "most"}
-    assert list(csv.reader(files[1].read_text().splitlines())) == [
-        ["name", "first"],
-        ["a", "1.5"],
-        ["b", "1.0"],
-    ]
+    rows = list(csv.reader(files[1].read_text().splitlines()))
+    assert rows == [["name", "first"], ["a", "1.5"], ["b", "1.0"]]
     assert files[2].read_bytes() == b"png"
 
 

@@ -135,15 +135,8 @@ def test_a_fit_that_is_cancelled_writes_nothing(tmp_path: Path) -> None:
         if isinstance(event, Progress):
             cancel.cancel()
 
-    call = find("density fit").call(
-        {
-            "data": data,
-            "space": "torus",
-            "unit": "radians",
-            "out": tmp_path / "out",
-            "max_frequency": 2,
-        }
-    )
+    given = {"data": data, "space": "torus", "unit": "radians", "out": tmp_path / "out"}
+    call = find("density fit").call({**given, "max_frequency": 2})
     assert run(call, sink, cancel).state == "cancelled"
     check_order(events)
     assert [p.name for p in tmp_path.iterdir()] == ["data.csv"]

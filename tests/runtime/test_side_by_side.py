@@ -103,9 +103,8 @@ def test_a_fit_is_the_same_on_any_number_of_cores(monkeypatch: pytest.MonkeyPatc
     quick_fits(monkeypatch)
     space, rng = Torus(2), np.random.default_rng(0)
     points = space.project(torch.tensor(0.1 * rng.normal(size=(320, 2))))
-    settings = DensitySettings(
-        components=("kernels", "flow"), segments=1, max_frequency=2, iterations=4, roughness=(1e-3,)
-    )
+    few: dict[str, Any] = {"segments": 1, "max_frequency": 2, "iterations": 4}
+    settings = DensitySettings(components=("kernels", "flow"), roughness=(1e-3,), **few)
     found: list[Any] = []
     for count in (1, 3):
         monkeypatch.setattr(module_of, "cores", lambda count=count: count)

@@ -108,7 +108,7 @@ def test_what_is_refused_is_in_the_pages_words(client: Client) -> None:
 
 
 @pytest.mark.parametrize("mask", ["pins", "emphasis"])
-@settings(max_examples=3, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(radius=st.sampled_from([0, 1, 2, 4, 8, 30, 120, 2000]), at=st.tuples(*[st.floats(0, 1)] * 2))
 def test_what_a_search_would_not_take_is_said_where_it_is_painted(
     client: Client, project: str, mask: str, radius: int, at: tuple[float, float]
