@@ -206,6 +206,8 @@ def test_centres_get_their_orders_as_the_tile_looks_best(run: Path) -> None:
 
 def test_the_tile_whose_image_looks_best_is_drawn(run: Path, tmp_path: Path) -> None:
     tiles = read_tiles(run)
+    lowest = tiles[-1]
+    assert [own.name for own in read_tiles(run / str(lowest.isohedral_class))] == [lowest.name]
     marks = {}
     for tile in tiles:
         if tile.isohedral_class != "IH4":
