@@ -78,10 +78,8 @@ def test_a_table_is_looked_at(client: Client) -> None:
     own, task = uploaded(client, BENDS, "bends of a chain.csv")
     assert task["result"]["rows"] == ROWS
     table = client.get(f"{own}/density").json()["table"]
-    assert [(column["name"], column["role"]) for column in table["columns"]] == [
-        ("phi", "angle:degrees"),
-        ("psi", "angle:degrees"),
-    ]
+    roles = {column["name"]: column["role"] for column in table["columns"]}
+    assert roles == {"phi": "angle:degrees", "psi": "angle:degrees"}
     assert len(table["first"]) == density_tasks.FIRST_ROWS
     assert table["guess"]["space"] == "torus"
     assert client.get(own).json()["name"] == "bends of a chain"
@@ -102,11 +100,11 @@ HEADS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("text", HEADS, ids=lambda text: text.split("\n")[0])
-def test_the_space_is_guessed(text: str, tmp_path: Path) -> None:
-    (tmp_path / "table.csv").write_text(text)
-    found = table_view(tmp_path / "table.csv")["guess"]
-    assert (found["space"], list(found["columns"])) == HEADS[text]
+def test_the_space_is_guessed(tmp_path: Path) -> None:
+    for text, wanted in HEADS.items():
+        (tmp_path / "table.csv").write_text(text)
+        found = table_view(tmp_path / "table.csv")["guess"]
+        assert (found["space"], list(found["columns"])) == wanted
 
 
 NAMES = ["phi", "lat", "lon", "x", "y", "z", "theta", "id", "pole lon", "speed"]
@@ -154,15 +152,12 @@ def test_hostile_tables_are_refused_in_words(client: Client, name: str, monkeypa
     assert "not read" in fit["error"]
 
 
-@pytest.mark.parametrize("name", ["table", "table.csv.exe", "../../etc/passwd"])
-def test_other_kinds_of_file_are_not_taken(client: Client, name: str) -> None:
+def test_other_kinds_of_file_are_not_taken_and_a_tile_has_no_density(client: Client) -> None:
     own = density_project(client)
-    answer = client.put(f"{own}/density/table", params={"name": name}, content=b"1,2\n")
-    assert answer.status_code == 422
-    assert "CSV" in answer.json()["error"]
-
-
-def test_a_tile_has_no_density(client: Client) -> None:
+    for name in ("table", "table.csv.exe", "../../etc/passwd"):
+        answer = client.put(f"{own}/density/table", params={"name": name}, content=b"1,2\n")
+        assert answer.status_code == 422
+        assert "CSV" in answer.json()["error"]
     own = new_project(client)
     for answer in (
         client.get(f"{own}/density"),
@@ -172,15 +167,12 @@ def test_a_tile_has_no_density(client: Client) -> None:
         assert answer.status_code == 404
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_are_tables_with_a_space(name: str) -> None:
-    view = table_view(TABLES / f"{name}.csv")
+def test_examples_are_tables_with_a_space(client: Client) -> None:
     spaces = {"poles": "projective-plane", "patches": "klein-bottle"}
-    assert view["guess"]["space"] == spaces.get(name, "torus")
-    assert view["rows"] == 1500
-
-
-def test_an_example_is_a_table_of_its_own(client: Client) -> None:
+    for name in EXAMPLES:
+        view = table_view(TABLES / f"{name}.csv")
+        assert view["guess"]["space"] == spaces.get(name, "torus")
+        assert view["rows"] == 1500
     own = density_project(client)
     assert client.post(f"{own}/density/example", json={"name": "nothing"}).status_code == 422
     task = done(client, client.post(f"{own}/density/example", json={"name": "sidechain"}))
@@ -196,24 +188,16 @@ def test_a_fit_says_what_it_is(client: Client, fitted: str) -> None:
     assert fit["likelihood"]["mean"] == pytest.approx(float(mean), abs=1e-6)
     assert fit["likelihood"]["rows"] == fit["rows"] == fit["shown"] == ROWS
     assert fit["likelihood"]["uniform"] == pytest.approx(-2 * np.log(360))
-    assert sum(part["share"] for part in fit["components"]) + fit["weights"][
-        "uniform"
-    ] == pytest.approx(1)
-    places = floats(fit["points"]).reshape(-1, 2)
-    np.testing.assert_allclose(
-        np.sort(places, axis=0), np.sort(values / 360 + 0.5, axis=0), atol=1e-5
-    )
+    shares = [part["share"] for part in fit["components"]]
+    assert sum(shares) + fit["weights"]["uniform"] == pytest.approx(1)
+    places, wanted = floats(fit["points"]).reshape(-1, 2), values / 360 + 0.5
+    np.testing.assert_allclose(np.sort(places, axis=0), np.sort(wanted, axis=0), atol=1e-5)
 
 
-def test_its_map_holds_the_whole_density(client: Client, fitted: str) -> None:
+def test_its_map_holds_the_whole_density_and_its_surface_is_drawn(client, fitted: str) -> None:
     fit = client.get(f"{fitted}/density").json()["fit"]["number"]
     data = client.get(f"{fitted}/density/{fit}/map", params={"axes": "0-1"}).json()
-    values = np.exp(floats(data["logs"]))
-    assert values.mean() * 360**2 == pytest.approx(1, abs=0.02)
-
-
-def test_its_surface_is_what_the_shared_script_draws(client: Client, fitted: str) -> None:
-    fit = client.get(f"{fitted}/density").json()["fit"]["number"]
+    assert np.exp(floats(data["logs"])).mean() * 360**2 == pytest.approx(1, abs=0.02)
     surface = client.get(f"{fitted}/density/{fit}/surface").json()
     assert len(floats(surface["points"])) == 3 * 81
     assert len(np.frombuffer(base64.b64decode(surface["levels"]), "<u2")) == 81
@@ -222,19 +206,18 @@ def test_its_surface_is_what_the_shared_script_draws(client: Client, fitted: str
     assert "export function showSurface" in script.text
 
 
-@pytest.mark.parametrize("axes", ["0-1-2", "..", "0-/etc", "-1", "0-9999999999999999999"])
-def test_other_maps_are_not_there(client: Client, fitted: str, axes: str) -> None:
+def test_other_maps_are_not_there(client: Client, fitted: str) -> None:
     fit = client.get(f"{fitted}/density").json()["fit"]["number"]
-    assert client.get(f"{fitted}/density/{fit}/map", params={"axes": axes}).status_code == 404
+    for axes in ("0-1-2", "..", "0-/etc", "-1", "0-9999999999999999999"):
+        assert client.get(f"{fitted}/density/{fit}/map", params={"axes": axes}).status_code == 404
     assert client.get(f"{fitted}/density/{fit + 1}/map").status_code == 422
 
 
 def test_faults_of_a_fit_are_told(client: Client, fitted: str) -> None:
     task = worked(client, fitted, "density fit", space="sphere", columns=["phi", "psi"])
     assert "latitude" in task["error"]
-    task = worked(
-        client, fitted, "density fit", space="torus", columns=["phi", "nothing"], unit="degrees"
-    )
+    wrong_columns = {"columns": ["phi", "nothing"], "unit": "degrees"}
+    task = worked(client, fitted, "density fit", space="torus", **wrong_columns)
     assert "nothing" in task["error"]
     assert client.get(f"{fitted}/density").json()["fit"] is not None
     angles = {"space": "torus", "columns": ["phi"]}
@@ -255,9 +238,8 @@ def taken(client: Client, own: str, what: str, **settings: Any) -> dict[str, byt
 
 
 def test_samples_and_the_model_are_taken_away(client: Client, fitted: str, tmp_path: Path) -> None:
-    rows = list(
-        csv.reader(io.StringIO(taken(client, fitted, "samples", count=25)["samples.csv"].decode()))
-    )
+    samples = taken(client, fitted, "samples", count=25)["samples.csv"].decode()
+    rows = list(csv.reader(io.StringIO(samples)))
     assert rows[0] == ["phi", "psi"]
     assert len(rows) == 26
     model = taken(client, fitted, "model")
@@ -274,10 +256,10 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize("settings", WRONG)
-def test_nothing_else_is_taken_away(client: Client, fitted: str, settings: dict[str, Any]) -> None:
-    body = {"operation": "density take", "settings": {"fit": 1, **settings}}
-    assert client.post(f"{fitted}/tasks", json=body).status_code == 422
+def test_nothing_else_is_taken_away(client: Client, fitted: str) -> None:
+    for settings in WRONG:
+        body = {"operation": "density take", "settings": {"fit": 1, **settings}}
+        assert client.post(f"{fitted}/tasks", json=body).status_code == 422
 
 
 def test_another_table_begins_anew(client: Client) -> None:
@@ -285,12 +267,8 @@ def test_another_table_begins_anew(client: Client) -> None:
     folder = client.studio.store.home(own.rsplit("/", 1)[1])
     (folder / "fits" / "7").mkdir(parents=True)
     (folder / "fits" / "7" / "view.json").write_text("{}")
-    done(
-        client,
-        client.put(
-            f"{own}/density/table", params={"name": "two.npy"}, content=array_bytes(np.eye(2))
-        ),
-    )
+    table = {"params": {"name": "two.npy"}, "content": array_bytes(np.eye(2))}
+    done(client, client.put(f"{own}/density/table", **table))
     assert {path.name for path in folder.iterdir()} == {"table.npy", "table.json"}
     assert client.get(own).json()["name"] == "two"
 
@@ -300,10 +278,9 @@ def test_two_of_many_angles_are_drawn_when_asked_for(client: Client) -> None:
     folder = client.studio.store.home(own.rsplit("/", 1)[1]) / "fits" / "3"
     (folder / "model").mkdir(parents=True)
     (folder / "view.json").write_text("{}")
-    density = random_kernels(np.random.default_rng(3), Torus(3, unit="degrees"))
-    (folder / "model" / "density.safetensors").write_bytes(
-        density_to_bytes(Mixture([density], [1.0]))
-    )
+    kernels = random_kernels(np.random.default_rng(3), Torus(3, unit="degrees"))
+    saved = density_to_bytes(Mixture([kernels], [1.0]))
+    (folder / "model" / "density.safetensors").write_bytes(saved)
     assert client.get(f"{own}/density/3/map", params={"axes": "0-2"}).json() is None
     assert client.get(f"{own}/density/3/surface").json() is None
     assert worked(client, own, "density map", fit=3, axes=[0, 2])["state"] == "done"

@@ -56,10 +56,6 @@ def uploaded(client: Client, data: bytes, name: str) -> tuple[str, dict[str, Any
     return own, done(client, answer)
 
 
-def test_what_is_uploaded_is_what_is_read() -> None:
-    assert tuple(READERS) == ENDINGS
-
-
 def home(client: Client, own: str) -> Path:
     return client.studio.store.home(own.rsplit("/", 1)[1])
 
@@ -126,6 +122,7 @@ def test_what_was_mended_is_said(client: Client) -> None:
     large, _ = uploaded(client, stl(box(30, 20, 50)), "box.stl")
     mesh = client.get(f"{large}/mesh").json()["mesh"]
     assert (mesh["usual_size"], mesh["notes"]) == (None, [])
+    assert tuple(READERS) == ENDINGS  # what is uploaded is what is read
 
 
 GLTF = b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "%s", "byteLength": 9}]}'
@@ -156,14 +153,12 @@ def test_hostile_meshes_are_refused_in_words(client: Client, name: str, monkeypa
     assert "not read" in worked(client, own, "fill")["error"]
 
 
-@pytest.mark.parametrize("name", ["mesh.blend", "mesh", "mesh.stl.exe", "../../etc/passwd"])
-def test_other_kinds_of_file_are_not_taken(client: Client, name: str) -> None:
-    answer = client.put(f"{solid_project(client)}/mesh", params={"name": name}, content=b"1")
-    assert answer.status_code == 422
-    assert ".3mf" in answer.json()["error"]
-
-
-def test_a_tile_has_no_mesh(client: Client) -> None:
+def test_other_kinds_of_file_are_not_taken_and_a_tile_has_no_mesh(client: Client) -> None:
+    own = solid_project(client)
+    for name in ("mesh.blend", "mesh", "mesh.stl.exe", "../../etc/passwd"):
+        answer = client.put(f"{own}/mesh", params={"name": name}, content=b"1")
+        assert answer.status_code == 422
+        assert ".3mf" in answer.json()["error"]
     own = new_project(client)
     for answer in (
         client.get(f"{own}/mesh"),
@@ -229,6 +224,10 @@ def test_a_solid_is_shown_by_the_shared_script(client: Client, filled: str) -> N
     view = client.get(f"{filled}/tiles/{card['id']}").json()
     assert set(view["meshes"]) == {"target", "bent", "tile"}
     assert len(view["copies"]) == 24
+    (folder,) = home(client, filled).glob("tiles/*/final/tile")
+    solid = read_solid(folder)  # as the command reads it
+    assert solid.certificate.valid
+    assert solid.millimetres == 30
     script = client.get("/api/solids/stack.js")
     assert "javascript" in script.headers["content-type"]
     assert "export function showStack" in script.text
@@ -271,11 +270,11 @@ def test_things_to_print_are_taken_away(
 WRONG = [{"kind": "cathedral"}, {"result": "/etc"}, {"copies": 5}, {"clearance": -1}, {"out": "x"}]
 
 
-@pytest.mark.parametrize("settings", WRONG)
-def test_nothing_else_is_taken_away(client: Client, filled: str, settings: dict[str, Any]) -> None:
+def test_nothing_else_is_taken_away(client: Client, filled: str) -> None:
     (card,) = client.get(filled).json()["tiles"]
-    body = {"operation": "build", "settings": {"tile": card["id"], **settings}}
-    assert client.post(f"{filled}/tasks", json=body).status_code == 422
+    for settings in WRONG:
+        body = {"operation": "build", "settings": {"tile": card["id"], **settings}}
+        assert client.post(f"{filled}/tasks", json=body).status_code == 422
 
 
 def test_a_film_is_taken_away(client: Client, filled: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -288,13 +287,6 @@ def test_a_film_is_taken_away(client: Client, filled: str, monkeypatch: pytest.M
     assert made["name"] == "bumpy-thing-stack.gif"
     film = client.get(f"/api/takeaways/{task['id']}/files/{made['name']}")
     assert film.content.startswith(b"GIF8")
-
-
-def test_what_is_kept_is_read_by_the_command(client: Client, filled: str) -> None:
-    (folder,) = home(client, filled).glob("tiles/*/final/tile")
-    solid = read_solid(folder)
-    assert solid.certificate.valid
-    assert solid.millimetres == 30
 
 
 def test_another_mesh_begins_anew(client: Client) -> None:

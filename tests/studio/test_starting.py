@@ -18,6 +18,7 @@ from orbiflow.studio import Store, StudioSettings
 from orbiflow.studio.app import PatientProtocol, Server
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.operations import studio
+from refusals import refused
 
 
 def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -54,14 +55,10 @@ def test_a_folder_that_cannot_be_had_is_told(name: str, tmp_path: Path) -> None:
 
 
 def test_two_studios_do_not_share_a_folder(tmp_path: Path) -> None:
-    with (
-        FileLock(tmp_path / "studio.lock"),
-        pytest.raises(OrbiflowError, match="another studio is using"),
-    ):
-        studio(StudioSettings(data=tmp_path, browser=False))
-
-
-def test_only_this_machine_comes_without_a_token() -> None:
+    own = StudioSettings(data=tmp_path, browser=False)
+    with FileLock(tmp_path / "studio.lock"), refused("another studio", kind=OrbiflowError):
+        studio(own)
+    # only this machine comes without a token
     assert StudioSettings().is_local
     assert StudioSettings(host="::1").is_local
     assert not StudioSettings(host="0.0.0.0").is_local
