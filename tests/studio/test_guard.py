@@ -87,14 +87,6 @@ def test_a_token_is_asked_for_where_others_may_come(tmp_path: Path) -> None:
 
 NAMES = ["../../../etc/passwd", "..\\..\\evil.png", "/etc/shadow", "a\0b.png"]
 NAMES += ["..", "x.p/ng", "a.%2e"]
-    "../../../etc/passwd",
-    "..\\..\\evil.png",
-    "/etc/shadow",
-    "a\x00b.png",
-    "..",
-    "x.p/ng",
-    "a.%2e",
-]
 
 
 def test_names_of_uploads_lead_nowhere(client: Client, tmp_path: Path) -> None:
