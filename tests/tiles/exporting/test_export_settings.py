@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from exported import scenes, tile_of
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import SettingError
 from orbiflow.settings import MILLIMETRES, PAGES, Length, LengthOrZero, PageSize, length
 from orbiflow.settings.kinds import RefusedValue, kind_of
 from orbiflow.settings.units import length_or_none, page_size, signed_length, size
@@ -87,16 +87,10 @@ def test_a_file_s_ending_goes_before_the_purpose_and_after_the_format() -> None:
 def test_a_page_smaller_than_a_tile_says_what_is_needed() -> None:
     tile = tile_of("IH2")
     small = ExportSettings(area=(35.0, 20.0))
-    with refused("35 x 20 mm", "38.7 x 33.5 mm"):
+    with refused("35 x 20 mm", "38.7 x 33.5 mm") as caught:
         scenes(tile, small)
-    message = ""
-    try:
-        scenes(tile, small)
-    except OrbiflowError as error:
-        message = str(error)
-    width, height = (
-        float(side) for side in message.split("needs ")[1].split(" mm")[0].split(" x ")
-    )
+    needed = str(caught.value).split("needs ")[1].split(" mm")[0]
+    width, height = map(float, needed.split(" x "))
     (scene,), _ = scenes(tile, ExportSettings(area=(width + 0.1, height + 0.1)))
     assert len(scene.tiles) >= 1
 

@@ -81,11 +81,10 @@ def test_tensors_lists_and_shapes() -> None:
 
 
 def test_in_the_input_s_coordinates() -> None:
-    case = bent_squirrel("IH4")
+    case, own = bending("IH4")
     frame = animal("squirrel.dat").frame
     placed = case.tile.transformed(frame.linear, frame.offset)
-    bending = map_of_bent(case.bent, case.factor, case.shift, case.tile)
-    carried = EscherTile(placed, map_source=TileMap(frame=frame, bending=bending))
+    carried = EscherTile(placed, map_source=TileMap(frame=frame, bending=own))
     assert carried.map is not None
     assert carried.map.ends_on(placed)
     ring = animal("squirrel.dat").outline
