@@ -64,6 +64,7 @@ def test_a_column_is_named_once() -> None:
         ("x_rad", "angle:radians"), ("hour", "cycle:24"), ("month", "cycle:12"), ("id", "ignore"),
         ("dayOfYear", "cycle:365.25"), ("speed", None), ("ra_hours", None), ("azimuth [gon]", None),
         ("temperature", None), ("radius", None), ("phase", "angle"), ("county", None),
+        ("turn_angle", "angle"), ("dir (tens of deg)", None), ("heading (tenths °)", None),
     ],
 )  # fmt: skip
 def test_names_have_roles(name: str, role: str | None) -> None:
@@ -80,6 +81,10 @@ CODED = np.where(np.arange(60) % 20 == 3, 999.0, DEGREES % 360)
 
 # tables of people's kinds, the space, and what their columns are once the printed words are pasted
 TABLES: dict[str, tuple[dict[str, Any], str, str]] = {
+    "tens of degrees, by name": (
+        {"Wind Dir (10s deg)": np.ceil(DEGREES % 360 / 10)}, "torus", "Wind Dir (10s deg)=cycle:36"
+    ),
+    "turning angles": ({"turn_angle": TURN}, "torus", "turn_angle=angle:radians"),
     "wind in degrees": ({"dir": DEGREES % 360, "speed": SPEED}, "torus",
                         "dir=angle:degrees,speed=positive"),
     "wind in tens": ({"dir": (DEGREES % 360 / 10).round()}, "torus", "dir=cycle:36"),

@@ -31,6 +31,9 @@ WIDTHS = {
 }  # fmt: skip
 """The numbers of columns that spaces take."""
 
+LOOKED_AT = 100
+"""Cells of a column of text that are looked at for times of day."""
+
 
 @dataclass(frozen=True)
 class Declaration:
@@ -151,11 +154,15 @@ class _Choice:
         numeric = [k for k in left if self.table.is_numeric(k)]
         words = [k for k in left if k not in numeric and self._named(k) is None]
         notes = [f"left out {listing(self._names(words))}: no numbers"] if words else []
-        if any(is_clock(str(cell).strip()) for k in words for cell in self.table.cells(k)[:1]):
+        if any(map(self._has_clocks, words)):
             notes[0] += f"; to use times of day, {HOURS}"
         if numeric:
             notes.append(f"left out {listing(self._names(numeric))}: name all columns to use them")
         return notes
+
+    def _has_clocks(self, column: int) -> bool:
+        """Return whether a column of text holds times of day."""
+        return any(is_clock(str(cell).strip()) for cell in self.table.cells(column)[:LOOKED_AT])
 
     def as_known(self, roles_of: Callable[[int], Roles]) -> Columns:
         """Return the columns of a space or a fit that is there already."""
@@ -227,7 +234,12 @@ class _Choice:
                     literal(f"{what}, or declare ") + f"{{columns}} {literal(name)}=ignore"
                 )
             notes = self._left_out(wanted)
-        self._check_count(list(wanted), None)
+        if not wanted:
+            clocks = [k for k in self.free if self._has_clocks(k)]
+            raise SettingError(
+                literal(f"there is no column of numbers among {listing(self._names(self.free))}")
+                + (f": {HOURS}" if clocks else "; specify with {columns} which they are")
+            )
         columns = {k: self._role(k, role) for k, role in wanted.items()}
         self._ask(columns)
         roles = tuple(columns.values())
@@ -279,6 +291,7 @@ class _Choice:
         if space in DIRECTIONS and count == 2:  # what is beyond a latitude is none
             reach = {name: self._reach(name) for name in names}
             names = sorted(names, key=lambda name: reach[name] > 90)
+        check_columns(space, names[:count])
         first = ",".join(names[:count]) or "NAME,NAME"
         raise UndeclaredError(
             literal(f"the {space} takes {what}, and the columns of numbers are {listing(names)}")
@@ -336,6 +349,13 @@ class _Choice:
         words = {k: str(role) for k, role in roles.items()}
         for k, values in unknown.items():
             words[k] = proposed_role(table.names[k], values, roles[k], by_size=not is_sure)
+        has_values = any(np.isfinite(values).any() for values in unknown.values())
+        if has_values and not own and all(Role.of(word).is_side for word in words.values()):
+            raise SettingError(
+                literal(f"{listing(self._names(words))} are no data, by their names and values: ")
+                + "declare with {columns} what they are; of a sine and a cosine, give the angle itself "
+                "(numpy.arctan2)"
+            )
         words |= {k: str(r) for k, r in self.roles.items() if r is not None and r.is_side}
         entries = [*map(self._called, own), *(f"{self._called(k)}={w}" for k, w in words.items())]
         codes = {c for k, v in unknown.items() for c in codes_among(v, Role.of(words[k]).turn)}

@@ -286,7 +286,10 @@ def listing(names: Sequence[str]) -> str:
 def short(text: str) -> str:
     """Return text for a message: at most 40 characters, on one line."""
     text = text.strip()
-    return ascii(text if len(text) <= 40 else text[:37] + "...")[1:-1]
+    text = text if len(text) <= 40 else text[:37] + "..."
+    return "".join(
+        letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text
+    )
 
 
 def and_others(faults: Sequence[str]) -> str:

@@ -37,6 +37,10 @@ FOREIGN = {
 }
 """Other units by the words of names, and a turn in each: such a column is declared as a cycle."""
 
+_PARTS = {"10s": 36.0, "10": 36.0, "tens": 36.0, "tenths": 3600.0, "hundredths": 36_000.0}
+_SCALED = re.compile(rf"\b({'|'.join(_PARTS)})\b\W*(of\b)?\W*(deg|°)", re.IGNORECASE)
+"""Degrees that are counted in tens or in tenths, as in "Wind Dir (10s deg)", and a turn in each."""
+
 _TOKEN = re.compile(r"°|[A-Z]+(?![a-zß-ÿ])|[A-Z]?[^\W\d_A-Z]+|\d+")
 _RUN_TOGETHER = re.compile(r"(?<=[A-Z])(?=(?:deg|rad|hms|dms)$)")
 
@@ -55,12 +59,13 @@ def words_of(name: str) -> list[str]:
 
 
 def unit_named(name: str) -> str | None:
-    """Return the unit of angles that a name says, or None.
+    """Return the unit of angles in which a name ends, or None.
 
-    >>> unit_named("phi (deg)"), unit_named("lat_rad"), unit_named("radius")
-    ('degrees', 'radians', None)
+    >>> unit_named("phi (deg)"), unit_named("lat_rad"), unit_named("radius"), unit_named("turn_angle")
+    ('degrees', 'radians', None, None)
     """
-    return next((UNITS[word] for word in words_of(name) if word in UNITS), None)
+    words = words_of(name)
+    return UNITS.get(words[-1]) if words and not _SCALED.search(name) else None
 
 
 def foreign_unit(name: str) -> float | None:
@@ -68,7 +73,11 @@ def foreign_unit(name: str) -> float | None:
 
     >>> foreign_unit("azimuth [gon]"), foreign_unit("ra_hours"), foreign_unit("hour")
     (400.0, 24.0, None)
+    >>> foreign_unit("Wind Dir (10s deg)"), foreign_unit("heading (tenths of degrees)")
+    (36.0, 3600.0)
     """
+    if scaled := _SCALED.search(name):
+        return _PARTS[scaled[1].lower()]
     words = words_of(name)
     return FOREIGN.get(words[-1]) if len(words) > 1 else None
 
