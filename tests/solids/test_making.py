@@ -30,13 +30,18 @@ def mesh_of(body: Manifold) -> Mesh:
 
 
 def test_an_offset_of_a_box_is_exact() -> None:
-    inner = mesh_of(offset_body(box(10, 20, 30), -0.5))
-    assert np.ptp(inner.points, axis=0) == pytest.approx([9, 19, 29], abs=0.01)
-    outer = mesh_of(offset_body(box(10, 20, 30), 0.5))
-    assert np.ptp(outer.points, axis=0) == pytest.approx([11, 21, 31], abs=0.01)
+    for offset in (-0.5, 0.5):
+        sides = np.ptp(mesh_of(offset_body(box(10, 20, 30), offset)).points, axis=0)
+        assert sides == pytest.approx(np.array([10, 20, 30]) + 2 * offset, abs=0.01)
     assert offset_body(box(10, 20, 30), 0).volume() == pytest.approx(6000)
     with refused("9 mm"):
         offset_body(box(10, 20, 30), -9)
+    # of a plate as thin as paper beside a cube little is left
+    both = as_mesh(Manifold.cube((5, 5, 5)) + Manifold.cube((5, 5, 0.1)).translate((5, 0, 0)))
+    inner = offset_body(both, -0.2)
+    assert 0 < inner.volume() < 5.0**3
+    assert (inner - as_body(both)).volume() == pytest.approx(0, abs=1e-9)
+    assert as_mesh(inner).is_closed
 
 
 @pytest.mark.parametrize("own", [BUMPY, HOOKED])
@@ -50,15 +55,6 @@ def test_a_smaller_tile_is_within_the_tile_all_around(own: Any) -> None:
     assert mesh_of(inner).euler_number == 2
     neighbour = inner.translate((30, 0, 0))
     assert 0.17 < inner.min_gap(neighbour, 1.0) < 0.21
-
-
-def test_where_a_tile_is_thinner_than_the_clearance_little_is_left() -> None:
-    """A plate as thin as paper beside a cube."""
-    both = as_mesh(Manifold.cube((5, 5, 5)) + Manifold.cube((5, 5, 0.1)).translate((5, 0, 0)))
-    inner = offset_body(both, -0.2)
-    assert 0 < inner.volume() < 5.0**3
-    assert (inner - as_body(both)).volume() == pytest.approx(0, abs=1e-9)
-    assert as_mesh(inner).is_closed
 
 
 def test_the_tile_to_print() -> None:

@@ -28,9 +28,8 @@ def fitted_fixture(studio: RunningStudio) -> str:
     studio.client.put(f"projects/{own}/density/table", params={"name": "bends.csv"}, content=TABLE)
     studio.until(lambda: studio.client.get(f"projects/{own}/density").json()["table"])
     settings = {"space": "torus", "columns": ["phi", "psi"], "unit": "degrees"}
-    studio.client.post(
-        f"projects/{own}/tasks", json={"operation": "density fit", "settings": settings}
-    )
+    body = {"operation": "density fit", "settings": settings}
+    studio.client.post(f"projects/{own}/tasks", json=body)
     studio.until(lambda: studio.client.get(f"projects/{own}/density").json()["fit"])
     return own
 

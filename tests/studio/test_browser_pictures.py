@@ -90,12 +90,8 @@ def test_what_is_added_of_the_background_is_no_colour(studio: RunningStudio) -> 
 
 def test_it_is_there_by_default_and_no_seam_shows(browser, studio, coloured, tile) -> None:
     for ratio in (1, 1.5):
-        context = browser.new_context(
-            base_url=studio.address,
-            viewport={"width": 900, "height": 800},
-            device_scale_factor=ratio,
-            reduced_motion="reduce",
-        )
+        size = {"viewport": {"width": 900, "height": 800}, "device_scale_factor": ratio}
+        context = browser.new_context(base_url=studio.address, reduced_motion="reduce", **size)
         own = context.new_page()
         close_up(own, coloured, tile, tint=0)
         assert own.get_by_label("Show my picture on the tiles").is_checked()
@@ -150,9 +146,8 @@ def test_a_preview_follows_each_setting(page: Any, coloured: str, tile: int) -> 
     page.get_by_label("How long is one tile?").fill("99999")
     page.get_by_label("How long is one tile?").press("Tab")
     page.get_by_text("must be above 0 and at most 20000").wait_for()
-    assert page.get_by_label("How long is one tile?").evaluate(
-        "box => box !== document.activeElement"
-    )
+    size = page.get_by_label("How long is one tile?")
+    assert size.evaluate("box => box !== document.activeElement")
     changed(lambda: page.get_by_role("radio", name="Film").check())
     page.get_by_text("One moment of the animation").wait_for()
     page.wrong[:] = [said for said in page.wrong if "422" not in said]

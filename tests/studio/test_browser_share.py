@@ -88,10 +88,8 @@ def alone_fixture(browser: Any) -> Iterator[Any]:
     own, wrong = context.new_page(), list[str]()
     own.on("pageerror", lambda error: wrong.append(str(error)))
     own.on("console", lambda said: said.type == "error" and wrong.append(said.text))
-    own.on(
-        "request",
-        lambda asked: asked.url.startswith(("file:", "data:", "blob:")) or wrong.append(asked.url),
-    )
+    near = ("file:", "data:", "blob:")
+    own.on("request", lambda asked: asked.url.startswith(near) or wrong.append(asked.url))
     yield own
     context.close()
     assert wrong == []
@@ -112,9 +110,9 @@ def drawing(page: Any) -> tuple[list[shapely.Polygon], list[str]]:
     fills = dict(re.findall(r'<g id="(\w+)"><polygon [^>]*?fill="(#\w+)"', text))
     rings = {name: [p.split(",") for p in own.split()] for name, own in symbols.items()}
     uses = re.findall(r'<use href="#(\w+)" transform="matrix\(([^)]+)\)"', text)
+    matrices = [[float(v) for v in matrix.split()] for _, matrix in uses]
     found = [
-        placed(np.array(rings[name], dtype=float), [float(v) for v in m.split()])
-        for name, m in uses
+        placed(np.array(rings[own], float), m) for (own, _), m in zip(uses, matrices, strict=True)
     ]
     return found, [fills[name] for name, _ in uses]
 
@@ -128,10 +126,14 @@ def test_page_of_each_class_opens_from_a_disk(alone: Any, tmp_path: Path, name: 
     check_colours(*drawing(alone), 900, 640)
 
 
+def opened_tile(page: Any, folder: Path, settings: ExportSettings | None = None) -> None:
+    """Export a tile as a page and open it."""
+    export(tile_of("IH4"), folder / "tile.html", settings or ExportSettings())
+    opened(page, folder / "tile.html")
+
+
 def test_page_is_moved_far_coloured_anew_and_turned(alone: Any, tmp_path: Path) -> None:
-    out = tmp_path / "tile.html"
-    export(tile_of("IH4"), out)
-    opened(alone, out)
+    opened_tile(alone, tmp_path)
     before = drawing(alone)
     alone.locator("#view").focus()
     for _ in range(120):
@@ -178,9 +180,7 @@ def reddish(page: Any) -> float:
 
 
 def test_engraved_lines_are_on_the_page_and_can_be_hidden(alone: Any, tmp_path: Path) -> None:
-    out = tmp_path / "tile.html"
-    export(tile_of("IH4"), out, ExportSettings(engrave=True, outline=0))
-    opened(alone, out)
+    opened_tile(alone, tmp_path, ExportSettings(engrave=True, outline=0))
     shown = "document.querySelector('#view').toDataURL()"
     alone.uncheck("#skin")
     alone.evaluate("new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(r)))")
@@ -198,9 +198,7 @@ def picture_of(address: str) -> np.ndarray:
 
 
 def test_pinch_zooms_and_a_finger_moves(alone: Any, tmp_path: Path) -> None:
-    out = tmp_path / "tile.html"
-    export(tile_of("IH4"), out)
-    opened(alone, out)
+    opened_tile(alone, tmp_path)
     first = len(drawing(alone)[0])
     alone.evaluate("""() => {
       const canvas = document.getElementById("view");
@@ -218,9 +216,8 @@ def test_pinch_zooms_and_a_finger_moves(alone: Any, tmp_path: Path) -> None:
 
 def test_what_users_wrote_is_escaped(alone: Any, tmp_path: Path) -> None:
     evil = "</script><script>console.log('evil')</script><b>&"
-    tile = tile_of("IH4")
     out = tmp_path / "tile.html"
-    made = export(tile, out)
+    made = export(tile_of("IH4"), out)
     scene = replace(made.scenes[0], title=evil)
     out.write_text(str(write_scene(scene, "html")), "utf-8")
     opened(alone, out)
@@ -231,13 +228,10 @@ def test_what_users_wrote_is_escaped(alone: Any, tmp_path: Path) -> None:
 
 def test_prints_the_tiling_alone(browser: Any, tmp_path: Path) -> None:
     pdfium = pytest.importorskip("pypdfium2")
-    out = tmp_path / "tile.html"
-    export(tile_of("IH4"), out, ExportSettings(palette="delft"))
-    context = browser.new_context(viewport={"width": 900, "height": 640})
-    page = context.new_page()
-    opened(page, out)
+    page = browser.new_page(viewport={"width": 900, "height": 640})
+    opened_tile(page, tmp_path, ExportSettings(palette="delft"))
     document = pdfium.PdfDocument(page.pdf(format="A4"))
-    context.close()
+    page.close()
     assert len(document) == 1
     assert document[0].get_textpage().get_text_bounded().strip() == ""  # no controls
     pixels = np.asarray(document[0].render(scale=0.5).to_pil().convert("RGB"))

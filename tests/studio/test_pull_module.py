@@ -68,18 +68,11 @@ def run_in_node(program: str, given: Any) -> Any:
     """Run a module of JavaScript with the close-up's modules; return the JSON that it prints."""
     node = shutil.which("node")
     if node is None:
-        driver = pytest.importorskip(
-            "playwright._impl._driver", reason="neither node nor playwright"
-        )
+        why = "neither node nor playwright"
+        driver = pytest.importorskip("playwright._impl._driver", reason=why)
         node = driver.compute_driver_executable()[0]
-    text = program.replace("MODULES", CLOSEUP.as_uri())
-    done = subprocess.run(
-        [node, "--input-type=module", "-e", text],
-        input=json.dumps(given),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [node, "--input-type=module", "-e", program.replace("MODULES", CLOSEUP.as_uri())]
+    done = subprocess.run(command, input=json.dumps(given), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -217,12 +210,8 @@ console.log(JSON.stringify({
 
     grid = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0)), axis=-1).reshape(-1, 2)
     corner = np.array([k for k in range(11) if k % 4 < 3])
-    triangles = np.concatenate(
-        [
-            np.stack([corner, corner + 1, corner + 5], 1),
-            np.stack([corner, corner + 5, corner + 4], 1),
-        ]
-    )
+    steps = np.array([[0, 1, 5], [0, 5, 4]])
+    triangles = (corner[:, None, None] + steps).reshape(-1, 3)
     images = grid @ [[1.2, 0.3], [-0.4, 0.9]] + 0.1 * np.sin(3 * grid[:, ::-1])
     bending = Bending(grid, images, triangles)
     points = np.random.default_rng(0).uniform(0, 3, (40, 2))

@@ -144,18 +144,14 @@ def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: 
     assert np.array_equal(loaded.forward(before), found.forward(before))
 
 
-def test_not_pulled_is_the_same_tile_and_map() -> None:
+def test_not_pulled_is_the_same_tile_and_refusals_are_plain() -> None:
     tile = squirrel("IH4")
-    found = pulled(tile, PullSpace(tile).start)
+    start = PullSpace(tile).start
+    found = pulled(tile, start)
     assert tile.bending is not None
     assert tile.frame is not None
     inside = tile.frame.to_input(tile.bending.images[tile.bending.triangles].mean(axis=1))
     assert np.abs(found.inverse(inside) - tile.inverse(inside)).max() < 1e-9
-
-
-def test_refusals_are_plain() -> None:
-    tile = squirrel("IH4")
-    start = PullSpace(tile).start
     crossed = start.copy()
     crossed[:2] += 3 * tile.tile.radius
     with pytest.raises(CertificationError, match=r"outline crosses itself there.*pull it less far"):
@@ -308,13 +304,10 @@ def test_a_tile_is_laid_in_another_class(client: Client, address: str) -> None:
     assert before.intersection(after).area > 0.8 * before.union(after).area
 
 
-def test_there_are_no_other_classes(client: Client, address: str) -> None:
+def test_there_are_no_other_classes_wishes_and_tiles(client: Client, address: str) -> None:
     answer = client.post(f"{address}/by-hand/class", json={"name": "IH99"})
     assert (answer.status_code, "IH99" in answer.json()["error"]) == (422, True)
     assert client.post(f"{address}/by-hand/wish", json={}).status_code == 404
-
-
-def test_no_tile_no_space(client: Client, address: str) -> None:
     assert client.get(f"{address}77/space").status_code == 404
 
 
