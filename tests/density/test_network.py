@@ -198,7 +198,7 @@ def test_arrows_are_along_the_chain() -> None:
 
 def test_the_default_takes_a_network_where_states_multiply() -> None:
     angles = states(5, 150, 6)
-    fit = od.DensityEstimator("torus", seed=1).fit(angles[:120])
+    fit = od.DensityEstimator("torus", components="auto", seed=1).fit(angles[:120])
     evidence = {part.name: part for part in fit.report_.components}
     assert evidence.keys() == {"kernels", "mixture", "chains", "network"}
     best = max(part.alone for name, part in evidence.items() if name != "network")

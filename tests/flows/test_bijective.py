@@ -153,7 +153,7 @@ def test_a_field_that_runs_away_is_told(size: float) -> None:
 
 
 STEEP = random_field(space_group("P2_1/c", 0), 2, 0, rms=0.8)
-POINTS = random_tensor(0, 60, 3)
+POINTS = random_tensor(0, 140, 3)  # of which some are looked at
 
 
 def roundtrip(flow: Flow) -> float:

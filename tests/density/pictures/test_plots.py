@@ -9,7 +9,6 @@ import pytest
 import torch
 
 import orbiflow.density as od
-from density.blends import bump
 from density.quick_fits import quick_pictures
 from orbiflow.density.operations.drawing import plot
 from orbiflow.density.pictures.plots import refuse_foreign_files
@@ -47,13 +46,13 @@ def test_a_folder_holds_the_pictures_of_one_plot(tmp_path: Path) -> None:
     assert names(out) == figures | {"surface.html"}
     assert set(plotted.files) == {out / name for name in names(out)}
     assert len(plotted.captions) == 3
-    od.plot_density(bump(od.Torus(2)), out)
-    assert names(out) == {"density.png", "surface.html"}
+    od.plot_density(example(), out)
+    assert names(out) == {"density.png", "flow.png", "surface.html"}
     assert names(out) < set(od.PICTURES)
     (out / "notes.txt").write_text("mine")
     with refused("density.png", kind=OutputError):
         od.plot_density(example(), out)
-    assert names(out) == {"density.png", "surface.html", "notes.txt"}
+    assert names(out) == {"density.png", "flow.png", "surface.html", "notes.txt"}
 
 
 def test_one_pdf_has_a_page_a_figure(tmp_path: Path) -> None:
