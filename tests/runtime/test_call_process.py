@@ -64,8 +64,7 @@ def test_a_mistake_is_the_last_event() -> None:
         assert process.wait() == 1
     check_order(events)
     assert isinstance(events[-1], Failed)
-    assert events[-1].failure == "mistake"
-    assert "IH94" in events[-1].message
+    assert (events[-1].failure, "IH94" in events[-1].message) == ("mistake", True)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")

@@ -142,7 +142,7 @@ def test_a_fit_that_is_cancelled_writes_nothing(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["data.csv"]
 
 
-def test_what_the_sink_raises_comes_out(tmp_path: Path) -> None:
+def test_what_the_sink_raises_comes_out_and_a_mistake_is_told(tmp_path: Path) -> None:
     told: list[Event] = []
 
     def sink(event: Event) -> None:
@@ -154,9 +154,6 @@ def test_what_the_sink_raises_comes_out(tmp_path: Path) -> None:
         run(boot_call(tmp_path, "IH4", "IH6"), sink)
     assert not any(isinstance(event, Failed) for event in told)
     assert files(tmp_path / "out") == {"read.png"}
-
-
-def test_a_mistake_is_told_and_raised(tmp_path: Path) -> None:
     events: list[Event] = []
     with refused(tmp_path / "none"):
         run(find("density sample").call({"model": tmp_path / "none"}), events.append)

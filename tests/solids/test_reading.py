@@ -68,12 +68,6 @@ def test_formats(name: str, content: bytes, tmp_path: Path) -> None:
     assert (len(mesh.points), len(mesh.faces), notes) == (8, 12, [])
 
 
-def test_gltf_is_in_metres(tmp_path: Path, monkeypatch) -> None:
-    bare_reads(monkeypatch)
-    mesh, _ = read(tmp_path, "a.glb", glb(box(0.001, 0.002, 0.003)))
-    assert np.ptp(mesh.points, axis=0) == pytest.approx([1, 2, 3])
-
-
 def test_gltf_takes_numbers_from_its_own_folder_only(tmp_path: Path) -> None:
     files: Any = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
     for name, content in files.items():
@@ -122,20 +116,16 @@ def test_gltf_that_is_hostile(what: str, tmp_path: Path, monkeypatch) -> None:
     check_refused(tmp_path, "a.gltf", content, words)
 
 
-def test_glb_that_is_cut_off(tmp_path: Path) -> None:
-    for content in (glb(box())[:-40], b"glTF"):
-        (tmp_path / "a.glb").write_bytes(content)
-        with refused("broken", kind=OrbiflowError):
-            read_here(tmp_path / "a.glb")
-
-
 @pytest.mark.parametrize(
     ("unit", "scale"), [("micron", 1e-3), ("centimeter", 10), ("inch", 25.4), ("meter", 1000)]
 )
-def test_units_of_3mf(unit: str, scale: float, tmp_path: Path, monkeypatch) -> None:
+def test_units_of_3mf_and_gltf(unit: str, scale: float, tmp_path: Path, monkeypatch) -> None:
     bare_reads(monkeypatch)
     mesh, _ = read(tmp_path, "a.3mf", three_mf(box(1, 2, 3), unit))
     assert mesh.volume == pytest.approx(6 * scale**3)
+    if unit == "meter":  # as in glTF
+        mesh, _ = read(tmp_path, "a.glb", glb(box(0.001, 0.002, 0.003)))
+        assert np.ptp(mesh.points, axis=0) == pytest.approx([1, 2, 3])
 
 
 def of_components(depth: int, times: int) -> bytes:
@@ -191,6 +181,10 @@ def test_memory_and_time_are_bounded(what: str, tmp_path: Path) -> None:
 
 def test_files_that_are_cut_off_or_lie(tmp_path: Path) -> None:
     content, ply = stl(ball()), b"ply\nformat ascii 1.0\nelement vertex %d\nend_header\n"
+    for cut in (glb(box())[:-40], b"glTF"):
+        (tmp_path / "a.glb").write_bytes(cut)
+        with refused("broken", kind=OrbiflowError):
+            read_here(tmp_path / "a.glb")
     for name, data, words in [
         ("a.stl", content[:-70], r"cut off: [\d,]+ triangles are announced"),
         ("a.stl", content[:80] + (10**9).to_bytes(4, "little") + content[84:], "4,000,000"),

@@ -44,11 +44,22 @@ def stroke(page: Any, canvas: str, *points: tuple[float, float]) -> None:
     page.mouse.up()
 
 
-def test_what_was_read_is_shown_and_what_was_left_out_is_said(page, drawing, studio) -> None:
+def test_what_was_read_is_shown_and_sliders_read_anew(page, drawing, studio) -> None:
     own = begun(page, drawing)
     assert "1 part is left out" in page.locator(".said").inner_text()
     assert page.locator("h1").inner_text() == "Is this your animal?"
     assert studio.project(own)["name"] == "beast"
+    before = studio.project(own)["silhouette"]["outline"]
+    page.get_by_label("Smoothing").focus()
+    for _ in range(12):
+        page.keyboard.press("ArrowRight")
+    studio.until(lambda: abs(studio.project(own)["reading"]["smooth"] - 0.024) < 1e-9)
+    studio.until(lambda: studio.project(own)["silhouette"]["outline"] != before)
+    page.get_by_label("Where it ends").focus()
+    page.keyboard.press("ArrowRight")
+    studio.until(lambda: studio.project(own)["reading"]["threshold"] == 0.51)
+    page.get_by_role("radio", name="light").press("Space")  # a click may miss what an answer moves
+    studio.until(lambda: studio.project(own)["reading"]["invert"] is True)
 
 
 def test_a_drawing_is_shown_in_its_colours_in_its_place(page, studio: RunningStudio) -> None:
@@ -87,22 +98,6 @@ def test_thin_legs_are_said_and_grown_by_a_button(page, studio: RunningStudio) -
     studio.until(lambda: studio.project(own)["reading"].get("thicken") == 0.04)
     studio.until(lambda: not (studio.project(own)["silhouette"] or before)["doubts"])
     page.get_by_text("at least 4 % wide").wait_for()
-
-
-def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
-    own = begun(page, drawing)
-    before = studio.project(own)["silhouette"]["outline"]
-    page.get_by_label("Smoothing").focus()
-    for _ in range(12):
-        page.keyboard.press("ArrowRight")
-    found = studio.until(lambda: abs(studio.project(own)["reading"]["smooth"] - 0.024) < 1e-9)
-    assert found
-    studio.until(lambda: studio.project(own)["silhouette"]["outline"] != before)
-    page.get_by_label("Where it ends").focus()
-    page.keyboard.press("ArrowRight")
-    studio.until(lambda: studio.project(own)["reading"]["threshold"] == 0.51)
-    page.get_by_role("radio", name="light").press("Space")  # a click may miss what an answer moves
-    studio.until(lambda: studio.project(own)["reading"]["invert"] is True)
 
 
 def test_painting_mends_the_shape_and_can_be_undone(page, drawing, studio: RunningStudio) -> None:

@@ -100,10 +100,9 @@ def run(home: Path, **choice: Any) -> tuple[dict[str, Any], list[tuple[int, str]
             number, stage = event.name.split("/")
             seen.append((int(number), stage))
 
+    wanted = SearchChoice(effort="fast", **choice)
     with small_pairs():
-        found = search(
-            Job(project=home, task=5), SearchChoice(effort="fast", **choice), on_event=watch
-        )
+        found = search(Job(project=home, task=5), wanted, on_event=watch)
     return found.summary, seen
 
 
@@ -196,11 +195,8 @@ def test_a_project_of_two_is_saved_opened_and_taken_away(client, home, pair, tmp
 
 def test_what_is_drawn_on_either_figure_goes_to_it(pair: EscherTile, tmp_path: Path) -> None:
     folder = save_tiles([pair], tmp_path / "tile")
-    inside = [
-        shapely.Polygon(part.figure.silhouette_outline).representative_point()
-        for part in pair.figures
-    ]
-    one, two = ([own.x, own.y, 1.0] for own in inside)
+    outlines = [shapely.Polygon(part.figure.silhouette_outline) for part in pair.figures]
+    one, two = ([*own.representative_point().coords[0], 1.0] for own in outlines)
     stroke = {"colour": "#d02030", "width": 1.0, "points": [two[:2], one[:2]]}
     drawing = json.dumps({"eyes": [one], "second": {"strokes": [stroke], "eyes": [two]}})
     result, files, given_settings = with_drawing(drawing, folder, {}, {}, tmp_path / "drawn")

@@ -76,9 +76,8 @@ def test_the_first_tile_waits_for_nothing_twice(home: Path, monkeypatch) -> None
     near, put = escherizing.near_symmetry, tasks.put_tile
 
     def put_with_threads(*given: Any) -> None:
-        threads.update(
-            pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"
-        )
+        pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
+        threads.update(pool["num_threads"] for pool in pools)
         put(*given)
 
     monkeypatch.setattr(escherizing, "near_symmetry", lambda own: asked.append(own) or near(own))

@@ -67,9 +67,8 @@ def test_two_studios_do_not_share_a_folder(tmp_path: Path) -> None:
 def test_a_connection_that_says_nothing_is_closed() -> None:
     waits, closed = list[Any](), list[bool]()
     loop = SimpleNamespace(call_later=lambda seconds, call: waits.append((seconds, call)))
-    transport = SimpleNamespace(
-        close=lambda: closed.append(True), get_extra_info=lambda *_: None, write=lambda _: None
-    )
+    silent = {"get_extra_info": lambda *_: None, "write": lambda _: None}
+    transport = SimpleNamespace(close=lambda: closed.append(True), **silent)
     config = uvicorn.Config(_app, interface="asgi3", log_config=None, ws="none")
     config.load()
     own = PatientProtocol(config, ServerState(), {}, loop)  # pyright: ignore[reportArgumentType]
