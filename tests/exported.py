@@ -33,8 +33,8 @@ def scenes(
     return list(made.scenes), made.notes
 
 
-def sheet_content(scene: Scene, settings: ExportSettings) -> str | bytes:
-    """The content of a sheet's file."""
+def sheet_content(scene: Scene, settings: ExportSettings) -> Any:
+    """The content of a sheet's file: text or bytes."""
     form = settings.file_format
     return write_scene(scene, form, tolerance=settings.fine, dpi=settings.dpi, dxf=settings.dxf)
 

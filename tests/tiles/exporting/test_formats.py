@@ -21,7 +21,7 @@ from refusals import refused
 TILE = tile_of("IH3")
 
 
-def content(**options) -> str | bytes:
+def content(**options) -> Any:
     chosen = ExportSettings(**options)
     return sheet_content(scenes(TILE, chosen)[0][0], chosen)
 
@@ -29,7 +29,6 @@ def content(**options) -> str | bytes:
 @pytest.mark.parametrize("cut", ["none", "skeleton", "pieces"])
 def test_dxf_is_sound(cut) -> None:
     text = content(format="dxf", cut=cut, calibrate=True)
-    assert isinstance(text, str)
     document, lines = dxf_lines(text)
     auditor = document.audit()
     assert not auditor.errors
@@ -52,8 +51,6 @@ def test_dxf_is_sound(cut) -> None:
 def test_dxf_of_old_machines_has_the_same_lines() -> None:
     old = content(format="dxf", dxf="r12", cut="pieces", calibrate=True)
     new = content(format="dxf", cut="pieces", calibrate=True)
-    assert isinstance(old, str)
-    assert isinstance(new, str)
     document = ezdxf.read(io.StringIO(old))
     assert document.dxfversion == "AC1009"
     assert not document.audit().has_errors
@@ -70,7 +67,6 @@ def test_dxf_of_old_machines_has_the_same_lines() -> None:
 
 def test_the_calibration_mark_is_100_mm() -> None:
     text = content(format="dxf", calibrate=True)
-    assert isinstance(text, str)
     marks = [line for line in dxf_lines(text)[1] if line.layer.startswith("calib")]
     points = np.concatenate([line.points for line in marks])
     assert np.ptp(points[:, 0]) == pytest.approx(100, abs=1e-9)
@@ -83,7 +79,6 @@ def test_the_calibration_mark_is_100_mm() -> None:
 @pytest.mark.parametrize("cut", ["none", "skeleton"])
 def test_pdf_has_its_real_size_curves_and_no_fonts(cut) -> None:
     data = content(format="pdf", cut=cut, area=(210.0, 148.0))
-    assert isinstance(data, bytes)
     assert data == content(format="pdf", cut=cut, area=(210.0, 148.0))
     (box,) = re.findall(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+) ?\]", data)
     assert [float(side) / 72 * 25.4 for side in box] == pytest.approx([210, 148], abs=1e-4)
@@ -100,7 +95,6 @@ def test_pdf_has_its_real_size_curves_and_no_fonts(cut) -> None:
 
 def test_png_has_its_real_size() -> None:
     data = content(format="png", dpi=150.0, area=(127.0, 101.6))
-    assert isinstance(data, bytes)
     picture = Image.open(io.BytesIO(data))
     assert picture.size == (750, 600)
     assert picture.info["dpi"] == pytest.approx((150, 150), abs=0.1)
@@ -111,14 +105,12 @@ def test_png_has_its_real_size() -> None:
 
 def test_hairlines_show_in_a_png() -> None:
     data = content(format="png", cut="skeleton", outline=0.01, stroke="#ff0000", dpi=100.0)
-    assert isinstance(data, bytes)
     pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=int)
     assert (pixels[..., 1] < 100).mean() > 0.005
 
 
 def test_json_says_where_every_tile_is() -> None:
     text = content(format="json", clip=True)
-    assert isinstance(text, str)
     document = json.loads(text)
     assert document["units"] == "mm"
     assert (document["class"], document["group"]) == ("IH3", "pg")

@@ -216,25 +216,17 @@ def test_the_drawing_s_own_outline_is_not_drawn_beside_the_tile_s(fill: str | No
 
 
 def test_sheets_share_the_engraving_out() -> None:
-    tile = squirrel("IH4")
-    whole = {
-        **PAGE,
-        **{"cut": "skeleton", "clip": True, "eyes": ((*EYE, 60.0),), "area": (120.0, 90.0)},
-    }
-    one, several = (
-        scenes(tile, ExportSettings(**{**whole, "bed": bed}))[0] for bed in (None, (70.0, 60.0))
-    )
+    large: dict[str, Any] = {"cut": "skeleton", "clip": True, "eyes": ((*EYE, 60.0),)}
+    chosen = ExportSettings(**{**PAGE, **large, "area": (120.0, 90.0)})
+    beds: Any = (None, (70.0, 60.0))
+    one, several = (scenes(squirrel("IH4"), chosen.replace(bed=bed))[0] for bed in beds)
     assert len(several) == 4
-    areas = [
-        sum(
-            region_of(part).area
-            for scene in found
-            for part in scene.layers[0].items
-            if isinstance(part, PathPart)
-        )
-        for found in (one, several)
-    ]
-    assert areas[0] == pytest.approx(areas[1], rel=1e-6)
+
+    def engraved(found: Any) -> float:
+        parts = (part for scene in found for part in scene.layers[0].items)
+        return sum(region_of(part).area for part in parts if isinstance(part, PathPart))
+
+    assert engraved(one) == pytest.approx(engraved(several), rel=1e-6)
     for scene in several:
         low, high = np.array(scene.clip[:2]), np.array(scene.clip[2:])
         for curve in scene.curves(scene.layers[0]):

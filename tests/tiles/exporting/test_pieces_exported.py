@@ -28,7 +28,6 @@ def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:
     found = []
     for scene in scenes(tile, chosen)[0]:
         text = sheet_content(scene, chosen)
-        assert isinstance(text, str)
         assert "<use" not in text
         lines = dxf_lines(text)[1] if chosen.format == "dxf" else svg_lines(text)
         found.append(polygons([line for line in lines if line.layer == "cut"]))
@@ -135,7 +134,6 @@ def test_a_fit_test_cuts_two_neighbours_five_times() -> None:
     ((scene,), notes) = scenes(tile, chosen)
     assert any("clearances of 0.1, 0.15, 0.2, 0.3 and 0.4 mm" in note for note in notes)
     text = sheet_content(scene, chosen)
-    assert isinstance(text, str)
     lines = svg_lines(text)
     pieces = polygons([line for line in lines if line.layer == "cut"])
     dots = polygons([line for line in lines if line.layer == "score"])
@@ -196,7 +194,6 @@ def test_pieces_in_the_file(name: str, offset: float) -> None:
     chosen = ExportSettings(offset=offset, kerf=0.2, copies=2, **options)
     (scene,), _ = scenes(tile_of(name), chosen)
     text = sheet_content(scene, chosen)
-    assert isinstance(text, str)
     lines = svg_lines(text)
     cuts = polygons([line for line in lines if line.layer == "cut"])
     tile = shapely.Polygon(scene.prototiles[0])
@@ -223,7 +220,6 @@ OPTIONS = {"cut": "jigsaw", "area": AREA, "margin": MARGIN, "tile_size": SIZE}
 def faces(scene: Scene, form: Literal["svg", "dxf"] = "svg") -> list[shapely.Polygon]:
     """The faces between the lines of the file, as any program would find them."""
     text = sheet_content(scene, ExportSettings(format=form, **OPTIONS))
-    assert isinstance(text, str)
     found = dxf_lines(text)[1] if form == "dxf" else svg_lines(text)
     lines = [
         shapely.LineString([*line.points, *line.points[: int(line.closed)]])

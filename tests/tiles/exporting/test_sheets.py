@@ -47,7 +47,6 @@ def sheets_of(area, bed, **options):
         row, column = divmod(k, across)
         place = np.array([column * (scene.width - OVERLAP), row * (scene.height - OVERLAP)])
         text = sheet_content(scene, chosen)
-        assert isinstance(text, str)
         lines = [line._replace(points=line.points + place) for line in dxf_lines(text)[1]]
         found.append((place, (scene.width, scene.height), lines))
     return found
@@ -191,7 +190,6 @@ def drawn(tile: str | EscherTile, **options) -> tuple[Scene, list[Line]]:
     chosen = ExportSettings(format="svg", **options)
     (scene,), _ = scenes(tile_of(tile) if isinstance(tile, str) else tile, chosen)
     text = sheet_content(scene, chosen)
-    assert isinstance(text, str)
     return scene, svg_lines(text)
 
 

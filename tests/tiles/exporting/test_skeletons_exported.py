@@ -24,7 +24,6 @@ def lines_of(tile: Tile, **options) -> tuple[Scene, list[Line]]:
     chosen = ExportSettings(cut="skeleton", area=AREA, **options)
     (scene,), _ = scenes(tile, chosen)
     text = sheet_content(scene, chosen)
-    assert isinstance(text, str)
     return scene, dxf_lines(text)[1] if chosen.format == "dxf" else svg_lines(text, 8)
 
 

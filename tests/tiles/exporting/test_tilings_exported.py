@@ -27,9 +27,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 def text_of(tile: Tile | EscherTile, **options) -> str:
     chosen = ExportSettings(**options)
     found, _ = scenes(tile, chosen)
-    content = sheet_content(found[0], chosen)
-    assert isinstance(content, str)
-    return content
+    return sheet_content(found[0], chosen)
 
 
 @settings(max_examples=7, deadline=None)
