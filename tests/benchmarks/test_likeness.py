@@ -100,8 +100,9 @@ def test_first_tiles_are_kept_and_what_is_not_at_hand_is_left_out(load, tmp_path
     assert set(blind.rival(fresh)) == {"arap", "est"}
 
 
-def test_answers_become_ranks(load) -> None:
-    ranks = load("likeness_blind").ranks
+def test_answers_become_ranks_and_the_key_says_whose_they_are(load) -> None:
+    blind = load("likeness_blind")
+    ranks = blind.ranks
     assert ranks([3, 1, 2], "ranking", 3) == [2, 3, 1]
     assert ranks([5, 8, 5], "scores", 3) == [2.5, 1, 2.5]
     for answer, kind in (([1, 1, 2], "ranking"), ([1, 2], "scores"), ([1, 2, 11], "scores")):
@@ -109,10 +110,6 @@ def test_answers_become_ranks(load) -> None:
             ranks(answer, kind, 3)
     with refused("kind", kind=ValueError):
         ranks([1, 2, 3], "marks", 3)
-
-
-def test_the_key_says_whose_the_numbers_are(load) -> None:
-    blind = load("likeness_blind")
     key = {"rounds": {"2": {"bat": ["arap", "likeness"], "elk": ["likeness", "arap"]}}}
     answers = {"round": 2, "kind": "ranking", "answers": {"bat": [2, 1], "elk": [1, 2]}}
     rows = blind.judged(key, answers)

@@ -121,7 +121,9 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow, monkeypatch) -> 
     assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES
 
 
-def test_stars_are_written_in_any_encoding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_version_and_stars_in_any_encoding(orbiflow, monkeypatch) -> None:
+    outcome = orbiflow("--version")
+    assert (outcome.status, outcome.out, outcome.err) == (0, f"orbiflow {__version__}\n", "")
     for encoding, stars in (("utf-8", "★★★½"), ("cp1252", "*** 1/2"), ("ascii", "*** 1/2")):
         file = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
         monkeypatch.setattr(terminal, "output", Console(file=file, width=80))
@@ -162,8 +164,3 @@ def test_a_forced_tile_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert {path.name for path in written} == FILES
     for name in ("tile.svg", "tiling.svg"):
         assert "boot.json, IH21 (p6), NOT CERTIFIED" in (tmp_path / "IH21" / name).read_text()
-
-
-def test_the_version(orbiflow) -> None:
-    outcome = orbiflow("--version")
-    assert (outcome.status, outcome.out, outcome.err) == (0, f"orbiflow {__version__}\n", "")

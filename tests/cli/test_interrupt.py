@@ -137,7 +137,7 @@ class Clock:
         return self.now
 
 
-def test_a_line_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_every_ten_seconds_or_a_terminals_bar_alone(capsys, monkeypatch) -> None:
     clock = Clock()
     with Terminal(clock=clock) as shown:
         for second in range(31):
@@ -152,6 +152,12 @@ def test_a_line_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:
         shown(Progress(1.0, "fitting", "IH4", 1.0))
         clock.now += 60
         assert not shown.watch()  # there is no more to tell
+    screen = Console(file=io.StringIO(), force_terminal=True)
+    monkeypatch.setattr(terminal, "output", screen)
+    with Terminal(clock=clock) as shown:
+        shown(Progress(0.0, "fitting"))
+        clock.now += 60
+        shown(Progress(0.5, "fitting"))
     assert not capsys.readouterr().err
 
 
@@ -169,17 +175,6 @@ def test_what_was_done_before_does_not_count_as_speed(capsys: pytest.CaptureFixt
         "  80% after 3 min: 8 of 10",
         "  90% after 4 min: 9 of 10; about 4 min left",
     ]
-
-
-def test_a_terminal_has_its_bar_alone(capsys, monkeypatch) -> None:
-    screen = Console(file=io.StringIO(), force_terminal=True)
-    monkeypatch.setattr(terminal, "output", screen)
-    clock = Clock()
-    with Terminal(clock=clock) as shown:
-        shown(Progress(0.0, "fitting"))
-        clock.now += 60
-        shown(Progress(0.5, "fitting"))
-    assert not capsys.readouterr().err
 
 
 def test_work_that_says_nothing_is_told_of_too(capsys, monkeypatch, tmp_path) -> None:

@@ -96,11 +96,6 @@ EVERY_FIELD = {
 WORD = st.text("abcxyz{}0 ", min_size=1).map(str.strip).filter(bool)
 
 
-def test_fields_under_a_heading_of_their_own_come_last() -> None:
-    assert list(FIELDS)[:2] == ["cut", "size"]
-    assert list(FIELDS)[-2:] == ["width", "kerf"]
-
-
 def values_of(kind: Kind) -> st.SearchStrategy[Any]:
     """Values that a kind takes, as Python has them."""
     match kind:
@@ -269,9 +264,9 @@ def test_what_fields_say_of_themselves() -> None:
     assert (kerf.kind.unit, kerf.default_text) == ("mm", "0 mm")
     assert (copies.option.names, copies.default_text) == (("--copies", "-n"), "many")
     assert (clip.option.off, clip.default_text) == ("--whole", "")
-
-
-def test_a_tuple_from_the_command_line() -> None:
+    # those under a heading of their own come last
+    assert (list(FIELDS)[:2], list(FIELDS)[-2:]) == (["cut", "size"], ["width", "kerf"])
+    # tuples from the command line
     assert FIELDS["names"].parse(["a, b"]) == ("a", "b")
     assert FIELDS["pins"].parse(["1,2", "3,4"]) == ("1,2", "3,4")
     assert FIELDS["middle"].parse(["1,-2"]) == (1.0, -2.0)

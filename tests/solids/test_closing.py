@@ -127,7 +127,7 @@ def test_cells_touch_in_faces_and_never_close_a_ring():
     assert not ball.can_attach(number_of(ball, 2, 1, 2))
 
 
-def test_a_cell_is_not_detached_where_the_hole_would_touch_the_outside():
+def test_a_cell_is_not_detached_or_moved_where_the_hole_would_touch_the_outside():
     ball = cube_ball()
     for cell in itertools.product((1, 2, 3), (1, 2, 3), (1, 2)):
         ball.attach(number_of(ball, *cell))
@@ -137,9 +137,7 @@ def test_a_cell_is_not_detached_where_the_hole_would_touch_the_outside():
     assert ball.detach(number_of(ball, 1, 1, 2))
     # its corner is on the boundary since its neighbour has gone: the dent would meet it there
     assert not ball.detach(middle)
-
-
-def test_a_move_that_is_not_possible_changes_nothing():
+    # a move that is not possible changes nothing
     ball = cube_ball()
     for x in (1, 2, 3):
         ball.attach(number_of(ball, x, 2, 2))

@@ -248,9 +248,7 @@ def test_it_tells_how_far_it_is_and_stops() -> None:
     cancel.cancel()
     with pytest.raises(Cancelled), small_fills():
         fill(creature(), SMALL, cancel=cancel)
-
-
-def test_sizes_that_nobody_prints_become_usual() -> None:
+    # sizes that nobody prints become usual
     assert usual_size(creature()) == 60
     assert usual_size(creature().moved(50 * np.eye(3))) is None
     goal = SolidGoal.of(creature(), FillSettings())

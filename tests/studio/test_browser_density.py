@@ -21,6 +21,11 @@ def new_density(studio: RunningStudio) -> str:
     return studio.client.post("projects", json={"kind": "density"}).json()["id"]
 
 
+def give(page: Any, table: str) -> None:
+    file = {"name": "table.csv", "mimeType": "text/csv", "buffer": table.encode()}
+    page.set_input_files("input[type=file]", file)
+
+
 @pytest.fixture(scope="module", name="fitted")
 def fitted_fixture(studio: RunningStudio) -> str:
     """A density of two angles."""
@@ -36,8 +41,7 @@ def fitted_fixture(studio: RunningStudio) -> str:
 
 def test_a_fit_is_begun_held_and_stopped(page: Any, studio: RunningStudio) -> None:
     page.goto(f"/#/d/{new_density(studio)}")
-    table = {"name": "bends.csv", "mimeType": "text/csv", "buffer": TABLE.encode()}
-    page.set_input_files("input[type=file]", table)
+    give(page, TABLE)
     assert page.get_by_role("radio", name=re.compile("^Angles")).is_checked()
     assert page.get_by_role("cell", name="−170", exact=True).is_visible()
     assert serious_issues(page) == []
@@ -56,8 +60,7 @@ def test_hours_are_fitted_as_hours_and_unsaid_columns_are_asked_for(
 ) -> None:
     page.goto(f"/#/d/{new_density(studio)}")
     rows = "hour,minutes,when\n" + "".join(f"{k % 24}.5,{5 * k},9:30\n" for k in range(40))
-    table = {"name": "hours.csv", "mimeType": "text/csv", "buffer": rows.encode()}
-    page.set_input_files("input[type=file]", table)
+    give(page, rows)
     fit = page.get_by_role("button", name="Fit the density")
     assert page.get_by_label("How is hour counted?").input_value() == "cycle:24"
     assert "Not shown: when," in page.inner_text(".density")

@@ -214,6 +214,11 @@ def test_paths_cannot_be_set(client: Client) -> None:
             assert client.post(f"{address}/tasks", json=ask).status_code == 422
 
 
+HEADERS = [(b"host", b"localhost:8437"), (b"x-orbiflow", b"1")]
+SCOPE: dict[str, Any] = {"type": "http", "method": "PUT", "path": "/", "scheme": "http"}
+SCOPE |= {"headers": HEADERS, "query_string": b""}
+
+
 def begun(limits: Limits, parts: Iterator[bytes]) -> tuple[int, bytes]:
     """Return the status and body of a request whose body comes in these parts, and then nothing."""
     sent: list[dict[str, Any]] = []
@@ -232,9 +237,7 @@ def begun(limits: Limits, parts: Iterator[bytes]) -> tuple[int, bytes]:
     async def send(message: Any) -> None:
         sent.append(message)
 
-    headers = [(b"host", b"localhost:8437"), (b"x-orbiflow", b"1")]
-    scope = {"type": "http", "method": "PUT", "path": "/", "scheme": "http", "headers": headers}
-    asyncio.run(Guard(app, limits, port=8437)({**scope, "query_string": b""}, receive, send))
+    asyncio.run(Guard(app, limits, port=8437)(SCOPE, receive, send))
     return sent[0]["status"], sent[1]["body"]
 
 
@@ -267,13 +270,10 @@ def test_no_more_bodies_at_once_than_allowed() -> None:
         async def send(message: Any) -> None:
             statuses.append(message.get("status"))
 
-        headers = [(b"host", b"localhost:8437"), (b"x-orbiflow", b"1")]
-        scope = {"type": "http", "method": "PUT", "path": "/", "scheme": "http", "headers": headers}
-        scope["query_string"] = b""
         own = Guard(app, limits, port=8437)
-        first = asyncio.create_task(own(scope, None, send))  # pyright: ignore[reportArgumentType]
+        first = asyncio.create_task(own(SCOPE, None, send))  # pyright: ignore[reportArgumentType]
         await inside.wait()
-        await own(scope, None, send)  # pyright: ignore[reportArgumentType]
+        await own(SCOPE, None, send)  # pyright: ignore[reportArgumentType]
         first.cancel()
         return statuses
 

@@ -74,9 +74,8 @@ def test_settings_that_would_be_refused_are_not_offered(client: Client, chosen: 
     for value in choices:
         for name, given in GIVEN.items():
             needed = properties[name]["x-only-with"]
-            offered = all(
-                ({chosen: value}.get(other)) in allowed for other, allowed in needed.items()
-            )
+            own = {chosen: value}
+            offered = all(own.get(other) in allowed for other, allowed in needed.items())
             try:
                 ArtSettings(**{chosen: value, name: given})
             except SettingError:

@@ -233,16 +233,13 @@ def test_a_tile_that_is_gone_cannot_be_taken_away(client: Client, project: str) 
     assert "no such tile" in worked(client, project, "export", tile=tile)["error"]
 
 
-def test_views_are_merged_and_say_who_changed_them(client: Client, project: str) -> None:
+def test_views_are_merged_and_no_answer_names_a_folder(client: Client, project: str) -> None:
     tab = {"X-Orbiflow-Client": "tab one"}
     client.patch(project, json={"view": {"a": 1, "b": {"c": 2}}}, headers=tab)
     client.patch(project, json={"view": {"b": 3}, "name": "a/b\n"}, headers=tab)
     found = client.get(project).json()
     assert found["view"] == {"a": 1, "b": 3}
     assert found["name"] == "b"
-
-
-def test_no_answer_names_a_folder_of_this_machine(client: Client, project: str) -> None:
     paths = (project, "/api/projects", "/api/about", f"{project}/tiles/{tile_number(900, 0)}")
     for path in paths:
         assert str(client.studio.store.folder) not in client.get(path).text
