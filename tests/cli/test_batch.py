@@ -65,12 +65,9 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     endless = f"import sys; sys.path.append({TESTS!r})\nimport runtime.endless_process\n"
     command = [sys.executable, "-u", "-c", endless + LAUNCH, "batch", tmp_path / "in"]
     command += ["--out", tmp_path / "out", "--workers", "2", *QUICK]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(
-        [str(part) for part in command],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        list(map(str, command)), text=True, start_new_session=True, **pipes
     ) as process:
         assert process.stdout is not None
         while "silhouettes for 2 processes" not in (line := process.stdout.readline()):

@@ -29,6 +29,7 @@ from refusals import refused
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text()
+rows = st.lists(words).map(tuple)
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | numbers | words,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(words, inner, max_size=3),
@@ -37,12 +38,8 @@ plain = st.recursive(
 EVENTS = st.one_of(
     st.builds(Started, words),
     st.builds(Note, words, st.booleans()),
-    st.builds(
-        Table, words, st.lists(words).map(tuple), st.lists(st.lists(words).map(tuple)).map(tuple)
-    ),
-    st.builds(
-        Progress, numbers, words, st.none() | words, st.none() | numbers, st.none() | numbers
-    ),
+    st.builds(Table, words, rows, st.lists(rows).map(tuple)),
+    st.builds(Progress, numbers, words, st.none() | words, *[st.none() | numbers] * 2),
     st.builds(Preview, words, numbers, numbers),
     st.builds(TileFound, words, numbers, numbers, st.booleans()),
     st.builds(ClassFailed, words, words),

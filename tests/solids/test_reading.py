@@ -307,20 +307,13 @@ def test_a_huge_mesh_is_simplified(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("name", ["a.stl", "b.stl", "a.obj", "a.ply", "b.ply", "a.3mf", "a.glb"])
 def test_broken_files_are_refused(name: str, tmp_path: Path) -> None:
     globe = ball(3, segments=8)
-    own = trimesh.Trimesh(globe.points, globe.faces, process=False)
-    contents: dict[str, Any] = {
-        "a.stl": stl(globe),
-        "b.stl": stl_text(globe),
-        "a.obj": obj(globe),
-        "a.ply": own.export(file_type="ply"),
-        "b.ply": own.export(file_type="ply", encoding="ascii"),
-        "a.3mf": three_mf(globe),
-        "a.glb": own.export(file_type="glb"),
-    }
+    own: Any = trimesh.Trimesh(globe.points, globe.faces, process=False)
+    text = own.export(file_type="ply", encoding="ascii")
+    contents = {"a.stl": stl(globe), "b.stl": stl_text(globe), "a.obj": obj(globe)}
+    contents |= {"a.ply": glb(globe, "ply"), "b.ply": text, "a.glb": glb(globe)}
+    contents |= {"a.3mf": three_mf(globe)}
     # the process of these bounds what this test would otherwise see
-    read = read_here if name in ("a.3mf", "a.glb") else read_mesh
-    whole = contents[name]
-    whole = whole.encode() if isinstance(whole, str) else whole
+    read, whole = read_here if name in ("a.3mf", "a.glb") else read_mesh, contents[name]
     rng, refusals = np.random.default_rng(5), list[str]()
     for k in range(40):
         broken = bytearray(whole)

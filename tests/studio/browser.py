@@ -41,12 +41,9 @@ class RunningStudio:
             self.port = free.getsockname()[1]
         self.folder, self.saved = folder, b""
         self.address = f"http://127.0.0.1:{self.port}"
-        self.client = httpx.Client(
-            base_url=f"{self.address}/api/",
-            headers={"X-Orbiflow": "1"},
-            timeout=PATIENCE,
-            trust_env=False,
-        )
+        given: dict[str, Any] = {"timeout": PATIENCE, "trust_env": False}
+        given |= {"base_url": f"{self.address}/api/", "headers": {"X-Orbiflow": "1"}}
+        self.client = httpx.Client(**given)
 
     def start(self) -> None:
         """Start the server and wait until it answers."""

@@ -153,9 +153,8 @@ def test_a_refusal_springs_back_is_said_once_and_makes_way(closeup, tile) -> Non
 def test_a_check_shows_how_far_it_is_and_can_be_stopped(page, studio, searched: str, tile) -> None:
     running = {"id": 999, "operation": "pull", "state": "running", "share": 0.4, "what": "checking"}
     event = f"event: task\ndata: {json.dumps(running)}\n\n"
-    page.route(
-        "**/events?after*", lambda r: r.fulfill(content_type="text/event-stream", body=event)
-    )
+    stream = {"content_type": "text/event-stream", "body": event}
+    page.route("**/events?after*", lambda route: route.fulfill(**stream))
     held, stopped = list[Any](), list[str]()
     page.route("**/by-hand/pull", lambda route: held.append(route))
     page.route("**/tasks/999/cancel", lambda r: stopped.append(r.request.url) or r.fulfill(json={}))
