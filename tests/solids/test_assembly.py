@@ -231,11 +231,7 @@ def test_a_tile_with_a_head_over_its_legs_comes_apart_once_it_is_sorted(monkeypa
     monkeypatch.setattr(separable, "DIRECTIONS", 12)
     group, body = group_named("P -1"), creature()
     distance = SignedDistance.of_mesh(body, 0.1)
-
-    def depth(points: Array) -> Array:
-        return -distance(points)
-
-    tile = separable_tile(700, depth, body, group)
+    tile = separable_tile(700, lambda points: -distance(points), body, group)
     assert tile is not None
     assert certify_solid(group, tile).valid
     size = float(np.ptp(tile.points, axis=0).max())

@@ -86,12 +86,9 @@ def test_a_flow_fits_a_body_and_gives_the_same_each_time(monkeypatch):
     group = group_named("P -1")
     body = ellipsoid(DirichletDomain(group).site)
     distance = SignedDistance.of_mesh(body, 0.05)
-
-    def depth(points):
-        return -distance(points)
-
     start = dirichlet_cell(group, best_site(body, group), 250).mesh
-    tile, again = (flowed_tile(depth, body, group, stages=QUICK) for _ in range(2))
+    given = (lambda points: -distance(points)), body, group
+    tile, again = (flowed_tile(*given, stages=QUICK) for _ in range(2))
     np.testing.assert_array_equal(tile.points, again.points)
     assert certify_solid(group, tile).is_ball
     assert mean_overlap(tile, body) > mean_overlap(start, body)
