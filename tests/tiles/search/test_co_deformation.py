@@ -117,7 +117,8 @@ def test_finalists_are_in_order_and_told() -> None:
 
 
 def test_a_class_is_given_up_where_most_shapes_cross_themselves(monkeypatch) -> None:
-    own = squirrel_orientations(), CLASSES["IH5"], SMALL
+    several = replace(SMALL, starts=4, finalists=2, carved=2)
+    own = squirrel_orientations(), CLASSES["IH5"], several
     monkeypatch.setattr(bending, "MAX_CROSSED_SHARE", -0.1)
     assert bent_tiles(*own, may_give_up=True) == ([], 0)
     assert bent_tiles(*own)[0]
