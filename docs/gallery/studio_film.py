@@ -138,7 +138,7 @@ def take_away(film: Film) -> None:
     page.wait_for_selector(".form")
     page.get_by_role("radio", name="Mug").check()
     film.rest(400)
-    film.click(*centre(page, "text=Make it"))
+    film.click(*centre(page, "text=Download"))
     page.wait_for_selector(".preview img", timeout=PATIENCE)
     page.wait_for_function("document.querySelector('.preview img').complete")
     page.evaluate("scrollTo(0, 0)")

@@ -110,7 +110,7 @@ def take_away(page: Page, path: str) -> None:
     page.goto(f"/#/{path}")
     page.wait_for_selector(".form")
     page.get_by_role("radio", name="Pieces for a laser").check()
-    page.get_by_text("Make it", exact=True).click()
+    page.get_by_role("button", name="Download", exact=True).click()
     page.wait_for_selector(".said a", timeout=PATIENCE)
     page.wait_for_timeout(700)
     page.evaluate("scrollTo(0, 0)")

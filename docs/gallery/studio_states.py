@@ -108,7 +108,7 @@ class Visit:
     def make(self, kind: str) -> None:
         """Take something away."""
         self.take(kind)
-        self.page.get_by_role("button", name="Make it").click()
+        self.page.get_by_role("button", name="Download").click()
         self.page.wait_for_selector(".preview img", timeout=PATIENCE)
 
     def picture(self, **silhouette: Any) -> None:
@@ -222,14 +222,14 @@ def take_running(on: Visit) -> None:
     on.take("Film")
     body = {"task": {**TASK, "operation": "animate", "state": "running", "what": "drawing"}}
     on.answer("**/tasks", body=body)
-    on.page.get_by_role("button", name="Make it").click()
+    on.page.get_by_role("button", name="Download").click()
     on.page.wait_for_selector("progress")
 
 
 def take_refused(on: Visit) -> None:
     on.take("Print or cut")
     on.page.get_by_label("How long is one tile?").fill("much")
-    on.page.get_by_role("button", name="Make it").click()
+    on.page.get_by_role("button", name="Download").click()
     on.page.wait_for_selector(".field .error")
 
 
