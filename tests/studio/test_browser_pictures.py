@@ -90,7 +90,7 @@ def test_what_is_added_of_the_background_is_no_colour(studio: RunningStudio) -> 
 
 def test_it_is_there_by_default_and_no_seam_shows(browser, studio, coloured, tile) -> None:
     for ratio in (1, 1.5):
-        size = {"viewport": {"width": 900, "height": 800}, "device_scale_factor": ratio}
+        size = {"viewport": {"width": 700, "height": 500}, "device_scale_factor": ratio}
         context = browser.new_context(base_url=studio.address, reduced_motion="reduce", **size)
         own = context.new_page()
         close_up(own, coloured, tile, tint=0)
