@@ -69,12 +69,6 @@ def bring_picture(film: Film) -> None:
     film.go(*centre(page, ".drop"), frames=9)
     film.carried = None
     page.evaluate(DROP, [list(ANIMAL.read_bytes()), "turtle.svg"])
-    page.wait_for_selector("canvas.reading[aria-busy=false]")
-    project = page.url.split("/")[-2]
-    quick = {"view": {"search": {"effort": "fast"}}}
-    page.request.patch(f"/api/projects/{project}", data=quick, headers={"X-Orbiflow": "1"})
-    film.rest(700)
-    film.click(*centre(page, "text=Find tiles"))
 
 
 def watch_search(film: Film) -> None:
