@@ -10,6 +10,7 @@ import pytest
 import torch
 from _pytest.doctest import DoctestModule
 from hypothesis import HealthCheck, register_random, settings
+from hypothesis.internal.conjecture import providers
 
 from bent_tiles import bent_tile_fixture, equivariant_fixture  # noqa: F401
 from small_searches import small_searches_fixture  # noqa: F401
@@ -29,6 +30,8 @@ settings.register_profile(
     "same", settings.get_profile("explore"), derandomize=True, database=None, max_examples=8
 )
 settings.load_profile("explore" if os.environ.get("ORBIFLOW_EXPLORE") else "same")
+# or else inputs hold numbers from the source of whichever modules a worker has imported
+providers.is_local_module_file = lambda _: False
 
 
 # what it does when it is imported is for processes alone, and the search for doctests imports all
