@@ -164,9 +164,11 @@ MET: set[tuple[int, str]] = set()
 
 def note(*words: object) -> None:
     """Append a line to this process's file, where marks are kept."""
-    if MARKS in os.environ:
-        with Path(os.environ[MARKS], str(os.getpid())).open("a") as file:
-            file.write("\t".join(map(str, words)) + "\n")
+    if MARKS in os.environ:  # not by what tests replace
+        path = f"{os.environ[MARKS]}/{os.getpid()}"
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        os.write(file, ("\t".join(map(str, words)) + "\n").encode())
+        os.close(file)
 
 
 def mark(number: int) -> None:
@@ -197,8 +199,8 @@ def copied(checkout: Path, folder: Path) -> Path:
 
 def environment(folder: Path, **more: str) -> dict[str, str]:
     """Return the environment of tests in a copy."""
-    paths = map(str, (folder / "src", folder / "tests", Path(__file__).parent))
-    return os.environ | {"PYTHONPATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1", **more}
+    paths = f"{folder}/src{os.pathsep}{folder}/tests{os.pathsep}{Path(__file__).parent}"
+    return os.environ | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1", **more}
 
 
 class Record(NamedTuple):
@@ -297,20 +299,19 @@ def outcome(
     text, (module, own) = file.read_text("utf-8"), functions(file)
     function = next(one for one in own if ast.unparse(one) == mutation.text)
     how = change(places(function)[mutation.place])
-    said = {"file": str(home), "function": function.name, "change": how}
+    said = {"file": str(home), "function": function.name, "change": how, "result": "not reached"}
     if not tests:
-        return said | {"result": "not reached"}
+        return said
     file.write_text(ast.unparse(ast.fix_missing_locations(module)), "utf-8")
     failed = failing(tests, folder, limit, *["-x"] * sure)
     file.write_text(text, "utf-8")
     if failed and not sure:
         also = failing(failed, folder, limit)
-        failed = [] if also is None else sorted({*failed} - {*also})
-    # what does not end is caught, too: a loop that counts wrongly
-    return said | {
-        "result": "survived" if failed == [] else "caught",
-        "by": str((failed or [""])[0]),
-    }
+        failed = None if also is None else sorted({*failed} - {*also})
+    # what does not end is caught, too, if tests do otherwise: a loop that counts wrongly
+    ends = failed is not None or sure
+    result = "survived" if failed == [] else "caught" if ends else "not known"
+    return said | {"result": result, "by": (failed or [""])[0]}
 
 
 def tests_of_room(file: str, checkout: Path) -> list[str]:
@@ -332,7 +333,6 @@ def main() -> None:
     options = parser.parse_args()
     work: Path = options.keep or Path(tempfile.mkdtemp())
     work.mkdir(parents=True, exist_ok=True)
-
     here, there = homes(ROOT), homes(options.before or ROOT)
     sites = [
         Mutation(text, place)
@@ -347,7 +347,7 @@ def main() -> None:
     found = Record({int(number): tests for number, tests in met.items()}, seconds, failed)
 
     def results(name: str, checkout: Path, tests: dict[int, list[str]], limit: float) -> Any:
-        """Make the changes in copies of a checkout, some side by side, and keep what came of them."""
+        """Make changes in copies of a checkout, some side by side, and keep what came of them."""
         file, copies, where = work / f"{name}.json", Queue[Path](), homes(checkout)
         done: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
         for number in range(options.processes):
@@ -370,9 +370,9 @@ def main() -> None:
     now = results("now", ROOT, every, 90 + 5 * options.seconds)
     print(dict(Counter(one["result"] for one in now.values())))
     open_ = {int(number): one["file"] for number, one in now.items() if one["result"] != "caught"}
-    if options.before:
-        rooms = {number: tests_of_room(file, options.before) for number, file in open_.items()}
-        before = results("before", options.before, rooms, 600.0)
+    if old := options.before:
+        rooms = {number: tests_of_room(file, old) for number, file in open_.items()}
+        before = results("before", old, rooms, 600.0)
         lost = [number for number in open_ if before[str(number)]["result"] == "caught"]
         print(f"caught before, and not now: {len(lost)}")
         print(*(before[str(number)] for number in lost), sep="\n")
