@@ -25,11 +25,12 @@ from studio_pictures import IMAGES, PATIENCE, TALL, keep, make_pictures
 from studio_screen import BACK, EYE, Film, centre, in_window, outline_in_window
 
 ANIMAL = Path(orbiflow.__file__).parent / "studio" / "animals" / "turtle.svg"
+SHAPE = IMAGES.parents[1] / "examples" / "silhouettes" / "turtle.png"
 FILMED: ViewportSize = {"width": 1080, "height": 675}
 
 DROP = """async ([bytes, name]) => {
     const files = new DataTransfer();
-    files.items.add(new File([new Uint8Array(bytes)], name, { type: "image/png" }));
+    files.items.add(new File([new Uint8Array(bytes)], name, { type: "image/svg+xml" }));
     const given = new Event("drop", { bubbles: true, cancelable: true });
     Object.defineProperty(given, "dataTransfer", { value: files });
     document.body.dispatchEvent(given);
@@ -63,7 +64,7 @@ def bring_picture(film: Film) -> None:
     page = film.page
     page.wait_for_selector(".animal img")
     film.rest(500)
-    with Image.open(ANIMAL) as picture:
+    with Image.open(SHAPE) as picture:
         film.carried = picture.convert("LA").resize((130, 122))
     film.pointer = (1050.0, 640.0)
     film.go(*centre(page, ".drop"), frames=9)
