@@ -32,6 +32,7 @@ from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.likeness import Likeness, mutual_iou
 from orbiflow.tiles.search import ClassFinalists, Goal
 from orbiflow.tiles.search.likeness_search import SKETCH
+from orbiflow.tiles.search.search_method import Sketches
 from orbiflow.tiles.search.search_record import best_of
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import animal, searched
@@ -434,3 +435,8 @@ def test_which_classes_are_searched_is_known_before() -> None:
     mirrored = Target.from_polygon([[0, 0], [4, 0], [4, 3], [3, 3], [2, 5], [1, 3], [0, 3]])
     assert "IH12" in searched_classes(mirrored, EscherizeSettings())
     assert searched_classes(animal("squirrel.dat"), EscherizeSettings()) == list(NINE)
+
+
+def test_sketches_are_of_every_class_the_quickest_first() -> None:
+    order = Sketches(OverlapSearch()).in_order(["IH69", "IH1", "IH4"])
+    assert order == ["IH4", "IH1", "IH69"]
