@@ -31,7 +31,7 @@ settings.register_profile(
 )
 settings.load_profile("explore" if os.environ.get("ORBIFLOW_EXPLORE") else "same")
 # or else inputs hold numbers from the source of whichever modules a worker has imported
-providers.is_local_module_file = lambda _: False
+pytest.MonkeyPatch().setattr(providers, "is_local_module_file", lambda _: False)
 
 
 # what it does when it is imported is for processes alone, and the search for doctests imports all

@@ -237,7 +237,7 @@ class _Choice:
         if not wanted:
             clocks = [k for k in self.free if self._has_clocks(k)]
             raise SettingError(
-                literal(f"there is no column of numbers among {listing(self._names(self.free))}")
+                literal(f"no column of numbers is left among {listing(self.table.names)}")
                 + (f": {HOURS}" if clocks else "; specify with {columns} which they are")
             )
         columns = {k: self._role(k, role) for k, role in wanted.items()}

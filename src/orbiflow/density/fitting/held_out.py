@@ -137,18 +137,19 @@ def stacking_weights(
     >>> stacking_weights(table).round(decimals=2)
     tensor([1., 0.])
     """
-    relative = (table - table.amax(dim=0)).exp().numpy()
-    weights = np.ones_like(relative[:, 0]) if start is None else start.to(table).numpy()
-    weights = weights / weights.sum()
-    counts = np.ones_like(relative[0]) if row_weights is None else row_weights.to(table).numpy()
-    shares = counts / counts.sum()
+    first = torch.ones_like(table[:, 0]) if start is None else start.to(table)
+    counts = torch.ones_like(table[0]) if row_weights is None else row_weights.to(table)
+    relative, weights, shares = (
+        own.detach().cpu().numpy()
+        for own in ((table - table.amax(dim=0)).exp(), first / first.sum(), counts / counts.sum())
+    )
     for iteration in range(MAX_ITERATIONS):
         ratio = relative @ (shares / (weights @ relative))
         if iteration % ITERATIONS_PER_CHECK == 0 and float(ratio.max()) - 1 < TOLERANCE_NATS:
             break
         weights = weights * ratio
         weights = weights / weights.sum()
-    return torch.as_tensor(weights)
+    return torch.as_tensor(weights).to(table)
 
 
 def supported_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:

@@ -86,6 +86,7 @@ def moments(kappa: Numbers, width: int) -> Moments[Numbers]:
 def concentration_for(mean: Tensor, below: Tensor, width: int) -> Tensor:
     """Return concentrations (...) of densities that have these mean cosines, from 0 to below 1.
 
+    They are not tracked by autograd.
     `below` is 1 less the mean cosine, to its own digits (Banerjee and others, Clustering on the unit
     hypersphere using von Mises-Fisher distributions, 2005; then Newton).
     """
