@@ -332,3 +332,22 @@ def test_machines_are_kept_by_name_and_lengths_shown_in_inches(page, studio, sea
     assert asked_for(page) == wanted
     page.get_by_role("button", name="Forget it").click()
     machine.locator("option", has_text="my K40").wait_for(state="detached")
+
+
+def test_a_machine_is_chosen_only_in_the_form_that_has_its_settings(page, studio, searched) -> None:
+    from playwright.sync_api import expect
+
+    taking(page, studio, searched)
+    machine, laser = page.get_by_label("Machine and material"), "Pieces for a laser"
+    page.get_by_role("radio", name=laser).check()
+    page.get_by_label("Width of the machine").fill("0.2")
+    page.get_by_role("button", name="Keep these settings").click()
+    page.get_by_label("Name", exact=True).fill("my  K40")
+    page.get_by_role("button", name="Keep", exact=True).click()
+    for thing, chosen in ((laser, "my K40"), ("Jigsaw", ""), (laser, "my K40")):
+        page.get_by_role("radio", name=thing).check()
+        expect(machine).to_have_value(chosen)
+    taking(page, studio, studio.with_tiles())
+    page.get_by_role("radio", name=laser).check()
+    expect(machine.get_by_role("option", name="my K40")).to_be_attached()
+    assert machine.input_value() == ""

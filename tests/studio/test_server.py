@@ -57,6 +57,38 @@ def test_an_eye_that_is_a_hole_is_something_to_see(client: Client) -> None:
         assert client.get(address).json()["silhouette"]["coloured"] is coloured
 
 
+def oval(ground: Any, *inks: Any) -> Image.Image:
+    """An oval of one colour, or of two beside each other, on a ground."""
+    picture = ground if isinstance(ground, Image.Image) else Image.new("RGB", (240, 160), ground)
+    ImageDraw.Draw(picture).ellipse((50, 40, 190, 120), fill=inks[0])
+    ImageDraw.Draw(picture).chord((50, 40, 190, 120), 90, 270, fill=inks[-1])
+    return picture
+
+
+def test_only_what_can_hardly_be_misread_is_clear(client: Client) -> None:
+    meadow = Image.merge(
+        "RGB",
+        [Image.linear_gradient("L").resize((240, 160))] * 2 + [Image.new("L", (240, 160), 90)],
+    )
+    two, edge = oval("white", "black"), oval("white", "black")
+    ImageDraw.Draw(two).ellipse((5, 5, 40, 30), fill="black")
+    ImageDraw.Draw(edge).rectangle((0, 60, 240, 160), fill="black")
+    cases = {
+        "one colour": (oval("white", "black"), True),
+        "cut out": (oval(Image.new("RGBA", (240, 160)), "red", "blue"), True),
+        "two colours": (oval("white", "red", "blue"), False),
+        "photograph": (oval(meadow, "brown"), False),
+        "a part left out": (two, False),
+        "hardly any border": (edge, False),
+    }
+    for case, (picture, is_clear) in cases.items():
+        address, file = new_project(client), io.BytesIO()
+        picture.save(file, "PNG")
+        done(client, client.put(f"{address}/input?name=oval.png", content=file.getvalue()))
+        silhouette = client.get(address).json()["silhouette"]
+        assert silhouette["clear"] is is_clear, case
+
+
 @pytest.mark.parametrize("name", ["turtle", "frog", "barbet"])
 def test_an_animal_that_was_drawn_is_one_shape_with_something_in_it(client, name: str) -> None:
     address = new_project(client)

@@ -23,11 +23,11 @@ def profiles(here: Studio) -> dict[str, Any]:
 
 @routes("PUT", "/profiles")
 async def keep(request: Request, here: Studio, name: str = "") -> dict[str, Any]:
-    """Keep settings under a name."""
+    """Keep settings under a name, and return it beside what `profiles` does."""
     from orbiflow.tiles import Profiles
 
-    await run_in_threadpool(Profiles().keep, name, await body_object(request))
-    return profiles(here)
+    title = await run_in_threadpool(Profiles().keep, name, await body_object(request))
+    return {**profiles(here), "name": title}
 
 
 @routes("DELETE", "/profiles")

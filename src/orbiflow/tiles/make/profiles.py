@@ -48,8 +48,8 @@ class Profiles:
         kept = read_json(self.file, "profiles by name")
         return {name: self._checked(name, settings) for name, settings in kept.items()}
 
-    def keep(self, name: str, settings: Mapping[str, Any]) -> None:
-        """Keep settings under a name, in place of what it had."""
+    def keep(self, name: str, settings: Mapping[str, Any]) -> str:
+        """Keep settings under a name, in place of what it had; return it with single blanks."""
         title = " ".join(name.split())
         if not title or len(title) > LONGEST_NAME or not title.isprintable():
             raise OrbiflowError(f"a profile's name has 1 to {LONGEST_NAME} letters")
@@ -57,6 +57,7 @@ class Profiles:
         if len(kept) > MOST_PROFILES:
             raise OrbiflowError(f"there are {MOST_PROFILES} profiles; forget one of them first")
         self._write(kept)
+        return title
 
     def forget(self, name: str) -> None:
         """Remove a profile, if it is there."""

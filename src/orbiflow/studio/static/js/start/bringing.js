@@ -136,15 +136,10 @@ export class Bringing {
     return this.trying(async () => {
       const { id } = await this.api.post("projects", { kind: "tile", name });
       const { silhouette } = await this.kept(id, () => send(id));
-      if (silhouette?.clear) {
-        await this.api.post(`projects/${id}/tasks`, { operation: "search", settings: {} });
-        if (!this.closed) {
-          toast(
-            "Looking for tiles of the shape that was read. Is it not right? Mend it in “Picture”.",
-          );
-        }
-      }
-      this.go(silhouette?.clear ? `p/${id}` : `p/${id}/picture`);
+      if (!silhouette?.clear || this.closed) return this.go(`p/${id}/picture`);
+      await this.api.post(`projects/${id}/tasks`, { operation: "search", settings: {} });
+      toast("Looking for tiles of the shape that was read. Is it not right? Mend it in “Picture”.");
+      return this.go(`p/${id}`);
     }, `Reading ${name} …`);
   }
 

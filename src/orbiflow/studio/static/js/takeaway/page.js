@@ -23,7 +23,7 @@ const ON = {
   picture: ["export", "art", "animate"],
 };
 const NEVER = "tile result out force picture drawing eyes second_eyes tint".split(" "); // what the page itself sets, or drawings hold
-/** What was chosen for tiles of each project: the thing, and the settings of each. */
+/** What was chosen for tiles of each project: the thing, and the settings and the machine of each. */
 const KEPT = {};
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
@@ -57,7 +57,7 @@ class TakeawayPage {
     this.navigate = navigate;
     this.card = card;
     this.place = `projects/${project.id}`;
-    this.kept = KEPT[project.id] ??= { thing: "poster" };
+    this.kept = KEPT[project.id] ??= { thing: "poster", machines: {} };
     this.about = about;
     this.look = lookOf(project, about);
     this.keepLook = keeper(api, project);
@@ -239,7 +239,7 @@ class TakeawayPage {
     put(
       this.wishes,
       this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)),
-      machine && profiles(this.api, this.form),
+      machine && profiles(this.api, this.form, this.kept.machines[thing] ??= {}),
       this.form,
       choice("Lengths in", [["mm", "mm"], ["in", "inches"]], unit(), (/** @type {any} */ own) => {
         showIn(own);

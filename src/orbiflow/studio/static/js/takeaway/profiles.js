@@ -3,16 +3,16 @@
 import { button, dialog, h, put, row, stack, trying, unique } from "../dom.js";
 
 /**
- * The choice of a profile for a form.
+ * The choice of a profile for a form; `memory` keeps its name while the form's values are kept.
  *
  * @param {Api} api
  * @param {any} form
+ * @param {{ profile?: string }} memory
  */
-export function profiles(api, form) {
-  let chosen = "";
+export function profiles(api, form, memory) {
   const id = unique("profile");
   const list = h("select", { id, onchange: () => take(list.value) });
-  const drop = button("Forget it", () => change("remove", chosen), { kind: "quiet" });
+  const drop = button("Forget it", () => change("remove", memory.profile), { kind: "quiet" });
   const root = h(
     "div",
     { class: "field" },
@@ -20,21 +20,21 @@ export function profiles(api, form) {
     list,
     row(button("Keep these settings …", keep, { kind: "quiet" }), drop),
   );
-  /** @type {{ settings: string[], kept: Record<string, any> }} */
+  /** @type {{ settings: string[], kept: Record<string, any>, name?: string }} */
   let told = { settings: [], kept: {} };
 
   function show() {
-    if (!(chosen in told.kept)) chosen = "";
+    if (!(memory.profile in told.kept)) memory.profile = "";
     put(
       list,
       h("option", { value: "" }, "None in particular"),
       Object.keys(told.kept).map((name) => h("option", { value: name }, name)),
     );
-    list.value = chosen;
-    drop.hidden = !chosen;
+    list.value = memory.profile;
+    drop.hidden = !memory.profile;
   }
   function take(name) {
-    chosen = name;
+    memory.profile = name;
     show();
     form.take(told.settings, told.kept[name] ?? {});
   }
@@ -42,32 +42,27 @@ export function profiles(api, form) {
   const change = (how, name, body = {}) =>
     trying(async () => {
       told = await api[how](`profiles?name=${encodeURIComponent(name)}`, body);
-      if (how === "put") chosen = name;
+      memory.profile = told.name;
       show();
     });
   async function keep() {
-    const box = h("input", { type: "text", maxlength: 80, value: chosen, "aria-label": "Name" });
+    const box = h("input", {
+      type: "text",
+      maxlength: 80,
+      value: memory.profile,
+      "aria-label": "Name",
+    });
     const name = await dialog("Keep machine and material", (close) =>
       stack(
         h("p", "Give them a name, such as “my K40, 3 mm birch”. The command line takes it, too."),
         box,
-        h(
-          "footer",
-          button("Keep", () => close(box.value.trim().replace(/\s+/g, " ")), { kind: "primary" }),
-        ),
+        h("footer", button("Keep", () => close(box.value.trim()), { kind: "primary" })),
       ));
-    if (name) await change("put", name, values());
+    const values = Object.entries(form.values()).filter(([own]) => told.settings.includes(own));
+    if (name) await change("put", name, Object.fromEntries(values));
   }
-  const values = () =>
-    Object.fromEntries(
-      Object.entries(form.values()).filter(([own]) => told.settings.includes(own)).sort(),
-    );
   trying(async () => {
     told = await api.get("profiles");
-    const now = JSON.stringify(values());
-    const holds = ([_, kept]) =>
-      JSON.stringify(Object.fromEntries(Object.entries(kept).sort())) === now;
-    chosen = Object.entries(told.kept).find(holds)?.[0] ?? "";
     show();
   });
   return root;
