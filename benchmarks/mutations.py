@@ -11,7 +11,7 @@ how many were caught, survived, or lie where no test goes, and all but the first
 
 With `--before`, only places are chosen whose function reads the same in that other checkout, and of
 what survived here the tests of its room there are tried, too: what they catch is what was lost since.
-`--keep` is a folder that keeps what was done, so that a run which was ended goes on.
+`--keep` is the folder that keeps what was done, so that a run which was ended goes on.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -190,10 +189,8 @@ def copied(checkout: Path, folder: Path) -> Path:
     shutil.rmtree(folder, ignore_errors=True)
     left = shutil.ignore_patterns(".git", ".venv", "out", "__pycache__", ".*_cache")
     shutil.copytree(checkout, folder, ignore=left, symlinks=True)
-    subprocess.run(
-        ["git", "init", "-q", folder], check=True
-    )  # tests ask for the files that are kept
-    subprocess.run(["git", "-C", folder, "add", "-A"], check=True, capture_output=True)
+    for words in (["init", "-q"], ["add", "-A"]):  # tests ask for the files that are kept
+        subprocess.run(["git", "-C", folder, *words], check=True, capture_output=True)
     return folder
 
 
@@ -261,26 +258,10 @@ def tests_of(number: int, found: Record, seconds: float) -> list[str]:
 
 def failing(tests: list[str], folder: Path, limit: float, *more: str) -> list[str] | None:
     """Return which tests fail in a copy of the checkout, None if they do not end."""
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-rfE",
-        "-p",
-        "no:cacheprovider",
-        *more,
-        *tests,
-    ]
+    command = [sys.executable, "-m", "pytest", "-q", "-rfE", "-p", "no:cacheprovider", *more]
+    how: Any = {"env": environment(folder), "timeout": limit, "capture_output": True}
     try:
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            env=environment(folder),
-            timeout=limit,
-            capture_output=True,
-            text=True,
-        )
+        done = subprocess.run([*command, *tests], cwd=folder, text=True, **how)
     except subprocess.TimeoutExpired:
         return None
     lines = [line.split(" - ")[0].split(maxsplit=1) for line in done.stdout.splitlines()]
@@ -329,9 +310,9 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=40.0)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--before", type=Path)
-    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--keep", type=Path, default=ROOT / "out" / "mutations")
     options = parser.parse_args()
-    work: Path = options.keep or Path(tempfile.mkdtemp())
+    work: Path = options.keep
     work.mkdir(parents=True, exist_ok=True)
     here, there = homes(ROOT), homes(options.before or ROOT)
     sites = [
@@ -342,8 +323,10 @@ def main() -> None:
     ]
     chosen = random.Random(options.seed).sample(sites, options.count)
     if not (stored := work / "record.json").exists():
-        stored.write_text(json.dumps(record(chosen, work, options.processes)))
-    met, seconds, failed = json.loads(stored.read_text())
+        stored.write_text(json.dumps([chosen, *record(chosen, work, options.processes)]))
+    marked, met, seconds, failed = json.loads(stored.read_text())
+    if marked != [list(mutation) for mutation in chosen]:
+        parser.error(f"{work} keeps what was done with other places or another source: remove it")
     found = Record({int(number): tests for number, tests in met.items()}, seconds, failed)
 
     def results(name: str, checkout: Path, tests: dict[int, list[str]], limit: float) -> Any:
