@@ -27,7 +27,6 @@ from .geometry import reverse as reverse
 from .geometry import ring_length as ring_length
 from .geometry import signed_area as signed_area
 from .geometry import subdivided as subdivided
-from .likeness.any_shape import faithfulness as faithfulness
 from .likeness.faithful import Fidelity as Fidelity
 from .likeness.faithful import fidelity as fidelity
 from .likeness.likeness import Likeness as Likeness
@@ -43,10 +42,8 @@ from .likeness.metrics import iou as iou
 from .likeness.metrics import pixel_accuracy as pixel_accuracy
 from .likeness.metrics import prepared_region as prepared_region
 from .likeness.necks import Thinnest as Thinnest
-from .likeness.necks import hair_share as hair_share
 from .likeness.necks import narrowest_neck as narrowest_neck
 from .likeness.necks import narrowest_slit as narrowest_slit
-from .likeness.necks import slit_share as slit_share
 from .likeness.own_symmetry import NearSymmetry as NearSymmetry
 from .likeness.own_symmetry import near_symmetry as near_symmetry
 from .likeness.ranking import diverse as diverse

@@ -2,26 +2,17 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from awkward import NOT_SIMPLE, USELESS
 from orbiflow.arrays import Complex
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import (
-    complex_points,
-    hair_share,
-    narrowest_neck,
-    narrowest_slit,
-    resampled,
-    ring_length,
-    slit_share,
-)
+from orbiflow.tiles import complex_points, narrowest_neck, narrowest_slit, resampled
 from orbiflow.tiles.likeness import Gaps, least_neck
 from orbiflow.tiles.likeness.necks import MIN_OUTLINE, POINT_SPACING
 from outlines import ANIMALS, SHAPES, animal, bar, comb, dumbbell, slit_square, star
-from refusals import refused
 from strategies import seeds
 
 widths = st.floats(0.005, 0.2)
@@ -73,8 +64,6 @@ def test_corners_are_no_necks(name: str) -> None:
     found = narrowest_neck(SHAPES[name])
     assert found.share > 0.6
     assert narrowest_slit(SHAPES[name]) is None
-    assert hair_share(SHAPES[name], 0.02) == 0
-    assert slit_share(SHAPES[name], 0.02) == 0
 
 
 def test_a_spike_is_measured_where_it_is_long_enough() -> None:
@@ -98,23 +87,6 @@ def test_similar_shapes_are_alike(name: str, turn: float, scale: float, x: float
         if before is not None and after is not None:
             assert after.width == pytest.approx(scale * before.width, rel=2e-3)
             assert after.share == pytest.approx(before.share, rel=2e-3)
-    for share in (hair_share, slit_share):
-        assert share(moved, 0.03 * scale) == pytest.approx(share(ring, 0.03), abs=1e-3)
-
-
-@settings(max_examples=7)
-@given(st.floats(0.002, 0.009), st.floats(0.1, 1.5))
-def test_hairs_are_counted_by_length(width: float, length: float) -> None:
-    assume(abs(2 * length + 0.3 - 5 * 0.31) > 0.02)  # the least length of a slit
-    ring = comb(4, width, 0.3, length)
-    expected = 4 * (2 * length + width) / ring_length(ring)
-    # a disc in the back does not reach where the outer teeth's sides go on
-    assert hair_share(ring, 0.01) == pytest.approx(expected, abs=0.025 / ring_length(ring))
-    assert hair_share(ring, 0.9 * width) == 0
-    assert slit_share(ring, 0.2) == 0
-    assert slit_share(ring, 0.31) == pytest.approx(
-        3 * (2 * length + 0.3) / ring_length(ring) if 2 * length + 0.3 > 5 * 0.31 else 0, rel=2e-2
-    )
 
 
 @pytest.mark.parametrize("case", [*USELESS, *NOT_SIMPLE])
@@ -123,15 +95,6 @@ def test_what_is_no_polygon_is_refused(case: str) -> None:
     for function in (narrowest_neck, narrowest_slit):
         with pytest.raises(OrbiflowError):
             function(ring)
-    for share in (hair_share, slit_share):
-        with pytest.raises(OrbiflowError):
-            share(ring, 0.01)
-
-
-def test_a_width_is_positive() -> None:
-    for share in (hair_share, slit_share):
-        with refused("width"):
-            share(SHAPES["square"], 0.0)
 
 
 def test_the_least_neck_of_an_outline_with_very_many_points() -> None:

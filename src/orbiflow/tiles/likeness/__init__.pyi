@@ -1,5 +1,3 @@
-from .any_shape import faithfulness as faithfulness
-from .bending_onto import bent_onto as bent_onto
 from .elastic import Elastic as Elastic
 from .elastic import ElasticBody as ElasticBody
 from .elastic import Stiffness as Stiffness
@@ -26,13 +24,11 @@ from .metrics import iou as iou
 from .metrics import pixel_accuracy as pixel_accuracy
 from .metrics import prepared_region as prepared_region
 from .necks import Thinnest as Thinnest
-from .necks import hair_share as hair_share
 from .necks import least_neck as least_neck
 from .necks import narrowest_neck as narrowest_neck
 from .necks import narrowest_slit as narrowest_slit
 from .necks import neck_factor as neck_factor
 from .necks import neck_up_to as neck_up_to
-from .necks import slit_share as slit_share
 from .own_symmetry import NearSymmetry as NearSymmetry
 from .own_symmetry import near_symmetry as near_symmetry
 from .ranking import diverse as diverse

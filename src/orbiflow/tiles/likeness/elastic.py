@@ -11,7 +11,6 @@ corners. Points are complex numbers x + iy; a batch of C shapes is (N, C).
 
 from __future__ import annotations
 
-import copy
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -178,13 +177,10 @@ class Elastic(ElasticBody):
         pairs = self._pairs(stiff)
         self._i, self._j = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
         self._d = self.rest[self._i] - self.rest[self._j]
-        self._rod, rod_cost = self._bending(stiff)
+        self._rod, self._rod_cost = self._bending(stiff)
         self._curved = self._rod @ self.rest[: self.size]
-        self._weigh(pairs.data, rod_cost)
-
-    def _weigh(self, pair_weights: Array, rod_cost: Array) -> None:
         shape = (len(self), len(self))
-        self._w, self._rod_cost = pair_weights, rod_cost
+        self._w = pairs.data
         self._weights = scipy.sparse.csr_matrix((self._w, (self._i, self._j)), shape=shape)
         self._sums: scipy.sparse.csr_matrix = scipy.sparse.csr_matrix(
             (self._w * self._d, (self._i, self._j)), shape=shape
@@ -192,7 +188,6 @@ class Elastic(ElasticBody):
         self._conjugate: scipy.sparse.csr_matrix = self._sums.conjugate().tocsr()
         self._own = np.asarray(self._sums.sum(axis=1)).ravel()
         self._own_conjugate = np.conj(self._own)
-        self._solvers = {}
 
     @property
     def figures(self) -> tuple[Elastic, ...]:
@@ -242,18 +237,6 @@ class Elastic(ElasticBody):
         f, g = self.stiffness.forgiven
         stretched, bent = (2 * (np.sqrt(1 + misfits) - 1) for misfits in (strain, kinks))
         return (self._w * (f * abs(self._d)) ** 2) @ stretched + (self._rod_cost * g**2) @ bent
-
-    def forgiving(self, z: Complex) -> Elastic:
-        """Return the body whose energy touches `forgiving_energy` at a shape (N,) from above.
-
-        Minimising with it repeatedly minimises that energy (iteratively reweighted least squares).
-        """
-        strain, bent = self._forgiven_misfits(z.reshape(-1, 1))
-        body = copy.copy(self)
-        for name in ("matrix", "condensed", "condensed_to_outlines"):
-            vars(body).pop(name, None)
-        body._weigh(self._w / np.sqrt(1 + strain[:, 0]), self._rod_cost / np.sqrt(1 + bent[:, 0]))
-        return body
 
     def _forgiven_misfits(self, z: Complex) -> tuple[Array, Array]:
         """Return the squared strains and kinks of `_relative` at the best rotations."""

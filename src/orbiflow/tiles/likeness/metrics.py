@@ -13,12 +13,13 @@ import numpy as np
 import scipy
 import shapely
 from numpy.typing import ArrayLike
+from scipy.spatial import KDTree
 from shapely.geometry import MultiPolygon, Polygon, box
 
-from orbiflow.arrays import Array, Complex, Integers, Window
+from orbiflow.arrays import Array, Complex, Window
 from orbiflow.errors import OrbiflowError
 from orbiflow.settings import as_array
-from orbiflow.tiles.geometry import complex_points, plane_points, polygons_in, signed_area
+from orbiflow.tiles.geometry import complex_points, plane_points, signed_area
 
 # the number of vertices beyond which a region of area 1 is simplified, and the tolerance
 MAX_REGION_VERTICES, REGION_TOLERANCE = 1500, 2e-3
@@ -138,49 +139,8 @@ def best_overlay(
     return best, complex(middle + optimum.x[2] + 1j * optimum.x[3]), -float(optimum.fun)
 
 
-# the accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves
-HAUSDORFF_TOLERANCE = 1e-6
-
-
-def _directed(a: Array, b: Array, tolerance: float, at_least: float = 0.0) -> float:
-    """Return the greatest distance from a point of segments `a` (M, 2, 2) to the nearest one of `b`."""
-    tree = shapely.STRtree(list(np.asarray(shapely.linestrings(b), dtype=object)))
-    start, end = a[:, 0], a[:, 1]
-    best = at_least
-    (d0, e0), (d1, e1) = _nearest(tree, start), _nearest(tree, end)
-    while len(start):
-        best = max(best, float(d0.max()), float(d1.max()))
-        length = np.hypot(*(end - start).T)
-        via0 = np.maximum(d0, _distance(end, b[e0]))
-        via1 = np.maximum(d1, _distance(start, b[e1]))
-        bound = np.minimum(np.minimum(via0, via1), (d0 + d1 + length) / 2)
-        go = bound > best + tolerance
-        start, end, d0, d1, e0, e1 = (item[go] for item in (start, end, d0, d1, e0, e1))
-        middle = (start + end) / 2
-        dm, em = _nearest(tree, middle)
-        start, end = np.concatenate([start, middle]), np.concatenate([middle, end])
-        d0, d1 = np.concatenate([d0, dm]), np.concatenate([dm, d1])
-        e0, e1 = np.concatenate([e0, em]), np.concatenate([em, e1])
-    return best
-
-
-def _nearest(tree: shapely.STRtree, points: Array) -> tuple[Array, Integers]:
-    """Return the distance to, and index of, the edge of `tree` nearest to each of `points` (P, 2)."""
-    pairs, distance = tree.query_nearest(
-        shapely.points(points), return_distance=True, all_matches=False
-    )
-    return distance, pairs[1]
-
-
-def _distance(points: Array, edges: Array) -> Array:
-    """Return the distance of each of `points` (P, 2) to the edge (P, 2, 2) of the same index."""
-    origin, along = edges[:, 0], edges[:, 1] - edges[:, 0]
-    length2 = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
-    t = np.clip(((points - origin) * along).sum(axis=1) / length2, 0.0, 1.0)
-    return np.hypot(*(points - origin - t[:, None] * along).T)
-
-
 WINDOW_MARGIN = 0.10
+STEPS_PER_DIAGONAL = 1000  # of points along a boundary, whose distances are measured
 
 Shape = ArrayLike | Polygon | MultiPolygon
 Region = Polygon | MultiPolygon
@@ -265,8 +225,7 @@ def hausdorff(a: Shape, b: Shape) -> float:
     """Return the Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
 
     This is the greatest distance from any point of one boundary, not only a vertex, to the nearest
-    point of the other. It is too small by at most 1e-6 of the diagonal of the box around both
-    shapes, never too large.
+    point of the other, to 1/2000 of the diagonal of the box around both shapes.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
@@ -275,10 +234,11 @@ def hausdorff(a: Shape, b: Shape) -> float:
     """
     first, other = as_region(a, "a"), as_region(b, "b")
     xmin, ymin, xmax, ymax = shapely.total_bounds([first, other])
-    tolerance = HAUSDORFF_TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
-    a_edges, b_edges = _edges(first), _edges(other)
-    forth = _directed(a_edges, b_edges, tolerance)
-    return max(forth, _directed(b_edges, a_edges, tolerance, at_least=forth))
+    step = float(np.hypot(xmax - xmin, ymax - ymin)) / STEPS_PER_DIAGONAL
+    lines = (shapely.segmentize(region.boundary, step) for region in (first, other))
+    here, there = map(shapely.get_coordinates, lines)
+    far = KDTree(there).query(here)[0], KDTree(here).query(there)[0]
+    return float(np.max(np.concatenate(far)))
 
 
 def compare(tile: Shape, target: Shape) -> ShapeMetrics:
@@ -305,13 +265,6 @@ def share(value: float) -> float:
     """Return a share, 0 to 1."""
     # rounding in the overlay can exceed the bounds by an ulp
     return min(max(float(value), 0.0), 1.0)
-
-
-def _edges(region: Region) -> Array:
-    """Return boundary segments of `region`, (M, 2 ends, 2 coordinates)."""
-    rings = [ring for part in polygons_in(region) for ring in (part.exterior, *part.interiors)]
-    coords = [shapely.get_coordinates(ring) for ring in rings]
-    return np.concatenate([np.stack([xy[:-1], xy[1:]], axis=1) for xy in coords])
 
 
 def as_region(shape: Shape, name: str) -> Region:

@@ -1,4 +1,4 @@
-"""The narrowest neck and slit of a polygon, and the share of its outline that is hair.
+"""The narrowest neck and slit of a polygon.
 
 Two points of the outline face each other across a neck if the segment between them is inside and at
 most `MAX_NECK_WIDTH` long, and both ways along the outline between them are long: at least
@@ -21,9 +21,8 @@ from scipy.spatial import KDTree
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.settings import as_array, as_number
-from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
-from orbiflow.tiles.silhouette import DISC_OVERREACH, opened
+from orbiflow.settings import as_array
+from orbiflow.tiles.geometry import arc_lengths, orient, ring_length
 
 # the least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)
 OUTLINE_PER_WIDTH = 5.0
@@ -140,30 +139,6 @@ def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
     return _facing(outside, size, lambda lines: ~cast(Any, polygon.intersects(lines)))
 
 
-def hair_share(ring: ArrayLike, width: float) -> float:
-    """Return the share, 0 to 1, of a polygon's outline that bounds parts thinner than `width`.
-
-    A part is thin if no disc of that diameter inside the polygon covers it (the residue of a
-    morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline,
-    so corners count only if they are sharper than 23 degrees. The width is in the polygon's own
-    units. The ring and errors are as for `narrowest_neck`; a width of 0 or less is refused.
-
-    >>> bar = [[0.0, 0.0], [9.5, 0.0], [9.5, 0.5], [0.0, 0.5]]
-    >>> hair_share(bar, 0.4), hair_share(bar, 0.6)
-    (0.0, 1.0)
-    """
-    _, polygon = _checked(ring)
-    return _thin_share(polygon, polygon, as_number(width, "width", above=0))
-
-
-def slit_share(ring: ArrayLike, width: float) -> float:
-    """Return the share of a polygon's outline that bounds gaps thinner than `width`."""
-    _, polygon = _checked(ring)
-    width = as_number(width, "width", above=0)
-    around = shapely.box(*polygon.buffer(2 * width).bounds)
-    return _thin_share(polygon, around.difference(polygon), width)
-
-
 def _checked(ring: ArrayLike) -> tuple[Array, shapely.Polygon]:
     points = as_array(ring, "the polygon", ("N", 2))
     polygon = shapely.Polygon(points) if len(points) > 2 else shapely.Polygon()
@@ -255,19 +230,3 @@ def _local_minima(i: Integers, j: Integers, width: Array) -> Integers:
 
 def _cross(a: Array, b: Array) -> Array:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-
-
-def _thin_share(
-    polygon: shapely.Polygon, region: shapely.geometry.base.BaseGeometry, width: float
-) -> float:
-    """Return the share of the polygon's outline on parts of the region that no disc in it covers."""
-    covered = opened(region, width, DISC_OVERREACH)
-    parts = polygons_in(region.difference(covered))
-    lines = shapely.get_parts(polygon.exterior.difference(covered))
-    lengths = shapely.length(lines)
-    lines, lengths = lines[lengths > 0], lengths[lengths > 0]
-    if not parts or not len(lines):
-        return 0.0
-    middles = shapely.line_interpolate_point(lines, 0.5, normalized=True)
-    totals = np.bincount(shapely.STRtree(parts).nearest(middles), lengths)
-    return float(totals[totals > OUTLINE_PER_WIDTH * width].sum() / polygon.exterior.length)
