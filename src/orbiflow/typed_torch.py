@@ -4,21 +4,15 @@ torch's compiled functions have no signatures and some of its Python functions n
 cannot replace this file: a partial stub package makes pyright lose the rest of torch's own types.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import torch
 from torch import Tensor
 from torch.autograd import Function, forward_ad
-from torch.optim import Optimizer
 
 _torch: Any = torch
 special, linalg, fft = _torch.special, _torch.linalg, _torch.fft
 unique, broadcast = _torch.unique, _torch.broadcast_tensors
-
-
-adam: Callable[..., Optimizer] = torch.optim.Adam
-"""The optimizer, whose own `step` has no types."""
 
 
 def applied(function: type[Function], *arguments: Any) -> Any:

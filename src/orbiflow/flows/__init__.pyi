@@ -1,3 +1,4 @@
+from .adam import Adam as Adam
 from .flow import Flow as Flow
 from .integrators import METHODS as METHODS
 from .integrators import RungeKutta as RungeKutta

@@ -12,7 +12,7 @@ from torch import Tensor
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models import NeuralMixture, outputs_per_kernel
 from orbiflow.density.spaces import Space
-from orbiflow.typed_torch import adam
+from orbiflow.flows import Adam
 
 HIDDEN = 64
 """Units of each of the two hidden layers."""
@@ -61,7 +61,7 @@ def fit_networks(
     layers = _start(space, features[0], seen, train, generator)
     best = [tensor.detach().clone() for tensor in layers]
     least = [math.inf] * len(train)
-    optimizer = adam(layers, RATE)
+    adam = Adam(layers)
     size = min(BATCH, *(len(tensor) for tensor in train))
     steps = min(STEPS, EPOCHS * max(1, len(train[0]) // size))
     mixture = NeuralMixture(space, layers)
@@ -71,12 +71,8 @@ def fit_networks(
         with torch.enable_grad():
             logs = mixture.logs(features[:, chosen], seen[chosen])
             loss = -(weights[chosen] * logs).sum() / size
-        for layer, slope in zip(layers, torch.autograd.grad(loss, layers), strict=True):
-            layer.grad = slope
         rate = RATE * (1 + math.cos(math.pi * (step - 1) / steps)) / 2
-        for group in optimizer.param_groups:
-            group["lr"] = rate
-        optimizer.step()
+        adam.step(loss, rate)
         with torch.no_grad():
             for tensor in layers[::2]:
                 tensor.mul_(1 - rate * DECAY)

@@ -14,6 +14,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from orbiflow.flows import Adam
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import as_instance, as_whole
 from orbiflow.tiles.flowing.descent import between
@@ -23,7 +24,7 @@ from orbiflow.tiles.flowing.tile_model import TileModel
 from orbiflow.tiles.search import OnProgress, SearchMethod, silent, template_symmetries
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
-from orbiflow.typed_torch import adam, linalg, listed
+from orbiflow.typed_torch import linalg, listed
 
 if TYPE_CHECKING:
     from orbiflow.tiles.flowing.overlap_search import OccupancySearch
@@ -129,15 +130,13 @@ def _pose(model: TileModel) -> list[torch.nn.Parameter]:
 def _affine_phase(
     model: TileModel, samples: OccupancySamples, settings: OccupancySearch, cancel: Cancel
 ) -> TileModel:
-    optimizer = adam(_pose(model), lr=0.03)
+    adam = Adam(_pose(model))
     for _ in range(settings.affine_iterations):
         cancel.check()
         points, inside = samples.draw(512)
-        optimizer.zero_grad()
         loss = occupancy_loss(model, points, inside, 15.0, affine=True)
         bent = SHAPE_PENALTY * model.shape.square().sum(dim=-1)
-        torch.autograd.backward((loss + bent).sum())
-        optimizer.step()
+        adam.step((loss + bent).sum(), rate=0.03)
     ranked = _ranked(model, samples, 15.0, keep=model.size, affine=True)
     return ranked.take(_distinct(ranked, settings.finalists))
 
@@ -169,26 +168,18 @@ def _flow_phase(
     end: int,
     report: OnProgress,
 ) -> TileModel:
-    rate = settings.learning_rate
-    optimizer = adam(
-        [
-            {"params": _pose(model), "lr": rate / 2, "peak": rate / 2},
-            {"params": list(model.flow.parameters()), "lr": rate, "peak": rate},
-        ]
-    )
+    pose, flow = _pose(model), list(model.flow.parameters())
+    peaks = [settings.learning_rate / 2] * len(pose) + [settings.learning_rate] * len(flow)
+    adam = Adam(pose + flow)
     for i in range(begin, end):
         done = i / settings.iterations
-        for group in optimizer.param_groups:
-            warm = min(1.0, (i - begin + 1) / 10)
-            group["lr"] = group["peak"] * warm * (0.51 + 0.49 * math.cos(math.pi * done))
-        optimizer.zero_grad()
+        warm, fall = min(1.0, (i - begin + 1) / 10), 0.51 + 0.49 * math.cos(math.pi * done)
         points, inside = samples.draw(settings.points)
         loss = occupancy_loss(model, points, inside, between(settings.hardness, done))
-        squares = [p.square().sum(dim=-1) for p in model.flow.parameters()]
+        squares = [p.square().sum(dim=-1) for p in flow]
         energy = between(settings.penalty, done) * torch.stack(squares).sum(dim=0)
         bent = SHAPE_PENALTY * model.shape.square().sum(dim=-1)
-        torch.autograd.backward((loss + energy + bent).sum())
-        optimizer.step()
+        adam.step((loss + energy + bent).sum(), [peak * warm * fall for peak in peaks])
         report((i + 1) / settings.iterations, float(loss.detach().min()))
     return model
 
