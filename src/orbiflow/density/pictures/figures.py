@@ -98,21 +98,20 @@ def density_picture(
     caption = ground.caption(notes, count)
     room = ground.room(sheet, label, [tick.text for tick in bar_ticks(shade)])
     room = room.with_words(caption, sheet)
-    frame = frames.make_frame(sheet, room, ground.aspect)
-    image = colouring.draw(frame.axes)
-    colouring.draw_regions(frame.axes, regions, sheet)
+    page = frames.Page(sheet, room, ground.aspect)
+    axes, side = page.axes(), page.side
+    image = colouring.draw(axes)
+    colouring.draw_regions(axes, regions, sheet)
     if places is not None:
-        scale = _dot_scale(ground, sheet, frame.side)
-        grounds.draw_dots_over(
-            frame.axes, places, frame.side / ground.width, limit=most, scale=scale
-        )
-    ground.draw_axes(frame.axes, sheet, frame.side, frames.Panel())
-    frames.colour_bar(image, frame, sheet, label, shade)
+        scale = _dot_scale(ground, sheet, side)
+        grounds.draw_dots_over(axes, places, side / ground.width, limit=most, scale=scale)
+    ground.draw_axes(axes, sheet, side, frames.Panel())
+    frames.colour_bar(image, page, sheet, label, shade)
     title = f"Density on the {space_title(ground.space)}"
     if not sheet.printed:
-        ground.write_title(frame, sheet, title)
-        frames.write_caption(frame.figure, caption, sheet)
-    return Picture(frame.figure, sheet, title, caption)
+        ground.write_title(axes, sheet, title)
+        frames.write_caption(page.figure, caption, sheet)
+    return Picture(page.figure, sheet, title, caption)
 
 
 def samples_picture(
@@ -144,15 +143,17 @@ def samples_picture(
     words = ground.samples_caption([] if colouring is None else [f"{colouring.reason}, {bar}"])
     room, stacked = ground.panels_room(sheet)
     room = room.with_words(words, sheet)
-    figure, both, side = frames.two_panels(sheet, room, ground.aspect, stacked=stacked)
-    for axes, (name, points) in zip(both, panels.items(), strict=True):
+    shape, gap = (2, 1) if stacked else (1, 2), sheet.em * room.gap
+    page = frames.Page(sheet, room, ground.aspect, shape, (gap, gap))
+    for number, (name, points) in enumerate(panels.items()):
+        axes, side = page.axes(number), page.side
         if colouring is not None and points is None:
             colouring.draw(axes)
         else:
             ground.fill(axes)
             scale = _dot_scale(ground, sheet, side)
             grounds.draw_dots(axes, places[name], 0.5, limit=count, fill=grounds.DOT, scale=scale)
-        panel = frames.Panel(False, stacked or axes is both[0], points is not None)
+        panel = frames.Panel(False, stacked or number == 0, points is not None)
         ground.draw_axes(axes, sheet, side, panel)
         head = "density"
         if points is not None:
@@ -160,9 +161,11 @@ def samples_picture(
             head = f"{f'{shown} of ' if shown < len(points) else ''}{len(points)} {name}"
         axes.set_title(head, fontsize=sheet.text, pad=ground.title_gap * sheet.text)
     if not sheet.printed:
-        frames.write_caption(figure, words, sheet)
-    first = "Density" if data is None else "Data"
-    return Picture(figure, sheet, f"{first} and samples on the {space_title(ground.space)}", words)
+        frames.write_caption(page.figure, words, sheet)
+    title = (
+        f"{'Density' if data is None else 'Data'} and samples on the {space_title(ground.space)}"
+    )
+    return Picture(page.figure, sheet, title, words)
 
 
 def _dot_scale(ground: Ground, sheet: Sheet, side: float) -> float:
@@ -201,8 +204,8 @@ def flow_picture(
     low, high = 0.5 - CELLS / 2, 0.5 + CELLS / 2
     window = (low, low, high, high)
     printed = frames.printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
-    frame = frames.make_frame(sheet, printed if sheet.printed else SCREEN)
-    axes = frame.axes
+    page = frames.Page(sheet, printed if sheet.printed else SCREEN)
+    axes = page.axes()
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these
 
@@ -212,15 +215,15 @@ def flow_picture(
     draw_magnitude(axes, field, window)
     draw_flow(axes, field, space.group, window, pen=sheet.pen)
     draw_cells(axes, space.group, window, pen=sheet.pen)
-    frames.colour_bar(axes.images[0], frame, sheet, SPEED)
+    frames.colour_bar(axes.images[0], page, sheet, SPEED)
     axes.set_axis_off()
     weight, flow = carried_part(density)
     part = "" if flow is density else f", {100 * weight:.0f} % of the density"
     title = f"Flow{part} on the {space_title(space)}"
     signs = "canonical square outlined, its images thin"
     if not sheet.printed:
-        frame.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
-    return Picture(frame.figure, sheet, title, f"The {signs}.")
+        page.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
+    return Picture(page.figure, sheet, title, f"The {signs}.")
 
 
 def carried_part(density: Density) -> tuple[float, Density]:

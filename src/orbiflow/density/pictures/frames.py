@@ -298,16 +298,6 @@ class Room(NamedTuple):
         return self._replace(below=self.below + 1.3 * (len(caption_lines(words, sheet)) + 1))
 
 
-class FigureFrame(NamedTuple):
-    """A figure with its axes, `side` inches wide, and those of its colour bar, below or beside."""
-
-    figure: Figure
-    axes: Axes
-    bar: Axes
-    side: float
-    under: bool = False
-
-
 class Panel(NamedTuple):
     """Whether a panel's axes are alone in the picture, have texts at the left, are without density."""
 
@@ -316,33 +306,52 @@ class Panel(NamedTuple):
     light: bool = False
 
 
-def make_frame(sheet: Sheet, room: Room, aspect: float = 1.0) -> FigureFrame:
-    """Make a figure as wide as the sheet, with axes of this width over height and a colour bar."""
-    side = sheet.width - sheet.em * (room.left + room.right)
-    inner = side / aspect
-    figure = sheet.figure(inner + sheet.em * (room.below + room.above))
-    left, below = sheet.em * room.left, sheet.em * room.below
-    gap, thick = sheet.em * room.gap, sheet.em * room.bar
-    under = (left, below - gap - thick, side, thick)
-    bar = axes_at(figure, *(under if room.under else (left + side + gap, below, thick, inner)))
-    return FigureFrame(figure, axes_at(figure, left, below, side, inner), bar, side, room.under)
+class Page:
+    """A figure with equal panels in rows, from the top left.
 
+    - `side`: How many inches wide a panel is. `bar_side`: How many a colour bar is long.
 
-def two_panels(
-    sheet: Sheet, room: Room, aspect: float, *, stacked: bool
-) -> tuple[Figure, tuple[Axes, Axes], float]:
-    """Make a figure with two equal axes, side by side or stacked, and return their width in inches."""
-    left, gap, right = (sheet.em * room[k] for k in (0, 4, 2))
-    side = sheet.width - left - right
-    side = side if stacked else (side - gap) / 2
-    inner = side / aspect
-    below = sheet.em * room.below
-    figure = sheet.figure(below + sheet.em * room.above + (2 * inner + gap if stacked else inner))
-    corners = [(left, below + inner + gap), (left, below)]
-    if not stacked:
-        corners = [(left + k * (side + gap), below) for k in (0, 1)]
-    first, second = (axes_at(figure, x, y, side, inner) for x, y in corners)
-    return figure, (first, second), side
+    Args:
+        sheet: The sheet, whose width the figure has.
+        room: The room around all panels.
+        aspect: The width of a panel over its height.
+        shape: How many rows of panels there are, and how many are in one.
+        apart: The inches between two panels.
+    """
+
+    def __init__(
+        self,
+        sheet: Sheet,
+        room: Room,
+        aspect: float = 1.0,
+        shape: tuple[int, int] = (1, 1),
+        apart: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        (rows, self._columns), self._room, em = shape, room, sheet.em
+        self._left, self._below = em * room.left, em * room.below
+        self._wide = sheet.width - em * (room.left + room.right)
+        self.side = (self._wide - (self._columns - 1) * apart[1]) / self._columns
+        self._step = self.side / aspect + apart[0], self.side + apart[1]
+        self._tall = rows * self._step[0] - apart[0]
+        self._size = self.side, self.side / aspect
+        self.figure = sheet.figure(self._tall + em * (room.below + room.above))
+        self.under = room.under
+        self.bar_side = self._wide if room.under else self._tall
+        self._gap, self._thick = em * room.gap, em * room.bar
+
+    def axes(self, number: int = 0) -> Axes:
+        """Make the axes of a panel, by its number."""
+        row, column = divmod(number, self._columns)
+        below = self._below + self._tall - self._size[1] - row * self._step[0]
+        return axes_at(self.figure, self._left + column * self._step[1], below, *self._size)
+
+    def bar(self) -> Axes:
+        """Make the axes of a colour bar, below the panels or at their right."""
+        if self.under:
+            below = self._below - self._gap - self._thick
+            return axes_at(self.figure, self._left, below, self._wide, self._thick)
+        left = self._left + self._wide + self._gap
+        return axes_at(self.figure, left, self._below, self._thick, self._tall)
 
 
 def axes_at(figure: Figure, left: float, below: float, width: float, high: float) -> Axes:
@@ -406,7 +415,7 @@ def write_caption(figure: Figure, words: str, sheet: Sheet) -> None:
 
 
 def colour_bar(
-    image: AxesImage, frame: FigureFrame, sheet: Sheet, label: str, shade: Shade | None = None
+    image: AxesImage, page: Page, sheet: Sheet, label: str, shade: Shade | None = None
 ) -> None:
     """Draw the bar of an image's colours; those of a density have ticks in its units."""
     from matplotlib.ticker import MaxNLocator
@@ -414,10 +423,10 @@ def colour_bar(
     extend = "neither"
     if shade is not None and shade.cut != shade.faint:
         extend = "max" if shade.cut else "min"
-    way = "horizontal" if frame.under else "vertical"
-    bar = frame.figure.colorbar(image, cax=frame.bar, extend=extend, orientation=way)
-    if sheet.printed or frame.under:
-        label = "\n".join(label_lines(sheet, label, frame.side))
+    way, side = "horizontal" if page.under else "vertical", page.bar_side
+    bar = page.figure.colorbar(image, cax=page.bar(), extend=extend, orientation=way)
+    if sheet.printed or page.under:
+        label = "\n".join(label_lines(sheet, label, side))
     bar.set_label(label, fontsize=sheet.text, color=INK)
     bar.ax.tick_params(
         which="both", labelsize=sheet.small, width=sheet.pen(0.8), length=0.3 * sheet.text
@@ -427,11 +436,11 @@ def colour_bar(
     bar.outline.set_visible(False)
     if shade is not None:
         at, texts = zip(*bar_ticks(shade), strict=True)
-        axis = frame.bar.xaxis if frame.under else frame.bar.yaxis
-        axis.set_ticks(at, without_overlap(at, texts, frame.side, sheet) if frame.under else texts)
+        axis = bar.ax.xaxis if page.under else bar.ax.yaxis
+        axis.set_ticks(at, without_overlap(at, texts, side, sheet) if page.under else texts)
         axis.set_ticks(minor_places(shade), minor=True)
-    elif frame.under:  # a few even steps
-        bar.locator = MaxNLocator(max(2, int(frame.side / (8 * LETTER_EMS * sheet.em))))
+    elif page.under:  # a few even steps
+        bar.locator = MaxNLocator(max(2, int(side / (8 * LETTER_EMS * sheet.em))))
         bar.update_ticks()
 
 

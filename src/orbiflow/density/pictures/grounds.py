@@ -322,9 +322,9 @@ class Ground(ABC):
         """Fill the ground with one light colour."""
         axes.set_facecolor(LIGHT)
 
-    def write_title(self, frame: frames.FigureFrame, sheet: Sheet, title: str) -> None:
+    def write_title(self, axes: Axes, sheet: Sheet, title: str) -> None:
         """Write the title above the picture."""
-        frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
+        axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
 
 
 def log_natural(density: Density, values: Array, points: Tensor, measure: str) -> Array:

@@ -24,6 +24,7 @@ from orbiflow.drawing import Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _PIXELS = 200_000
 """About how many pixels a density is evaluated at: sharp in two columns of a journal."""
@@ -192,9 +193,10 @@ class Map(Ground):
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes or ["dots are points"], None)
 
-    def write_title(self, frame: frames.FigureFrame, sheet: Sheet, title: str) -> None:
-        top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
-        frame.figure.text(
+    def write_title(self, axes: Axes, sheet: Sheet, title: str) -> None:
+        figure = cast("Figure", axes.figure)
+        top = 1 - 1.6 * sheet.em / figure.get_size_inches()[1]
+        figure.text(
             0.5, top, f"{title}: {self._subtitle}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -19,9 +19,6 @@ from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import ProductSpace
 from orbiflow.drawing import Picture, Sheet
 from orbiflow.errors import SettingError, literal
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 PANELS = 6
 """Values that are drawn if none are asked for."""
@@ -112,58 +109,34 @@ def series_picture(
         notes.append(f"peaks narrower than {pixels.size} are averaged over it")
     caption = ground.caption(notes, None)
     label = bar_label(shade, ground.space, settings.measure)
-    page = _Page(sheet, ground, len(tables), caption, label, [t.text for t in bar_ticks(shade)])
+    ticks = [tick.text for tick in bar_ticks(shade)]
+    page, across = _page(sheet, ground, len(tables), caption, label, ticks)
     for k, (value, values) in enumerate(zip(along.values, tables, strict=True)):
         axes = page.axes(k)
         places = pixels.table(shade.places(values), 0.0)
         colouring = GroundColouring(places, pixels.extent, shade, "", "", None, ground.outline)
         image = colouring.draw(axes)
-        ground.draw_axes(axes, sheet, page.side, frames.Panel(False, k % page.columns == 0))
+        ground.draw_axes(axes, sheet, page.side, frames.Panel(False, k % across == 0))
         number = f"{value:.{DIGITS}g}".replace("-", "\N{MINUS SIGN}")
         head = f"{frames.cut(frames.symbol(along.name), 24)} = {number}"
         axes.set_title(head, fontsize=sheet.text, pad=ground.title_gap * sheet.text)
         if k == 0:
-            frames.colour_bar(image, page.frame(axes), sheet, label, shade)
+            frames.colour_bar(image, page, sheet, label, shade)
     title = f"Density on the {frames.space_title(space.base)} along {frames.cut(along.name, 40)}"
     if not sheet.printed:
         frames.write_caption(page.figure, caption, sheet)
     return Picture(page.figure, sheet, title, caption)
 
 
-class _Page:
-    """Equal panels in rows, `side` inches wide, beside one colour bar."""
-
-    def __init__(
-        self, sheet: Sheet, ground: Ground, count: int, caption: str, label: str, ticks: list[str]
-    ) -> None:
-        panel, _ = ground.panels_room(sheet)
-        self.sheet, self.gap = sheet, panel.gap * sheet.em
-        self.between = sheet.em * (panel.above + panel.below)
-        room = panel._replace(left=panel.left + 0.8, above=panel.above + 0.6, gap=1.6, bar=1.2)
-        room = frames.room_for_bar_beside(sheet, room, label, ticks)
-        room = room.with_words(caption, sheet)
-        self.room, self.beside = room._replace(right=room.right + panel.right), panel.right
-        inner = sheet.width - sheet.em * (self.room.left + self.room.right)
-        most = MOST_ACROSS if ground.aspect < WIDE else 2
-        self.columns = 1 if sheet.printed and sheet.width < frames.NARROW_INCHES else most
-        self.columns = min(self.columns, count)
-        self.side = (inner - (self.columns - 1) * self.gap) / self.columns
-        self.high, self.rows = self.side / ground.aspect, -(-count // self.columns)
-        tall = self.rows * self.high + (self.rows - 1) * self.between
-        self.figure = sheet.figure(tall + sheet.em * (self.room.above + self.room.below))
-
-    def axes(self, number: int) -> Axes:
-        """Return the axes of a panel, by its number from the top left."""
-        row, column = divmod(number, self.columns)
-        left = self.sheet.em * self.room.left + column * (self.side + self.gap)
-        below = self.sheet.em * self.room.below
-        below += (self.rows - 1 - row) * (self.high + self.between)
-        return frames.axes_at(self.figure, left, below, self.side, self.high)
-
-    def frame(self, axes: Axes) -> frames.FigureFrame:
-        """Return the frame of one panel with the bar of all."""
-        em, wide = self.sheet.em, self.figure.get_size_inches()[0]
-        left = wide - em * (self.room.right - self.beside - self.room.gap)
-        tall = self.rows * self.high + (self.rows - 1) * self.between
-        bar = frames.axes_at(self.figure, left, em * self.room.below, em * self.room.bar, tall)
-        return frames.FigureFrame(self.figure, axes, bar, tall)
+def _page(
+    sheet: Sheet, ground: Ground, count: int, caption: str, label: str, ticks: list[str]
+) -> tuple[frames.Page, int]:
+    """Return a page of equal panels beside one colour bar, and how many are in a row."""
+    panel, _ = ground.panels_room(sheet)
+    room = panel._replace(left=panel.left + 0.8, above=panel.above + 0.6, gap=1.6, bar=1.2)
+    room = frames.room_for_bar_beside(sheet, room, label, ticks).with_words(caption, sheet)
+    room = room._replace(right=room.right + panel.right, gap=room.gap + panel.right)
+    most = MOST_ACROSS if ground.aspect < WIDE else 2
+    across = min(count, 1 if sheet.printed and sheet.width < frames.NARROW_INCHES else most)
+    apart = sheet.em * (panel.above + panel.below), sheet.em * panel.gap
+    return frames.Page(sheet, room, ground.aspect, (-(-count // across), across), apart), across

@@ -53,25 +53,19 @@ def trend_picture(
     down = math.ceil(len(found) / across)
     left, below, right, above = (7.0, 5.0, 1.5, 2.0) if not sheet.printed else (6.0, 4.0, 1.0, 1.0)
     gap = 0.0 if len(found) == 1 else 1.5
-    side = (sheet.width - sheet.em * (left + right + gap * (across - 1))) / across
-    high = (SHAPE if across == 1 else 0.9) * side
-    whole = down * high + sheet.em * (below + above + gap * down)
-    figure = sheet.figure(whole)
+    room = frames.Room(left, below, right, above + gap, 0.0, 0.0)
+    aspect, apart = 1 / (SHAPE if across == 1 else 0.9), gap * sheet.em
+    page = frames.Page(sheet, room, aspect, (down, across), (apart, apart))
     style: dict[str, Any] = {"fontsize": sheet.text, "color": frames.INK, "parse_math": False}
     for number, (title, curve) in enumerate(found.items()):
-        row, column = divmod(number, across)
-        at = sheet.em * left + column * (side + gap * sheet.em)
-        up = whole - sheet.em * (above + gap * (row > 0) * row) - (row + 1) * high
-        if gap:
-            up -= gap * sheet.em
-        axes = frames.axes_at(figure, at, up, side, high)
+        axes = page.axes(number)
         _draw(axes, curve, space, sheet, words)
         if title:
             axes.set_title(frames.cut(title, 24), pad=2, **style)
         lowest = number + across >= len(found)
         if lowest:
             axes.set_xlabel(frames.axis_label(view, 1), **style)
-        if column:
+        if number % across:
             axes.set_yticklabels([])
         else:
             axes.set_ylabel(frames.axis_label(view, 0), **style)
@@ -81,7 +75,7 @@ def trend_picture(
     shares = " and ".join(f"{100 * level:g} %" for level in first.levels)
     title = f"{frames.cut(names[0], 40)} along {frames.cut(names[1], 40)}"
     mark = "Dots are means, bars" if words else "The line is the mean, bands"
-    return Picture(figure, sheet, title, f"{mark} hold {shares}.")
+    return Picture(page.figure, sheet, title, f"{mark} hold {shares}.")
 
 
 def _draw(axes: Axes, found: Trend, space: Torus, sheet: Sheet, words: Sequence[str]) -> None:
