@@ -50,7 +50,7 @@ TOPICS = {
         "field_picture "
     ),
     "Densities": (
-        "DensityEstimator AngleRegressor read_density density_to_bytes "
+        "DensityEstimator read_density density_to_bytes "
         "Density Mixture FlowDensity AdaptiveKernels VonMisesChains VonMisesNetwork Space make_space "
         "QuotientSpace RotationSpace UnitVectorSpace conditional marginal log_density_gradient "
         "highest_density_region DensityLevels outlines "

@@ -1,7 +1,6 @@
 __version__: str
 __all__: list[str]
 
-from .density.angle_regressor import AngleRegressor as AngleRegressor
 from .density.comparing.data_sets import compare_samples as compare_samples
 from .density.comparing.named import named_tests as named_tests
 from .density.comparing.paired import compare_models as compare_models

@@ -14,11 +14,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
-from sklearn.base import clone
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
-from orbiflow.density import AngleRegressor, DensityEstimator, UniformDensity, make_space
+from orbiflow.density import DensityEstimator, UniformDensity, make_space
 from orbiflow.density.cross_validation import cross_validate
 from orbiflow.density.data import given_roles
 from orbiflow.density.fitting import GivenReport
@@ -298,21 +295,6 @@ def test_weights_and_groups_count() -> None:
     how = {"sample_weight": weights, "groups": np.arange(240) // 4}
     fit = DensityEstimator(**QUICK).fit(angles[:, None], given={"x": x}, **how)
     assert fit.at(x=0.5).mean()[0] == pytest.approx(1.0, abs=0.25)
-
-
-def test_the_regressor_is_scikit_learns() -> None:
-    rng = np.random.default_rng(7)
-    x = rng.normal(size=(80, 2))
-    angles = rng.vonmises(3 * np.tanh(x[:, 0]), 12.0)
-    own = AngleRegressor(**QUICK).fit(x[:50], angles[:50])
-    assert own.n_features_in_ == 2
-    assert own.predict(x[50:]).shape == (30,)
-    assert own.score(x[50:], angles[50:]) > 0.7
-    assert own.score(x[:40], own.predict(x[:40]) + np.pi) < 0
-    at = own.at(x1=0.3, x2=0.1)
-    assert own.predict([[0.3, 0.1]])[0] == pytest.approx(at.mean()[0], abs=1e-4)
-    scaled = make_pipeline(StandardScaler(), clone(own)).fit(x[:50], angles[:50])
-    assert scaled.score(x[50:], angles[50:]) > 0.7
 
 
 def test_a_saved_estimator_knows_its_covariates(tmp_path: Path) -> None:

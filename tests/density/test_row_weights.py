@@ -341,18 +341,6 @@ def test_covariates_have_labels() -> None:
             call(y, given=x.set_axis([*NAMES[1:], "new"]))
 
 
-def test_targets_of_regressions_have_labels() -> None:
-    x = pandas.DataFrame({"x": RNG.uniform(0, 90, ROWS)}, NAMES)
-    y = pandas.Series(np.degrees(RNG.vonmises(np.radians(x["x"]), 9)), NAMES, name="phi")
-    real: Any = {**KIND, "columns": {"x": "linear"}}
-    one, other = (od.AngleRegressor(**real).fit(x, own) for own in (y, y.iloc[SHUFFLED]))
-    assert np.array_equal(one.predict(x), other.predict(x))
-    assert one.predict(x).shape == (ROWS,)
-    assert one.score(x, y.iloc[SHUFFLED], WEIGHTS.iloc[SHUFFLED]) == one.score(x, y, WEIGHTS)
-    with refused("y", "2"):
-        one.score(x, y.set_axis([*NAMES[1:], "new"]))
-
-
 def test_a_time_that_is_none_is_no_group() -> None:
     days = pandas.Series(pandas.date_range("2020-01-01", periods=ROWS))
     days[3] = pandas.NaT

@@ -1,4 +1,3 @@
-from .angle_regressor import AngleRegressor as AngleRegressor
 from .comparing.data_sets import DataComparison as DataComparison
 from .comparing.data_sets import Divergence as Divergence
 from .comparing.data_sets import compare_samples as compare_samples

@@ -9,7 +9,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.conditional_parts import ConditionalPart, checked, mean_cosines
+from orbiflow.density.models.conditional_parts import ConditionalPart, checked
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -58,12 +58,6 @@ class CircularRegression(ConditionalPart):
         mean, kappa = self._shape(x[None])
         center = self.space.project(mean / (2 * math.pi))
         return AdaptiveKernels(self.space, center, kappa, torch.ones(1, dtype=torch.float64))
-
-    @torch.no_grad()
-    def mean_features(self, x: Tensor) -> Tensor:
-        mean, kappa = self._shape(x)
-        length = mean_cosines(kappa)
-        return torch.cat([length * mean.cos(), length * mean.sin()], dim=1)
 
     @classmethod
     def from_header(

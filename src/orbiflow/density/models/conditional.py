@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
@@ -44,9 +43,6 @@ class Unconditional(ConditionalPart):
     def at(self, x: Tensor) -> Density:
         del x
         return self.density
-
-    def mean_features(self, x: Tensor) -> Tensor:
-        return super().mean_features(x[:1]).expand(len(x), -1)
 
     def header(self) -> dict[str, Any]:
         return {"density": density_parts(self.density, "density")[0]}
@@ -117,13 +113,6 @@ class ConditionalDensity:
         for weight, part in zip(listed(self.weights), self.parts, strict=True):
             weighted += [(weight * share, density) for share, density in part.at(x).parts()]
         return mixture_of(weighted)
-
-    def mean_directions(self, context: Context) -> Tensor:
-        """Return the mean directions (N, d) of a torus' angles in turns."""
-        x = self.context(context)
-        means = torch.stack([part.mean_features(x) for part in self.parts])
-        cos, sin = torch.einsum("p,pnk->nk", self.weights, means).chunk(2, dim=1)
-        return torch.atan2(sin, cos) / (2 * math.pi)
 
     def header(self) -> dict[str, Any]:
         """Return what makes the density again, together with `tensors`; ready for JSON."""

@@ -8,14 +8,9 @@ from typing import Any, NamedTuple, Self
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.conditional_parts import (
-    ConditionalPart,
-    checked,
-    mean_cosines,
-    on_chart,
-)
+from orbiflow.density.models.conditional_parts import ConditionalPart, checked
 from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import CHART, Space
 from orbiflow.errors import OrbiflowError
 
 KERNEL_SCALES = (1.0, 4.0, 16.0)
@@ -84,7 +79,7 @@ class ConditionalKernels(ConditionalPart):
         size = max(1, BLOCK_ENTRIES // len(self.points))
         blocks = zip(torch.split(points, size), torch.split(x, size), strict=True)
         logs = [self.logs(part, features) for part, features in blocks]
-        return on_chart(self.space, points, torch.cat(logs))
+        return torch.cat(logs) + self.space.log_kernel_factor(points, CHART)
 
     def logs(self, points: Tensor, x: Tensor, apart: Tensor | None = None) -> Tensor:
         """Return log densities (M,) as kernels have them, at points (M, d) and features (M, m).
@@ -129,13 +124,6 @@ class ConditionalKernels(ConditionalPart):
             kappa.repeat_interleave(len(weights), dim=0),
             (self.shares[:, None] * weights).flatten(),
         )
-
-    @torch.no_grad()
-    def mean_features(self, x: Tensor) -> Tensor:
-        scales = torch.tensor(KERNEL_SCALES, dtype=torch.float64)[:, None]
-        length = self.shares @ mean_cosines(self.concentrations / scales)
-        weights = torch.softmax(self._near(x), dim=1)
-        return weights @ self.space.features(self.points, slice(1))[0] * length.repeat(2)
 
     def with_rows(self, points: Tensor, weights: Tensor | None, x: Tensor) -> ConditionalKernels:
         """Return kernels of the same widths at other rows."""

@@ -11,10 +11,8 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.density import Density
-from orbiflow.density.models.evaluation import cell_masses, cells
-from orbiflow.density.spaces import CHART, Space
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import special
 
 
 class ConditionalPart(ABC):
@@ -35,11 +33,6 @@ class ConditionalPart(ABC):
     @abstractmethod
     def at(self, x: Tensor) -> Density:
         """Return the density where the features are x (m,)."""
-
-    @torch.no_grad()
-    def mean_features(self, x: Tensor) -> Tensor:
-        """Return the means (N, 2 d) of the features of a torus' points where features are x (N, m)."""
-        return torch.stack([_mean_features(self.at(row)) for row in x])
 
     def header(self) -> dict[str, Any]:
         """Return what makes it again, together with `tensors`; ready for JSON."""
@@ -63,25 +56,6 @@ class ConditionalPart(ABC):
 
 LEAST_LOG_KAPPA, MOST_LOG_KAPPA = math.log(0.02), math.log(1e6)
 """Logarithms of the least and largest concentration of kernels that are fitted."""
-
-
-def on_chart(space: Space, points: Tensor, logs: Tensor) -> Tensor:
-    """Return log densities per area of the chart, of those that kernels have (N,) at points (N, d)."""
-    return logs + space.log_kernel_factor(points, CHART)
-
-
-def _mean_features(density: Density) -> Tensor:
-    """Return the means (2 d,) of cosines and of sines of a torus' angles."""
-    angle, means = 2 * math.pi * cells()[:, 0], list[Tensor]()
-    for axis in range(density.space.dim):
-        weights = cell_masses(density, axis)
-        means.append(torch.stack([weights @ angle.cos(), weights @ angle.sin()]))
-    return torch.stack(means, dim=1).flatten()
-
-
-def mean_cosines(kappa: Tensor) -> Tensor:
-    """Return the mean cosines of von Mises densities of concentrations (...)."""
-    return special.i1e(kappa) / special.i0e(kappa)
 
 
 def checked(

@@ -10,14 +10,9 @@ import torch
 from torch import Tensor
 from torch.nn.functional import silu
 
-from orbiflow.density.models.conditional_parts import (
-    ConditionalPart,
-    checked,
-    mean_cosines,
-    on_chart,
-)
+from orbiflow.density.models.conditional_parts import ConditionalPart, checked
 from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
-from orbiflow.density.spaces import Space, by_sphere
+from orbiflow.density.spaces import CHART, Space, by_sphere
 from orbiflow.errors import OrbiflowError
 
 KAPPAS = (0.02, 1e5)
@@ -87,7 +82,7 @@ class NeuralMixture(ConditionalPart):
         ):
             logs = self.logs(self.space.features(some)[:, None], features[None])
             logs_of_blocks.append(logs.logsumexp(dim=0) - math.log(len(logs)))
-        return on_chart(self.space, points, torch.cat(logs_of_blocks))
+        return torch.cat(logs_of_blocks) + self.space.log_kernel_factor(points, CHART)
 
     @torch.no_grad()
     def at(self, x: Tensor) -> AdaptiveKernels:
@@ -95,12 +90,6 @@ class NeuralMixture(ConditionalPart):
         points = self.space.lifted(centers.flatten(0, 1))
         shares = torch.softmax(weights.flatten(), dim=0)
         return AdaptiveKernels(self.space, points, kappa.flatten(0, 1), shares)
-
-    @torch.no_grad()
-    def mean_features(self, x: Tensor) -> Tensor:
-        centers, kappa, weights = self.kernels(x[None])
-        means = centers * mean_cosines(kappa).repeat(1, 1, 1, 2)
-        return (means * weights.exp()[..., None]).sum(dim=2).mean(dim=0)
 
     def alone(self, first: int, count: int = 1) -> NeuralMixture:
         """Return some of the F mixtures."""
