@@ -84,7 +84,7 @@ sample() {
 }
 
 ramachandran() {
-    fit ramachandran "$data/backbone.csv" phi,psi --space torus --unit degrees
+    fit ramachandran "$data/backbone.csv" phi,psi --unit degrees
     draw "density samples" --regions 0.5,0.9,0.98,0.9995
     region 0.5,0.9,0.98,0.9995
     score --region --samples 200000 <<'TABLE'

@@ -114,6 +114,8 @@ def test_units_are_known_or_refused() -> None:
         made("torus").fit(frame(ANGLES, "phi,psi"))
     again = made("torus", columns=caught.value.proposal).fit(frame(ANGLES, "phi,psi"))
     assert again.space_ == od.Torus(2, unit="degrees")
+    with refused("space sphere columns lat,lon", kind=od.UndeclaredError):
+        made("torus").fit(frame(ANGLES, "lat,lon"))
     assert made("torus").fit(np.radians(ANGLES)).space_ == od.Torus(2, unit="radians")
     assert made("torus").fit(frame(ANGLES, "phi_deg,psi_deg")).space_ == od.Torus(2, unit="degrees")
     with refused("unit", "radians", kind=SettingError):

@@ -9,7 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orbiflow.density.data.checks import codes_among
-from orbiflow.density.data.names import check_columns, chosen_arrangement, is_number_name
+from orbiflow.density.data.names import (
+    arrangements,
+    check_columns,
+    chosen_arrangement,
+    is_number_name,
+)
 from orbiflow.density.data.proposals import proposed_role, undeclared
 from orbiflow.density.data.roles import Asked, Role, role_named
 from orbiflow.density.data.table import (
@@ -363,6 +368,11 @@ class _Choice:
         cure = f" {{missing_codes}} {listed} {{drop_missing}}" if codes and table.is_file else ""
         values = {table.names[k]: column for k, column in unknown.items()}
         left = "; ".join(self._left_out([*own, *roles])) if table.is_named else ""
+        names = list(values)
+        for way in arrangements("sphere", names) if self.said.space == "torus" else ():
+            if len(way.columns) == 2:
+                place = literal(",".join(names[k] for k in way.columns))
+                cure += f", or, as directions, {{space}} sphere {{columns}} {place}"
         raise undeclared("columns", values, ",".join(entries), cure, left=left)
 
     def _called(self, column: int) -> str:
