@@ -89,7 +89,7 @@ def test_flows_are_integrated(seed: int) -> None:
     with torch.no_grad():
         expected = density.log_prob(whole) - integrated(density, points[:1] * 0 + 0.3, [0])
     assert (slice_.log_prob(points) - expected).abs().max() < 1e-4
-    assert max(found.error, slice_.error) < 1e-4
+    assert max(found.error, slice_.error) < 2e-4
 
 
 @given(seeds, st.data())

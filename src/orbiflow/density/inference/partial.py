@@ -18,7 +18,6 @@ from orbiflow.density.models import (
     Mixture,
     PartialDensity,
     Split,
-    Weighted,
     kernels_for,
     mixture_of,
 )
@@ -40,12 +39,6 @@ MOST_TABULATED = 2
 CHECKED, CHECKED_TWICE = 512, 16
 """Points at which two levels of accuracy are compared, and two sets of quasi-random nodes."""
 
-FEWEST_CHECKED, COMPARED = 32, 10_000_000
-"""The fewest points at which a density is compared with the exact one, and the most terms of these."""
-
-SEARCHED, NEAR = (0.03, 0.01, 0.003), 8
-"""How far, in turns, the largest error is looked for about the worst points, and a share of these."""
-
 LEAST_WEIGHT = 1e-9
 """The least weight of a component."""
 
@@ -66,7 +59,7 @@ def marginal(
     angles. The rest, of one or two angles, is integrated and becomes kernels on a grid: what comes out
     is exactly normalised. Its `error` says by how many nats (root mean square) it is off the true
     density where it is dense, and its `largest_error` by how many it is off anywhere, as far as was
-    found, in the faintest tails too. The rest of three angles and more is a `PartialDensity`, which
+    found. The rest of three angles and more is a `PartialDensity`, which
     asks the whole.
 
     Args:
@@ -145,8 +138,6 @@ def _restricted(
     elif left:
         parts = [_Left(*entry) for entry in left]
         whole, error = _refined(closed, parts, space, accuracy, say)
-        say(1.0, "comparing")
-        error = _compared(whole, closed, parts) or error
     else:
         whole = _mixture(closed)
     if error.usual > MOST_OFF:
@@ -182,8 +173,8 @@ class Error(NamedTuple):
     largest: float
 
 
-EXACT = Error(1e-6, 1e-5)
-"""What densities that are integrated point by point may be off themselves."""
+ON_GRID = Error(1e-4, 1e-3)
+"""What kernels on a grid may be off however fine the nodes are, which two levels have in common."""
 
 
 @dataclass
@@ -203,16 +194,6 @@ class _Left:
     found: list[tuple[float, Density]] = field(default_factory=list[tuple[float, Density]])
     logs: Tensor = field(default_factory=lambda: torch.zeros(0))
     error: Error = field(default_factory=lambda: Error(math.inf, math.inf))
-
-    def terms(self) -> int | None:
-        """Return how many terms its exact density takes at a point, None if there is none."""
-        return self.density.terms_at(list(self.split.observed))
-
-    def exact(self, points: Tensor) -> Tensor:
-        """Return its exact log density (N,) at points (N, r), with its weight."""
-        fixed = points.new_tensor(self.split.values).expand(len(points), -1)
-        whole = torch.cat([points, fixed], dim=1)
-        return self.log + self.density.log_marginal(whole, list(self.split.observed))
 
     def refine(self, space: Space, tick: Callable[[], None]) -> list[tuple[float, Density]]:
         """Find kernels of the next level, and return those of the level before."""
@@ -271,41 +252,8 @@ def _refined(
         refine(piece)
         old, piece.logs = piece.logs, _log_sum(piece.found, points)
         piece.compare(old, now())
-    usual = math.hypot(*(piece.error.usual for piece in left))
-    return whole(), Error(usual, sum(piece.error.largest for piece in left))
-
-
-def _compared(whole: Mixture, closed: list[Weighted], left: list[_Left]) -> Error | None:
-    """Return the error by exact densities, None where there are none or they would take too long.
-
-    The largest is looked for about the worst points.
-    """
-    terms = [component.terms() for component in left]
-    counts = [component for component in terms if component is not None]
-    count = min(CHECKED, COMPARED // max(1, sum(counts)))
-    if len(counts) < len(left) or count < FEWEST_CHECKED:
-        return None
-
-    def off(points: Tensor) -> Tensor:
-        exact = [component.exact(points) for component in left]
-        if closed:
-            exact.append(_log_sum(closed, points))
-        return torch.stack(exact).logsumexp(dim=0) - whole.log_prob(points)
-
-    points = _checked_points(whole, count)
-    changes = off(points)
-    shift = changes.new_zeros(())
-    if left[0].split.given:  # the density of what is given, of which the samples tell
-        shift = changes[:count].logsumexp(dim=0) - math.log(count)
-    changes = changes - shift
-    generator = torch.Generator().manual_seed(2)
-    for reach in SEARCHED:
-        worst = points[changes.abs().topk(max(1, count // NEAR)).indices].repeat(NEAR, 1)
-        noise = torch.randn(worst.shape, dtype=torch.float64, generator=generator)
-        near = (worst + reach * noise) % 1
-        points, changes = torch.cat([points, near]), torch.cat([changes, off(near) - shift])
-    usual, largest = changes[:count].square().mean().sqrt(), changes.abs().max()
-    return Error(float(usual) + EXACT.usual, float(largest) + EXACT.largest)
+    usual = math.hypot(*(piece.error.usual for piece in left), ON_GRID.usual)
+    return whole(), Error(usual, sum(piece.error.largest for piece in left) + ON_GRID.largest)
 
 
 def _checked_points(density: Density, count: int) -> Tensor:

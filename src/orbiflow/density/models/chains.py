@@ -13,13 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.chain_integrals import (
-    MAX_NODES,
-    MAX_NODES_ALONE,
-    chain_tables,
-    node_counts,
-    nodes_of,
-)
+from orbiflow.density.models.chain_integrals import chain_tables, nodes_of
 from orbiflow.density.models.chain_sums import SCALES, ChainFits, ChainSum
 from orbiflow.density.models.density import Density, Restriction, Split, Weighted
 from orbiflow.density.models.kernels import lattice_kernels
@@ -170,22 +164,6 @@ class VonMisesChains(Density, kind="chains"):
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         return _chains_at(self, points, axes, seed)
-
-    def terms_at(self, axes: list[int]) -> int | None:
-        count = 0
-        for which, order in _by_order(self, axes):
-            hidden, seen = (
-                [i for i in order if (i in axes) == is_seen] for is_seen in (False, True)
-            )
-            means, kappa = _at_scales(self, which)
-            if not hidden:
-                count += len(kappa)
-                continue
-            sizes = node_counts(means, kappa, hidden, seen)[1].prod(dim=1)
-            if float(sizes.max()) > (MAX_NODES_ALONE if len(hidden) == 1 else MAX_NODES):
-                return None
-            count += int(sizes.sum())
-        return count
 
     def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep the chains in which all that is given comes first and all that is hidden last."""

@@ -185,14 +185,6 @@ class Density(WithFigures):
             )
         return torch.stack([log + part.log_chart(points) for log, part in closed]).logsumexp(dim=0)
 
-    def terms_at(self, axes: list[int]) -> int | None:
-        """Return how many terms `log_marginal` of some angles takes at a point.
-
-        None if it is not exact, which is to more digits than `approximated`.
-        """
-        del axes
-        return None
-
     def restricted(self, split: Split, space: Space) -> Restriction:
         """Return the density of the angles kept, given others, as far as there is a closed form."""
         del space

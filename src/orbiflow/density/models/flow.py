@@ -41,9 +41,6 @@ CARRIED_POINTS = 4096
 FIRST_NODES, MOST_NODES = {1: 64, 2: 16}, {1: 512, 2: 64}
 """Nodes of each hidden angle at first and at most, by the number of hidden angles."""
 
-FLOW_TERMS = 50
-"""Terms of other densities that take as long as a flow at a point."""
-
 SETTLED_NATS = 1e-7
 """Mean change, in nats, by twice as many nodes, below which there are enough."""
 
@@ -156,11 +153,6 @@ class FlowDensity(Density, kind="flow"):
             if settled or count >= MOST_NODES[len(hidden)]:
                 return now
             count, last = 2 * count, now
-
-    def terms_at(self, axes: list[int]) -> int | None:
-        hidden = self.space.dim - len(axes)
-        # one step of a flow costs as much as many terms
-        return FLOW_TERMS * MOST_NODES[hidden] ** hidden if 0 < hidden < 3 else None
 
     def _at_nodes(
         self, points: Tensor, observed: list[int], hidden: list[int], nodes: Tensor

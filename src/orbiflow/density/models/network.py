@@ -214,12 +214,6 @@ class VonMisesNetwork(Density, kind="network"):
             logs_of_blocks.append(log_sum_exp(logs.expand(len(block), count)) - math.log(count))
         return torch.cat(logs_of_blocks)
 
-    def terms_at(self, axes: list[int]) -> int | None:
-        factors = self._leading_to(axes)
-        if any(factor.axes[-1] not in axes for factor in factors):
-            return None
-        return sum(factor.chains.log_weights.numel() for factor in factors)
-
     def _leading_to(self, observed: list[int]) -> list[Factor]:
         """Return the factors of the observed angles, and of all from which arrows lead to them."""
         wanted = set(observed)

@@ -99,10 +99,6 @@ class VonMisesSine(Density, kind="von-mises-sine"):
         over = _log_over_first(self.shape[1 - axis], self.shape[2], angle.sin())
         return over + self.shape[axis] * angle.cos() + self._log_top - math.log(2 * math.pi)
 
-    def terms_at(self, axes: list[int]) -> int | None:
-        del axes
-        return 1
-
     def restricted(self, split: Split, space: Space) -> Restriction:
         """Keep an angle's von Mises density where the other is given."""
         if not split.given or len(split.kept) != 1:

@@ -98,7 +98,7 @@ def density_picture(
     caption = ground.caption(notes, count)
     room = ground.room(sheet, label, [tick.text for tick in bar_ticks(shade)])
     room = room.with_words(caption, sheet)
-    page = frames.Page(sheet, room, ground.aspect)
+    page = frames.PanelPage(sheet, room, ground.aspect)
     axes, side = page.axes(), page.side
     image = colouring.draw(axes)
     colouring.draw_regions(axes, regions, sheet)
@@ -144,7 +144,7 @@ def samples_picture(
     room, stacked = ground.panels_room(sheet)
     room = room.with_words(words, sheet)
     shape, gap = (2, 1) if stacked else (1, 2), sheet.em * room.gap
-    page = frames.Page(sheet, room, ground.aspect, shape, (gap, gap))
+    page = frames.PanelPage(sheet, room, ground.aspect, shape, (gap, gap))
     for number, (name, points) in enumerate(panels.items()):
         axes, side = page.axes(number), page.side
         if colouring is not None and points is None:
@@ -204,7 +204,7 @@ def flow_picture(
     low, high = 0.5 - CELLS / 2, 0.5 + CELLS / 2
     window = (low, low, high, high)
     printed = frames.printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
-    page = frames.Page(sheet, printed if sheet.printed else SCREEN)
+    page = frames.PanelPage(sheet, printed if sheet.printed else SCREEN)
     axes = page.axes()
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these

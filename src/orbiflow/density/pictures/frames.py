@@ -306,7 +306,7 @@ class Panel(NamedTuple):
     light: bool = False
 
 
-class Page:
+class PanelPage:
     """A figure with equal panels in rows, from the top left.
 
     - `side`: How many inches wide a panel is. `bar_side`: How many a colour bar is long.
@@ -415,7 +415,7 @@ def write_caption(figure: Figure, words: str, sheet: Sheet) -> None:
 
 
 def colour_bar(
-    image: AxesImage, page: Page, sheet: Sheet, label: str, shade: Shade | None = None
+    image: AxesImage, page: PanelPage, sheet: Sheet, label: str, shade: Shade | None = None
 ) -> None:
     """Draw the bar of an image's colours; those of a density have ticks in its units."""
     from matplotlib.ticker import MaxNLocator

@@ -130,7 +130,7 @@ def series_picture(
 
 def _page(
     sheet: Sheet, ground: Ground, count: int, caption: str, label: str, ticks: list[str]
-) -> tuple[frames.Page, int]:
+) -> tuple[frames.PanelPage, int]:
     """Return a page of equal panels beside one colour bar, and how many are in a row."""
     panel, _ = ground.panels_room(sheet)
     room = panel._replace(left=panel.left + 0.8, above=panel.above + 0.6, gap=1.6, bar=1.2)
@@ -139,4 +139,6 @@ def _page(
     most = MOST_ACROSS if ground.aspect < WIDE else 2
     across = min(count, 1 if sheet.printed and sheet.width < frames.NARROW_INCHES else most)
     apart = sheet.em * (panel.above + panel.below), sheet.em * panel.gap
-    return frames.Page(sheet, room, ground.aspect, (-(-count // across), across), apart), across
+    return frames.PanelPage(
+        sheet, room, ground.aspect, (-(-count // across), across), apart
+    ), across

@@ -55,7 +55,7 @@ def trend_picture(
     gap = 0.0 if len(found) == 1 else 1.5
     room = frames.Room(left, below, right, above + gap, 0.0, 0.0)
     aspect, apart = 1 / (SHAPE if across == 1 else 0.9), gap * sheet.em
-    page = frames.Page(sheet, room, aspect, (down, across), (apart, apart))
+    page = frames.PanelPage(sheet, room, aspect, (down, across), (apart, apart))
     style: dict[str, Any] = {"fontsize": sheet.text, "color": frames.INK, "parse_math": False}
     for number, (title, curve) in enumerate(found.items()):
         axes = page.axes(number)
