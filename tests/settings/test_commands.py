@@ -58,7 +58,7 @@ MISTAKES = {
     "export X --spacing 1mm": "--spacing --cut pieces",
     **{"export X --eye 53,66,-3": "--eye 53,66,-3", "export X --kerf 1mm": "--kerf --cut pieces"},
     **{"export X --force=maybe": "--force maybe", "export X -o a.foo": "--out --format"},
-    **{"density score X": "--model",
+    **{"density score X": "--model", "density fitt": "fitt fit", "exprot": "exprot export"},
     "escherize X --strength 2": "--strength --emphasis",
     "density fit X --space sphere --missing marginalise": "--missing torus",
     **{"density plot": "--model", "density plot -m X --columns a,b": "--columns --data"},

@@ -41,10 +41,10 @@ class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
     space: str = "torus"
-    """Where the data live: torus, which is any columns that have roles; sphere, klein-bottle or projective-plane; unit vectors of any
-    dimension on a hypersphere or in a projective-space; a rotation-space; or a group whose quotient it
-    is: a plane group such as p4m, a flat manifold such as hantzsche-wendt, or a space group such as
-    "P 21 21 21"."""
+    """Where the data live: torus, which is any columns that have roles; sphere, klein-bottle or
+    projective-plane; unit vectors of any dimension on a hypersphere or in a projective-space; a
+    rotation-space; or a group whose quotient it is: a plane group such as p4m, a flat manifold such as
+    hantzsche-wendt, or a space group such as "P 21 21 21"."""
 
     cell: Annotated[
         tuple[float, ...] | None, DefaultText("lengths about 1 that suit the group")
