@@ -205,7 +205,7 @@ def close_symmetry(on: Visit) -> None:
 
 
 def close_refused(on: Visit) -> None:
-    on.refuse("**/pulled", "the tile has become much too small or too large; pull less far")
+    on.refuse("**/by-hand/*", "the tile has become much too small or too large; pull less far")
     on.pull(10, -20)
     on.page.mouse.up()
     on.page.wait_for_selector("[data-kind=refused]")
