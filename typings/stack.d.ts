@@ -18,5 +18,5 @@ export interface Stack {
 export function showStack(
   canvas: HTMLCanvasElement,
   data: object,
-  options?: { changed?: (view: StackView) => void },
+  options?: { changed?: (view: StackView) => void; scrolls?: boolean },
 ): Stack | null;

@@ -196,7 +196,13 @@ interface Page {
   api: Api;
   events: Feed;
   project: Project;
-  tileId: number | null;
+  /** Of the tile or picture that the address names. */
+  number: number | null;
   navigate: typeof import("../src/orbiflow/studio/static/js/main.js").navigate;
   about: About;
+  /** Ends when the page is left. */
+  signal: AbortSignal;
 }
+
+/** Shows a page; what it returns is called when the page is left. */
+type Show = (root: HTMLElement, page: Page) => Promise<void | (() => any)>;

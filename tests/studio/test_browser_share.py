@@ -286,23 +286,6 @@ def test_damaged_link_is_said_in_words(page: Any) -> None:
     page.wrong.clear()  # the refusal is what is wanted
 
 
-def test_drawing_is_copied_and_printed(taking: Any) -> None:
-    taking.get_by_role("button", name="Copy as SVG").click()
-    taking.get_by_text("The drawing is copied").wait_for()
-    text = clipboard(taking)
-    assert text.startswith("<svg ")
-    assert text.count("<use ") > 20
-    pdfium = pytest.importorskip("pypdfium2")
-    taking.emulate_media(color_scheme="dark")
-    taking.set_viewport_size({"width": 390, "height": 844})
-    document = pdfium.PdfDocument(taking.pdf(format="A4", print_background=True))
-    assert len(document) == 1
-    assert document[0].get_textpage().get_text_bounded().strip() == ""
-    pixels = np.asarray(document[0].render(scale=0.5).to_pil().convert("L"))
-    assert pixels[:, 20:-20].max(axis=1).min() > 100  # no row is dark all along
-    assert taking.locator(".share").is_visible()
-
-
 @pytest.fixture(name="project")
 def project_fixture(studio: RunningStudio, tmp_path: Path) -> dict[str, Any]:
     """A project with eight tiles, of which one goes to a sphere."""

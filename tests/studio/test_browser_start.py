@@ -229,14 +229,6 @@ def test_a_shape_can_be_drawn_and_is_searched_for_at_once(page, studio, how) -> 
     assert own["tasks"][0]["operation"] == "search"
 
 
-def test_a_photo_is_taken(page, studio: RunningStudio) -> None:
-    page.goto("/")
-    page.get_by_role("button", name="Take a photo").click()
-    page.get_by_role("button", name="Take the photo").click()
-    own = own_project(page)
-    assert studio.project(own)["input"] == {"name": "photo.png", "type": "png"}
-
-
 def test_a_page_that_was_left_while_it_came_is_not_waited_for(page, studio: RunningStudio) -> None:
     own, held = studio.with_picture(), list[Any]()
     page.goto("/")
@@ -316,19 +308,6 @@ def test_an_animal_is_taken_by_keyboard_and_the_project_renamed(page, studio) ->
     page.keyboard.press("Enter")
     page.get_by_role("link", name="Your beast").wait_for()
     assert studio.project(own)["name"] == "Your beast"
-
-
-def test_a_project_is_duplicated_with_all_that_is_in_it(page, studio: RunningStudio) -> None:
-    searched, name = studio.with_tiles(), "made twice"
-    studio.client.patch(f"projects/{searched}", json={"name": name})
-    page.goto("/")
-    page.get_by_role("button", name=f"Duplicate {name}", exact=True).click()
-    page.get_by_role("link", name=f"{name} (copy)").wait_for()
-    found = {own["name"]: own["id"] for own in studio.client.get("projects").json()}
-    one, other = studio.project(searched), studio.project(found[f"{name} (copy)"])
-    cards, copies = ([card["polygon"] for card in own["tiles"]] for own in (one, other))
-    assert cards == copies
-    assert one["silhouette"]["outline"] == other["silhouette"]["outline"]
 
 
 def test_a_project_is_deleted_when_the_page_is_left_unless_that_is_taken_back(page, studio) -> None:

@@ -35,8 +35,9 @@ const FRAGMENT = `#version 300 es
  *
  * - `data`: What `stack_data` in web_page.py returns.
  * - `changed`: Called with the view whenever it has changed by itself or by a key.
+ * - `scrolls`: Whether the page scrolls: then the wheel zooms only with the Ctrl key.
  */
-export function showStack(canvas, data, { changed = () => {} } = {}) {
+export function showStack(canvas, data, { changed = () => {}, scrolls = false } = {}) {
   const gl = canvas.getContext("webgl2", { antialias: true });
   if (!gl) return null;
   const calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -45,36 +46,20 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
   let glide = null, before = 0, reach = goal();
 
   function prepare() {
-    const made = gl.createProgram();
-    for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, text);
-      gl.compileShader(shader);
-      gl.attachShader(made, shader);
-    }
-    gl.linkProgram(made);
-    if (!gl.getProgramParameter(made, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(gl.getProgramInfoLog(made));
+    const made = programOf(gl, VERTEX, FRAGMENT);
     const meshes = {};
     for (const [name, mesh] of Object.entries(data.meshes)) {
       const array = gl.createVertexArray(), indices = unpack(mesh.triangles, Uint32Array);
       gl.bindVertexArray(array);
-      feed(made, "p", unpack(mesh.points, Float32Array), gl.FLOAT, false);
-      feed(made, "n", unpack(mesh.normals, Int8Array), gl.BYTE, true);
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+      feed(gl, made, "p", stored(gl, unpack(mesh.points, Float32Array)), 3, gl.FLOAT);
+      feed(gl, made, "n", stored(gl, unpack(mesh.normals, Int8Array)), 3, gl.BYTE, true);
+      stored(gl, indices, gl.ELEMENT_ARRAY_BUFFER);
       gl.bindVertexArray(null);
       meshes[name] = { array, count: indices.length };
     }
     gl.enable(gl.DEPTH_TEST);
     const at = Object.fromEntries(["turn", "view", "shift", "center", "size", "radius", "colour"].map(name => [name, gl.getUniformLocation(made, name)]));
     return { made, meshes, at };
-  }
-  function feed(made, name, values, type, normalised) {
-    const place = gl.getAttribLocation(made, name);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, 3, type, normalised, 0, 0);
   }
 
   // rows to the right, up and towards the eye, in the coordinates of the solids
@@ -121,7 +106,7 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
       changed(view);
     }
     if (view.turning) view.yaw += 2 * Math.PI * passed / ROUND;
-    sharpened(canvas);
+    sized(canvas);
     reach = goal();
     draw();
     const moves = glide || view.turning;
@@ -149,7 +134,8 @@ export function showStack(canvas, data, { changed = () => {} } = {}) {
     moveApart(0);
   }
 
-  turnedByHand(canvas, byAngles(canvas, view, redraw), {
+  byHand(canvas, byAngles(canvas, view, redraw), {
+    scrolls,
     keys: { "[": () => moveApart(view.apart - 0.1), "]": () => moveApart(view.apart + 0.1), 0: startAgain },
   });
   canvas.addEventListener("webglcontextlost", e => e.preventDefault());

@@ -66,7 +66,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false 
       precision highp float;
       uniform mat4 M; uniform vec3 eye, center; uniform float radius, cut, lowest, pale;`;
     const depth = "depth = dot(eye, p - center) / radius;";
-    const surface = program(`${head}
+    const surface = programOf(gl, `${head}
       in vec3 p, n; in float t, l; out vec3 normal; out float value, level, depth;
       void main() { gl_Position = M * vec4(p, 1.0); normal = n; value = t; level = l; ${depth} }`, `${head}
       uniform sampler2D map; uniform vec3 right, up; in vec3 normal; in float value, level, depth; out vec4 colour;
@@ -77,7 +77,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false 
         vec3 own = texture(map, vec2((value * 255.0 + 0.5) / 256.0, 0.5)).rgb;
         colour = vec4(light * (level < lowest ? mix(own, vec3(pale), ${PALENESS}) : own), 1.0);
       }`);
-    const stroke = program(`${head}
+    const stroke = programOf(gl, `${head}
       in vec3 a, b; in vec2 corner; uniform vec2 size; uniform float width; out float depth;
       void main() {
         vec4 A = M * vec4(a, 1.0), B = M * vec4(b, 1.0);
@@ -89,7 +89,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false 
       }`, `${head}
       uniform vec4 ink; in float depth; out vec4 colour;
       void main() { if (depth > cut) discard; colour = ink; }`);
-    const dots = program(`${head}
+    const dots = programOf(gl, `${head}
       in vec3 p; in float wide; uniform float most, least, unit; out float depth, ink;
       void main() { gl_Position = M * vec4(p, 1.0); gl_Position.z -= ${PULL} * gl_Position.w;
         float own = wide * unit / gl_Position.w; gl_PointSize = clamp(own, least, most);
@@ -101,32 +101,6 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false 
         colour = r > 0.68 ? vec4(0.1, 0.1, 0.1, 0.8 * ink) : vec4(1.0, 1.0, 1.0, 0.85 * ink);
       }`);
 
-    function program(vertex, fragment) {
-      const made = gl.createProgram();
-      for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-        const shader = gl.createShader(kind);
-        gl.shaderSource(shader, text);
-        gl.compileShader(shader);
-        if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-        gl.attachShader(made, shader);
-      }
-      gl.linkProgram(made);
-      if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
-      return made;
-    }
-    function feed(made, name, buffer, size, type, normalised = false, stride = 0, offset = 0, divisor = 0) {
-      const place = gl.getAttribLocation(made, name);
-      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, size, type, normalised, stride, offset);
-      gl.vertexAttribDivisor(place, divisor);
-    }
-    function store(array, target = gl.ARRAY_BUFFER) {
-      const buffer = gl.createBuffer();
-      gl.bindBuffer(target, buffer);
-      gl.bufferData(target, array, gl.STATIC_DRAW);
-      return buffer;
-    }
     function setup(fill) {
       const array = gl.createVertexArray();
       gl.bindVertexArray(array);
@@ -135,24 +109,24 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false 
       return array;
     }
     const surfaceArray = setup(() => {
-      feed(surface, "p", store(points), 3, gl.FLOAT);
-      feed(surface, "n", store(normals), 3, gl.BYTE, true);
-      feed(surface, "t", store(values), 1, gl.UNSIGNED_SHORT, true);
-      feed(surface, "l", store(levels), 1, gl.UNSIGNED_SHORT, true);
-      store(triangles, gl.ELEMENT_ARRAY_BUFFER);
+      feed(gl, surface, "p", stored(gl, points), 3, gl.FLOAT);
+      feed(gl, surface, "n", stored(gl, normals), 3, gl.BYTE, true);
+      feed(gl, surface, "t", stored(gl, values), 1, gl.UNSIGNED_SHORT, true);
+      feed(gl, surface, "l", stored(gl, levels), 1, gl.UNSIGNED_SHORT, true);
+      stored(gl, triangles, gl.ELEMENT_ARRAY_BUFFER);
     });
-    const corners = store(new Float32Array([0, -1, 0, 1, 1, -1, 1, 1]));
+    const corners = stored(gl, new Float32Array([0, -1, 0, 1, 1, -1, 1, 1]));
     const strokes = lines.map(({ width, segments }) => {
-      const buffer = store(segments);
+      const buffer = stored(gl, segments);
       return { width, count: segments.length / 6, array: setup(() => {
-        feed(stroke, "corner", corners, 2, gl.FLOAT);
-        feed(stroke, "a", buffer, 3, gl.FLOAT, false, 24, 0, 1);
-        feed(stroke, "b", buffer, 3, gl.FLOAT, false, 24, 12, 1);
+        feed(gl, stroke, "corner", corners, 2, gl.FLOAT);
+        feed(gl, stroke, "a", buffer, 3, gl.FLOAT, false, [24, 0, 1]);
+        feed(gl, stroke, "b", buffer, 3, gl.FLOAT, false, [24, 12, 1]);
       }) };
     });
     const dotsArray = setup(() => {
-      feed(dots, "p", store(samples), 3, gl.FLOAT);
-      feed(dots, "wide", store(widths), 1, gl.FLOAT);
+      feed(gl, dots, "p", stored(gl, samples), 3, gl.FLOAT);
+      feed(gl, dots, "wide", stored(gl, widths), 1, gl.FLOAT);
     });
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, colours);
@@ -222,11 +196,11 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false 
   const draw = drawer();
   const redraw = atNextFrame(paint);
   function paint() {
-    const [width, height, scale] = sharpened(canvas);
-    draw(width, height, scale);
+    const { ratio } = sized(canvas), { width, height } = canvas;
+    draw(width, height, ratio);
     placeLabels(width, height);
   }
-  turnedByHand(canvas, byAngles(canvas, view, redraw), {
+  byHand(canvas, byAngles(canvas, view, redraw), {
     scrolls,
     keys: { 0: () => { Object.assign(view, data.start, { zoom: 1 }); changed(view); redraw(); } },
   });

@@ -4,12 +4,7 @@ import { fill, shaded } from "./tiling.js";
 
 const known = new Map();
 
-/**
- * A colour of CSS as red, green and blue, 0 to 255.
- *
- * @param {string} colour
- * @returns {number[]}
- */
+/** A colour of CSS as red, green and blue, 0 to 255. @param {string} colour @returns {number[]} */
 export function rgbOf(colour) {
   if (!known.has(colour)) {
     const canvas = document.createElement("canvas");
@@ -22,7 +17,9 @@ export function rgbOf(colour) {
   return known.get(colour);
 }
 
-const hex = (colour) => "#" + rgbOf(colour).map((v) => v.toString(16).padStart(2, "0")).join("");
+/** A colour of CSS as "#rrggbb". @param {string} colour */
+export const hex = (colour) =>
+  "#" + rgbOf(colour).map((v) => v.toString(16).padStart(2, "0")).join("");
 
 const plain = (text) => text.replace(/[&<>"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 
@@ -82,11 +79,7 @@ export function svgOf(tiling, camera, palette, { width, height, line = 1.2, skin
   ].filter(Boolean).join("\n");
 }
 
-/**
- * Put a text on the clipboard.
- *
- * @param {string} text
- */
+/** Put a text on the clipboard. @param {string} text */
 export async function copied(text) {
   try {
     await navigator.clipboard.writeText(text);

@@ -1,5 +1,7 @@
 /** The endless tiling of a card: which copies are in view, their colours, and how they are drawn. */
 
+import { sized } from "./turned.js";
+
 const MOST_COPIES = 6000;
 
 /** A camera shows the input's point (x, y) in the middle, `scale` pixels a unit, turned by `turn`. */
@@ -72,12 +74,7 @@ export function moved([a, b, c, d, e, f], [x, y]) {
   return [a * x + c * y + e, b * x + d * y + f];
 }
 
-/**
- * The inverse of a canvas matrix.
- *
- * @param {Matrix} matrix
- * @returns {Matrix}
- */
+/** The inverse of a canvas matrix. @param {Matrix} matrix @returns {Matrix} */
 export function inverse([a, b, c, d, e, f]) {
   const size = a * d - b * c;
   return [
@@ -90,11 +87,14 @@ export function inverse([a, b, c, d, e, f]) {
   ];
 }
 
-/**
- * The area of a polygon, and the coordinates of its centroid.
- *
- * @param {Point[]} polygon
- */
+/** The upright box around points: the least coordinates, and its sides. @param {Point[]} points */
+export function boxOf(points) {
+  const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k]));
+  const [left, top] = [Math.min(...xs), Math.min(...ys)];
+  return { left, top, wide: Math.max(...xs) - left, high: Math.max(...ys) - top };
+}
+
+/** The area of a polygon, and the coordinates of its centroid. @param {Point[]} polygon */
 export function measured(polygon) {
   let [area, x, y] = [0, 0, 0];
   polygon.forEach(([x0, y0], k) => {
@@ -107,10 +107,7 @@ export function measured(polygon) {
   return { area: Math.abs(area), x: x / area, y: y / area };
 }
 
-/**
- * @param {Group["cosets"][0]} coset
- * @returns {Matrix}
- */
+/** @param {Group["cosets"][0]} coset @returns {Matrix} */
 const asMatrix = ({ linear: [[a, c], [b, d]], translation: [e, f] }) => [a, b, c, d, e, f];
 
 /**
@@ -150,11 +147,13 @@ export class Tiling {
     figuresOf(card).forEach(({ polygon }, k) => this.change(polygon, k));
   }
 
-  /**
-   * Take another polygon of a figure for the same group.
-   *
-   * @param {Point[]} polygon
-   */
+  /** The matrix of a step along each vector of the lattice. @returns {Matrix} */
+  get lattice() {
+    const [p, q, r, s] = this.basis;
+    return [p, q, r, s, 0, 0];
+  }
+
+  /** Take another polygon of a figure for the same group. @param {Point[]} polygon */
   change(polygon, figure = 0) {
     const { area, x, y } = measured(polygon);
     const radius = Math.max(...polygon.map(([u, v]) => Math.hypot(u - x, v - y)));
@@ -218,7 +217,7 @@ export class Tiling {
     const view = camera.matrix(width, height);
     const back = inverse(view);
     const [p, q, r, s] = this.basis;
-    const cells = inverse([p, q, r, s, 0, 0]);
+    const cells = inverse(this.lattice);
     /** @type {Copy[]} */
     const found = [];
     this.aspects.forEach((element, aspect) => {
@@ -231,13 +230,9 @@ export class Tiling {
       const corners = edge.map((corner) => moved(back, corner));
       const [x, y] = moved(element, [middle.x, middle.y]);
       const at = corners.map(([u, v]) => moved(cells, [u - x, v - y]));
-      const [low, high] = [0, 1].map((k) => at.map((point) => point[k])).reduce(
-        (
-          [lows, highs],
-          line,
-        ) => [[...lows, Math.ceil(Math.min(...line))], [...highs, Math.floor(Math.max(...line))]],
-        [[], []],
-      );
+      const along = (k) => at.map((point) => point[k]);
+      const low = [0, 1].map((k) => Math.ceil(Math.min(...along(k))));
+      const high = [0, 1].map((k) => Math.floor(Math.max(...along(k))));
       for (let m = low[0]; m <= high[0]; m += 1) {
         for (let n = low[1]; n <= high[1]; n += 1) {
           const [u, v] = moved(view, [x + p * m + r * n, y + q * m + s * n]);
@@ -252,17 +247,8 @@ export class Tiling {
   }
 }
 
-/**
- * A closed polygon as a path.
- *
- * @param {Point[]} polygon
- */
-export function pathOf(polygon) {
-  const path = new Path2D();
-  polygon.forEach(([x, y], k) => (k ? path.lineTo(x, y) : path.moveTo(x, y)));
-  path.closePath();
-  return path;
-}
+/** A closed polygon as a path. @param {Point[]} polygon */
+export const pathOf = (polygon) => new Path2D(`M${polygon.join("L")}Z`);
 
 /**
  * Colour number `index` of a palette; after the last they start again, paler.
@@ -325,19 +311,6 @@ export function paint(
 }
 
 /**
- * Give a canvas as many pixels as the screen has where it lies.
- *
- * @param {HTMLCanvasElement} canvas
- */
-export function sized(canvas) {
-  const ratio = Math.min(globalThis.devicePixelRatio || 1, 2);
-  const [width, height] = [canvas.clientWidth || 1, canvas.clientHeight || 1];
-  const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
-  return { context: canvas.getContext("2d"), width, height, ratio };
-}
-
-/**
  * Draw a card's tiling into a canvas as large as it lies in the page; `skins(tiling, scale)` gives what lies on it.
  *
  * @param {HTMLCanvasElement} canvas
@@ -346,9 +319,10 @@ export function sized(canvas) {
  * @param {{ across?: number, line?: number, skins?: (tiling: Tiling, scale: number) => any[] }} how
  */
 export function paintCard(canvas, card, palette, { across = 5, line = 1.2, skins } = {}) {
-  const { context, width, height, ratio } = sized(canvas);
+  const { width, height, ratio } = sized(canvas);
   const tiling = new Tiling(card);
   const camera = Camera.fit(tiling, width, height, across);
   const own = skins?.(tiling, camera.scale * ratio);
+  const context = canvas.getContext("2d");
   paint(context, tiling, camera, palette, { width, height, ratio, line, skins: own });
 }

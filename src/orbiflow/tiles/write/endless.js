@@ -1,6 +1,6 @@
 /** The page of one tiling without an end: colours, lines and pictures to change, and what to keep of it. */
 
-import { copied, printed, rgbOf, svgOf } from "../../drawing/js/svg.js";
+import { copied, hex, printed, rgbOf, svgOf } from "../../drawing/js/svg.js";
 import { Camera, fill, paint, Tiling } from "../../drawing/js/tiling.js";
 import { Skin } from "../../drawing/js/tinted.js";
 import { View } from "../../drawing/js/view.js";
@@ -39,11 +39,7 @@ function skinsLoaded(skins) {
   }));
 }
 
-/**
- * Show a tiling that `write_html` has described.
- *
- * @param {any} data
- */
+/** Show a tiling that `write_html` has described. @param {any} data */
 export async function showEndless({ title, tile, palettes, tint, outline, skins }) {
   const tiling = new Tiling(tile);
   const used = 1 + Math.max(...tile.colours.table.flat(2));
@@ -82,9 +78,8 @@ export async function showEndless({ title, tile, palettes, tint, outline, skins 
   const swatches = () => {
     const boxes = Array.from({ length: used }, (_, k) => {
       const box = document.createElement("input");
-      const [red, green, blue] = rgbOf(fill({ ...state.palette, colours: state.colours }, k));
       box.type = "color";
-      box.value = `#${[red, green, blue].map((v) => v.toString(16).padStart(2, "0")).join("")}`;
+      box.value = hex(fill({ ...state.palette, colours: state.colours }, k));
       box.setAttribute("aria-label", `Colour ${k + 1}`);
       box.oninput = () => {
         state.colours[k] = box.value;
@@ -110,21 +105,19 @@ export async function showEndless({ title, tile, palettes, tint, outline, skins 
   at("palette").onchange = () => choose(Number(at("palette").value));
   at("order").onclick = () => take([...state.colours.slice(1), state.colours[0]]);
   at("turn").oninput = () => {
-    view.camera.turn = Number(at("turn").value) * Math.PI / 180;
+    view.camera.turn = at("turn").valueAsNumber * Math.PI / 180;
     view.redraw();
   };
-  at("line").oninput = () => {
-    state.line = Number(at("line").value);
-    look();
+  /** @type {(name: string, read: (box: HTMLInputElement) => any) => void} */
+  const listen = (name, read) => {
+    at(name).oninput = () => {
+      state[name] = read(at(name));
+      look();
+    };
   };
-  at("tint").oninput = () => {
-    state.tint = Number(at("tint").value);
-    look();
-  };
-  at("skin").onchange = () => {
-    state.skin = at("skin").checked;
-    look();
-  };
+  listen("line", (box) => box.valueAsNumber);
+  listen("tint", (box) => box.valueAsNumber);
+  listen("skin", (box) => box.checked);
   at("has-skin").hidden = at("has-tint").hidden = !layers.some(Boolean);
   at("nearer").onclick = () => view.zoom(1.35);
   at("farther").onclick = () => view.zoom(1 / 1.35);

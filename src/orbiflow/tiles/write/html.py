@@ -22,7 +22,7 @@ from orbiflow.tiles.write.png import texture
 SIDE_PIXELS = 900  # of the longer side of a picture on a tile, at most
 ROOM = 6  # pixels of it that lie beyond the outline
 QUALITY = 88  # of these pictures, in per cent
-SHARED = [f"drawing/js/{name}.js" for name in ("tiling", "tinted", "svg", "view")]
+SHARED = [f"drawing/js/{name}.js" for name in ("turned", "tiling", "tinted", "svg", "view")]
 """Scripts that the page carries before its own, which the studio has, too."""
 
 

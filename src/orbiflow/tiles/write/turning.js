@@ -5,7 +5,7 @@
  * from the one in the middle, as long as they can be seen.
  */
 
-import { atNextFrame, sharpened, turnedByHand } from "../../drawing/js/turned.js";
+import { atNextFrame, byHand, sized } from "../../drawing/js/turned.js";
 
 const LEAST = [4, 9]; // pixels of the smallest copies, at rest and in the hand
 const DRAWN = [40, 110]; // pixels of those that carry their drawing, at rest and in the hand
@@ -244,26 +244,22 @@ class World {
   }
 }
 
-/**
- * Show a world, and let it be turned.
- *
- * @param {any} data
- */
+/** Show a world, and let it be turned. @param {any} data */
 export function showWorld(data) {
   const world = new World(data);
   const canvas = at("view");
   let inHand = false;
   const draw = atNextFrame(() => {
-    const [width, height] = sharpened(canvas);
-    world.paint(canvas.getContext("2d"), width, height, inHand);
+    sized(canvas);
+    world.paint(canvas.getContext("2d"), canvas.width, canvas.height, inHand);
     canvas.dataset.drawn = "yes";
   });
   const zoom = (by) => {
     world.radius = Math.min(20, Math.max(0.1, world.radius * by));
     draw();
   };
-  turnedByHand(canvas, {
-    turn(from, to) {
+  byHand(canvas, {
+    drag(from, to) {
       const scale = world.radius * Math.min(canvas.clientWidth, canvas.clientHeight);
       const places = [from, to].map(([x, y]) => [
         (x - canvas.clientWidth / 2) / scale,

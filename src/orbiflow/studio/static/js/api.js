@@ -67,6 +67,15 @@ export const api = {
   put: (path, body, options) => call("PUT", path, body, options),
   /** @type {(path: string, body: any, options?: Options) => Promise<any>} */
   patch: (path, body, options) => call("PATCH", path, body, options),
+  /** Send a file under its name. @type {(path: string, file: File, query?: Record<string, string>) => Promise<any>} */
+  upload: (path, file, query) =>
+    call(
+      "PUT",
+      `${path}?${new URLSearchParams({ name: file.name, ...query })}`,
+      file.slice(0, file.size, "application/octet-stream"), // whatever it is, it is no message
+    ),
+  /** Give a project a task. @type {(project: Pick<Project, "id">, operation: string, settings: object) => Promise<any>} */
+  start: ({ id }, operation, settings) => api.post(`projects/${id}/tasks`, { operation, settings }),
   /** @type {(path: string, options?: Options) => Promise<any>} */
   remove: (path, options) => call("DELETE", path, undefined, options),
 };

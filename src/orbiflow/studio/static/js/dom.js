@@ -5,49 +5,57 @@ import { sentence } from "./words.js";
 const SVG = "http://www.w3.org/2000/svg";
 
 /**
- * Make an element. Attributes, which may be left out, are as in HTML; functions listen, `style` is an object.
+ * Make an element of a tag and classes, such as "ul.cards". Attributes, which may be left out, are as in HTML; functions
+ * listen, `style` is an object. Children may stand in lists.
  *
  * @template {keyof HTMLElementTagNameMap} T
- * @param {T} tag
+ * @param {T | `${T}.${string}`} selector
  * @param {any} [attributes]
  * @param {...Child} children
  */
-export function h(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
+export function h(selector, attributes = {}, ...children) {
+  const [tag, ...classes] = selector.split(".");
+  const made = document.createElement(/** @type {T} */ (tag));
   if (attributes?.constructor !== Object) [attributes, children] = [{}, [attributes, ...children]];
+  made.classList.add(...classes);
   for (const [name, value] of Object.entries(attributes)) {
     if (value === undefined || value === null || value === false) continue;
     if (typeof value === "function") made.addEventListener(name.replace(/^on/, ""), value);
     else if (name === "style") {
       Object.entries(value).forEach(([key, entry]) => made.style.setProperty(key, entry));
-    } else if (["value", "checked", "srcObject", "muted"].includes(name)) made[name] = value;
+    } else if (["value", "checked"].includes(name)) made[name] = value;
     else made.setAttribute(name, value === true ? "" : value);
   }
-  /** @type {any[]} */
-  const all = children.flat();
-  made.append(...all.filter((child) => child !== null && child !== undefined && child !== false));
+  made.append(...nodes(children));
   return made;
 }
 
+/** What of children is shown, in one list. @param {Child[]} children */
+const nodes = (children) =>
+  /** @type {any[]} */ (children).flat(Infinity).filter((child) =>
+    child !== false && child != null
+  );
+
+/** Replace all children. @param {Element} place @param {...Child} children */
+export const put = (place, ...children) => place.replaceChildren(...nodes(children));
+
 /** @param {...Child} words small print */
-export const aside = (...words) => h("p", { class: "soft small" }, ...words);
+export const aside = (...words) => h("p.soft.small", ...words);
 /** @param {...Child} words what is less important */
-export const soft = (...words) => h("p", { class: "soft" }, ...words);
+export const soft = (...words) => h("p.soft", ...words);
 /** A part of a page by its title's id. */
 export const section = (kind, id, title, ...parts) =>
-  h(
-    "section",
-    { class: `stack ${kind}`, "aria-labelledby": id },
-    h("h2", { id }, title),
-    ...parts,
-  );
+  h("section", { class: `stack ${kind}`, "aria-labelledby": id }, [h("h2", { id }, title), parts]);
 /** A part of a page, with a title. */
-export const panel = (title, ...parts) =>
-  h("section", { class: "panel stack" }, h("h2", title), ...parts);
+export const panel = (title, ...parts) => h("section.panel.stack", h("h2", title), ...parts);
 /** @param {...Child} parts one beside the other */
-export const row = (...parts) => h("div", { class: "row" }, ...parts);
+export const row = (...parts) => h("div.row", ...parts);
 /** @param {...Child} parts one below the other */
-export const stack = (...parts) => h("div", { class: "stack" }, ...parts);
+export const stack = (...parts) => h("div.stack", ...parts);
+
+/** A canvas that is moved by hand and keys; its label and the id of its help are for readers of screens. */
+export const handled = (kind, role, label, help = undefined) =>
+  h("canvas", { class: kind, tabindex: "0", role, "aria-label": label, "aria-describedby": help });
 
 /** An icon of `icons.svg`; words stand beside it, so readers of screens skip it. @param {string} name */
 export function icon(name) {
@@ -68,14 +76,12 @@ export function icon(name) {
  * @param {{ kind?: string, image?: string, [attribute: string]: any }} [options]
  */
 export function button(text, onclick, { kind = "", image, ...rest } = {}) {
-  const shown = kind.includes("icon") ? [h("span", { class: "unseen" }, text)] : [text];
+  const shown = kind.includes("icon") ? [h("span.unseen", text)] : [text];
   const title = kind.includes("icon") ? text : undefined;
-  return h(
-    "button",
-    { type: "button", class: `button ${kind}`, onclick, title, ...rest },
+  return h("button", { type: "button", class: `button ${kind}`, onclick, title, ...rest }, [
     image && icon(image),
-    ...shown,
-  );
+    shown,
+  ]);
 }
 
 /**
@@ -85,140 +91,34 @@ export function button(text, onclick, { kind = "", image, ...rest } = {}) {
  * @param {() => any} fit
  */
 export const zooms = (zoom, fit) =>
-  h(
-    "div",
-    { class: "zooms" },
+  h("div.zooms", [
     button("+", () => zoom(1.35), { "aria-label": "Nearer" }),
     button("−", () => zoom(1 / 1.35), { "aria-label": "Farther" }),
     button("Fit", fit),
-  );
-
-/** Palettes that are seen before "More". */
-export const FEW_PALETTES = 6;
-
-/** Options of a list; after the first few, under "More". */
-export const listed = (options, few) => [
-  ...options.slice(0, few),
-  options.length > few && h("optgroup", { label: "More" }, options.slice(few)),
-];
-
-/** A box to tick. */
-export const check = (words, checked, onchange) =>
-  h(
-    "label",
-    { class: "check" },
-    h("input", { type: "checkbox", checked, onchange: ({ target }) => onchange(target.checked) }),
-    h("span", words),
-  );
+  ]);
 
 let count = 0;
-/**
- * A name that no other element of the page has.
- *
- * @param {string} stem
- */
+/** A name that no other element of the page has. @param {string} stem */
 export const unique = (stem) => `${stem}-${(count += 1)}`;
 
-/**
- * One of a few, as buttons side by side. `.set(value)` changes it.
- *
- * @template V
- * @param {string} label
- * @param {[value: V, words: string, image?: string][]} options
- * @param {V} value
- * @param {(value: V) => any} onchange
- * @param {{ unseen?: boolean }} [look]
- */
-export function choice(label, options, value, onchange, { unseen = false } = {}) {
-  const name = unique("choice");
-  const boxes = options.map(([own]) =>
-    h("input", {
-      type: "radio",
-      name,
-      value: String(own),
-      checked: own === value,
-      onchange: () => onchange(own),
-    })
-  );
-  const made = h(
-    "fieldset",
-    { class: "choice" },
-    h("legend", { class: unseen && "unseen" }, label),
-    h(
-      "div",
-      options.map(([, words, image], k) =>
-        h("label", boxes[k], h("span", image && icon(image), words))
-      ),
-    ),
-  );
-  return Object.assign(made, {
-    /** @param {V} chosen */
-    set: (chosen) =>
-      boxes.forEach((box, k) => {
-        box.checked = options[k][0] === chosen;
-      }),
-  });
-}
+/** How much there is of something, from 0 to 1, in a list. */
+export const meter = (title, share, words, about) =>
+  h("li", [
+    h("div.share", h("strong", title), h("span", words)),
+    h("meter", { value: share, "aria-label": title }),
+    aside(about),
+  ]);
 
-/**
- * A slider that says its value in words. `.set(value)` changes it.
- *
- * @param {string} label
- * @param {{ min: number, max: number, step: number, value: number, said?: (value: number) => string }} range
- * @param {(value: number) => any} oninput
- */
-export function slider(label, { min, max, step, value, said = String }, oninput) {
-  const id = unique("slider");
-  const shown = h("output", { for: id });
-  const box = h("input", {
-    type: "range",
-    id,
-    min,
-    max,
-    step,
-    oninput: () => {
-      tell();
-      oninput(Number(box.value));
-    },
-  });
-  const tell = () => {
-    shown.textContent = said(Number(box.value));
-    box.setAttribute("aria-valuetext", shown.textContent);
-  };
-  const made = h(
-    "div",
-    { class: "slider" },
-    h("label", { for: id, class: "label" }, label),
-    shown,
-    box,
-  );
-  /** @param {number} number */
-  const set = (number) => {
-    box.value = String(number);
-    tell();
-  };
-  set(value);
-  return Object.assign(made, { set });
-}
-
-/**
- * Show a sentence for a while; one that is bad stays until it is closed.
- *
- * @param {string} text
- */
+/** Show a sentence for a while; one that is bad stays until it is closed. @param {string} text */
 export function toast(text, { bad = false } = {}) {
   const box = document.querySelector("#toasts");
   if ([...box.children].some((other) => other.firstChild.textContent === text)) return;
-  const made = h(
-    "div",
-    { class: bad ? "toast bad" : "toast" },
+  const made = h("div", { class: bad ? "toast bad" : "toast" }, [
     h("span", text),
-    h(
-      "button",
-      { type: "button", "aria-label": "Close", onclick: () => made.remove() },
+    h("button", { type: "button", "aria-label": "Close", onclick: () => made.remove() }, [
       icon("close"),
-    ),
-  );
+    ]),
+  ]);
   box.append(made);
   while (box.children.length > 3) box.firstChild.remove();
   if (!bad) setTimeout(() => made.remove(), 6000);
@@ -231,7 +131,7 @@ export function toast(text, { bad = false } = {}) {
  */
 export const notes = (texts) =>
   texts.length > 0 &&
-  h("ul", { class: "said-notes soft small" }, texts.map((text) => h("li", sentence(text))));
+  h("ul.said-notes.soft.small", texts.map((text) => h("li", sentence(text))));
 
 /**
  * Call a function that may fail; if it does, say why.
@@ -271,15 +171,13 @@ export function dialog(title, build) {
       made.close();
     };
     made.append(
-      h(
-        "div",
-        h(
-          "header",
+      h("div", [
+        h("header", [
           h("h2", { id }, title),
           button("Close", () => close(), { kind: "quiet icon", image: "close" }),
-        ),
+        ]),
         build(close),
-      ),
+      ]),
     );
     document.body.append(made);
     made.showModal();
@@ -297,12 +195,50 @@ export function confirmed(title, text, verb) {
   return dialog(title, (close) =>
     stack(
       h("p", text),
-      h(
-        "footer",
+      h("footer", [
         button("Keep it", () => close(false), { autofocus: true }),
         button(verb, () => close(true), { kind: "primary" }),
-      ),
+      ]),
     ));
+}
+
+/**
+ * Ask for a name; resolves with it, undefined if none was given.
+ *
+ * @param {string} title
+ * @param {string} verb
+ * @param {string} name that is there already
+ * @param {Child[]} words above the box
+ * @returns {Promise<string | undefined>}
+ */
+export function entered(title, verb, name, words = []) {
+  const box = h("input", { type: "text", maxlength: 80, value: name, "aria-label": "Its name" });
+  return dialog(title, (close) => {
+    const onsubmit = (event) => {
+      event.preventDefault();
+      close(box.value.trim());
+    };
+    return h("form.stack", { onsubmit }, [words, box, h("footer", submit(verb))]);
+  });
+}
+
+/** The button of a form. */
+const submit = (verb) => button(verb, () => {}, { kind: "primary", type: "submit" });
+
+/**
+ * Hear the keys that undo and do again: `go(-1)` and `go(1)`.
+ *
+ * @param {(step: -1 | 1) => void} go
+ * @param {AbortSignal} signal
+ */
+export function undoKeys(go, signal) {
+  document.addEventListener("keydown", (event) => {
+    const { key, shiftKey, altKey, target } = event;
+    const isText = /** @type {Element} */ (target).matches("[type=text], [type=number], select");
+    if (isText || altKey || !(event.ctrlKey || event.metaKey) || !/^[zy]$/i.test(key)) return;
+    event.preventDefault();
+    go(shiftKey || key.toLowerCase() === "y" ? 1 : -1);
+  }, { signal });
 }
 
 /**
@@ -355,16 +291,4 @@ export async function style(...names) {
   }
   await Promise.all(names.map((name) => sheets.get(name).ready));
   for (const [other, { link }] of sheets) link.disabled = !names.includes(other);
-}
-
-/**
- * Replace all children.
- *
- * @param {Element} place
- * @param {...Child} children
- */
-export function put(place, ...children) {
-  /** @type {any[]} */
-  const all = children.flat();
-  place.replaceChildren(...all.filter(Boolean));
 }

@@ -10,37 +10,37 @@ const byId = (list, item, add) => {
   else list[add](item);
 };
 
-/**
- * Best first: certified stars, then the score.
- *
- * @param {Card} a
- * @param {Card} b
- */
+/** Best first: certified stars, then the score. @param {Card} a @param {Card} b */
 export const better = (a, b) => b.stars - a.stars || b.score - a.score || a.id - b.id;
 
-export class Feed {
-  /**
-   * The feed of a project that was just fetched.
-   *
-   * @param {Project} project
-   */
+export class Feed extends EventTarget {
+  /** The feed of a project that was just fetched. @param {Project} project */
   constructor(project) {
+    super();
     this.project = project;
-    this.heard = new Map();
-    this.seen = () => (document.hidden ? this.rest() : this.refresh());
-    document.addEventListener("visibilitychange", this.seen);
+    this.closing = new AbortController();
+    const seen = () => (document.hidden ? this.rest() : this.refresh());
+    document.addEventListener("visibilitychange", seen, { signal: this.closing.signal });
     this.open();
   }
 
-  /** Hear a kind of event, "lost", "back" or "refresh"; returns a function that stops hearing. */
-  on(kind, handler) {
-    if (!this.heard.has(kind)) this.heard.set(kind, new Set());
-    this.heard.get(kind).add(handler);
-    return () => this.heard.get(kind).delete(handler);
+  /**
+   * Hear kinds of events, "lost", "back" or "refresh", as long as a signal lasts.
+   *
+   * @param {string} kinds such as "task gone"
+   * @param {(data: any) => any} handler
+   * @param {AbortSignal} [signal]
+   */
+  on(kinds, handler, signal) {
+    for (const kind of kinds.split(" ")) {
+      this.addEventListener(kind, (event) => handler(/** @type {CustomEvent} */ (event).detail), {
+        signal,
+      });
+    }
   }
 
-  tell(kind, data) {
-    for (const handler of [...(this.heard.get(kind) ?? [])]) handler(data);
+  tell(kind, detail) {
+    this.dispatchEvent(new CustomEvent(kind, { detail }));
   }
 
   apply(kind, data) {
@@ -101,7 +101,7 @@ export class Feed {
       else this.again();
       return false;
     }
-    if (this.closed) return false;
+    if (this.closing.signal.aborted) return false;
     this.open();
     this.tell("refresh");
     return true;
@@ -114,9 +114,7 @@ export class Feed {
   }
 
   close() {
-    this.closed = true;
+    this.closing.abort();
     this.rest();
-    this.heard.clear();
-    document.removeEventListener("visibilitychange", this.seen);
   }
 }

@@ -1,6 +1,7 @@
 /** Forms from the JSON Schema of an operation's settings. */
 
-import { h, listed, unique } from "./dom.js";
+import { labelled, listed } from "./controls.js";
+import { h, unique } from "./dom.js";
 import { millimetres, shown, unit as lengthUnit } from "./lengths.js";
 import { capital } from "./words.js";
 
@@ -35,19 +36,17 @@ function read(given, found) {
  * `value` is undefined where that is the default, which `usual` changes.
  */
 function control(name, schema, words, changed) {
-  const id = unique(name);
   const found = kinds(schema);
   const options = found.find((kind) => kind.enum)?.enum;
   const meaning = words?.about ?? schema.description;
-  const described = meaning ? `${id}-about` : undefined;
-  const about = meaning && h("p", { class: "soft small", id: described }, meaning);
-  const shared = { id, name, "aria-describedby": described, onchange: changed };
+  const about = meaning && h("p.soft.small", { id: unique("about") }, meaning);
+  const shared = { name, "aria-describedby": about?.id, onchange: changed };
   const isLength = schema["x-unit"] === "mm";
   const unit = isLength ? lengthUnit() : schema["x-unit"];
   const title = words?.title ?? label(name);
   const yes = found.some(({ type }) => type === "boolean");
   const some = words?.some &&
-    h("datalist", { id: `${id}-some` }, words.some.map((own) => h("option", { value: own })));
+    h("datalist", { id: unique("some") }, words.some.map((value) => h("option", { value })));
   let standard = schema.default ?? (yes ? false : null);
   /** @type {HTMLInputElement | HTMLSelectElement} */
   let box;
@@ -65,18 +64,10 @@ function control(name, schema, words, changed) {
     const first = standard === null && words?.usual !== false
       ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "none"))]
       : [];
-    const few = words?.few ?? options.length;
-    box = h(
-      "select",
-      shared,
-      first,
-      listed(
-        options.map((option) =>
-          h("option", { value: option }, words?.options?.[option] ?? capital(option))
-        ),
-        few,
-      ),
+    const listing = options.map((value) =>
+      h("option", { value }, words?.options?.[value] ?? capital(value))
     );
+    box = h("select", shared, first, listed(listing, words?.few ?? options.length));
     show = (value) => {
       box.value = value ?? "";
     };
@@ -118,11 +109,10 @@ function control(name, schema, words, changed) {
     if (own === undefined) show(next);
   };
   show(standard);
-  const named = yes ? [h("label", { class: "check" }, box, title)] : [
-    h("label", { for: id, class: "label" }, unit && !options ? `${title} (${unit})` : title),
-    box,
-  ];
-  const root = h("div", { class: "field" }, named, some, about);
+  const named = yes
+    ? h("label.check", box, title)
+    : labelled(unit && !options ? `${title} (${unit})` : title, box);
+  const root = h("div.field", named, some, about);
   return { root, box, now: get, value, usual, standard, show, reset: () => show(standard) };
 }
 
@@ -191,26 +181,19 @@ export function form(
   }
   const now = (name) => controls.get(name).now();
   const rest = names.filter((name) => !first.includes(name) && !fixed.includes(name));
-  const groups = Map.groupBy
-    ? Map.groupBy(rest, (name) => schema.properties[name]["x-group"] || "More")
-    : new Map([["More", rest]]);
-  const made = h(
-    "div",
-    { class: "stack form" },
+  const groups = Map.groupBy(rest, (name) => schema.properties[name]["x-group"] || "More");
+  const made = h("div.stack.form", [
     first.filter((name) => controls.has(name)).map((name) => controls.get(name).root),
-    h(
-      "details",
+    h("details", [
       h("summary", "More"),
       [...groups].map(([group, own]) =>
-        h(
-          "div",
-          { class: "stack group" },
+        h("div.stack.group", [
           groups.size > 1 && h("h3", group),
           own.map((name) => controls.get(name).root),
-        )
+        ])
       ),
-    ),
-  );
+    ]),
+  ]);
   function values() {
     const shown = names.filter((name) => !controls.get(name).root.hidden);
     return Object.fromEntries(
@@ -222,7 +205,7 @@ export function form(
   function refuse(name, text, focus = true) {
     if (!controls.has(name)) return false;
     const { root, box } = controls.get(name);
-    const said = h("p", { class: "error small", role: "alert" }, text);
+    const said = h("p.error.small", { role: "alert" }, text);
     root.querySelector(".error")?.remove();
     root.append(said);
     root.closest("details")?.setAttribute("open", "");

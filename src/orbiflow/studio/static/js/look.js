@@ -1,16 +1,11 @@
 /** How a project's tiles look, one choice for all pages: colours, outline, picture and its tint. */
 
-import { newest } from "./dom.js";
+import { keeper } from "./memory.js";
 
 /** Whether tiles show what lies under a silhouette: not if that is of one colour, or dark as lines. */
 const shows = (own) => Boolean(own?.silhouette?.coloured && own.silhouette.told_apart !== false);
 
-/**
- * The look of a project's tiles.
- *
- * @param {Project} project
- * @param {About} about
- */
+/** The look of a project's tiles. @param {Project} project @param {About} about */
 export function lookOf(project, about) {
   const { look, closeup, search } = project.view ?? {};
   return {
@@ -38,23 +33,10 @@ export function paletteOf({ palette, custom }, { palettes }) {
   return palette === "own" && custom ? { ...found, ...custom, shades: undefined } : found;
 }
 
-/**
- * A function that keeps what changes of a project's look.
- *
- * @param {Api} api
- * @param {Project} project
- */
-export function keeper(api, project) {
+/** A function that keeps what changes of a project's look. @param {Page} page */
+export function lookKeeper(page) {
+  const keep = keeper(page, "look");
   const chosen = {}; // on this page: what the server tells meanwhile may be older
-  const send = newest(
-    () =>
-      api.patch(`projects/${project.id}`, { view: { look: { ...project.view?.look, ...chosen } } }),
-    400,
-  );
   /** @param {object} what */
-  return (what) => {
-    Object.assign(chosen, what);
-    project.view = { ...project.view, look: { ...project.view?.look, ...chosen } };
-    send();
-  };
+  return (what) => keep({ ...page.project.view?.look, ...Object.assign(chosen, what) });
 }

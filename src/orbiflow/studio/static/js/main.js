@@ -8,12 +8,7 @@ import { sentence } from "./words.js";
 /** @type {[pattern: RegExp, load: () => Promise<any>, step?: string][]} */
 const ROUTES = [
   [/^$/, () => import("./start/page.js")],
-  [/^p\/([\w-]+)\/picture$/, () => import("./start/picture.js"), "picture"],
-  [
-    /^p\/([\w-]+)\/picture\/2$/,
-    async () => ({ show: (await import("./start/picture.js")).showSecond }),
-    "picture",
-  ],
+  [/^p\/([\w-]+)\/picture(?:\/(2))?$/, () => import("./start/picture.js"), "picture"],
   [/^p\/([\w-]+)$/, () => import("./search/page.js"), "tiles"],
   [/^p\/([\w-]+)\/t\/(\d+)$/, () => import("./closeup/page.js"), "closeup"],
   [/^p\/([\w-]+)\/take\/(\d+)$/, () => import("./takeaway/page.js"), "take"],
@@ -25,8 +20,9 @@ const ROUTES = [
 
 const page = document.querySelector("#page");
 const bar = document.querySelector("#top");
-/** @type {() => any} */
+/** What the page that is shown does when it is left, and what ends all that it hears. */
 let close = () => {};
+let leaving = new AbortController();
 /** @type {Feed | null} */
 let feed = null;
 let turn = 0;
@@ -35,11 +31,7 @@ const places = {};
 let [here, path] = [0, ""];
 history.scrollRestoration = "manual";
 
-/**
- * Go to a page; `replace` leaves no step in the history.
- *
- * @param {string} to
- */
+/** Go to a page; `replace` leaves no step in the history. @param {string} to */
 export function navigate(to, { replace = false, quiet = false } = {}) {
   if (quiet) {
     path = to;
@@ -60,32 +52,36 @@ async function show() {
   path = decodeURIComponent(location.hash.replace(/^#\/?/, ""));
   const mine = (turn += 1);
   const [pattern, load, step] = ROUTES.find(([known]) => known.test(path)) ?? [null];
-  const [, id, tileId] = pattern ? path.match(pattern) : [];
+  const [, id, digits] = pattern ? path.match(pattern) : [];
   if (id !== feed?.project.id) {
     document.querySelectorAll("#toasts .bad").forEach((one) => one.remove());
   }
   const leave = close;
   close = () => {};
+  leaving.abort();
+  const { signal } = leaving = new AbortController();
   await leave();
-  const root = h("div", { class: "page" });
+  const root = h("div.page");
   const waiting = setTimeout(
-    () => mine === turn && put(page, h("p", { class: "lonely soft" }, "One moment …")),
+    () => mine === turn && put(page, h("p.lonely.soft", "One moment …")),
     300,
   );
   try {
     if (!pattern) throw new Error("There is no such page.");
     const [module, known] = await Promise.all([load(), about(), follow(id)]);
     if (mine !== turn) return;
-    drawBar(step, Number(tileId) || null);
+    const number = Number(digits) || null;
+    drawBar(step, step === "picture" ? null : number);
     clearTimeout(waiting);
     put(page, root);
     const shown = await module.show(root, {
       api,
       events: feed,
       project: feed?.project ?? null,
-      tileId: Number(tileId) || null,
+      number,
       navigate,
       about: known,
+      signal,
     });
     if (mine !== turn) shown?.();
     else close = shown ?? (() => {});
@@ -93,16 +89,13 @@ async function show() {
   } catch (error) {
     if (mine !== turn) return;
     drawBar();
-    put(
-      page,
-      h(
-        "div",
-        { class: "lonely stack" },
+    put(page, [
+      h("div.lonely.stack", [
         h("h1", { tabindex: "-1" }, "This page cannot be shown"),
         h("p", error.message),
         h("p", h("a", { href: "#/" }, "Back to the start")),
-      ),
-    );
+      ]),
+    ]);
     head();
   } finally {
     clearTimeout(waiting);
@@ -139,12 +132,8 @@ async function follow(id) {
       navigate("");
     }
   });
-  own.on("project", rename);
-  own.on("refresh", () => {
-    rename();
-    links();
-  });
-  own.on("card", links);
+  own.on("project refresh", rename);
+  own.on("card refresh", links);
 }
 
 let shownStep;
@@ -164,57 +153,37 @@ function links() {
   const tile = shownTile ?? tiles[0]?.id;
   const steps = [["picture", "Picture", `p/${id}/picture`]];
   if (silhouette || tiles.length) steps.push(["tiles", "Tiles", `p/${id}`]);
-  if (tile) {
-    steps.push(["closeup", "Close up", `p/${id}/t/${tile}`], [
-      "take",
-      "Take away",
-      `p/${id}/take/${tile}`,
-    ]);
-  }
-  put(
-    place,
-    steps.map(([key, words, path]) =>
-      h("a", { href: `#/${path}`, "aria-current": key === shownStep && "page" }, words)
-    ),
-  );
+  if (tile) steps.push(["closeup", "Close up", `p/${id}/t/${tile}`]);
+  if (tile) steps.push(["take", "Take away", `p/${id}/take/${tile}`]);
+  /** @param {string[]} step */
+  const link = ([key, words, path]) =>
+    h("a", { href: `#/${path}`, "aria-current": key === shownStep && "page" }, words);
+  put(place, steps.map(link));
 }
 
 function drawBar(step, tile) {
   [shownStep, shownTile] = [step, tile];
   const project = feed?.project;
   const save = newest((name) => api.patch(`projects/${project.id}`, { name }), 500);
-  put(
-    bar,
-    h(
-      "div",
-      { class: `bar at-${step}` },
-      h(
-        "a",
-        { class: "brand", href: "#/", "aria-label": "orbiflow studio: start" },
+  put(bar, [
+    h("div", { class: `bar at-${step}` }, [
+      h("a.brand", { href: "#/", "aria-label": "orbiflow studio: start" }, [
         h("img", { src: "icon.svg", alt: "" }),
         h("span", "orbiflow"),
-      ),
-      project && h("input", {
-        class: "title",
+      ]),
+      project && h("input.title", {
         type: "text",
         "aria-label": "Name of the project",
         maxlength: 80,
         value: project.name,
-        oninput: ({ target }) => {
-          if (target.value.trim()) {
-            project.name = target.value.trim();
-            save(project.name);
-          }
+        oninput: ({ target: { value } }) => {
+          if (value.trim()) save(project.name = value.trim());
         },
       }),
-      project && step && h("nav", { class: "steps", "aria-label": "Steps" }),
-    ),
-    h(
-      "p",
-      { class: "lost", role: "status", hidden: true },
-      "The studio does not answer. Trying again …",
-    ),
-  );
+      project && step && h("nav.steps", { "aria-label": "Steps" }),
+    ]),
+    h("p.lost", { role: "status", hidden: true }, "The studio does not answer. Trying again …"),
+  ]);
   if (project) links();
 }
 

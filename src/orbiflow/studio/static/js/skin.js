@@ -1,7 +1,7 @@
 /** What lies on a tile, as one picture of the prototile: the artwork, lines and eyes. */
 
 import { laidOn } from "./texture.js";
-import { inverse, moved } from "../../../drawing/js/tiling.js";
+import { boxOf, inverse, moved } from "../../../drawing/js/tiling.js";
 import { Skin } from "../../../drawing/js/tinted.js";
 
 const MOST = 1400; // pixels along a side
@@ -46,24 +46,16 @@ export function lineInto(context, points, colour, width) {
   context.lineCap = "round";
   context.lineJoin = "round";
   context.beginPath();
-  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  points.forEach(([x, y]) => context.lineTo(x, y));
   if (points.length === 1) context.lineTo(points[0][0] + 1e-3 * width, points[0][1]);
   context.stroke();
 }
 
 /** Draw a line, or fill a part with its `rings`. */
 export function markInto(context, { points, colour, width, rings }) {
-  if (!rings) {
-    lineInto(context, points, colour, width);
-    return;
-  }
+  if (!rings) return lineInto(context, points, colour, width);
   context.fillStyle = colour;
-  context.beginPath();
-  for (const ring of rings) {
-    ring.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
-    context.closePath();
-  }
-  context.fill("evenodd");
+  context.fill(new Path2D(rings.map((ring) => `M${ring.join("L")}Z`).join("")), "evenodd");
 }
 
 /** Pictures by their addresses; `came()` when one is there. */
@@ -115,18 +107,15 @@ export function between({ map, place = [1, 0, 0, 1, 0, 0] }, share) {
  */
 export function paintSkin(figure, { art, marks, palette, tint = 0 }, scale) {
   if (!art && !marks.lines.length && !marks.eyes.length) return null;
-  const xs = figure.polygon.map((p) => p[0]);
-  const ys = figure.polygon.map((p) => p[1]);
-  const [low, high] = [[Math.min(...xs), Math.min(...ys)], [Math.max(...xs), Math.max(...ys)]];
-  const size = Math.max(high[0] - low[0], high[1] - low[1]);
-  const own = Math.min(scale, MOST / size);
+  const { left, top, wide, high } = boxOf(figure.polygon);
+  const own = Math.min(scale, MOST / Math.max(wide, high));
   const pad = PAD / own;
   const canvas = document.createElement("canvas");
-  canvas.width = Math.ceil((high[0] - low[0] + 2 * pad) * own);
-  canvas.height = Math.ceil((high[1] - low[1] + 2 * pad) * own);
+  canvas.width = Math.ceil((wide + 2 * pad) * own);
+  canvas.height = Math.ceil((high + 2 * pad) * own);
   const context = canvas.getContext("2d");
   /** @type {Matrix} */
-  const matrix = [own, 0, 0, own, (pad - low[0]) * own, (pad - low[1]) * own];
+  const matrix = [own, 0, 0, own, (pad - left) * own, (pad - top) * own];
   if (art) {
     const [from, to] = art.covered;
     const shares = art.map.rest.map(([x, y]) => {

@@ -52,7 +52,7 @@ export function tookWords(project, operation, effort) {
 
 /** A text that says so each second: {root, update(task)}. */
 export function clock() {
-  const root = h("span", { class: "soft small" });
+  const root = h("span.soft.small");
   /** @type {Task | null} */
   let shown = null;
   let timer = 0;

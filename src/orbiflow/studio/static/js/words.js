@@ -34,11 +34,7 @@ export function waitWords({ state, place, error }) {
   return ["done", "running"].includes(state) ? undefined : `${STATES[state]}.`;
 }
 
-/**
- * Whether a task may still do something.
- *
- * @param {Task | null | undefined} task
- */
+/** Whether a task may still do something. @param {Task | null | undefined} task */
 export const alive = (task) => ["waiting", "running", "paused"].includes(task?.state);
 
 /**
@@ -73,10 +69,7 @@ export function starText({ stars, figures = [] }) {
   return figures.map((own) => `${one ? "" : `${own.name} `}${starText({ stars: own.stars })}`)
     .join(one ? " · " : "\n");
 }
-/**
- * @param {Starred} card
- * @returns {string}
- */
+/** @param {Starred} card @returns {string} */
 export function starWords({ stars, figures }) {
   if (!figures) return stars ? `${stars} of 5 stars` : "not rated yet";
   return figures.map((own) => `${own.name}: ${starWords({ stars: own.stars })}`).join(", ");
@@ -89,13 +82,6 @@ export function starWords({ stars, figures }) {
  */
 export const named = ({ figures = [] }) =>
   [...new Set(figures.map(({ name }) => name))].join(" and ");
-
-/**
- * A name that may be long, with as many letters as there is room for.
- *
- * @param {string} name
- */
-export const brief = (name) => (name.length > 14 ? `${name.slice(0, 13)}…` : name);
 
 /** @param {string} text */
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -118,26 +104,18 @@ export function sentence(text) {
  * @param {string | number} moment
  */
 export function ago(moment) {
-  const seconds = (Date.now() - (typeof moment === "number" ? moment * 1000 : Date.parse(moment))) /
-    1000;
+  const then = typeof moment === "number" ? moment * 1000 : Date.parse(moment);
+  const seconds = (Date.now() - then) / 1000;
   /** @type {[Intl.RelativeTimeFormatUnit, number][]} */
   const units = [["day", 86400], ["hour", 3600], ["minute", 60]];
   const [unit, size] = units.find(([, length]) => seconds >= length) ?? [null, 1];
   if (!unit) return "just now";
-  return new Intl.RelativeTimeFormat("en", { numeric: "auto" }).format(
-    -Math.floor(seconds / size),
-    unit,
-  );
+  const words = new Intl.RelativeTimeFormat("en", { numeric: "auto" });
+  return words.format(-Math.floor(seconds / size), unit);
 }
 
-/**
- * How large a file is.
- *
- * @param {number} count
- */
-export const bytes = (count) =>
-  count < 1e3
-    ? `${count} bytes`
-    : count < 1e6
-    ? `${(count / 1e3).toFixed(0)} kB`
-    : `${(count / 1e6).toFixed(1)} MB`;
+/** How large a file is. @param {number} count */
+export function bytes(count) {
+  if (count < 1e3) return `${count} bytes`;
+  return count < 1e6 ? `${(count / 1e3).toFixed(0)} kB` : `${(count / 1e6).toFixed(1)} MB`;
+}

@@ -39,11 +39,12 @@ export function everyPoint(space, middle, group) {
   return { points: sparseOf(rows, cols + 2 * size - tied), tied };
 }
 
-/** The cotangent of each corner of each triangle, and the Laplacian that they make. */
+/** The cotangent of each corner of each triangle, the Laplacian that they make of both coordinates, and its diagonal. */
 export function weigh(triangles, rest, area) {
   const size = rest.length / 2;
   const cotangents = new Float64Array(triangles.length);
-  const near = Array.from({ length: size }, () => new Map());
+  const stiffness = new Float64Array(size);
+  const near = Array.from({ length: 2 * size }, () => new Map());
   for (let t = 0; t < triangles.length; t += 3) {
     const corners = [triangles[t], triangles[t + 1], triangles[t + 2]];
     const cot = corners.map((a, k) => {
@@ -55,11 +56,16 @@ export function weigh(triangles, rest, area) {
     const share = 0.5 * Math.min(1, STEEPEST / Math.max(...cot.map(Math.abs)));
     corners.forEach((_, k) => {
       const [b, c] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
-      cotangents[t + k] = share * cot[k]; // of the side opposite of corner k
-      for (const [i, j, sign] of [[b, c, -1], [c, b, -1], [b, b, 1], [c, c, 1]]) {
-        near[i].set(j, (near[i].get(j) ?? 0) + sign * share * cot[k]);
+      const weight = cotangents[t + k] = share * cot[k]; // of the side opposite of corner k
+      for (
+        const [i, j, own] of [[b, c, -weight], [c, b, -weight], [b, b, weight], [c, c, weight]]
+      ) {
+        if (i === j) stiffness[i] += own;
+        for (const x of [0, 1]) {
+          near[2 * i + x].set(2 * j + x, (near[2 * i + x].get(2 * j + x) ?? 0) + own);
+        }
       }
     });
   }
-  return { cotangents, laplacian: sparseOf(near, size) };
+  return { cotangents, stiffness, laplacian: sparseOf(near, 2 * size) };
 }

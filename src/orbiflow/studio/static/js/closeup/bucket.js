@@ -1,5 +1,6 @@
 /** The bucket: the part of a tile around a place, up to its outline and the lines that were drawn. */
 
+import { boxOf } from "../../../../drawing/js/tiling.js";
 import { lineInto } from "../skin.js";
 import { simplified } from "./lines.js";
 
@@ -75,12 +76,11 @@ function ringsAround(cells, wide) {
  * @returns {Point[][]}
  */
 export function partAround({ polygon, path }, lines, place) {
-  const [xs, ys] = [0, 1].map((j) => polygon.map((point) => point[j]));
-  const [left, top] = [Math.min(...xs), Math.min(...ys)];
-  const scale = CELLS / Math.max(Math.max(...xs) - left, Math.max(...ys) - top);
+  const box = boxOf(polygon);
+  const { left, top } = box;
+  const scale = CELLS / Math.max(box.wide, box.high);
   const pad = UNDER + 2;
-  const cells = (all, least) => Math.ceil((Math.max(...all) - least) * scale) + 2 * pad;
-  const [wide, high] = [cells(xs, left), cells(ys, top)];
+  const [wide, high] = [box.wide, box.high].map((side) => Math.ceil(side * scale) + 2 * pad);
   const canvas = document.createElement("canvas");
   Object.assign(canvas, { width: wide, height: high });
   const context = canvas.getContext("2d");

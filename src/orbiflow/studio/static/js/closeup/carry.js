@@ -1,5 +1,7 @@
 /** The map from the silhouette to the tile, affine on triangles, both ways. No page is needed here. */
 
+import { boxOf } from "../../../../drawing/js/tiling.js";
+
 const CELLS = 40; // of the grid that finds triangles, along each side
 
 /** One direction: where points of `from` go. */
@@ -13,23 +15,15 @@ class Way {
     this.from = from;
     this.to = to;
     this.triangles = triangles;
-    const xs = from.map((p) => p[0]);
-    const ys = from.map((p) => p[1]);
-    this.low = [Math.min(...xs), Math.min(...ys)];
-    this.step = Math.max(Math.max(...xs) - this.low[0], Math.max(...ys) - this.low[1]) / CELLS || 1;
+    const { left, top, wide, high } = boxOf(from);
+    this.low = [left, top];
+    this.step = Math.max(wide, high) / CELLS || 1;
     this.cells = new Map();
     triangles.forEach((triangle, t) => {
       const corners = triangle.map((k) => this.#cell(from[k]));
-      for (
-        let i = Math.min(...corners.map((c) => c[0]));
-        i <= Math.max(...corners.map((c) => c[0]));
-        i += 1
-      ) {
-        for (
-          let j = Math.min(...corners.map((c) => c[1]));
-          j <= Math.max(...corners.map((c) => c[1]));
-          j += 1
-        ) {
+      const { left, top, wide, high } = boxOf(corners);
+      for (let i = left; i <= left + wide; i += 1) {
+        for (let j = top; j <= top + high; j += 1) {
           const key = i * 4096 + j;
           if (!this.cells.has(key)) this.cells.set(key, []);
           this.cells.get(key).push(t);
@@ -38,6 +32,7 @@ class Way {
     });
   }
 
+  /** @returns {Point} */
   #cell([x, y]) {
     return [Math.floor((x - this.low[0]) / this.step), Math.floor((y - this.low[1]) / this.step)];
   }

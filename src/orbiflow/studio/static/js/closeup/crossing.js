@@ -1,10 +1,6 @@
 /** Whether an outline can be one of a tile. No page is needed here. */
 
-/**
- * Whether an outline x0, y0, x1, y1 ... crosses itself.
- *
- * @param {ArrayLike<number>} ring
- */
+/** Whether an outline x0, y0, x1, y1 ... crosses itself. @param {ArrayLike<number>} ring */
 export function crosses(ring) {
   const count = ring.length / 2;
   const order = Array.from({ length: count }, (_, k) => k);

@@ -1,6 +1,6 @@
 /** A tiling whose tile and group move. */
 
-import { pathOf, Tiling } from "../../../../drawing/js/tiling.js";
+import { moved, pathOf, Tiling, times } from "../../../../drawing/js/tiling.js";
 
 const COARSE = 0.6; // pixels below which a side of the outline is left out
 
@@ -9,8 +9,8 @@ export class LiveTiling extends Tiling {
   constructor(view) {
     super(view);
     this.home = { aspects: this.aspects, basis: this.basis };
-    /** @type {{ linear: [Point, Point], shift: Point }} */
-    this.moved = { linear: [[1, 0], [0, 1]], shift: [0, 0] };
+    /** @type {Matrix} */
+    this.map = [1, 0, 0, 1, 0, 0]; // where the group has moved
     /** @type {{ scale: number, path: Path2D }[]} */
     this.simple = [];
   }
@@ -21,31 +21,22 @@ export class LiveTiling extends Tiling {
    * @param {{ linear: [Point, Point], shift: Point }} by
    */
   place({ linear, shift }) {
-    this.moved = { linear, shift };
-    const by = (x, y) => [linear[0][0] * x + linear[0][1] * y, linear[1][0] * x + linear[1][1] * y];
+    const [[a, c], [b, d]] = linear;
+    this.map = [a, b, c, d, ...shift];
     const [p, q, r, s] = this.home.basis;
-    this.basis = [...by(p, q), ...by(r, s)];
+    this.basis = [...times(this.map, [p, q, r, s, 0, 0]).slice(0, 4)];
     const [u, v] = shift;
     /** @type {(aspect: Matrix) => Matrix} */
     const placed = ([a, b, c, d, e, f]) => {
-      const [x, y] = by(e, f);
-      return [a, b, c, d, x + u - a * u - c * v, y + v - b * u - d * v];
+      const [x, y] = moved(this.map, [e, f]);
+      return [a, b, c, d, x - a * u - c * v, y - b * u - d * v];
     };
     this.aspects = this.home.aspects.map(placed);
   }
 
-  /**
-   * Where a point that the group has gone to has come to.
-   *
-   * @param {Point} point
-   * @returns {Point}
-   */
-  carried([x, y]) {
-    const { linear, shift } = this.moved;
-    return [
-      linear[0][0] * x + linear[0][1] * y + shift[0],
-      linear[1][0] * x + linear[1][1] * y + shift[1],
-    ];
+  /** Where a point that the group has gone to has come to. @param {Point} point */
+  carried(point) {
+    return moved(this.map, point);
   }
 
   /** Take the outline of each figure; `exact` measures them as well. */

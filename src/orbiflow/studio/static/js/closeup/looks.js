@@ -1,18 +1,7 @@
 /** The controls for colours, outline, artwork and symmetry. */
 
-import {
-  aside,
-  button,
-  check,
-  choice,
-  FEW_PALETTES,
-  h,
-  put,
-  slider,
-  soft,
-  stack,
-  unique,
-} from "../dom.js";
+import { check, controlsOf, FEW_PALETTES } from "../controls.js";
+import { aside, button, h, put, soft, stack, unique } from "../dom.js";
 import { kindsOf, signInto } from "./signs.js";
 
 export const HELP = {
@@ -52,6 +41,13 @@ const USES = {
 };
 const PERCENT = (value) => `${Math.round(100 * value)} %`;
 
+/** One of the radio buttons `name`, as what it stands for looks; `words` are its name. */
+const looking = (name, words, checked, onchange, shown, kind = null) =>
+  h("label", { class: kind, title: words }, [
+    h("input", { type: "radio", name, checked, "aria-label": words, onchange }),
+    shown,
+  ]);
+
 /**
  * Palettes as rows of swatches, and one of the user's own.
  *
@@ -64,79 +60,60 @@ export function colourPanel(about, look, needed, change) {
   const name = unique("palette");
   const own = () =>
     look.custom ?? { colours: [...about.palettes[0].colours], outline: about.palettes[0].outline };
-  const chips = (colours) =>
-    h(
-      "span",
-      { class: "chips" },
-      colours.slice(0, 5).map((colour) => h("span", { style: { background: colour } })),
-    );
-  const wells = h("div", { class: "wells" });
+  const chip = (colour) => h("span", { style: { background: colour } });
+  const chips = (colours) => h("span.chips", colours.slice(0, 5).map(chip));
+  const wells = h("div.wells");
   const drawWells = () => {
     const custom = own();
-    const labels = [...Array(Math.max(needed, 1)).keys()].map((
-      k,
-    ) => [`Colour ${k + 1}`, custom.colours[k] ?? "#cccccc", (colour) => {
-      custom.colours[k] = colour;
-    }]);
-    labels.push(["Lines", custom.outline, (colour) => {
-      custom.outline = colour;
-    }]);
-    put(
-      wells,
-      labels.map(([words, value, set]) =>
-        h(
-          "label",
-          h("input", {
-            type: "color",
-            value,
-            oninput: ({ target }) => {
-              set(target.value);
-              look.custom = custom;
-              change({ palette: "own" });
-            },
-          }),
-          h("span", words),
-        )
-      ),
+    const well = (words, values, key) =>
+      h("label", [
+        h("input", {
+          type: "color",
+          value: values[key] ?? "#cccccc",
+          oninput: ({ target }) => {
+            values[key] = target.value;
+            look.custom = custom;
+            change({ palette: "own" });
+          },
+        }),
+        h("span", words),
+      ]);
+    const colours = Array.from(
+      { length: needed },
+      (_, k) => well(`Colour ${k + 1}`, custom.colours, k),
     );
+    put(wells, colours, well("Lines", custom, "outline"));
     wells.hidden = look.palette !== "own";
   };
-  const radio = (value, words, colours = null) =>
-    h(
-      "label",
-      { class: colours ? "palette" : "palette own", title: words },
-      h("input", {
-        type: "radio",
-        name,
-        value,
-        checked: look.palette === value,
-        "aria-label": words,
-        onchange: () => {
-          if (value === "own") look.custom = own();
-          change({ palette: value });
-          drawWells();
-        },
-      }),
-      colours ? chips(colours) : h("span", words),
+  const radio = (value, words, shown, kind) =>
+    looking(
+      name,
+      words,
+      look.palette === value,
+      () => {
+        if (value === "own") look.custom = own();
+        change({ palette: value });
+        drawWells();
+      },
+      shown,
+      kind,
     );
-  const radios = about.palettes.map((own) => radio(own.name, own.name, own.colours));
-  const made = h(
-    "fieldset",
-    h("legend", "Colours"),
-    h(
-      "div",
-      { class: "palettes" },
-      radios.slice(0, FEW_PALETTES),
-      radio("own", "My own"),
-    ),
-    h(
-      "details",
-      { open: about.palettes.slice(FEW_PALETTES).some((own) => own.name === look.palette) },
-      h("summary", "More colours"),
-      h("div", { class: "palettes" }, radios.slice(FEW_PALETTES)),
-    ),
-    wells,
+  const radios = about.palettes.map((own) =>
+    radio(own.name, own.name, chips(own.colours), "palette")
   );
+  const rest = about.palettes.slice(FEW_PALETTES);
+  const made = h("fieldset", [
+    h("legend", "Colours"),
+    h("div.palettes", [
+      radios.slice(0, FEW_PALETTES),
+      radio("own", "My own", h("span", "My own"), "palette own"),
+    ]),
+    h("details", { open: rest.some((own) => own.name === look.palette) }, [
+      h("summary", "More colours"),
+      h("div.palettes", radios.slice(FEW_PALETTES)),
+    ]),
+    wells,
+  ]);
   drawWells();
   return made;
 }
@@ -150,30 +127,18 @@ export function colourPanel(about, look, needed, change) {
  */
 export function shapePanel(look, { count, hasMap, hasArt }, change) {
   const pictures = count > 1 ? "pictures" : "picture";
-  const tint = slider("Colour over it", {
-    min: 0,
-    max: 1,
-    step: 0.05,
-    value: look.tint,
-    said: (v) => (v ? PERCENT(v) : "none"),
-  }, (share) => change({ tint: share }));
+  const controls = controlsOf(look, change);
+  const share = (v) => (v >= 1 ? "the tile" : v <= 0 ? `your ${pictures}` : PERCENT(v));
+  const tint = controls.slider(
+    "tint",
+    "Colour over it",
+    [0, 1, 0.05],
+    (v) => v ? PERCENT(v) : "none",
+  );
   tint.hidden = !look.art;
   return stack(
-    hasMap &&
-      slider(`From your ${pictures} to the tile`, {
-        min: 0,
-        max: 1,
-        step: 0.01,
-        value: 1,
-        said: (v) => (v >= 1 ? "the tile" : v <= 0 ? `your ${pictures}` : PERCENT(v)),
-      }, (share) => change({ share })),
-    slider("Outline", {
-      min: 0,
-      max: 6,
-      step: 0.2,
-      value: look.line,
-      said: (v) => (v ? `${v} px` : "none"),
-    }, (line) => change({ line })),
+    hasMap && controls.slider("share", `From your ${pictures} to the tile`, [0, 1, 0.01], share),
+    controls.slider("line", "Outline", [0, 6, 0.2], (v) => (v ? `${v} px` : "none")),
     hasArt && check(`Show my ${pictures} on the tiles`, look.art, (art) => {
       tint.hidden = !art;
       change({ art });
@@ -191,7 +156,7 @@ export function shapePanel(look, { count, hasMap, hasArt }, change) {
  * @param {(key: string | null) => void} light
  */
 export function signPanel(elements, look, change, light) {
-  const list = h("ul", { class: "signs", hidden: !look.signs });
+  const list = h("ul.signs", { hidden: !look.signs });
   const ratio = 2;
   for (const { key, name, says, colour } of kindsOf(elements)) {
     const canvas = h("canvas", { width: 28 * ratio, height: 28 * ratio, "aria-hidden": "true" });
@@ -201,32 +166,25 @@ export function signPanel(elements, look, change, light) {
       const ink = colour === "currentcolor" ? getComputedStyle(canvas).color : colour;
       signInto(context, key, 14, 14, 9, ink);
     };
-    const row = h(
-      "button",
-      {
-        type: "button",
-        class: "sign",
-        "data-key": key,
-        onfocus: () => light(key),
-        onblur: () => light(null),
-        onpointerenter: () => light(key),
-        onpointerleave: () => light(null),
-        onclick: () => light(key),
-      },
-      canvas,
-      h("span", h("strong", name), h("span", { class: "small" }, says)),
-    );
+    const row = h("button.sign", {
+      type: "button",
+      "data-key": key,
+      onfocus: () => light(key),
+      onblur: () => light(null),
+      onpointerenter: () => light(key),
+      onpointerleave: () => light(null),
+      onclick: () => light(key),
+    }, [canvas, h("span", h("strong", name), h("span.small", says))]);
     list.append(h("li", row));
     requestAnimationFrame(draw);
   }
-  const made = h(
-    "div",
+  const made = h("div", [
     check("Show the symmetry", look.signs, (signs) => {
       list.hidden = !signs;
       change({ signs });
     }),
     list,
-  );
+  ]);
   /** @param {string | null} key */
   const lit = (key) =>
     list.querySelectorAll(".sign").forEach((row) =>
@@ -247,44 +205,33 @@ export function signPanel(elements, look, change, light) {
 export function pullPanel(pull, change, back, hasInside, lay) {
   if (!hasInside) pull.what = "outline";
   const inside = pull.what === "inside";
+  const controls = controlsOf(pull, change);
+  const kinds = [["outline", "The outline"], ["inside", "The inside"]];
+  const reach = (
+    v,
+  ) => (v < 0.3 ? "a little" : v < 0.8 ? "a part" : v < 1.5 ? "most of it" : "all of it");
   return stack(
-    hasInside &&
-      choice(
-        "What to pull",
-        [["outline", "The outline"], ["inside", "The inside"]],
-        pull.what,
-        (what) => change({ what }),
-        { unseen: true },
-      ),
+    hasInside && controls.choice("what", "What to pull", kinds, { unseen: true }),
     soft(
       inside
         ? "Take hold of an eye, a fin or anything inside and pull. The tile stays a tile."
         : "Take hold of any point of the outline and pull: all copies follow, without a gap.",
     ),
-    slider("How far the pull reaches", {
-      min: 0.1,
-      max: 2,
-      step: 0.05,
-      value: pull.reach,
-      said: (
-        v,
-      ) => (v < 0.3 ? "a little" : v < 0.8 ? "a part" : v < 1.5 ? "most of it" : "all of it"),
-    }, (reach) => change({ reach })),
-    inside && check("The outline gives way", pull.gives, (gives) => change({ gives })),
-    check("The grid may change, too", pull.lattice, (lattice) => change({ lattice })),
-    !inside && h(
-      "p",
-      { class: "small soft by-keys" },
-      "By keyboard: click the picture or go to it with ",
-      h("kbd", "Tab"),
-      ", choose a point with ",
-      h("kbd", "←"),
-      " ",
-      h("kbd", "→"),
-      ", move it with ",
-      h("kbd", "Shift"),
-      " and arrows.",
-    ),
+    controls.slider("reach", "How far the pull reaches", [0.1, 2, 0.05], reach),
+    inside && controls.check("gives", "The outline gives way"),
+    controls.check("lattice", "The grid may change, too"),
+    !inside &&
+      h("p.small.soft.by-keys", [
+        "By keyboard: click the picture or go to it with ",
+        h("kbd", "Tab"),
+        ", choose a point with ",
+        h("kbd", "←"),
+        " ",
+        h("kbd", "→"),
+        ", move it with ",
+        h("kbd", "Shift"),
+        " and arrows.",
+      ]),
     lay && button("Lay the copies another way …", lay),
     button("Put it back", back, { kind: "quiet" }),
   );
@@ -301,69 +248,52 @@ export function pullPanel(pull, change, back, hasInside, lay) {
  */
 export function penPanel(pen, change, clear, drawn, show) {
   const name = unique("pen");
-  const well = h("input", {
-    type: "color",
-    value: pen.colour,
-    "aria-label": "Another colour",
-    oninput: ({ target }) => change({ colour: target.value }),
-  });
-  const swatches = h(
-    "fieldset",
-    h("legend", "Colour"),
-    h(
-      "div",
-      { class: "swatches" },
-      PEN_COLOURS.map(([colour, words]) =>
-        h(
-          "label",
-          { title: words },
-          h("input", {
-            type: "radio",
-            name,
-            checked: pen.colour === colour,
-            "aria-label": words,
-            onchange: () => change({ colour }),
-          }),
-          h("span", { style: { background: colour } }),
-        )
-      ),
-      well,
-    ),
-  );
-  const size = (title, name, min, max) =>
-    slider(title, {
-      min,
-      max,
-      step: 0.001,
-      value: pen[name],
-      said: (v) => `${(100 * v).toFixed(1)} % of a tile`,
-    }, (value) => change({ [name]: value }));
-  const parts = {
-    colour: swatches,
-    size: size("Size of the brush", "size", 0.004, 0.12),
-    eye: size("Size of an eye", "eye", 0.015, 0.15),
-    fill: aside("It fills what your lines and the outline bound, and covers the picture there."),
-    mirror: check("The same on the other side", pen.mirror, (mirror) => change({ mirror })),
-  };
+  const parts = {};
   const fit = (tool) => {
     for (const [name, part] of Object.entries(parts)) part.hidden = !USES[tool].includes(name);
   };
+  const controls = controlsOf(pen, (what) => {
+    if (what.tool) fit(what.tool);
+    change(what);
+  });
+  const size = (v) => `${(100 * v).toFixed(1)} % of a tile`;
+  parts.colour = h("fieldset", [
+    h("legend", "Colour"),
+    h("div.swatches", [
+      PEN_COLOURS.map(([colour, words]) =>
+        looking(
+          name,
+          words,
+          pen.colour === colour,
+          () => change({ colour }),
+          h("span", { style: { background: colour } }),
+        )
+      ),
+      h("input", {
+        type: "color",
+        value: pen.colour,
+        "aria-label": "Another colour",
+        oninput: ({ target }) => change({ colour: target.value }),
+      }),
+    ]),
+  ]);
+  parts.size = controls.slider("size", "Size of the brush", [0.004, 0.12, 0.001], size);
+  parts.eye = controls.slider("eye", "Size of an eye", [0.015, 0.15, 0.001], size);
+  parts.fill = aside(
+    "It fills what your lines and the outline bound, and covers the picture there.",
+  );
+  parts.mirror = controls.check("mirror", "The same on the other side");
   fit(pen.tool);
   return stack(
     soft("Draw inside any tile: the same appears in all of them."),
-    choice("Draw with", TOOLS, pen.tool, (tool) => {
-      fit(tool);
-      change({ tool });
-    }),
+    controls.choice("tool", "Draw with", TOOLS),
     Object.values(parts),
     check("Show the drawing", drawn, show),
-    h(
-      "p",
-      { class: "small soft by-keys" },
+    h("p.small.soft.by-keys", [
       "By keyboard: move the pen with arrows, put it down and up with ",
       h("kbd", "Space"),
       ".",
-    ),
+    ]),
     button("Clear the drawing", clear, { kind: "quiet", image: "bin" }),
   );
 }

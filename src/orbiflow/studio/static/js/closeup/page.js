@@ -1,12 +1,11 @@
 /** The close-up of one tile: look, pull, draw. */
 
 import { client } from "../api.js";
+import { choice } from "../controls.js";
 import {
   button,
-  choice,
   dialog,
   h,
-  newest,
   notes,
   put,
   soft,
@@ -14,8 +13,10 @@ import {
   style,
   toast,
   trying,
+  undoKeys,
 } from "../dom.js";
-import { keeper, lookOf, paletteOf } from "../look.js";
+import { keeper } from "../memory.js";
+import { lookKeeper, lookOf, paletteOf } from "../look.js";
 import { shapeCards } from "../shapes/page.js";
 import { backdropOf } from "../skin.js";
 import { figuresOf } from "../../../../drawing/js/tiling.js";
@@ -34,59 +35,43 @@ const PEN = { tool: "pencil", colour: "#1b1b1b", size: 0.018, eye: 0.045, mirror
 const percent = (share) => `${Math.round(100 * share)} %`;
 const CALM = 8000; // ms after which a refusal makes way
 
-/**
- * @param {HTMLElement} root
- * @param {Page} given
- */
+/** @type {Show} */
 export async function show(root, given) {
   await style("closeup");
-  const page = new Closeup(root, given);
-  await page.open(given.tileId);
-  return () => page.close();
+  await new Closeup(root, given).open(given.number);
 }
 
 class Closeup {
-  /**
-   * @param {HTMLElement} root
-   * @param {Page} page
-   */
-  constructor(root, { api, events, project, navigate, about }) {
+  /** @param {HTMLElement} root @param {Page} page */
+  constructor(root, page) {
+    const { api, events, project, navigate, about, signal } = page;
     this.root = root;
+    this.signal = signal;
     this.api = api;
-    this.events = events;
     this.project = project;
     this.navigate = navigate;
     this.about = about;
     this.home = `projects/${project.id}`;
     const kept = project.view?.closeup ?? {};
     this.look = { ...lookOf(project, about), share: 1 };
-    this.keepLook = keeper(api, project);
+    this.keepLook = lookKeeper(page);
     this.pull = { what: "outline", reach: 0.5, lattice: true, gives: false, ...kept.pull };
     this.penSettings = { ...PEN, ...kept.pen };
     this.mode = "look"; // not what it was: the first click of whoever comes back would draw
     this.lit = null;
-    this.keep = newest(
-      () => api.patch(this.home, { view: { closeup: { pull: this.pull, pen: this.penSettings } } }),
-      300,
-    );
-    this.keepDrawing = newest((drawing) => api.patch(this.home, { view: { drawing } }), 500);
+    const keep = keeper(page, "closeup");
+    this.keep = () => keep({ pull: this.pull, pen: this.penSettings });
+    this.keepDrawing = keeper(page, "drawing");
     this.#build();
-    this.offs = [
-      events.on("card", (card) => this.#better(card)),
-      events.on("project", (now) => this.#elsewhere(now)),
-      events.on("task", () => this.#checking()),
-      events.on("gone", ({ tile }) => tile === this.view?.id && navigate(`p/${project.id}`)),
-    ];
-    this.keys = (event) => this.past.key(event);
-    addEventListener("keydown", this.keys);
-  }
-
-  close() {
-    removeEventListener("keydown", this.keys);
-    clearTimeout(this.calming);
-    this.offs.forEach((off) => off());
-    this.stage.close();
-    this.closed = true;
+    events.on("card", (card) => this.#better(card), signal);
+    events.on("project", (now) => this.#elsewhere(now), signal);
+    events.on("task", () => this.#checking(), signal);
+    events.on("gone", ({ tile }) => tile === this.view?.id && navigate(`p/${project.id}`), signal);
+    undoKeys((step) => (step < 0 ? this.past.undo() : this.past.redo()), signal);
+    signal.addEventListener("abort", () => {
+      clearTimeout(this.calming);
+      this.stage.close();
+    });
   }
 
   /** A search has made the tile that is shown better: show it, unless it is in the hand. */
@@ -108,23 +93,12 @@ class Closeup {
   }
 
   #build() {
-    this.said = h("p", { class: "unseen", role: "status", "aria-live": "polite" });
-    this.badge = h("p", { class: "badge" });
-    this.stop = button(
-      "Stop",
-      () => trying(() => this.api.post(`tasks/${this.checked.id}/cancel`)),
-      {
-        image: "stop",
-        kind: "stop",
-        hidden: true,
-      },
-    );
-    this.hint = h("p", { class: "hint", hidden: true });
-    this.stage = new Stage({
-      label: "The tiling, without end",
-      help: "closeup-help",
-      tool: () => this.tool,
-    });
+    this.said = h("p.unseen", { role: "status", "aria-live": "polite" });
+    this.badge = h("p.badge");
+    const stop = () => trying(() => this.api.post(`tasks/${this.checked.id}/cancel`));
+    this.stop = button("Stop", stop, { image: "stop", kind: "stop", hidden: true });
+    this.hint = h("p.hint", { hidden: true });
+    this.stage = new Stage("The tiling, without end", "closeup-help", () => this.tool);
     this.pulling = new Pulling(this.stage, this.pull, {
       released: (parameters, inside) => this.#byHand("pull", { parameters, inside }),
       said: (text) => this.say(text),
@@ -144,29 +118,25 @@ class Closeup {
     this.stage.layers.push((context) => this.#overlay(context));
     this.stage.onhover = (place) => this.#hover(place);
     this.stage.options.over = (context, copy) => this.pen.over(context, copy);
+    const { buttons } = this.past;
     this.stage.box.append(
-      h("div", { class: "past" }, this.past.buttons),
+      h("div.past", buttons),
       this.badge,
       this.stop,
       this.hint,
       this.stage.zooms(),
     );
     this.heading = h("h1", { tabindex: "-1" }, "Close up");
-    this.kind = h("p", { class: "soft small" });
+    this.kind = h("p.soft.small");
     this.noted = h("div");
-    this.more = h("p", { class: "soft small" });
-    this.modes = choice(
-      "What to do",
-      [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]],
-      this.mode,
-      (mode) => this.#choose(mode),
-      { unseen: true },
-    );
-    this.panel = h("div", { class: "stack" });
-    this.help = h("p", { class: "small soft", id: "closeup-help" });
-    const side = h(
-      "div",
-      { class: "closeup-side" },
+    this.more = h("p.soft.small");
+    /** @type {[string, string][]} */
+    const modes = [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]];
+    const choose = (mode) => this.#choose(mode);
+    this.modes = choice("What to do", modes, this.mode, choose, { unseen: true });
+    this.panel = h("div.stack");
+    this.help = h("p.small.soft", { id: "closeup-help" });
+    const side = h("div.closeup-side", [
       h(
         "div",
         this.heading,
@@ -177,15 +147,15 @@ class Closeup {
       this.modes,
       this.panel,
       this.help,
-    );
+    ]);
     this.root.classList.add("closeup");
-    put(this.root, h("div", { class: "closeup-page" }, this.stage.box, side), this.said);
+    put(this.root, h("div.closeup-page", this.stage.box, side), this.said);
   }
 
   /** Show a tile of the project. */
   async open(id, { quiet = false } = {}) {
     const view = await this.api.get(`${this.home}/tiles/${id}`);
-    if (this.closed) return;
+    if (this.signal.aborted) return;
     const drawing = this.view ? this.pen.drawing : this.project.view?.drawing;
     this.view = view;
     this.figures = figuresOf(view);
@@ -217,7 +187,7 @@ class Closeup {
     if (this.space) return;
     try {
       const space = await this.api.get(`${this.home}/tiles/${view.id}/space`);
-      if (this.closed || this.view !== view) return;
+      if (this.signal.aborted || this.view !== view) return;
       this.space = space;
       this.tiling.outlines(this.#rings());
       this.pulling.use(space);
@@ -247,53 +217,36 @@ class Closeup {
     const { look, view, about } = this;
     const inside = this.mode === "pull" && this.pull.what === "inside";
     const [hands, keys] = HELP[inside ? "draw" : this.mode];
-    put(this.help, hands, h("span", { class: "by-keys" }, ` Keys: ${keys}`));
+    put(this.help, hands, h("span.by-keys", ` Keys: ${keys}`));
     const needed = 1 + Math.max(...view.colours.table.flat(2));
     const change = (what) => this.#change(what);
+    const hasMap = this.figures.every(({ map }) => map);
     if (this.mode === "look") {
+      const has = {
+        count: this.figures.length,
+        hasMap,
+        hasArt: this.figures.some((figure, k) => backdropOf(this.project, figure, k)),
+      };
       this.signs = signPanel(view.elements, look, change, (key) => this.#light(key));
-      put(
-        this.panel,
-        shapePanel(look, {
-          count: this.figures.length,
-          hasMap: this.figures.every(({ map }) => map),
-          hasArt: this.figures.some((figure, k) => backdropOf(this.project, figure, k)),
-        }, change),
-        this.signs,
-        colourPanel(about, look, needed, change),
-      );
+      const colours = colourPanel(about, look, needed, change);
+      put(this.panel, shapePanel(look, has, change), this.signs, colours);
     } else if (this.mode === "pull") {
-      put(
-        this.panel,
-        pullPanel(
-          this.pull,
-          (what) => {
-            Object.assign(this.pull, what);
-            this.keep();
-            this.stage.redraw();
-            if ("what" in what) this.#panels();
-          },
-          () => this.#restore(),
-          this.figures.every(({ map }) => map),
-          this.figures.length === 1 && (() => trying(() => this.#lay())),
-        ),
-      );
+      const pulled = (what) => {
+        Object.assign(this.pull, what);
+        this.keep();
+        this.stage.redraw();
+        if ("what" in what) this.#panels();
+      };
+      const lay = this.figures.length === 1 && (() => trying(() => this.#lay()));
+      put(this.panel, pullPanel(this.pull, pulled, () => this.#restore(), hasMap, lay));
     } else {
-      put(
-        this.panel,
-        penPanel(
-          this.penSettings,
-          (what) => {
-            Object.assign(this.penSettings, what);
-            this.keep();
-          },
-          () => this.#setDrawing({ strokes: [], eyes: [] }),
-          this.look.drawn,
-          (drawn) => {
-            change({ drawn });
-          },
-        ),
-      );
+      const chosen = (what) => {
+        Object.assign(this.penSettings, what);
+        this.keep();
+      };
+      const clear = () => this.#setDrawing({ strokes: [], eyes: [] });
+      const show = (drawn) => change({ drawn });
+      put(this.panel, penPanel(this.penSettings, chosen, clear, look.drawn, show));
     }
   }
 
@@ -318,10 +271,8 @@ class Closeup {
     const { share } = this.look;
     const there = ({ silhouette_track: from, tile_track: to }) =>
       from.map(([x, y], k) => [x + share * (to[k][0] - x), y + share * (to[k][1] - y)]);
-    this.tiling.outlines(
-      share >= 1 ? this.#rings() : this.figures.map(there),
-      { exact: share >= 1 },
-    );
+    const isThere = share >= 1;
+    this.tiling.outlines(isThere ? this.#rings() : this.figures.map(there), { exact: isThere });
     this.dress.stale();
   }
 
@@ -334,13 +285,8 @@ class Closeup {
 
   #overlay(context) {
     if (this.mode !== "look" || !this.look.signs) return;
-    this.places = placed(
-      this.view.elements,
-      this.tiling,
-      this.stage.camera,
-      this.stage.width,
-      this.stage.height,
-    );
+    const { camera, width, height } = this.stage;
+    this.places = placed(this.view.elements, this.tiling, camera, width, height);
     paintSigns(context, this.places, this.lit);
   }
 
@@ -408,19 +354,13 @@ class Closeup {
   async #lay() {
     const shapes = await this.api.get("shapes");
     const { list, close } = shapeCards(this.about);
-    const name = await dialog(
-      "Lay the copies another way",
-      (done) =>
-        stack(
-          soft("The outline stays as near to what it is as it can."),
-          list(shapes, (own, parts) =>
-            h("button", {
-              type: "button",
-              disabled: own.name === this.view.class_name,
-              onclick: () => done(own.name),
-            }, parts)),
-        ),
-    );
+    const name = await dialog("Lay the copies another way", (done) => {
+      const card = ({ name }, parts) => {
+        const disabled = name === this.view.class_name;
+        return h("button", { type: "button", disabled, onclick: () => done(name) }, parts);
+      };
+      return stack(soft("The outline stays as near to what it is as it can."), list(shapes, card));
+    });
     close();
     if (name) this.#byHand("class", { name });
   }
@@ -438,12 +378,12 @@ class Closeup {
     try {
       const place = `${this.home}/tiles/${before.id}/by-hand/${way}`;
       const card = await this.api.post(place, settings);
-      if (this.closed) return;
+      if (this.signal.aborted) return;
       this.past.did({ tile: [before.id, card.id] });
       await this.open(card.id, { quiet: true });
       this.say("Proved to tile.");
     } catch (error) {
-      if (this.closed) return;
+      if (this.signal.aborted) return;
       const why = capital(error.message);
       this.pulling.back();
       this.tell("refused", why);
@@ -463,17 +403,12 @@ class Closeup {
 
   #drawn(drawing, before) {
     this.past.did({ drawing: [before, drawing] });
-    this.#keepDrawn(drawing);
+    this.keepDrawing(drawing);
   }
 
   #setDrawing(drawing) {
     this.#drawn(drawing, this.pen.drawing);
     this.pen.use(this.carries, drawing);
-  }
-
-  #keepDrawn(drawing) {
-    this.project.view = { ...this.project.view, drawing };
-    this.keepDrawing(drawing);
   }
 
   /**
@@ -486,7 +421,7 @@ class Closeup {
     if (tile) await this.open(tile[side], { quiet: true });
     else {
       this.pen.use(this.carries, drawing[side]);
-      this.#keepDrawn(drawing[side]);
+      this.keepDrawing(drawing[side]);
     }
   }
 }

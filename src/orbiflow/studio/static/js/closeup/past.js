@@ -72,15 +72,4 @@ export class Past {
     this.going = false;
     this.show(this.view);
   }
-
-  /** Undo and redo by keys. */
-  key(event) {
-    const typing = event.target.matches?.("input[type=text], input[type=number], textarea, select");
-    if (typing || !(event.ctrlKey || event.metaKey) || event.altKey) return;
-    const key = event.key.toLowerCase();
-    if (key === "z") event.shiftKey ? this.redo() : this.undo();
-    else if (key === "y") this.redo();
-    else return;
-    event.preventDefault();
-  }
 }

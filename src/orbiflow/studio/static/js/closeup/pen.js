@@ -1,16 +1,19 @@
 /** The tool that draws on the tile: pencil, rubber and eyes, in all copies at once. */
 
+import { boxOf } from "../../../../drawing/js/tiling.js";
+import { KeyPen } from "../keypen.js";
 import { eyeInto, lineInto, markInto } from "../skin.js";
 import { partAround } from "./bucket.js";
 import { Riders } from "./carry.js";
 import { drawnOn, marksOf } from "./drawn.js";
 import { rubbed, short, simplified } from "./lines.js";
+import { isSame } from "./stage.js";
 
 const PIECES = 40; // of a straight line, which bends with the tile
 const NEAR = 0.0015; // by which a line may be simplified
 const LONGEST = 0.03; // side of a line
 const RUBBER = 0.03;
-const KEY_STEP = 7; // pixels that a key moves the pen
+const KEY_STEP = 7; // pixels that a key moves the pen, with Shift three times as many
 
 /** Points on the way from one to another. */
 const straight = ([a, b], [c, d]) =>
@@ -39,6 +42,16 @@ export class Pen {
     this.drawing = { strokes: [], eyes: [] };
     this.marks = [{ lines: [], eyes: [] }]; // on each figure
     this.line = null;
+    this.keys = new KeyPen({
+      size: () => [stage.width, stage.height],
+      step: (far) => (far ? 3 : 1) * KEY_STEP,
+      down: (at) => this.#press(at),
+      move: (at) => this.move(at),
+      up: () => {
+        this.up();
+        on.said("The pen is up.");
+      },
+    });
   }
 
   /** Take the map of each of a tile's figures, and what was drawn: on the second figure under `second`. */
@@ -80,8 +93,7 @@ export class Pen {
   }
 
   #draw({ copy, at }) {
-    const same = copy.aspect === this.line.copy.aspect &&
-      String(copy.cell) === String(this.line.copy.cell);
+    const same = isSame(copy, this.line.copy);
     if (this.settings.tool === "line") {
       if (same) this.line.points = straight(this.line.points[0], at);
       return;
@@ -119,8 +131,8 @@ export class Pen {
   #bothSides(figure, points) {
     const { map } = this.carries[figure];
     if (!this.settings.mirror || !map) return [points];
-    const xs = map.rest.map(([x]) => x);
-    const twice = Math.min(...xs) + Math.max(...xs);
+    const { left, wide } = boxOf(map.rest);
+    const twice = 2 * left + wide;
     return [points, points.map(([x, y, ...more]) => [twice - x, y, ...more])];
   }
 
@@ -238,57 +250,34 @@ export class Pen {
     for (const { at, radius, light } of eyes) eyeInto(context, at, radius, palette, light);
   }
 
-  hover(place) {
-    this.at = place;
+  hover() {
     this.stage.canvas.style.cursor = "crosshair";
   }
 
   /** Arrows move the pen, space puts it down and up again. */
   key(event) {
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const way = ways[event.key];
-    if (way) {
-      this.pen ??= [this.stage.width / 2, this.stage.height / 2];
-      const far = event.shiftKey ? 3 * KEY_STEP : KEY_STEP;
-      this.pen = [this.pen[0] + far * way[0], this.pen[1] + far * way[1]];
-      if (this.penDown) this.move(this.pen);
-      this.stage.redraw();
-      return true;
-    }
-    if (event.key === " " || event.key === "Enter") {
-      this.pen ??= [this.stage.width / 2, this.stage.height / 2];
-      if (this.penDown) {
-        this.up();
-        this.penDown = false;
-        this.on.said("The pen is up.");
-      } else if (this.down(this.pen)) {
-        this.penDown = !["eye", "fill"].includes(this.settings.tool);
-        if (!this.penDown) this.up();
-        this.on.said(
-          this.penDown
-            ? "The pen is down. Arrow keys draw; press space to lift it."
-            : this.settings.tool === "eye"
-            ? "An eye is in its place."
-            : "The part is filled.",
-        );
-      }
-      return true;
-    }
-    return false;
+    const heard = this.keys.key(event);
+    if (heard) this.stage.redraw();
+    return heard;
+  }
+
+  /** The pen of the keys is put down; whether it stays down. */
+  #press(place) {
+    if (!this.down(place)) return false;
+    const { tool } = this.settings;
+    const once = { eye: "An eye is in its place.", fill: "The part is filled." }[tool];
+    if (once) this.up();
+    this.on.said(once ?? "The pen is down. Arrow keys draw; press space to lift it.");
+    return !once;
   }
 
   paint(context) {
-    if (!this.pen || document.activeElement !== this.stage.canvas) return;
-    const [x, y] = this.pen;
+    if (!this.keys.at || document.activeElement !== this.stage.canvas) return;
+    const [x, y] = this.keys.at;
     for (const [colour, width] of [["#ffffff", 5], ["#0b6b66", 2]]) {
       context.strokeStyle = colour;
       context.lineWidth = width;
-      context.beginPath();
-      context.moveTo(x - 11, y);
-      context.lineTo(x + 11, y);
-      context.moveTo(x, y - 11);
-      context.lineTo(x, y + 11);
-      context.stroke();
+      context.stroke(new Path2D(`M${x - 11} ${y}h22M${x} ${y - 11}v22`));
     }
   }
 }

@@ -15,6 +15,7 @@ import { dot, multiply, multiplyBack } from "./sparse.js";
 
 const GRAB = 600; // strength of the spring to the pointer; that of a triangle is about one
 const GRIP = 0.3; // width of the hand, in reaches
+const FAINTEST = 0.05; // weight of what is held
 const HOLD = 4; // of those beyond the reach
 const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
 const AFTER = [1, 2, 0, 1]; // corners of a triangle after corner 0, 1, 2
@@ -45,10 +46,11 @@ export class Puller {
     this.middle = [0, 0];
     this.#measure(space.rings.map((ring) => ring.map((k) => space.polygon[k])));
     const { points, tied } = everyPoint(space, this.middle, this.group);
-    const { cotangents, laplacian } = weigh(this.triangles, this.rest, this.area);
     this.points = points;
     this.tied = tied;
+    const { cotangents, stiffness, laplacian } = weigh(this.triangles, this.rest, this.area);
     this.cotangents = cotangents;
+    this.stiffness = stiffness;
     this.laplacian = laplacian;
     this.#findOrbits();
     const columns = this.points.cols;
@@ -111,20 +113,11 @@ export class Puller {
    */
   grab(vertex, share, reach, { lattice = true, figure = 0 } = {}) {
     const ring = this.rings[figure];
-    this.ahead = null;
+    const next = ring[(vertex + 1) % ring.length];
     this.inside = false;
-    this.pin = {
-      vertex: ring[vertex],
-      next: ring[(vertex + 1) % ring.length],
-      share,
-      target: null,
-    };
-    this.#grip(ring, vertex, GRIP * reach);
-    this.pin.target = this.held();
-    this.free.fill(1);
-    if (!lattice) this.free.fill(0, this.group, this.parametersCount);
-    this.#holdBeyond(reach);
-    this.#measureDiagonal();
+    this.pin = { vertex: ring[vertex], next, share, parts: null, target: null };
+    const from = lattice ? this.parametersCount : this.group;
+    this.#take(this.#along(ring, vertex, GRIP * reach), this.#apart(), reach, from);
   }
 
   /**
@@ -132,25 +125,23 @@ export class Puller {
    * above.
    */
   grabInside([x, y], reach, { gives = false, lattice = true } = {}) {
-    const { rest, size } = this;
-    this.ahead = null;
+    const { rest } = this;
     this.inside = true;
-    const apart = Array.from(
-      { length: size },
-      (_, i) => Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y),
-    );
+    this.pin = { parts: null, target: null };
+    const apart = Array.from(this.hold, (_, i) => Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y));
     const width = Math.max(GRIP * reach, 1.5 * Math.min(...apart));
-    const near = apart.map((far, i) => [i, Math.exp(-3 * (far / width) ** 2)])
-      .filter(([, own]) => own > 0.05);
-    const total = near.reduce((sum, [, own]) => sum + own, 0);
-    this.pin = { parts: near.map(([i, own]) => [i, own / total]), target: null };
+    const near = apart.map((far, i) => [i, Math.exp(-3 * (far / width) ** 2)]);
+    const from = gives ? (lattice ? this.parametersCount : this.group) : 0;
+    this.#take(near.filter(([, own]) => own > FAINTEST), apart, reach, from);
+  }
+
+  /** Hold points by their weights, and what is `apart` from them; parameters `from` some on stay as they are. */
+  #take(parts, apart, reach, from) {
+    const total = parts.reduce((sum, [, own]) => sum + own, 0);
+    this.ahead = null;
+    this.pin.parts = parts.map(([i, own]) => [i, own / total]);
     this.pin.target = this.held();
-    this.free.fill(1);
-    this.free.fill(
-      0,
-      gives ? (lattice ? this.parametersCount : this.group) : 0,
-      this.parametersCount,
-    );
+    this.free.fill(1).fill(0, from, this.parametersCount);
     apart.forEach((far, i) => {
       this.hold[i] = LEAST_HOLD + HOLD * Math.min(1, far / reach) ** 4;
     });
@@ -158,28 +149,26 @@ export class Puller {
   }
 
   /** The hand is soft: it holds the mean of the outline nearby, so that no spike comes out. */
-  #grip(ring, place, width) {
-    const { pin, rest } = this;
+  #along(ring, place, width) {
+    const { pin: { vertex, next, share }, rest } = this;
     const count = ring.length;
     const [x, y] = this.grip();
-    const weight = (i) =>
-      Math.exp(-3 * ((rest[2 * i] - x) ** 2 + (rest[2 * i + 1] - y) ** 2) / width ** 2);
-    const found = new Map([[pin.vertex, 1 - pin.share], [pin.next, pin.share]]);
+    const found = new Map([[vertex, 1 - share], [next, share]]);
     for (const [from, step] of [[place, -1], [place + 1, 1]]) {
       for (let k = 0; k < count / 4; k += 1) {
         const i = ring[(from + step * k + count) % count];
-        const own = weight(i);
-        if (k > 1 && own < 0.05) break;
+        const far = Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y);
+        const own = Math.exp(-3 * (far / width) ** 2);
+        if (k > 1 && own < FAINTEST) break;
         found.set(i, (found.get(i) ?? 0) + own);
       }
     }
-    const total = [...found.values()].reduce((sum, own) => sum + own, 0);
-    pin.parts = [...found].map(([i, own]) => [i, own / total]);
+    return [...found];
   }
 
-  #holdBeyond(reach) {
-    const { rest, orbit, count } = this;
-    const { vertex, next, share } = this.pin;
+  /** How far points are from what is held of the outline, or from where the same vertex is elsewhere. */
+  #apart() {
+    const { rest, orbit, count, pin: { vertex, next, share } } = this;
     const target = this.grip();
     const nearest = share < 0.5 ? vertex : next;
     const from = (i, x, y) => Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y);
@@ -189,59 +178,36 @@ export class Puller {
       if (orbit[i] === orbit[nearest] && i !== nearest) places.push([rest[2 * i], rest[2 * i + 1]]);
       near.set(orbit[i], Math.min(near.get(orbit[i]) ?? Infinity, from(i, ...target)));
     }
-    for (let i = 0; i < this.size; i += 1) {
+    return Array.from(this.hold, (_, i) => {
       const apart = Math.min(...places.map((place) => from(i, ...place)));
-      const own = Math.min(apart, i < count ? near.get(orbit[i]) : Infinity) / reach;
-      this.hold[i] = LEAST_HOLD + HOLD * Math.min(1, own) ** 4;
-    }
+      return Math.min(apart, i < count ? near.get(orbit[i]) : Infinity);
+    });
   }
 
-  /**
-   * The point of the outline that was taken hold of, where it is now.
-   *
-   * @returns {Point}
-   */
+  /** The point of the outline that was taken hold of, where it is now. @returns {Point} */
   grip() {
     if (this.inside) return this.held();
     const { vertex, next, share } = this.pin;
-    const at = this.#pointsOf(2 * vertex, 2 * vertex + 2).concat(
-      this.#pointsOf(2 * next, 2 * next + 2),
-    );
-    return [(1 - share) * at[0] + share * at[2], (1 - share) * at[1] + share * at[3]];
+    const x = this.polygon();
+    const at = (k) => (1 - share) * x[2 * vertex + k] + share * x[2 * next + k];
+    return [at(0), at(1)];
   }
 
   /** What the hand holds, the mean of the outline nearby, where it is now. */
   held() {
-    /** @type {Point} */
-    const found = [0, 0];
-    for (const [i, part] of this.pin.parts) {
-      this.#pointsOf(2 * i, 2 * i + 2).forEach((own, j) => {
-        found[j] += part * own;
-      });
-    }
-    return found;
+    return this.#mean(this.body());
   }
 
-  #pointsOf(from, to) {
-    const { start, at, value } = this.points;
-    const found = [];
-    for (let i = from; i < to; i += 1) {
-      let sum = 0;
-      for (let k = start[i]; k < start[i + 1]; k += 1) sum += value[k] * this.z[at[k]];
-      found.push(sum);
-    }
-    return found;
+  /** @returns {Point} */
+  #mean(x) {
+    const along = (k) => this.pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + k], 0);
+    return [along(0), along(1)];
   }
 
   /** The diagonal of the quadratic form, for which conjugate gradients are scaled; exact for the group. */
   #measureDiagonal() {
     const { start, at, value } = this.points;
-    const own = new Float64Array(this.size);
-    for (let i = 0; i < this.size; i += 1) {
-      for (let k = this.laplacian.start[i]; k < this.laplacian.start[i + 1]; k += 1) {
-        if (this.laplacian.at[k] === i) own[i] = this.laplacian.value[k] + this.hold[i];
-      }
-    }
+    const own = this.stiffness.map((stiff, i) => stiff + this.hold[i]);
     for (const [i, part] of this.pin.parts) own[i] += GRAB * part ** 2;
     this.diagonal.fill(0);
     for (let i = 0; i < 2 * this.size; i += 1) {
@@ -260,28 +226,15 @@ export class Puller {
 
   /** out = B' (L + holds + grab) B given */
   #form(given, out) {
-    const { x, y, laplacian, hold, pin } = this;
+    const { x, y, hold } = this;
     multiply(this.points, given, x);
-    const { start, at, value } = laplacian;
-    for (let i = 0; i < this.size; i += 1) {
-      let u = hold[i] * x[2 * i];
-      let v = hold[i] * x[2 * i + 1];
-      for (let k = start[i]; k < start[i + 1]; k += 1) {
-        u += value[k] * x[2 * at[k]];
-        v += value[k] * x[2 * at[k] + 1];
-      }
-      y[2 * i] = u;
-      y[2 * i + 1] = v;
-    }
-    this.#addGrab(
-      y,
-      pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i], 0),
-      pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + 1], 0),
-    );
+    multiply(this.laplacian, x, y);
+    for (let i = 0; i < y.length; i += 1) y[i] += hold[i >> 1] * x[i];
+    this.#addGrab(y, this.#mean(x));
     return multiplyBack(this.points, y, out);
   }
 
-  #addGrab(y, u, v) {
+  #addGrab(y, [u, v]) {
     for (const [i, part] of this.pin.parts) {
       y[2 * i] += GRAB * part * u;
       y[2 * i + 1] += GRAB * part * v;
@@ -322,7 +275,7 @@ export class Puller {
         y[c + 1] -= v;
       }
     }
-    this.#addGrab(y, pin.target[0], pin.target[1]);
+    this.#addGrab(y, pin.target);
     return multiplyBack(this.points, y, out);
   }
 
@@ -422,11 +375,7 @@ export class Puller {
     return multiply(this.points, this.z, new Float64Array(2 * this.count));
   }
 
-  /**
-   * The outline of each figure.
-   *
-   * @returns {Point[][]}
-   */
+  /** The outline of each figure. @returns {Point[][]} */
   outlines() {
     const points = this.polygon();
     return this.rings.map((ring) => ring.map((k) => [points[2 * k], points[2 * k + 1]]));

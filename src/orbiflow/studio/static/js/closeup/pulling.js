@@ -1,6 +1,8 @@
 /** The tool that pulls a point of the outline. */
 
 import { inverse, moved } from "../../../../drawing/js/tiling.js";
+import { isSame } from "./stage.js";
+import { ARROWS } from "../../../../drawing/js/turned.js";
 import { Puller } from "./pull.js";
 
 const GRIP = 18; // pixels around the outline in which a mouse takes hold
@@ -39,41 +41,34 @@ export class Pulling {
 
   down(place, event) {
     if (!this.ready) return false;
-    if (this.settings.what === "inside") return this.#downInside(place);
-    const found = this.stage.outlineAt(place, event.pointerType === "touch" ? FINGER : GRIP);
+    const found = this.settings.what === "inside"
+      ? this.stage.copyAt(place)
+      : this.stage.outlineAt(place, event.pointerType === "touch" ? FINGER : GRIP);
     if (!found) return false;
     this.#take(found);
-    const [x, y] = this.puller.held();
-    const own = moved(inverse(this.stage.matrixOf(found.copy)), place);
-    this.hand.offset = [x - own[0], y - own[1]];
-    this.aim = place;
-    this.#follow();
+    const [[x, y], [u, v]] = [this.puller.held(), this.#inTile(place)];
+    this.hand.offset = [x - u, y - v];
+    this.move(place);
     return true;
   }
 
-  #downInside(place) {
-    const found = this.stage.copyAt(place);
-    if (!found) return false;
+  /** Take hold of the outline, or of what lies inside `at` a place of the tile. */
+  #take({ copy, at, vertex, share }) {
     const { reach, gives, lattice } = this.settings;
-    this.puller.grabInside(found.at, reach * this.size, { gives, lattice });
-    const [x, y] = this.puller.held();
-    this.hand = { copy: found.copy, offset: [x - found.at[0], y - found.at[1]] };
-    this.aim = place;
-    this.#follow();
-    return true;
-  }
-
-  #take({ copy, vertex, share }) {
+    const far = reach * this.size;
+    this.hand = { copy, offset: [0, 0] };
+    if (at) return this.puller.grabInside(at, far, { gives, lattice });
     if (this.puller.isHeld(share < 0.5 ? vertex : vertex + 1, copy.figure)) {
       this.on.said(
         "This point is a turning point of the pattern. It moves when the grid does, or pull next to it.",
       );
     }
-    this.puller.grab(vertex, share, this.settings.reach * this.size, {
-      lattice: this.settings.lattice,
-      figure: copy.figure,
-    });
-    this.hand = { copy, vertex, share, offset: [0, 0] };
+    return this.puller.grab(vertex, share, far, { lattice, figure: copy.figure });
+  }
+
+  /** Where a place of the canvas is in the tile whose copy is in hand. */
+  #inTile(place) {
+    return moved(inverse(this.stage.matrixOf(this.hand.copy)), place);
   }
 
   move(place) {
@@ -83,15 +78,10 @@ export class Pulling {
 
   hover(place) {
     const inside = this.settings.what === "inside";
-    const found = (this.ready && !inside && this.stage.outlineAt(place, GRIP)) || null;
+    const found = (place && this.ready && !inside && this.stage.outlineAt(place, GRIP)) || null;
     this.stage.canvas.style.cursor = found || inside ? "grab" : "";
     if (found || this.near) this.stage.redraw();
     this.near = found;
-  }
-
-  leave() {
-    this.near = null;
-    this.stage.redraw();
   }
 
   up() {
@@ -111,33 +101,25 @@ export class Pulling {
     this.hand = null;
     this.stopped = false;
     this.aim = null;
-    if (!pulled) {
-      this.back();
-      return;
-    }
+    if (!pulled) return this.back();
     this.waiting = true;
-    this.on.released(this.puller.parameters(), this.puller.insides());
+    return this.on.released(this.puller.parameters(), this.puller.insides());
   }
 
   /** Let the outline follow the pointer. */
   #follow() {
     this.stage.before = () => {
-      if (!this.hand || !this.aim) {
-        this.stage.before = null;
-        return;
-      }
+      if (!this.hand || !this.aim) return this.stage.before = null;
       const left = this.#step();
       this.#show();
-      if (left > STILL) setTimeout(() => this.stage.redraw());
+      return left > STILL && setTimeout(() => this.stage.redraw());
     };
     this.stage.redraw();
   }
 
   #step() {
-    const own = moved(inverse(this.stage.matrixOf(this.hand.copy)), this.aim);
-    /** @type {Point} */
-    const goal = [own[0] + this.hand.offset[0], own[1] + this.hand.offset[1]];
-    const { left, stopped } = this.puller.follow(goal);
+    const [[x, y], [u, v]] = [this.#inTile(this.aim), this.hand.offset];
+    const { left, stopped } = this.puller.follow([x + u, y + v]);
     this.stopped = stopped;
     return left;
   }
@@ -182,28 +164,20 @@ export class Pulling {
   /** Arrows choose a point, shift and arrows move it; Enter lets go, Escape springs back. */
   key(event) {
     if (!this.ready || (this.settings.what === "inside" && !this.hand)) return false;
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const way = ways[event.key];
-    if (way && event.shiftKey) {
-      this.#nudge(way);
-      return true;
-    }
+    const way = ARROWS[event.key];
     if (way) {
-      this.#choose(way[0] + way[1] || 0);
+      if (event.shiftKey) this.#nudge(way);
+      else this.#choose(way[0] + way[1] || 0);
       return true;
     }
-    if (event.key === "Enter" && this.hand) {
-      clearTimeout(this.timer);
-      this.up();
-      return true;
-    }
-    if (event.key === "Escape" && this.hand) {
-      clearTimeout(this.timer);
+    if (!this.hand || !["Enter", "Escape"].includes(event.key)) return false;
+    clearTimeout(this.timer);
+    if (event.key === "Enter") this.up();
+    else {
       this.back();
       this.on.said("Put back.");
-      return true;
     }
-    return false;
+    return true;
   }
 
   #choose(step) {
@@ -229,10 +203,7 @@ export class Pulling {
       vertex -= this.puller.rings[figure].length;
     }
     const known = this.chosen?.copy;
-    const copy = known?.figure === figure &&
-      this.stage.copies.find((own) =>
-        own.aspect === known.aspect && String(own.cell) === String(known.cell)
-      );
+    const copy = known?.figure === figure && this.stage.copies.find((own) => isSame(own, known));
     return { number, vertex, copy: copy || this.#middleCopy(figure) };
   }
 
@@ -283,31 +254,24 @@ export class Pulling {
     if (!at) return;
     const [x, y] = moved(this.stage.matrixOf(at.copy), at.point);
     const reach = this.settings.reach * this.size * this.stage.camera.scale;
-    const ring = (radius, wide, colour, dash = []) => {
+    const colour = this.stopped ? STOPPED : FREE;
+    const stroke = (path, wide, ink, dash = []) => {
       context.setLineDash(dash);
       context.lineWidth = wide;
-      context.strokeStyle = colour;
-      context.beginPath();
-      context.arc(x, y, radius, 0, 2 * Math.PI);
-      context.stroke();
+      context.strokeStyle = ink;
+      context.stroke(path);
     };
-    if (this.stopped) {
-      context.setLineDash([]);
-      context.lineWidth = 2;
-      context.strokeStyle = STOPPED;
-      context.beginPath();
-      context.moveTo(x, y);
-      context.lineTo(...this.aim);
-      context.stroke();
-    }
-    ring(reach, 4, "rgb(255 255 255 / 70%)");
-    ring(reach, 1.6, this.stopped ? STOPPED : FREE, [7, 5]);
-    context.setLineDash([]);
-    context.fillStyle = this.stopped ? STOPPED : FREE;
-    context.beginPath();
-    context.arc(x, y, 6, 0, 2 * Math.PI);
-    context.fill();
-    ring(6, 2.5, "#ffffff");
+    const ring = (radius) => {
+      const path = new Path2D();
+      path.arc(x, y, radius, 0, 2 * Math.PI);
+      return path;
+    };
+    if (this.stopped) stroke(new Path2D(`M${x} ${y}L${this.aim}`), 2, STOPPED);
+    stroke(ring(reach), 4, "rgb(255 255 255 / 70%)");
+    stroke(ring(reach), 1.6, colour, [7, 5]);
+    context.fillStyle = colour;
+    context.fill(ring(6));
+    stroke(ring(6), 2.5, "#ffffff");
   }
 
   /**

@@ -1,12 +1,14 @@
 /** The symmetry of a tiling, drawn over it and said in plain sentences. */
 
-import { moved } from "../../../../drawing/js/tiling.js";
+import { inverse, moved, pathOf, times } from "../../../../drawing/js/tiling.js";
 import { beside } from "./lines.js";
 
 const COLOURS = { 2: "#c2410c", 3: "#6d28d9", 4: "#0f766e", 6: "#b91c1c" };
 const LINES = "#b91c1c";
 const NEAREST = 26; // pixels between signs below which they are left out
 const AT_MOST = 1500;
+const MOST_LINES = 200;
+const NEAR_VIEW = 40; // pixels around the view in which signs may begin
 
 const TURNS = {
   2: ["Half", "half way"],
@@ -81,10 +83,7 @@ export function signInto(context, key, x, y, size, colour) {
     context.strokeRect(-size, -0.7 * size, 2 * size, 1.4 * size);
   } else {
     context.setLineDash(key === "glides" ? [4, 3] : []);
-    context.beginPath();
-    context.moveTo(-size, 0);
-    context.lineTo(size, 0);
-    context.stroke();
+    context.stroke(new Path2D(`M${-size} 0H${size}`));
   }
   context.restore();
 }
@@ -115,112 +114,64 @@ function centre(context, order, size) {
  */
 export function placed(elements, tiling, camera, width, height) {
   const view = camera.matrix(width, height);
-  const [p, q, r, s] = tiling.basis;
   const to = (point) => moved(view, tiling.carried(point));
-  /** @type {[Point, Point]} */
-  const steps = [[view[0] * p + view[2] * q, view[1] * p + view[3] * q], [
-    view[0] * r + view[2] * s,
-    view[1] * r + view[3] * s,
-  ]];
-  const flat = Math.abs(steps[0][0] * steps[1][1] - steps[0][1] * steps[1][0]);
+  const [a, b, c, d] = times(view, tiling.lattice); // steps of the lattice
+  const back = inverse([a, b, c, d, 0, 0]);
   const reach = Math.hypot(width, height);
-  const cells = (point) => {
-    // the cells whose copy of a point is in view
-    const far = reach / 2 + 40;
-    const [m, n] = inSteps(steps, [width / 2 - point[0], height / 2 - point[1]]);
-    const [dm, dn] = [
-      (far * Math.hypot(...steps[1])) / flat,
-      (far * Math.hypot(...steps[0])) / flat,
-    ];
-    return [Math.floor(m - dm), Math.ceil(m + dm), Math.floor(n - dn), Math.ceil(n + dn)];
-  };
-  /** @type {{ key: string, at: Point }[]} */
-  const centres = [];
-  const crowded = Math.sqrt(flat / Math.max(1, elements.centres.length)) < NEAREST;
-  for (const element of crowded ? [] : elements.centres) {
-    const at = to(element.at);
-    const [m0, m1, n0, n1] = cells(at);
-    for (let m = m0; m <= m1; m += 1) {
-      for (let n = n0; n <= n1 && centres.length < AT_MOST; n += 1) {
-        const [x, y] = [
-          at[0] + m * steps[0][0] + n * steps[1][0],
-          at[1] + m * steps[0][1] + n * steps[1][1],
-        ];
-        if (x > -20 && y > -20 && x < width + 20 && y < height + 20) {
-          centres.push({ key: `turn${element.order}`, at: [x, y] });
-        }
-      }
+  /** @type {(point: Point) => Point} */
+  const fromMiddle = ([x, y]) => moved(back, [width / 2 - x, height / 2 - y]);
+  /** @type {(point: Point, m: number, n: number) => Point} */
+  const shifted = ([x, y], m, n) => [x + m * a + n * c, y + m * b + n * d];
+  /** The places to which the lattice takes a point, in view or near it. */
+  const copies = (point) => {
+    const far = reach / 2 + NEAR_VIEW;
+    const [m, n] = fromMiddle(point);
+    const [dm, dn] = [far * Math.hypot(back[0], back[2]), far * Math.hypot(back[1], back[3])];
+    const found = [];
+    for (let i = Math.floor(m - dm); i <= m + dm; i += 1) {
+      for (let j = Math.floor(n - dn); j <= n + dn; j += 1) found.push(shifted(point, i, j));
     }
-  }
+    return found;
+  };
+  const isSeen = ([x, y]) => x > -20 && y > -20 && x < width + 20 && y < height + 20;
+  const area = Math.abs(a * d - b * c);
+  const crowded = Math.sqrt(area / Math.max(1, elements.centres.length)) < NEAREST;
+  const centres = (crowded ? [] : elements.centres).flatMap(({ order, at }) =>
+    copies(to(at)).filter(isSeen).map((at) => ({ key: `turn${order}`, at }))
+  ).slice(0, AT_MOST);
   /** @type {Map<string, { key: string, from: Point, to: Point, along: Point }>} */
   const lines = new Map();
-  for (const key of /** @type {const} */ (["mirrors", "glides"])) {
+  for (const key of ["mirrors", "glides"]) {
     for (const line of elements[key]) {
-      const at = to(line.at);
-      const end = to([line.at[0] + line.along[0], line.at[1] + line.along[1]]);
-      const long = Math.hypot(end[0] - at[0], end[1] - at[1]);
-      /** @type {Point} */
-      const along = [(end[0] - at[0]) / long, (end[1] - at[1]) / long];
-      const [m0, m1, n0, n1] = cells(at);
-      for (let m = m0; m <= m1; m += 1) {
-        for (let n = n0; n <= n1 && lines.size < 200; n += 1) {
-          const [x, y] = [
-            at[0] + m * steps[0][0] + n * steps[1][0],
-            at[1] + m * steps[0][1] + n * steps[1][1],
-          ];
-          const off = (x - width / 2) * along[1] - (y - height / 2) * along[0];
-          if (Math.abs(off) > reach / 2) continue;
-          const name = `${key} ${Math.round(along[1] * 100)} ${Math.round(off)}`;
-          const middle = [width / 2 + off * along[1], height / 2 - off * along[0]];
-          /** @type {Point} */
-          const at0 = [middle[0] - reach * along[0], middle[1] - reach * along[1]];
-          if (!lines.has(name)) {
-            lines.set(name, {
-              key,
-              from: at0,
-              to: [middle[0] + reach * along[0], middle[1] + reach * along[1]],
-              along,
-            });
-          }
-        }
+      const [start, end] = [
+        to(line.at),
+        to([line.at[0] + line.along[0], line.at[1] + line.along[1]]),
+      ];
+      const long = Math.hypot(end[0] - start[0], end[1] - start[1]);
+      const [u, v] = [(end[0] - start[0]) / long, (end[1] - start[1]) / long];
+      for (const [x, y] of copies(start)) {
+        const off = (x - width / 2) * v - (y - height / 2) * u;
+        if (Math.abs(off) > reach / 2) continue;
+        const [p, q] = [width / 2 + off * v, height / 2 - off * u];
+        lines.set(`${key} ${Math.round(v * 100)} ${Math.round(off)}`, {
+          key,
+          from: [p - reach * u, q - reach * v],
+          to: [p + reach * u, q + reach * v],
+          along: [u, v],
+        });
       }
     }
   }
+  const ring = elements.cell.map(to);
+  const middle = (j) => ring.reduce((sum, at) => sum + at[j] / 4, 0);
+  const [m, n] = fromMiddle([middle(0), middle(1)]).map(
+    Math.round,
+  );
   return {
     centres,
-    lines: [...lines.values()],
-    cell: cellNear(elements, to, steps, width, height),
+    lines: [...lines.values()].slice(0, MOST_LINES),
+    cell: ring.map((at) => shifted(at, m, n)),
   };
-}
-
-/**
- * A vector as multiples of the two steps of the lattice.
- *
- * @param {[Point, Point]} steps
- * @param {Point} vector
- */
-function inSteps([[a, b], [c, d]], [x, y]) {
-  const size = a * d - b * c;
-  return [(x * d - y * c) / size, (a * y - b * x) / size];
-}
-
-/**
- * @param {Elements} elements
- * @param {(point: Point) => Point} to
- * @param {[Point, Point]} steps
- * @param {number} width
- * @param {number} height
- */
-function cellNear(elements, to, steps, width, height) {
-  const ring = elements.cell.map(to);
-  const middle = [0, 1].map((j) => ring.reduce((sum, point) => sum + point[j] / 4, 0));
-  const [m, n] = inSteps(steps, [width / 2 - middle[0], height / 2 - middle[1]]).map(Math.round);
-  /** @type {(point: Point) => Point} */
-  const shifted = ([u, v]) => [
-    u + m * steps[0][0] + n * steps[1][0],
-    v + m * steps[0][1] + n * steps[1][1],
-  ];
-  return ring.map(shifted);
 }
 
 /**
@@ -232,39 +183,21 @@ function cellNear(elements, to, steps, width, height) {
  */
 export function paintSigns(context, signs, lit) {
   const strong = (key) => !lit || lit === key;
-  const both = (draw, width, colour) => {
+  const both = (path, width, colour) => {
     for (const [ink, wide] of [["rgb(255 255 255 / 85%)", width + 2.5], [colour, width]]) {
       context.strokeStyle = ink;
       context.lineWidth = wide;
-      draw();
+      context.stroke(path);
     }
   };
   for (const { key, from, to } of signs.lines) {
     context.globalAlpha = strong(key) ? 1 : 0.25;
     context.setLineDash(key === "glides" ? [9, 6] : []);
-    both(
-      () => {
-        context.beginPath();
-        context.moveTo(...from);
-        context.lineTo(...to);
-        context.stroke();
-      },
-      lit === key ? 3 : 2,
-      LINES,
-    );
+    both(new Path2D(`M${from}L${to}`), lit === key ? 3 : 2, LINES);
   }
   context.setLineDash([]);
   context.globalAlpha = strong("cell") ? 1 : 0.25;
-  both(
-    () => {
-      context.beginPath();
-      signs.cell.forEach((point) => context.lineTo(...point));
-      context.closePath();
-      context.stroke();
-    },
-    lit === "cell" ? 4 : 2.5,
-    "#111111",
-  );
+  both(pathOf(signs.cell), lit === "cell" ? 4 : 2.5, "#111111");
   for (const { key, at } of signs.centres) {
     context.globalAlpha = strong(key) ? 1 : 0.25;
     context.save();

@@ -67,10 +67,7 @@ export function multiplyBack(matrix, x, out) {
   return out;
 }
 
-/**
- * @param {Float64Array} a
- * @param {Float64Array} b
- */
+/** @param {Float64Array} a @param {Float64Array} b */
 export function dot(a, b) {
   let sum = 0;
   for (let i = 0; i < a.length; i += 1) sum += a[i] * b[i];

@@ -1,25 +1,22 @@
 /** The canvas of the close-up: what lies under a place of it. */
 
-import { inverse, moved } from "../../../../drawing/js/tiling.js";
+import { inverse, moved, times } from "../../../../drawing/js/tiling.js";
 import { View } from "../../../../drawing/js/view.js";
 /** @import { LiveTiling } from "./live.js" */
-import { h, zooms } from "../dom.js";
+import { h, handled, zooms } from "../dom.js";
 import { beside } from "./lines.js";
 
+/** Whether two copies are of the same tile, and not of one beside it. @param {Copy} a @param {Copy} b */
+export const isSame = (a, b) => a.aspect === b.aspect && String(a.cell) === String(b.cell);
+
 export class Stage extends View {
-  /** `tool()` gives the tool in hand, as a view takes it. */
-  constructor({ label, help, tool }) {
-    const canvas = h("canvas", {
-      class: "closeup-canvas",
-      tabindex: "0",
-      role: "application",
-      "aria-label": label,
-      "aria-describedby": help,
-    });
+  /** `label` and the id of its `help` are for readers of screens; `tool()` gives the tool in hand, as a view takes it. */
+  constructor(label, help, tool) {
+    const canvas = handled("closeup-canvas", "application", label, help);
     super(canvas, tool);
     /** @type {LiveTiling} */
     this.tiling = undefined;
-    this.box = h("div", { class: "closeup-stage" }, canvas);
+    this.box = h("div.closeup-stage", canvas);
     this.tester = document.createElement("canvas").getContext("2d");
   }
 
@@ -61,15 +58,6 @@ export class Stage extends View {
    * @returns {Matrix}
    */
   matrixOf({ aspect, cell }) {
-    const view = this.camera.matrix(this.width, this.height);
-    const own = this.tiling.copy(aspect, ...cell);
-    return [
-      view[0] * own[0] + view[2] * own[1],
-      view[1] * own[0] + view[3] * own[1],
-      view[0] * own[2] + view[2] * own[3],
-      view[1] * own[2] + view[3] * own[3],
-      view[0] * own[4] + view[2] * own[5] + view[4],
-      view[1] * own[4] + view[3] * own[5] + view[5],
-    ];
+    return times(this.camera.matrix(this.width, this.height), this.tiling.copy(aspect, ...cell));
   }
 }

@@ -129,11 +129,7 @@ export class Grid {
   }
 }
 
-/**
- * Lines of a globe or disc, as pieces of places.
- *
- * @param {any} grid
- */
+/** Lines of a globe or disc, as pieces of places. @param {any} grid */
 export function meridians(grid) {
   const steps = Array.from({ length: 61 }, (_, k) => k / 60), north = grid.map === disc;
   const upright = Array.from(

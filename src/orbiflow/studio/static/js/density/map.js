@@ -1,6 +1,7 @@
 /** The flat map of a density, with the table's rows as dots, a region that stands out, and a line that is held. */
 
 import { unpack } from "../../api/density/surface.js";
+import { atNextFrame, placeOn, sized } from "../../../../drawing/js/turned.js";
 import { meridians } from "./grid.js";
 
 const PALENESS = 0.85; // as the surface has it
@@ -10,55 +11,40 @@ export const pale = () => (dark.matches ? 0.25 : 0.8);
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /**
- * Draw a canvas, and again when its size or the colours of the page change; returns what asks for it, `ends` what stops it.
+ * Draw a canvas, and again when its size or the colours of the page change; returns what asks for it.
  *
  * @param {HTMLCanvasElement} canvas
- * @param {(() => void)[]} ends
+ * @param {AbortSignal} signal
  * @param {(pen: CanvasRenderingContext2D, width: number, height: number, ratio: number) => void} paint
  */
-export function painted(canvas, ends, paint) {
-  const draw = () => {
-    const ratio = Math.min(2, globalThis.devicePixelRatio || 1),
-      width = canvas.clientWidth,
-      height = canvas.clientHeight;
-    if (!width || !height) return;
-    [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
-    const pen = canvas.getContext("2d");
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    paint(pen, width, height, ratio);
-  };
-  let asked = 0;
-  const soon = () => {
-    cancelAnimationFrame(asked);
-    asked = requestAnimationFrame(draw);
-  };
-  const observer = new ResizeObserver(soon);
-  observer.observe(canvas);
-  dark.addEventListener("change", soon);
-  ends.push(() => {
-    cancelAnimationFrame(asked);
-    observer.disconnect();
-    dark.removeEventListener("change", soon);
+export function painted(canvas, signal, paint) {
+  const soon = atNextFrame(() => {
+    if (!canvas.clientWidth || signal.aborted) return;
+    const { width, height, ratio } = sized(canvas);
+    const context = canvas.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    paint(context, width, height, ratio);
   });
+  new ResizeObserver(soon).observe(canvas);
+  dark.addEventListener("change", soon, { signal });
   return soon;
 }
 
 export class FlatMap {
-  /**
-   * `frame` is what `flat_frame` gives; `pick(u, v)` hears of pointers on the map.
-   */
-  constructor(canvas, ends, frame, pick) {
+  /** `frame` is what `flat_frame` gives; `pick(u, v)` hears of pointers on the map. */
+  constructor(canvas, signal, frame, pick) {
     this.frame = frame;
     this.colours = unpack(frame.colours, Uint8Array);
     this.points = unpack(frame.points, Float32Array);
     this.least = -Infinity;
     this.dots = true;
     this.held = null;
-    this.redraw = painted(canvas, ends, (...given) => this.paint(...given));
+    this.redraw = painted(canvas, signal, (...given) => this.paint(...given));
     const heard = (event) => {
       if (!event.buttons || !this.box) return;
-      const { x, y, w, h } = this.box, at = canvas.getBoundingClientRect();
-      const [u, v] = [(event.clientX - at.left - x) / w, 1 - (event.clientY - at.top - y) / h];
+      const { x, y, w, h } = this.box, [a, b] = placeOn(canvas, event);
+      const [u, v] = [(a - x) / w, 1 - (b - y) / h];
       pick(Math.max(0, Math.min(1, u)), Math.max(0, Math.min(1, v)));
     };
     for (const name of ["pointerdown", "pointermove"]) canvas.addEventListener(name, heard);
@@ -85,7 +71,6 @@ export class FlatMap {
     const box = this.room(width, height);
     this.box = box;
     if (box.w < 10) return;
-    pen.clearRect(0, 0, width, height);
     pen.drawImage(
       this.picture(Math.round(box.w * ratio), Math.round(box.h * ratio), ratio),
       box.x,
@@ -156,9 +141,7 @@ export class FlatMap {
     if (this.grid.onGlobe) {
       pen.strokeStyle = "rgb(255 255 255 / 35%)";
       for (const line of meridians(this.grid)) {
-        pen.beginPath();
-        line.forEach((place) => pen.lineTo(...at(place)));
-        pen.stroke();
+        pen.stroke(new Path2D(`M${line.map(at).join("L")}`));
       }
       pen.strokeStyle = ink("--edge");
       pen.beginPath();
@@ -217,10 +200,7 @@ export class FlatMap {
     for (const [colour, width] of [["#fff", 5], ["#c81e5a", 2.5]]) {
       pen.strokeStyle = colour;
       pen.lineWidth = width;
-      pen.beginPath();
-      pen.moveTo(...from);
-      pen.lineTo(...to);
-      pen.stroke();
+      pen.stroke(new Path2D(`M${from}L${to}`));
     }
   }
 }
@@ -269,18 +249,11 @@ export function drawCurve(pen, width, height, { values, axis, least = -Infinity 
     peak = Math.max(...values);
   const x = (k) => left + ((k + 0.5) / values.length) * w,
     y = (value) => foot - (value / peak / 1.06) * h;
-  pen.clearRect(0, 0, width, height);
   const fill = (colour, inside) => {
     pen.fillStyle = colour;
+    const wide = w / values.length;
     values.forEach((value, k) => {
-      if (inside(value)) {
-        pen.fillRect(
-          x(k) - w / values.length / 2,
-          y(value),
-          w / values.length + 0.7,
-          foot - y(value),
-        );
-      }
+      if (inside(value)) pen.fillRect(x(k) - wide / 2, y(value), wide + 0.7, foot - y(value));
     });
   };
   fill(ink("--line"), () => true);
@@ -288,15 +261,10 @@ export function drawCurve(pen, width, height, { values, axis, least = -Infinity 
   pen.strokeStyle = ink("--accent");
   pen.lineWidth = 2.5;
   pen.lineJoin = "round";
-  pen.beginPath();
-  values.forEach((value, k) => pen.lineTo(x(k), y(value)));
-  pen.stroke();
+  pen.stroke(new Path2D(`M${values.map((value, k) => [x(k), y(value)]).join("L")}`));
   pen.strokeStyle = ink("--edge");
   pen.lineWidth = 1;
-  pen.beginPath();
-  pen.moveTo(left, foot + 0.5);
-  pen.lineTo(left + w, foot + 0.5);
-  pen.stroke();
+  pen.stroke(new Path2D(`M${left} ${foot + 0.5}h${w}`));
   pen.fillStyle = ink("--ink");
   pen.font = "13px system-ui, sans-serif";
   axis.at.forEach((t, k) => {

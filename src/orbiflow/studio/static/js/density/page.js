@@ -6,32 +6,26 @@ import { Result } from "./result.js";
 import { chooseSpace, chooseTable } from "./table.js";
 import { Watch } from "./watch.js";
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- */
+/** @type {Show} */
 export async function show(root, page) {
   const { api, events, project } = page, path = `projects/${project.id}/density`;
   await style("density");
-  const body = h("div", { class: "stack" }),
+  const body = h("div.stack"),
     problem = h("div", {}),
-    actions = h("div", { class: "row" });
-  put(
-    root,
-    h(
-      "div",
-      { class: "density stack" },
-      row(h("h1", { class: "grow", tabindex: "-1" }, "See where your data crowd"), actions),
+    actions = h("div.row");
+  put(root, [
+    h("div.density.stack", [
+      row(h("h1.grow", { tabindex: "-1" }, "See where your data crowd"), actions),
       problem,
       body,
-    ),
-  );
+    ]),
+  ]);
   let state = await api.get(path), shown = "", part = null, changing = false;
 
   const newest = (operation) => project.tasks.find((task) => task.operation === operation);
   const start = (settings) =>
     trying(async () => {
-      await api.post(`projects/${project.id}/tasks`, { operation: "density fit", settings });
+      await api.start(project, "density fit", settings);
       changing = false;
     });
   /** Which part of the page it is time for, and a word that changes when it must be built again. */
@@ -61,15 +55,14 @@ export async function show(root, page) {
       changing = false;
       build();
     }, { image: "undo" });
-    put(
-      actions,
+    put(actions, [
       kind === "result" && again,
       kind === "space" && state.fit && back,
       ["result", "space"].includes(kind) && button("Another table", another),
-    );
+    ]);
     if (kind === "table") put(body, intro(), chooseTable(page, state.examples));
     if (kind === "reading") {
-      put(body, h("p", { class: "panel", role: "status" }, "Reading the table …"));
+      put(body, h("p.panel", { role: "status" }, "Reading the table …"));
     }
     if (kind === "space") {
       put(body, chooseSpace(state.table, start, state.fit && { ...state.fit, why: "" }));
@@ -85,8 +78,7 @@ export async function show(root, page) {
     trying(async () => page.navigate(`d/${(await api.post("projects", { kind: "density" })).id}`));
   const intro = () =>
     h(
-      "p",
-      { class: "soft lead" },
+      "p.soft.lead",
       "A density says where rows of a table are likely. It is made for numbers that go round: angles, directions, axes.",
     );
 
@@ -97,7 +89,7 @@ export async function show(root, page) {
     const fault = STEPS.map(newest).find((task) => task?.state === "failed");
     if (fault?.id === told) return;
     told = fault?.id;
-    put(problem, fault && h("p", { class: "error", role: "alert" }, `${capital(fault.error)}.`));
+    put(problem, fault && h("p.error", { role: "alert" }, `${capital(fault.error)}.`));
   }
 
   async function hear(task) {
@@ -106,20 +98,17 @@ export async function show(root, page) {
     complain();
     build();
   }
-  const offs = [
-    events.on("task", (task) => trying(() => hear(task))),
-    events.on("refresh", () =>
-      trying(async () => {
-        state = await api.get(path);
-        build();
-      })),
-  ];
+  events.on("task", (task) => trying(() => hear(task)), page.signal);
+  const refresh = async () => {
+    state = await api.get(path);
+    build();
+  };
+  events.on("refresh", () => trying(refresh), page.signal);
   build();
   complain();
   return () => {
     // a project that nobody brought a table to is not kept
     const empty = !state.table && !project.tasks.length;
-    offs.forEach((off) => off());
     part?.stop?.();
     return empty && api.remove(`projects/${project.id}`).catch(() => {});
   };

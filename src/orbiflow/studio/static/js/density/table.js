@@ -1,7 +1,8 @@
 /** Choosing a table, and what is fitted to it. */
 
+import { check, chooser, labelled, select } from "../controls.js";
 import { aside, button, h, icon, panel, put, row, soft, stack, trying, unique } from "../dom.js";
-import { bytes } from "../words.js";
+import { bytes, capital, number as numbered } from "../words.js";
 import { count, CYCLES, figure, roleWords, shape, spaceOf, SPACES, UNITS } from "./words.js";
 
 const ENDINGS = ".csv,.tsv,.txt,.npy";
@@ -15,30 +16,19 @@ const ENDINGS = ".csv,.tsv,.txt,.npy";
 export function chooseTable(page, examples) {
   const { api, project } = page, path = `projects/${project.id}/density`;
   const take = (file) =>
-    file && trying(async () => {
+    trying(async () => {
       if (file.size > page.about.limits.bytes) {
         throw new Error(`At most ${bytes(page.about.limits.bytes)} are taken.`);
       }
-      await api.put(
-        `${path}/table?name=${encodeURIComponent(file.name)}`,
-        file.slice(0, file.size, "application/octet-stream"),
-      );
+      await api.upload(`${path}/table`, file);
     });
-  const input = h("input", {
-    type: "file",
-    id: unique("table"),
-    hidden: true,
-    accept: ENDINGS,
-    onchange: () => take(input.files[0]),
-  });
-  const drop = h(
-    "div",
-    { class: "drop panel stack" },
+  const input = chooser("A table from your computer", take, { accept: ENDINGS });
+  const drop = h("div.drop.panel.stack", [
     icon("upload"),
     h("p", "Drop a table here"),
     aside("CSV, TSV or .npy, with a row for each thing that you measured."),
     h("div", button("Choose a file", () => input.click(), { kind: "primary" }), input),
-  );
+  ]);
   const over = (yes) => (event) => {
     event.preventDefault();
     drop.classList.toggle("over", yes);
@@ -47,26 +37,19 @@ export function chooseTable(page, examples) {
   drop.addEventListener("dragleave", over(false));
   drop.addEventListener("drop", (event) => {
     over(false)(event);
-    take(event.dataTransfer.files[0]);
+    if (event.dataTransfer.files.length) take(event.dataTransfer.files[0]);
   });
   const example = ({ name, title, about }) =>
-    h(
-      "li",
-      h(
-        "button",
-        {
-          type: "button",
-          class: "example panel",
-          onclick: () => trying(() => api.post(`${path}/example`, { name })),
-        },
-        h("strong", title),
-        h("span", { class: "soft small" }, about),
-      ),
-    );
+    h("li", [
+      h("button.example.panel", {
+        type: "button",
+        onclick: () => trying(() => api.post(`${path}/example`, { name })),
+      }, [h("strong", title), h("span.soft.small", about)]),
+    ]);
   return stack(
     drop,
     h("h2", "Or try one of these"),
-    h("ul", { class: "grid narrow" }, examples.map(example)),
+    h("ul.grid.narrow", examples.map(example)),
     aside("From the Top8000 proteins of Duke University (CC BY 4.0), PmagPy and javaPlex (BSD)."),
   );
 }
@@ -74,29 +57,20 @@ export function chooseTable(page, examples) {
 /** The first rows of a table. */
 function firstRows(table) {
   const head = table.columns.map(({ name, role, missing }) =>
-    h(
-      "th",
-      { scope: "col" },
+    h("th", { scope: "col" }, [
       name,
-      h(
-        "span",
-        { class: "soft small" },
-        roleWords(role),
-        missing > 0 && `, ${count(missing)} empty`,
-      ),
-    )
+      h("span.soft.small", roleWords(role), missing > 0 && `, ${count(missing)} empty`),
+    ])
   );
   const cell = (value) => h("td", value === null ? "" : figure(value, 6));
-  return h(
-    "div",
-    { class: "scroll", tabindex: "0", role: "region", "aria-label": "First rows of the table" },
-    h(
-      "table",
-      h("caption", { class: "unseen" }, "First rows of the table"),
+  const title = "First rows of the table";
+  return h("div.scroll", { tabindex: "0", role: "region", "aria-label": title }, [
+    h("table", [
+      h("caption.unseen", title),
       h("thead", h("tr", head)),
       h("tbody", table.first.map((row) => h("tr", row.map(cell)))),
-    ),
-  );
+    ]),
+  ]);
 }
 
 /**
@@ -115,9 +89,9 @@ export function chooseSpace(table, start, last) {
   last?.roles.forEach((role, k) => {
     roles[last.columns[k]] = role;
   });
-  const units = h("div", { class: "unit" }),
+  const units = h("div.unit"),
     go = button("Fit the density", () => start(settings()), { kind: "primary big" });
-  const says = h("p", { class: "soft", role: "status" });
+  const says = h("p.soft", { role: "status" });
   const settings = () => ({
     space: chosen.space,
     columns: chosen.space === "torus"
@@ -127,53 +101,38 @@ export function chooseSpace(table, start, last) {
   });
 
   const name = unique("space");
-  const spaces = h(
-    "fieldset",
+  const card = (space) => {
+    const onchange = () => {
+      chosen.space = space.name;
+      fit();
+    };
+    return h("label.space", [
+      h("input", { type: "radio", name, checked: space.name === chosen.space, onchange }),
+      h("span", [
+        h("strong", space.title),
+        h("span.soft.small", space.about),
+        h("span.soft.small", `Needs ${space.needs}.`),
+      ]),
+    ]);
+  };
+  const spaces = h("fieldset", [
     h("legend", "What are the numbers?"),
-    h(
-      "div",
-      { class: "grid narrow" },
-      SPACES.map((space) =>
-        h(
-          "label",
-          { class: "space" },
-          h("input", {
-            type: "radio",
-            name,
-            checked: space.name === chosen.space,
-            onchange: () => {
-              chosen.space = space.name;
-              fit();
-            },
-          }),
-          h(
-            "span",
-            h("strong", space.title),
-            h("span", { class: "soft small" }, space.about),
-            h("span", { class: "soft small" }, `Needs ${space.needs}.`),
-          ),
-        )
+    h("div.grid.narrow", SPACES.map(card)),
+  ]);
+  const order = h("span.soft.small");
+  const columns = h("fieldset", [
+    h("legend", "Which columns?"),
+    row(
+      table.columns.map((column) =>
+        check(column.name, chosen.columns.includes(column.name), (taken) => {
+          chosen.columns = chosen.columns.filter((own) => own !== column.name);
+          if (taken) chosen.columns.push(column.name);
+          fit();
+        })
       ),
     ),
-  );
-  const order = h("span", { class: "soft small" });
-  const columns = h(
-    "fieldset",
-    h("legend", "Which columns?"),
-    row(table.columns.map((column) => {
-      const box = h("input", {
-        type: "checkbox",
-        checked: chosen.columns.includes(column.name),
-        onchange: () => {
-          chosen.columns = chosen.columns.filter((own) => own !== column.name);
-          if (box.checked) chosen.columns.push(column.name);
-          fit();
-        },
-      });
-      return h("label", { class: "check" }, box, column.name);
-    })),
     order,
-  );
+  ]);
 
   function fit() {
     const space = spaceOf(chosen.space), number = chosen.columns.length;
@@ -183,78 +142,53 @@ export function chooseSpace(table, start, last) {
     if (kind === "angle") chosen.unit ??= said;
     /** A box that asks how something is counted, and builds this form again. */
     const asked = (words, choices, value, took) => {
-      const id = unique("unit");
-      const box = h(
-        "select",
-        {
-          id,
-          onchange: () => {
-            took(box.value);
-            fit();
-          },
-        },
-        [
-          ["", "Choose …"],
-          ...choices,
-          ...(value && !choices.some(([own]) => own === value) ? [[value, roleWords(value)]] : []),
-        ].map(([own, text]) => h("option", { value: own }, text)),
-      );
-      box.value = value ?? "";
-      return h("div", h("label", { for: id, class: "label" }, words), box);
+      const other = value && !choices.some(([own]) => own === value);
+      const options = [["", "Choose …"], ...choices, ...other ? [[value, roleWords(value)]] : []];
+      const take = (chosen) => {
+        took(chosen);
+        fit();
+      };
+      return h("div", labelled(words, select(options, value ?? "", take)));
     };
     const angles = UNITS.map(([unit, words]) => [`angle:${unit}`, words]);
-    put(
-      units,
+    put(units, [
       torus &&
-        chosen.columns.map((name) =>
-          asked(`How is ${name} counted?`, [...angles, ...CYCLES], roles[name], (role) => {
-            roles[name] = role;
-          })
-        ),
+      chosen.columns.map((name) =>
+        asked(`How is ${name} counted?`, [...angles, ...CYCLES], roles[name], (role) => {
+          roles[name] = role;
+        })
+      ),
       space?.name === "klein-bottle" &&
-        asked("How are angles counted?", UNITS, chosen.unit, (unit) => {
-          chosen.unit = unit;
-        }),
-    );
+      asked("How are angles counted?", UNITS, chosen.unit, (unit) => {
+        chosen.unit = unit;
+      }),
+    ]);
     const unsaid = torus ? chosen.columns.filter((name) => !roles[name]) : [];
     const many = space && number >= space.least && number <= space.most;
     const fits = many && !unsaid.length && (space.name !== "klein-bottle" || chosen.unit);
     go.disabled = !fits;
-    says.textContent = !space
-      ? "Choose what the numbers are."
-      : many && !fits
-      ? `Say how ${torus ? unsaid.join(" and ") : "the angles"} ${
-        unsaid.length === 1 ? "is" : "are"
-      } counted.`
-      : fits
-      ? `${shape(space.name, number)}.${
-        table.rows > 5000 ? " So many rows take some minutes." : ""
-      }`
-      : `This needs ${space.needs}; ${number} ${
-        number === 1 ? "column is" : "columns are"
-      } chosen.`;
+    says.textContent = told();
+    function told() {
+      if (!space) return "Choose what the numbers are.";
+      if (!many) {
+        return `This needs ${space.needs}; ${numbered(number, "column is", "columns are")} chosen.`;
+      }
+      const slow = table.rows > 5000 ? " So many rows take some minutes." : "";
+      if (fits) return `${shape(space.name, number)}.${slow}`;
+      const verb = unsaid.length === 1 ? "is" : "are";
+      return `Say how ${torus ? unsaid.join(" and ") : "the angles"} ${verb} counted.`;
+    }
   }
   fit();
-  const why = h(
-    "p",
-    { class: guess.space ? "notice good" : "notice" },
-    guess.why.charAt(0).toUpperCase() + guess.why.slice(1) +
-      (guess.space ? ". So this is chosen already; change it if it is wrong." : "."),
-  );
-  return h(
-    "div",
-    { class: "ask" },
-    panel(
-      "The table",
-      soft(
-        `${count(table.rows)} rows${
-          table.more.length
-            ? `. Not shown: ${table.more.join(", ")}, as only columns of numbers are, 30 at most`
-            : ""
-        }. Rows with an empty cell are left out.`,
-      ),
+  const hint = guess.space ? ". So this is chosen already; change it if it is wrong." : ".";
+  const why = h("p.notice", { class: guess.space && "notice good" }, capital(guess.why) + hint);
+  const more = table.more.length > 0 &&
+    `. Not shown: ${table.more.join(", ")}, as only columns of numbers are, 30 at most`;
+  return h("div.ask", [
+    panel("The table", [
+      soft(`${count(table.rows)} rows`, more, ". Rows with an empty cell are left out."),
       firstRows(table),
-    ),
+    ]),
     panel("Where they live", !last && why, spaces, columns, units, row(go, says)),
-  );
+  ]);
 }

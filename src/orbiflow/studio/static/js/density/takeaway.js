@@ -1,86 +1,41 @@
 /** What can be taken away of a density: new rows, pictures, regions, and itself. */
 
-import { aside, button, h, icon, panel, put, trying, unique } from "../dom.js";
-import { alive, bytes } from "../words.js";
+import { labelled, select } from "../controls.js";
+import { aside, button, h, panel, put, trying } from "../dom.js";
+import { wordsOf } from "../takeaway/made.js";
+
+/** @type {[string, string][]} */
+const FORMATS = [["png", "PNG, for screens"], ["svg", "SVG, for print"], ["pdf", "PDF, for print"]];
 
 /**
- * Files to take away: `submit(settings)` asks for them, `ends` hears how to stop listening.
+ * Files to take away: `submit(settings)` asks for them.
  *
  * @param {Page} page
  * @param {any} fit
- * @param {(() => void)[]} ends
+ * @param {AbortSignal} signal
  * @param {(settings: object) => Promise<any>} submit
  */
-export function takeaway(page, fit, ends, submit) {
-  const amount = h("input", {
-    type: "number",
-    id: unique("amount"),
-    min: 1,
-    max: 1000000,
-    value: 1000,
-  });
-  const format = h(
-    "select",
-    { id: unique("format") },
-    [["png", "PNG, for screens"], ["svg", "SVG, for print"], ["pdf", "PDF, for print"]].map((
-      [value, words],
-    ) => h("option", { value }, words)),
-  );
-  const made = h("ul", { class: "made" });
+export function takeaway(page, fit, signal, submit) {
+  const amount = h("input", { type: "number", min: 1, max: 1000000, value: 1000 });
+  const format = select(FORMATS, "png");
+  const made = h("ul.made");
   const get = (words, what, settings = () => ({})) =>
-    button(
-      words,
-      () => trying(() => submit({ fit: fit.number, what, ...settings() })),
-    );
+    button(words, () => trying(() => submit({ fit: fit.number, what, ...settings() })));
   const card = (title, about, act, ...fields) =>
-    h(
-      "div",
-      { class: "take stack" },
-      h("h3", title),
-      aside(about),
-      fields,
-      act,
-    );
+    h("div.take.stack", h("h3", title), aside(about), fields, act);
   const list = () => {
     const tasks = page.project.tasks.filter(({ operation }) => operation === "density take");
-    put(
-      made,
-      tasks.map((task) =>
-        h(
-          "li",
-          alive(task)
-            ? h("span", { role: "status" }, `${task.what || "Waiting"} …`)
-            : task.state === "done"
-            ? task.result.files.map((file) =>
-              h(
-                "a",
-                {
-                  class: "button",
-                  download: file.name,
-                  href: `api/takeaways/${task.id}/files/${encodeURIComponent(file.name)}`,
-                },
-                icon("download"),
-                `${file.name}, ${bytes(file.bytes)}`,
-              )
-            )
-            : h("span", { class: "error" }, task.error ?? "Stopped."),
-        )
-      ),
-    );
+    put(made, tasks.map((task) => h("li", wordsOf(task))));
   };
-  ends.push(page.events.on("task", list), page.events.on("refresh", list));
+  page.events.on("task refresh", list, signal);
   list();
-  return panel(
-    "Take away",
-    h(
-      "div",
-      { class: "grid narrow" },
+  return panel("Take away", [
+    h("div.grid.narrow", [
       card(
         "New rows",
         "As many as you like, drawn from the density.",
         get("Draw rows", "samples", () => ({ count: Number(amount.value) })),
-        h("label", { for: amount.id, class: "label" }, "How many"),
-        amount,
+        labelled("How many", amount),
       ),
       card(
         "Pictures",
@@ -88,8 +43,7 @@ export function takeaway(page, fit, ends, submit) {
           ? "The map, and the surface as a page of its own."
           : "New rows beside yours, angle by angle.",
         get("Make pictures", "figures", () => ({ format: format.value })),
-        h("label", { for: format.id, class: "label" }, "Format"),
-        format,
+        labelled("Format", format),
       ),
       card(
         "Regions",
@@ -103,7 +57,7 @@ export function takeaway(page, fit, ends, submit) {
         "To go on with in Python, or with the command orbiflow density.",
         get("Get the density", "model"),
       ),
-    ),
+    ]),
     made,
-  );
+  ]);
 }

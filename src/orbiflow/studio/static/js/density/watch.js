@@ -1,6 +1,6 @@
 /** A fit as it goes on: how far it is, what it tries, and buttons to hold or stop it. */
 
-import { aside, h, put } from "../dom.js";
+import { aside, h, meter, put } from "../dom.js";
 import { steering } from "../steering.js";
 import { capital, STATES } from "../words.js";
 import { PARTS } from "./words.js";
@@ -8,38 +8,27 @@ import { PARTS } from "./words.js";
 const TRIED = /^held-out part (\d+) of (\d+): (\w+)(?: of (\d+))?/;
 
 /** A part of a density, with a bar that says how much of it there is. */
-export const partBar = (name, share, words, more = "") => {
+export function partBar(name, share, words, more = "") {
   const [title, about] = PARTS[name] ?? [name, ""];
-  return h(
-    "li",
-    h("div", { class: "share" }, h("strong", title), h("span", words)),
-    h("meter", { value: share, "aria-label": title }),
-    aside(`${capital(about)}. ${more}`),
-  );
-};
+  return meter(title, share, words, `${capital(about)}. ${more}`);
+}
 
 export class Watch {
-  /**
-   * @param {Page} page
-   * @param {Task} task
-   */
+  /** @param {Page} page @param {Task} task */
   constructor(page, task) {
     this.page = page;
     this.found = new Map();
-    this.bar = h("progress", { max: 1, "aria-label": "How far the fit is" });
     this.says = h("p");
-    this.kinds = h("ul", { class: "parts stack" });
-    this.steer = steering(page.api);
-    this.root = h(
-      "section",
-      { class: "panel stack watch" },
+    this.kinds = h("ul.parts.stack");
+    this.steer = steering(page.api, "How far the fit is");
+    this.root = h("section.panel.stack.watch", [
       h("h2", "Making the density"),
-      this.bar,
+      this.steer.bar,
       this.says,
       this.steer.root,
       aside("Several kinds of density are tried. Rows kept aside choose among them."),
       this.kinds,
-    );
+    ]);
     this.update(task);
   }
 
@@ -48,7 +37,6 @@ export class Watch {
     const what = task.what ?? "",
       step = { drawing: ": drawing it", "putting together": ": putting it together" }[what] ??
         (this.hear(what) ? ": trying what suits the rows" : "");
-    this.bar.value = task.share;
     const state = task.state === "waiting" && task.place
       ? `${STATES.waiting}: ${task.place} before it`
       : STATES[task.state];

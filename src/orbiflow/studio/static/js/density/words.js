@@ -66,21 +66,19 @@ export const roleWords = (role) => {
   }[kind] ?? "number";
 };
 
-export const UNITS = [["degrees", "Degrees (360 all round)"], [
-  "radians",
-  "Radians (6.28 all round)",
-], ["turns", "Turns (1 all round)"]];
+export const UNITS = Object.entries({
+  degrees: "Degrees (360 all round)",
+  radians: "Radians (6.28 all round)",
+  turns: "Turns (1 all round)",
+});
 
 /** What a column that comes back may be, beside an angle. */
-export const CYCLES = [
-  ["cycle:24", "Hours of a day (24 all round)"],
-  [
-    "cycle:7",
-    "Days of a week (7 all round)",
-  ],
-  ["cycle:12", "Months (12 all round)"],
-  ["axial:degrees", "Both ends alike (180° all round)"],
-];
+export const CYCLES = Object.entries({
+  "cycle:24": "Hours of a day (24 all round)",
+  "cycle:7": "Days of a week (7 all round)",
+  "cycle:12": "Months (12 all round)",
+  "axial:degrees": "Both ends alike (180° all round)",
+});
 
 /** What a density may be made of: a title, and what it is. */
 export const PARTS = {

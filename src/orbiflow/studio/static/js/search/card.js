@@ -16,37 +16,23 @@ export function cardView(project, actions) {
   let view = null;
   let asked = "";
   const canvas = h("canvas", { "aria-hidden": "true" });
-  const stars = h("span", { class: "stars", role: "img" });
-  const word = h("span", { class: "word" });
-  const lies = h("span", { class: "lies" });
-  const stage = h("span", { class: "stage-word" });
-  const why = h("span", { class: "soft small" });
-  const link = h(
-    "a",
-    { class: "open" },
+  const stars = h("span.stars", { role: "img" });
+  const word = h("span.word");
+  const lies = h("span.lies");
+  const stage = h("span.stage-word");
+  const why = h("span.soft.small");
+  const link = h("a.open", [
     canvas,
-    h(
-      "span",
-      { class: "facts" },
-      h("span", { class: "row" }, stars, word, h("span", { class: "grow" }), stage),
-      lies,
-      why,
-    ),
-  );
+    h("span.facts", h("span.row", stars, word, h("span.grow"), stage), lies, why),
+  ]);
   const more = button("More like this", () => actions.more(shown), { kind: "quiet" });
   const drop = button("Remove this tile", () => actions.remove(shown), {
     kind: "quiet icon",
     image: "bin",
   });
-  const take = h("a", { class: "button quiet" }, "Take away");
-  const versions = h("div", { class: "versions", role: "group", "aria-label": "Versions" });
-  const root = h(
-    "li",
-    { class: "card" },
-    link,
-    versions,
-    h("div", { class: "row deeds" }, take, more, h("span", { class: "grow" }), drop),
-  );
+  const take = h("a.button.quiet", "Take away");
+  const versions = h("div.versions", { role: "group", "aria-label": "Versions" });
+  const root = h("li.card", link, versions, h("div.row.deeds", take, more, h("span.grow"), drop));
   /** @type {Card | null} */
   let shown = null;
   /** @type {Palette | null} */
@@ -115,10 +101,7 @@ export function cardView(project, actions) {
     tell(group.find(({ id }) => id === chosen), colours);
   }
 
-  /**
-   * @param {Card} card
-   * @param {Palette} colours
-   */
+  /** @param {Card} card @param {Palette} colours */
   function tell(card, colours) {
     const anew = !shown || shown.polygon !== card.polygon || palette !== colours;
     [shown, palette] = [card, colours];

@@ -1,9 +1,6 @@
 /** Put children in an order, moving as few as possible: what has the focus keeps it. */
 
-/**
- * @param {HTMLElement} place
- * @param {HTMLElement[]} children
- */
+/** @param {HTMLElement} place @param {HTMLElement[]} children */
 export function reordered(place, children) {
   const held = /** @type {HTMLElement} */ (document.activeElement);
   [...place.children].forEach((child) => {

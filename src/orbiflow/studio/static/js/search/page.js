@@ -1,21 +1,10 @@
 /** The search as it goes: all classes side by side, best first. */
 
-import {
-  button,
-  confirmed,
-  FEW_PALETTES,
-  h,
-  listed,
-  notes,
-  put,
-  row,
-  soft,
-  style,
-  toast,
-  trying,
-} from "../dom.js";
+import { FEW_PALETTES, select } from "../controls.js";
+import { button, confirmed, h, notes, put, row, soft, style, toast, trying } from "../dom.js";
+import { atNextFrame } from "../../../../drawing/js/turned.js";
 import { better } from "../events.js";
-import { keeper, lookOf, paletteOf } from "../look.js";
+import { lookKeeper, lookOf, paletteOf } from "../look.js";
 import { Pictures } from "../skin.js";
 import { LATE, steering } from "../steering.js";
 import { alive, capital, isOutdated, number, waitWords } from "../words.js";
@@ -27,26 +16,21 @@ const NINE = 9; // classes that are searched for every picture
 const WEAK = 2; // stars of a tile that is folded away
 const REST = 1500; // ms after the last move of the mouse, for which cards stay where they are
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- */
+/** @type {Show} */
 export async function show(root, page) {
   const { project, navigate } = page;
   if (!project.silhouette && !project.tiles.length) {
     navigate(`p/${project.id}/picture`, { replace: true });
-    return () => {};
+    return;
   }
   await style("search");
-  const own = new SearchPage(page);
-  own.build(root);
-  return () => own.close();
+  new SearchPage(page).build(root);
 }
 
 /** Cards that are folded away. */
 class Fold {
   title = h("summary");
-  list = h("ul", { class: "cards" });
+  list = h("ul.cards");
   root = h("details", this.title, this.list);
 
   show(cards, title) {
@@ -62,117 +46,81 @@ class SearchPage {
 
   /** @param {Page} page */
   constructor(page) {
-    const { api, events, project, about } = page;
+    const { api, project, about } = page;
+    this.page = page;
     this.wishes = wishes(page);
     this.api = api;
-    this.events = events;
     this.project = project;
     this.about = about;
     this.place = `projects/${project.id}`;
     this.look = lookOf(project, about);
-    this.keepLook = keeper(api, project);
+    this.keepLook = lookKeeper(page);
     this.pictures = new Pictures(() => this.views.forEach((view) => view.paint()));
     this.views = new Map();
     this.spare = []; // cards that hold a place
     this.touched = -Infinity; // when the mouse last moved over the cards
-    this.soon = () => {
-      cancelAnimationFrame(this.due);
-      this.due = requestAnimationFrame(() => {
-        this.arrange();
-        this.tell();
-      });
-    };
+    this.soon = atNextFrame(() => {
+      this.arrange();
+      this.tell();
+    });
   }
 
   build(root) {
     const moved = ({ pointerType }) => {
       if (pointerType === "mouse") this.touched = performance.now();
     };
-    this.grid = h("ul", { class: "cards", onpointermove: moved });
+    this.grid = h("ul.cards", { onpointermove: moved });
     this.folds = [this.weaker, this.earlier].map((fold) => {
       fold.root.ontoggle = () => this.views.forEach((view) => view.paint(false));
       return fold.root;
     });
-    this.said = h("p", { class: "state-words", role: "status" });
+    this.said = h("p.state-words", { role: "status" });
     this.noted = h("div", { role: "status" });
-    this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
-    this.steer = steering(this.api);
+    this.steer = steering(this.api, "How far the search is");
     this.again = button("", () => this.search(), { kind: "primary", image: "arrow" });
     this.deeds = row(this.steer.root, this.again);
     this.heading = h("h1", { tabindex: "-1" }, "Tiles");
     const { effort, objective } = this.wishes;
-    this.panel = h("div", { class: "wishes" }, effort, objective);
-    this.empty = h(
-      "div",
-      { class: "lonely stack" },
+    this.panel = h("div.wishes", effort, objective);
+    this.empty = h("div.lonely.stack", [
       soft("No tiles yet."),
       h("p", h("a", { href: `#/p/${this.project.id}/picture` }, "Back to the picture")),
-    );
-    put(
-      root,
-      h(
-        "div",
-        { class: "head" },
-        h("div", { class: "grow" }, this.heading, this.said),
-        this.colours(),
-        this.panel,
-        this.deeds,
-      ),
-      this.bar,
+    ]);
+    put(root, [
+      h("div.head", h("div.grow", this.heading, this.said), this.colours(), this.panel, this.deeds),
+      this.steer.bar,
       this.noted,
       this.empty,
       this.grid,
       this.folds,
-    );
-    this.watch = new ResizeObserver(() => this.views.forEach((view) => view.paint(false)));
-    this.watch.observe(this.grid);
-    this.off = ["card", "gone", "refresh", "silhouette", "task"].map((kind) =>
-      this.events.on(kind, this.soon)
-    );
+    ]);
+    new ResizeObserver(() => this.views.forEach((view) => view.paint(false))).observe(this.grid);
+    this.page.events.on("card gone refresh silhouette task", this.soon, this.page.signal);
     this.arrange();
     this.tell();
   }
 
-  close() {
-    this.off.forEach((stop) => stop());
-    this.watch.disconnect();
-    cancelAnimationFrame(this.due);
-    clearTimeout(this.later);
-  }
-
   /** The choice of colours. */
   colours() {
-    const dots = h("span", { class: "dots", "aria-hidden": "true" });
+    const dots = h("span.dots", { "aria-hidden": "true" });
     const show = () => {
       this.palette = paletteOf(this.look, this.about);
-      put(
-        dots,
-        this.palette.colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })),
-      );
+      const dot = (colour) => h("i", { style: { background: colour } });
+      put(dots, this.palette.colours.slice(0, 4).map(dot));
     };
     const names = this.about.palettes.map(({ name }) => name);
     if (this.look.custom) names.unshift("own");
-    const list = h(
-      "select",
-      {
-        "aria-label": "Colours",
-        onchange: () => {
-          this.look.palette = list.value;
-          this.keepLook({ palette: list.value });
-          show();
-          this.arrange();
-        },
-      },
-      listed(
-        names.map((name) =>
-          h("option", { value: name }, capital(name === "own" ? "my own" : name))
-        ),
-        FEW_PALETTES,
-      ),
-    );
-    list.value = this.look.palette;
+    /** @type {[string, string][]} */
+    const options = names.map((name) => [name, capital(name === "own" ? "my own" : name)]);
+    const list = select(options, this.look.palette, (palette) => {
+      this.look.palette = palette;
+      this.keepLook({ palette });
+      show();
+      this.arrange();
+    }, FEW_PALETTES);
+    list.ariaLabel = "Colours";
     show();
-    return h("label", { class: "palette row" }, dots, list);
+    return h("label.palette.row", dots, list);
   }
 
   /** The search that is going on, or the last one. */
@@ -183,10 +131,8 @@ class SearchPage {
 
   start(words, more = {}) {
     return trying(async () => {
-      await this.api.post(`${this.place}/tasks`, {
-        operation: "search",
-        settings: { ...this.wishes.settings(), ...more },
-      });
+      const settings = { ...this.wishes.settings(), ...more };
+      await this.api.start(this.project, "search", settings);
       toast(words);
     });
   }
@@ -196,13 +142,8 @@ class SearchPage {
   }
 
   async remove({ id }) {
-    if (
-      !(await confirmed(
-        "Remove this tile?",
-        "It will be gone for good. A new search may find it again.",
-        "Remove it",
-      ))
-    ) return;
+    const words = "It will be gone for good. A new search may find it again.";
+    if (!(await confirmed("Remove this tile?", words, "Remove it"))) return;
     await trying(() => this.api.remove(`${this.place}/tiles/${id}`));
     this.heading.focus();
   }
@@ -213,9 +154,6 @@ class SearchPage {
     const words = stateWords(task, project, this.groups.length);
     if (this.said.textContent !== words) this.said.textContent = words;
     this.said.classList.toggle("error", task?.state === "failed");
-    this.bar.hidden = !alive(task);
-    if (task?.state === "waiting") this.bar.removeAttribute("value");
-    else this.bar.value = task?.share ?? 0;
     const doubts = [project, project.second].flatMap((own) => own?.silhouette?.doubts ?? []);
     const said = [...doubts, ...task?.result?.notes ?? []];
     const told = JSON.stringify(said);
@@ -232,13 +170,12 @@ class SearchPage {
    */
   offer(task) {
     const [busy, held] = [alive(task), this.deeds.contains(document.activeElement)];
-    if (task) this.steer.update(task);
+    this.steer.update(task);
     this.again.lastChild.textContent = task ? "Search again" : "Search";
     if (busy === this.busy) return;
     this.turned = this.busy === undefined ? -Infinity : performance.now();
     this.busy = busy;
     this.again.hidden = this.panel.hidden = busy || !this.project.silhouette;
-    this.steer.root.hidden = !busy;
     /** @type {HTMLButtonElement} */
     const first = this.deeds.querySelector("button:not([hidden], [hidden] *)");
     if (held) first.focus();
@@ -251,18 +188,15 @@ class SearchPage {
 
   /** The tiles, each with what was pulled from it, best first. */
   get groups() {
-    const groups = new Map();
-    for (const card of [...this.project.tiles].sort((a, b) => a.id - b.id)) {
-      const own = card.root ?? card.id;
-      groups.set(own, [...(groups.get(own) ?? []), card]);
-    }
+    const byId = this.project.tiles.toSorted((a, b) => a.id - b.id);
+    const groups = Map.groupBy(byId, ({ id, root }) => root ?? id);
     return [...groups.values()].sort((a, b) => better(a[0], b[0]));
   }
 
   /** Show the cards in their order; but not away from the mouse. */
   arrange() {
     const { views, grid, groups } = this;
-    const key = ([{ id, root }]) => root ?? id;
+    const key = (group) => group[0].root ?? group[0].id;
     if (performance.now() - this.touched < REST) {
       const places = new Map([...grid.children].map((child, k) => [child, k]));
       const place = (group) => places.get(views.get(key(group))?.root) ?? Infinity;
@@ -275,17 +209,15 @@ class SearchPage {
     for (const id of [...views.keys()]) if (!keys.includes(id)) views.delete(id);
     for (const id of keys) if (!views.has(id)) views.set(id, cardView(this.project, this));
     const roots = (own) => own.map((group) => views.get(key(group)).root);
-    const isOld = ([first]) => isOutdated(first, this.project);
+    const isOld = (group) => isOutdated(group[0], this.project);
     const now = groups.filter((group) => !isOld(group));
     const old = groups.filter(isOld);
     const weak = this.weak(now);
     const alike = weak.some(([card]) => card.stars > WEAK);
     const one = alike ? "weaker or nearly alike" : "weaker one";
     this.weaker.show(roots(weak), number(weak.length, one, alike ? one : `${one}s`));
-    this.earlier.show(
-      roots(old),
-      `Found before you changed the picture: ${number(old.length, "tile")}`,
-    );
+    const before = `Found before you changed the picture: ${number(old.length, "tile")}`;
+    this.earlier.show(roots(old), before);
     reordered(grid, [...roots(now.filter((group) => !weak.includes(group))), ...this.ghosts()]);
     groups.forEach((group) => views.get(key(group)).update(group, this.palette));
   }
@@ -305,7 +237,7 @@ class SearchPage {
     const begun = alive(this.task) && !tiles.some(({ stage }) => stage === "final");
     const missing = begun ? Math.max(0, NINE - this.groups.length) : 0;
     while (this.spare.length < missing) {
-      this.spare.push(h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {})));
+      this.spare.push(h("li.card.ghost", { "aria-hidden": "true" }, h("div", {})));
     }
     return this.spare.slice(0, missing);
   }
@@ -321,9 +253,8 @@ class SearchPage {
 function stateWords(task, { tiles: { length: every }, second, silhouette }, tiles) {
   const pulled = every > tiles ? ` and ${number(every - tiles, "pulled version")}` : "";
   const first = silhouette ? ", best first" : "";
-  const found = `${
-    number(tiles, "tile")
-  }${pulled}${first}. Each one covers the plane: we proved it.`;
+  const count = number(tiles, "tile");
+  const found = `${count}${pulled}${first}. Each one covers the plane: we proved it.`;
   if (!task) return tiles ? found : "Nothing has been searched yet.";
   const wait = waitWords(task);
   if (wait) return wait;

@@ -30,21 +30,18 @@ export function shapeCards(about) {
     watch.observe(canvas);
     const parts = [
       canvas,
-      h("span", { class: "shape-words" }, capital(own.arrangement)),
-      own.symmetry !== "C1" && h("span", { class: "soft small" }, symmetryWords(own.symmetry)),
+      h("span.shape-words", capital(own.arrangement)),
+      own.symmetry !== "C1" && h("span.soft.small", symmetryWords(own.symmetry)),
     ];
     return h("li", { title: `${own.name}, ${own.group_name}` }, link(own, parts));
   };
   return {
-    list: (shapes, link) => h("ul", { class: "shapes" }, shapes.map((own) => card(own, link))),
+    list: (shapes, link) => h("ul.shapes", shapes.map((own) => card(own, link))),
     close: () => watch.disconnect(),
   };
 }
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- */
+/** @type {Show} */
 export async function show(root, { api, about }) {
   await style("start");
   const cards = shapeCards(about);
@@ -54,26 +51,19 @@ export async function show(root, { api, about }) {
       (own, parts) => h("a", { href: `#/open/${own.text}`, "data-shape": own.name }, parts),
     );
   const others = h("div");
-  const more = h(
-    "details",
-    {
-      ontoggle: () =>
-        others.firstChild ||
-        trying(async () => put(others, list(await api.get("shapes?every=1")))),
-    },
-    h("summary", "All other types"),
-    others,
-  );
-  put(
-    root,
+  const more = h("details", {
+    ontoggle: () =>
+      others.firstChild ||
+      trying(async () => put(others, list(await api.get("shapes?every=1")))),
+  }, [h("summary", "All other types"), others]);
+  put(root, [
     h("h1", { tabindex: "-1" }, "Begin with a shape that fits"),
     h(
-      "p",
-      { class: "lead soft" },
+      "p.lead.soft",
       "Copies of each fill the plane. Choose one and pull its edges: all copies follow. Then draw an animal into it.",
     ),
     list(await api.get("shapes")),
     more,
-  );
+  ]);
   return cards.close;
 }

@@ -1,21 +1,17 @@
 /** The page of a mesh: the figure, the search, the solids that were found, and what is made of them. */
 
-import { button, confirmed, h, newest, put, stack, style, trying } from "../dom.js";
+import { button, confirmed, h, put, stack, style, trying } from "../dom.js";
+import { atNextFrame } from "../../../../drawing/js/turned.js";
 import { alive, number } from "../words.js";
 import { Search } from "./search.js";
 import { Stage } from "./stage.js";
 import { Takeaway } from "./takeaway.js";
 import { facts, percent, sides, stateWords } from "./words.js";
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- */
+/** @type {Show} */
 export async function show(root, page) {
   await style("takeaway", "solid");
-  const own = new SolidPage(page);
-  await own.build(root);
-  return () => own.close();
+  await new SolidPage(page).build(root);
 }
 
 class SolidPage {
@@ -24,17 +20,15 @@ class SolidPage {
     this.page = page;
     this.project = page.project;
     this.place = `projects/${page.project.id}`;
-    this.chosen = page.tileId; // by the user; else the best is shown
+    this.chosen = page.number; // by the user; else the best is shown
     this.stage = new Stage();
-    this.soon = () => {
-      cancelAnimationFrame(this.due);
-      this.due = requestAnimationFrame(() => trying(() => this.tell()));
-    };
+    this.soon = atNextFrame(() => trying(() => this.tell()));
+    page.signal.addEventListener("abort", () => this.stage.close());
   }
 
   /** Build what there is to see, now or once the mesh is read. */
   async build(root) {
-    const { api, events } = this.page;
+    const { api, events, signal } = this.page;
     const [{ mesh }, fill, build] = await Promise.all([
       api.get(`${this.place}/mesh`),
       api.get("operations/fill/schema"),
@@ -43,67 +37,47 @@ class SolidPage {
     const heading = h("h1", { tabindex: "-1" }, "A solid that fills space");
     if (!mesh) {
       put(root, heading, h("p", { role: "status" }, this.unread()));
-      const off = events.on("task", (task) => {
+      const read = new AbortController();
+      events.on("task", (task) => {
         if (task.operation !== "mesh read" || alive(task)) return;
-        off();
+        read.abort();
         trying(() => this.build(root));
-      });
-      this.off = [off];
+      }, AbortSignal.any([signal, read.signal]));
       return;
     }
     this.mesh = mesh;
-    const keep = newest((fill) => api.patch(this.place, { view: { fill } }), 400);
     this.search = new Search(this.page, mesh, fill, {
       begin: (settings) => this.begin(settings),
       turnUp: (axis) => this.stage.turnUp(axis),
-      keep,
     });
     this.takeaway = new Takeaway(this.page, build);
-    this.said = h("p", { class: "state-words", role: "status" });
-    this.facts = h("section", { class: "panel stack" });
-    this.list = h("ul", { class: "solids" });
-    this.others = h(
-      "section",
-      { class: "stack", "aria-labelledby": "found" },
+    this.said = h("p.state-words", { role: "status" });
+    this.facts = h("section.panel.stack");
+    this.list = h("ul.solids");
+    this.others = h("section.stack", { "aria-labelledby": "found" }, [
       h("h2", { id: "found", tabindex: "-1" }, "Solids"),
       this.list,
-    );
-    const notes = h("ul", { class: "notice" }, mesh.notes.map((text) => h("li", text)));
-    put(
-      root,
-      h(
-        "div",
-        { class: "solid stack" },
-        h("div", heading, this.said),
-        h(
-          "div",
-          { class: "take" },
-          stack(
-            this.stage.root,
-            mesh.notes.length > 0 && notes,
-            this.others,
-            this.takeaway.making.earlier,
-          ),
-          h(
-            "div",
-            { class: "stack side" },
-            this.search.watch,
-            this.facts,
-            this.takeaway.root,
-            this.search.wishes,
-          ),
+    ]);
+    const notes = h("ul.notice", mesh.notes.map((text) => h("li", text)));
+    put(root, [h("div.solid.stack", [
+      h("div", heading, this.said),
+      h("div.take", [
+        stack(
+          this.stage.root,
+          mesh.notes.length > 0 && notes,
+          this.others,
+          this.takeaway.making.earlier,
         ),
-      ),
-    );
-    this.off = ["card", "gone", "refresh", "task"].map((kind) => events.on(kind, this.soon));
+        h("div.stack.side", [
+          this.search.watch,
+          this.facts,
+          this.takeaway.root,
+          this.search.wishes,
+        ]),
+      ]),
+    ])]);
+    events.on("card gone refresh task", this.soon, signal);
     await this.tell();
-  }
-
-  close() {
-    this.closed = true;
-    this.off.forEach((stop) => stop());
-    cancelAnimationFrame(this.due);
-    this.stage.close();
   }
 
   unread() {
@@ -120,10 +94,7 @@ class SolidPage {
   /** Search; another time from other places. */
   begin(settings) {
     const seed = this.project.tasks.filter(({ operation }) => operation === "fill").length;
-    return this.page.api.post(`${this.place}/tasks`, {
-      operation: "fill",
-      settings: { seed, ...settings },
-    });
+    return this.page.api.start(this.project, "fill", { seed, ...settings });
   }
 
   /** Show what is true now. */
@@ -157,7 +128,7 @@ class SolidPage {
     const { api, project } = this.page;
     const path = own ? `tiles/${own.id}` : "mesh/figure";
     const data = await api.get(`${this.place}/${path}`);
-    if (this.closed || key !== this.opened) return;
+    if (this.page.signal.aborted || key !== this.opened) return;
     const { triangles, low, high } = this.mesh;
     const label = own
       ? `${project.name}: a solid, and a stack of its copies`
@@ -181,24 +152,21 @@ class SolidPage {
         now?.focus();
       });
     };
-    return h(
-      "li",
-      h(
-        "a",
-        { href: `#/${path}`, "aria-current": current && "true", onclick: choose },
+    return h("li", [
+      h("a", { href: `#/${path}`, "aria-current": current && "true", onclick: choose }, [
         h("img", {
           src: `api/${this.place}/tiles/${id}/files/thumb.png`,
           alt: "",
           loading: "lazy",
         }),
         h("strong", group),
-        h("span", { class: "soft small" }, `shadows ${percent(shadows)}`),
-      ),
+        h("span.soft.small", `shadows ${percent(shadows)}`),
+      ]),
       button(`Remove the solid in ${group}`, () => this.remove(card), {
         kind: "quiet icon",
         image: "bin",
       }),
-    );
+    ]);
   }
 
   async remove({ id }) {

@@ -1,10 +1,12 @@
 /** How to search for solids, and how far a search is. */
 
-import { aside, button, choice, h, put, stack } from "../dom.js";
+import { choice } from "../controls.js";
+import { aside, button, h, put, stack } from "../dom.js";
 import { form } from "../forms.js";
+import { keeper } from "../memory.js";
 import { steering } from "../steering.js";
-import { tookWords } from "../waiting.js";
-import { alive, EFFORTS } from "../words.js";
+import { effortChoice } from "../wishes.js";
+import { alive } from "../words.js";
 import { sides } from "./words.js";
 
 const AXES = ["x", "y", "z"];
@@ -12,28 +14,22 @@ const SHOWN = ["size", "groups", "emphasis", "tiles"]; // settings of the form; 
 
 export class Search {
   /**
-   * `begin(settings)` searches, `turnUp(axis)` shows what points up, `keep(wanted)` remembers what was chosen.
+   * `begin(settings)` searches, `turnUp(axis)` shows what points up.
    *
    * @param {Page} page
    * @param {any} mesh
    * @param {any} schema
-   * @param {{ begin(settings: object): Promise<any>, turnUp(axis: string): void, keep(wanted: object): void }} actions
+   * @param {{ begin(settings: object): Promise<any>, turnUp(axis: string): void }} actions
    */
-  constructor({ api, project, about }, mesh, schema, { begin, turnUp, keep }) {
+  constructor(page, mesh, schema, { begin, turnUp }) {
+    const { api, project } = page, keep = keeper(page, "fill");
     const wanted = { effort: "normal", up: mesh.up, form: {}, ...project.view?.fill };
     this.wanted = wanted;
     const changed = () => keep(wanted);
-    const meaning = aside(tookWords(project, "fill", wanted.effort));
-    const long = choice(
-      "How long",
-      about.efforts.map((own) => [own, EFFORTS[own] ?? own]),
-      wanted.effort,
-      (own) => {
-        wanted.effort = own;
-        meaning.textContent = tookWords(project, "fill", own);
-        changed();
-      },
-    );
+    const long = effortChoice(page, "fill", wanted.effort, (effort) => {
+      wanted.effort = effort;
+      changed();
+    });
     const up = choice(
       "Which axis points up?",
       AXES.map((axis) => [axis, axis]),
@@ -50,7 +46,7 @@ export class Search {
       try {
         await begin(this.settings());
       } catch (error) {
-        put(this.error, h("p", { class: "error" }, error.message));
+        put(this.error, h("p.error", error.message));
       }
     }, { kind: "primary big", image: "arrow" });
     this.form = form(described(schema, mesh), {
@@ -62,24 +58,19 @@ export class Search {
       changed();
     });
     this.title = h("summary", "How to search");
-    this.wishes = h(
-      "details",
-      { class: "panel wishes", open: true },
+    this.wishes = h("details.panel.wishes", { open: true }, [
       this.title,
-      stack(h("div", long, meaning), up, this.form, this.error, this.go),
-    );
-    this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
-    this.share = h("p", { class: "soft" });
-    this.steer = steering(api);
-    this.watch = h(
-      "section",
-      { class: "panel stack watch" },
+      stack(long, up, this.form, this.error, this.go),
+    ]);
+    this.share = h("p.soft");
+    this.steer = steering(api, "How far the search is");
+    this.watch = h("section.panel.stack.watch", [
       h("h2", "Searching"),
-      this.bar,
+      this.steer.bar,
       this.share,
       this.steer.root,
       aside("You may close this page: the search goes on without it."),
-    );
+    ]);
   }
 
   settings() {
@@ -101,8 +92,6 @@ export class Search {
     if (found !== this.found) this.wishes.open = !found;
     this.found = found;
     if (!busy) return;
-    if (task.state === "waiting") this.bar.removeAttribute("value");
-    else this.bar.value = task.share;
     this.share.textContent = `${Math.round(100 * task.share)} % done`;
     this.steer.update(task);
   }

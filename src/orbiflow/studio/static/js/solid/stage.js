@@ -1,7 +1,8 @@
 /** A figure or a solid that turns, by the script of the pages that `orbiflow fill` writes, and its controls. */
 
 import { showStack } from "../../api/solids/stack.js";
-import { button, choice, h, put, row, slider, unique } from "../dom.js";
+import { check, choice, slider } from "../controls.js";
+import { button, h, handled, put, row, unique } from "../dom.js";
 
 /** @type {[name: string, words: string][]} */
 const SHOWN = [["target", "Figure"], ["bent", "Bent"], ["tile", "Tile"], ["stack", "Stack"]];
@@ -18,61 +19,39 @@ export class Stage {
 
   constructor() {
     this.tips = unique("tips");
-    this.place = h("div", { class: "turned" });
-    const scrolls = (event) => event.ctrlKey || event.stopPropagation(); // else the wheel would zoom
-    this.place.addEventListener("wheel", scrolls, { capture: true, passive: true });
+    this.place = h("div.turned");
     this.kinds = choice("Show", SHOWN, this.shown, (name) => {
       this.shown = name;
       this.view?.show(name);
     }, { unseen: true });
-    this.apart = slider("Apart", {
-      min: 0,
-      max: 100,
-      step: 1,
-      value: 0,
-      said: (apart) => `${apart} %`,
-    }, (apart) => this.view?.moveApart(apart / 100));
+    const moved = (apart) => this.view?.moveApart(apart / 100);
+    this.apart = slider("Apart", [0, 100, 1], 0, (apart) => `${apart} %`, moved);
     this.opening = button("Open", () => this.view?.glideApart(this.view.view.apart > 0.5 ? 0 : 1));
-    this.turner = h("input", {
-      type: "checkbox",
-      onchange: () => this.view?.keepTurning(this.turner.checked),
-    });
+    this.turner = check("Turn slowly", false, (turning) => this.view?.keepTurning(turning));
     this.stack = row(this.apart, this.opening);
-    this.keys = h("p", { class: "soft small", id: this.tips });
-    this.root = h(
-      "figure",
-      { class: "panel stack stage" },
+    this.keys = h("p.soft.small", { id: this.tips });
+    this.root = h("figure.panel.stack.stage", [
       this.place,
       this.kinds,
       this.stack,
-      row(h("label", { class: "check" }, this.turner, "Turn slowly"), this.keys),
-    );
+      row(this.turner, this.keys),
+    ]);
   }
 
-  /**
-   * Show what `stack_data` or `figure_data` gives.
-   *
-   * @param {any} data
-   * @param {string} label
-   */
+  /** Show what `stack_data` or `figure_data` gives. @param {any} data @param {string} label */
   open(data, label) {
     this.close();
     this.alone = !data.copies.length;
     this.kinds.hidden = this.stack.hidden = this.alone;
     this.keys.textContent = "Drag or use the arrow keys to turn; + and − zoom" +
       (this.alone ? "." : ", [ and ] open and close the stack, 0 starts again.");
-    const canvas = h("canvas", {
-      role: "img",
-      tabindex: "0",
-      "aria-label": label,
-      "aria-describedby": this.tips,
-    });
+    const canvas = handled("view", "img", label, this.tips);
     put(this.place, canvas);
     const shown = this.shown, turning = this.turning;
     this.data = data;
-    this.view = showStack(canvas, data, { changed: (view) => this.heard(view) });
+    this.view = showStack(canvas, data, { changed: (view) => this.heard(view), scrolls: true });
     if (!this.view) {
-      put(this.place, h("p", { class: "lonely" }, "This picture needs WebGL 2."));
+      put(this.place, h("p.lonely", "This picture needs WebGL 2."));
       return;
     }
     this.lost = canvas.getContext("webgl2").getExtension("WEBGL_lose_context");
@@ -92,7 +71,8 @@ export class Stage {
   heard(view) {
     if (this.alone) view.shown = "target";
     else this.shown = view.shown;
-    this.turning = this.turner.checked = view.turning;
+    this.turning = view.turning;
+    this.turner.set(view.turning);
     this.apart.set(Math.round(100 * view.apart));
     this.opening.textContent = view.apart > 0.5 ? "Close" : "Open";
     this.kinds.set(view.shown);

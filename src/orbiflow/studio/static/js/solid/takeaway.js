@@ -9,10 +9,7 @@ import { Making, picture } from "../takeaway/made.js";
 const FILES = [["sheet.png", "Picture", "picture"], ["page.html", "Page that turns it", "solid"]];
 
 export class Takeaway {
-  /**
-   * @param {Page} page
-   * @param {any} schema
-   */
+  /** @param {Page} page @param {any} schema */
   constructor({ api, project }, schema) {
     this.place = `projects/${project.id}`;
     this.making = new Making(api, project, {
@@ -33,19 +30,16 @@ export class Takeaway {
       words: BUILD.words,
       hidden: ["solid"],
     }, () => this.making.change());
-    this.shown = h("div", { class: "preview", hidden: true });
-    this.files = h("div", { class: "row" });
-    this.root = section(
-      "panel",
-      "take",
-      "Take it away",
+    this.shown = h("div.preview", { hidden: true });
+    this.files = h("div.row");
+    this.root = section("panel", "take", "Take it away", [
       this.form,
       this.making.make,
       this.shown,
       this.making.said,
       h("h3", "To show it to others"),
       this.files,
-    );
+    ]);
   }
 
   /** Be about another solid. */
@@ -54,15 +48,14 @@ export class Takeaway {
     this.tile = id;
     this.making.task = null;
     const href = (name) => `api/${this.place}/tiles/${id}/files/${name}`;
-    put(
-      this.files,
+    put(this.files, [
       button("Film (GIF)", () => trying(() => this.making.submit("film", this.settings())), {
         image: "film",
       }),
       FILES.map(([name, title, image]) =>
-        h("a", { class: "button", href: href(name), download: true }, icon(image), title)
+        h("a.button", { href: href(name), download: true }, icon(image), title)
       ),
-    );
+    ]);
     this.making.tell();
   }
 

@@ -1,6 +1,6 @@
 /** Words about solids. */
 
-import { aside, h } from "../dom.js";
+import { aside, h, meter } from "../dom.js";
 import { number, waitWords } from "../words.js";
 
 const STEPS = {
@@ -42,32 +42,14 @@ const MEASURES = [
   ["kept", "Thin parts", "How much of legs, ears and the like is still there."],
 ];
 
-/**
- * How much a solid looks like its figure, and what it is.
- *
- * @param {any} card
- */
+/** How much a solid looks like its figure, and what it is. @param {any} card */
 export function facts(card) {
   const { strain, size, group, positions: ways } = card;
   return [
     h("h2", "How alike it is"),
-    h(
-      "ul",
-      { class: "stack measures" },
-      MEASURES.map(([name, title, about]) =>
-        h(
-          "li",
-          h(
-            "div",
-            { class: "share" },
-            h("strong", title),
-            h("span", percent(card[name])),
-          ),
-          h("meter", { value: card[name], "aria-label": title }),
-          aside(about),
-        )
-      ),
-    ),
+    h("ul.stack.measures", [
+      MEASURES.map(([name, title, about]) => meter(title, card[name], percent(card[name]), about)),
+    ]),
     h("p", `To get there, parts of the figure became ${percent(strain)} longer or shorter.`),
     aside(
       `${sides(size)}. ${

@@ -1,5 +1,6 @@
 /** All ways to bring a picture, a table or a project: choose, drop, paste, photograph, draw. */
 
+import { chooser } from "../controls.js";
 import { aside, button, h, put, row, toast } from "../dom.js";
 import { Feed } from "../events.js";
 import { alive, bytes, sentence } from "../words.js";
@@ -8,23 +9,6 @@ const PICTURES = "image/*,.svg,.json,.geojson,.dat,.wkt";
 const MESHES = /\.(stl|obj|ply|3mf|gltf|glb)$/i;
 const TABLES = /\.(csv|tsv|txt|npy|parquet)$/i;
 export const stem = (name) => name.replace(/\.\w+$/, "");
-const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
-
-/** A field for files that a button opens. */
-function chooser(label, use, attributes) {
-  const box = h("input", {
-    type: "file",
-    hidden: true,
-    "aria-label": label,
-    ...attributes,
-    onchange: () => {
-      const [file] = box.files;
-      box.value = ""; // the same file can be chosen again
-      if (file) use(file);
-    },
-  });
-  return box;
-}
 
 /** Resolves when nothing is done for a new project any more; fails if what was done did. */
 function filled(project) {
@@ -36,7 +20,7 @@ function filled(project) {
       if (failed && !silhouette && !tiles.length) reject(new Error(sentence(failed.error)));
       else if (!tasks.some(alive)) resolve();
     };
-    ["task", "refresh"].forEach((kind) => feed.on(kind, check));
+    feed.on("task refresh", check);
     feed.on("gone", () => reject(new Error("This project was deleted.")));
     check();
   }).finally(() => feed.close());
@@ -46,8 +30,9 @@ export class Bringing {
   number = 0; // of the picture in its project
 
   /** @param {Page} page */
-  constructor({ api, navigate, about }) {
+  constructor({ api, navigate, about, signal }) {
     this.api = api;
+    this.signal = signal;
     this.navigate = navigate;
     this.most = about.limits?.bytes ?? Infinity;
     this.touch = matchMedia("(pointer: coarse)").matches;
@@ -59,32 +44,28 @@ export class Bringing {
       accept: "image/*",
       capture: "environment",
     });
-    this.said = h("div", { class: "told", role: "status" });
+    this.said = h("div.told", { role: "status" });
     this.mesh = chooser("A mesh from your computer", (file) => this.shape(file), {
       accept: ".stl,.obj,.ply,.3mf,.gltf,.glb",
     });
     this.saved = chooser("A project file", (file) => this.open(file), { accept: ".orbiflow" });
-    /** @type {Record<string, (event: any) => any>} */
-    this.heard = {
-      dragover: (event) => {
-        event.preventDefault();
-        document.body.classList.add("over");
-      },
-      dragleave: (event) => {
-        if (!event.relatedTarget) document.body.classList.remove("over");
-      },
-      drop: (event) => this.dropped(event),
-      paste: ({ clipboardData: { files: [first] } }) => {
-        if (first) this.either(first);
-      },
-    };
-    Object.entries(this.heard).forEach(([name, hear]) => document.addEventListener(name, hear));
-  }
-
-  close() {
-    Object.entries(this.heard).forEach(([name, hear]) => document.removeEventListener(name, hear));
-    document.body.classList.remove("over", "busy");
-    this.closed = true;
+    const over = (yes) => document.body.classList.toggle("over", yes);
+    /** @type {(kind: string, hear: (event: any) => any) => void} */
+    const on = (kind, hear) => document.addEventListener(kind, hear, { signal });
+    on("dragover", (event) => {
+      event.preventDefault();
+      over(true);
+    });
+    on("dragleave", (event) => event.relatedTarget || over(false));
+    on("drop", (event) => {
+      event.preventDefault();
+      over(false);
+      const [first] = event.dataTransfer.files;
+      if (first) this.either(first);
+      else this.tell("That was no file. Save the picture first, then drop it here.", "notice");
+    });
+    on("paste", ({ clipboardData: { files: [first] } }) => first && this.either(first));
+    signal.addEventListener("abort", () => document.body.classList.remove("over", "busy"));
   }
 
   /** Say a sentence beside the buttons. */
@@ -107,18 +88,15 @@ export class Bringing {
   }
 
   panel() {
-    return h(
-      "div",
-      { class: "drop" },
-      h("p", { class: "drop-words" }, this.touch ? "Bring a picture" : "Drop a picture here"),
+    return h("div.drop", [
+      h("p.drop-words", this.touch ? "Bring a picture" : "Drop a picture here"),
       aside("One animal, or any other shape, on a plain background works best."),
       row(
         button("Choose a picture", () => this.file.click(), {
           kind: "primary big",
           image: "upload",
         }),
-        (this.touch || hasCamera()) &&
-          button("Take a photo", () => this.snap(), { image: "camera" }),
+        this.touch && button("Take a photo", () => this.photo.click(), { image: "camera" }),
         button("Draw a shape", () => this.draw(), { image: "pencil" }),
         navigator.clipboard?.read &&
           button("Paste", () => this.trying(() => this.paste()), { image: "paste" }),
@@ -128,7 +106,7 @@ export class Bringing {
       this.photo,
       this.saved,
       this.mesh,
-    );
+    ]);
   }
 
   /** Make a project of what `send` puts into it; search if the picture is clear, or show what was read. */
@@ -136,8 +114,8 @@ export class Bringing {
     return this.trying(async () => {
       const { id } = await this.api.post("projects", { kind: "tile", name });
       const { silhouette } = await this.kept(id, () => send(id));
-      if (!silhouette?.clear || this.closed) return this.go(`p/${id}/picture`);
-      await this.api.post(`projects/${id}/tasks`, { operation: "search", settings: {} });
+      if (!silhouette?.clear || this.signal.aborted) return this.go(`p/${id}/picture`);
+      await this.api.start({ id }, "search", {});
       toast("Looking for tiles of the shape that was read. Is it not right? Mend it in “Picture”.");
       return this.go(`p/${id}`);
     }, `Reading ${name} …`);
@@ -158,7 +136,7 @@ export class Bringing {
 
   /** Go to a page, unless the user has gone to another. */
   go(path) {
-    if (!this.closed) this.navigate(path);
+    if (!this.signal.aborted) this.navigate(path);
   }
 
   animal({ name, title }) {
@@ -170,39 +148,27 @@ export class Bringing {
 
   /** The animals that are there to try. */
   animals({ animals }) {
-    return h(
-      "ul",
-      { class: "animals" },
-      animals.map((own) =>
-        h(
-          "li",
-          h(
-            "button",
-            { type: "button", class: "animal", onclick: () => this.animal(own) },
-            h("img", { src: own.picture, alt: "", loading: "lazy" }),
-            h("span", own.title),
-          ),
-        )
-      ),
-    );
+    const animal = (own) =>
+      h("button.animal", { type: "button", onclick: () => this.animal(own) }, [
+        h("img", { src: own.picture, alt: "", loading: "lazy" }),
+        h("span", own.title),
+      ]);
+    return h("ul.animals", animals.map((own) => h("li", animal(own))));
   }
 
   /** Say that a file is too large, if it is. */
   refuses({ name, size }) {
     if (size <= this.most) return false;
-    const most = bytes(this.most);
-    this.tell(
-      `${name} has ${bytes(size)}; at most ${most} can be read. Make it smaller first.`,
-      "error",
-    );
+    const words = `${name} has ${bytes(size)}; at most ${bytes(this.most)} can be read.`;
+    this.tell(`${words} Make it smaller first.`, "error");
     return true;
   }
 
   take(file) {
-    const name = file.name || "picture.png";
     if (this.refuses(file)) return undefined;
-    const query = `name=${encodeURIComponent(name)}&number=${this.number}`;
-    return this.begin(stem(name), (id) => this.api.put(`projects/${id}/input?${query}`, file));
+    const number = String(this.number);
+    const send = (id) => this.api.upload(`projects/${id}/input`, file, { number });
+    return this.begin(stem(file.name), send);
   }
 
   open(file) {
@@ -216,16 +182,9 @@ export class Bringing {
   /** Begin with a table, or with none yet. */
   count(file) {
     return this.trying(async () => {
-      const { id } = await this.api.post("projects", {
-        kind: "density",
-        name: file ? stem(file.name) : "My table",
-      });
-      if (file) {
-        await this.api.put(
-          `projects/${id}/density/table?name=${encodeURIComponent(file.name)}`,
-          file,
-        );
-      }
+      const name = file ? stem(file.name) : "My table";
+      const { id } = await this.api.post("projects", { kind: "density", name });
+      if (file) await this.api.upload(`projects/${id}/density/table`, file);
       this.navigate(`d/${id}`);
     });
   }
@@ -236,9 +195,7 @@ export class Bringing {
     const { name } = file;
     return this.trying(async () => {
       const { id } = await this.api.post("projects", { kind: "solid", name: stem(name) });
-      const raw = file.slice(0, file.size, "application/octet-stream");
-      const query = `name=${encodeURIComponent(name)}`;
-      await this.kept(id, () => this.api.put(`projects/${id}/mesh?${query}`, raw));
+      await this.kept(id, () => this.api.upload(`projects/${id}/mesh`, file));
       this.go(`s/${id}`);
     }, `Reading ${name} …`);
   }
@@ -247,21 +204,6 @@ export class Bringing {
     if (file.name?.endsWith(".orbiflow")) return this.open(file);
     if (MESHES.test(file.name)) return this.shape(file);
     return TABLES.test(file.name) ? this.count(file) : this.take(file);
-  }
-
-  dropped(event) {
-    event.preventDefault();
-    document.body.classList.remove("over");
-    const [first] = event.dataTransfer.files;
-    if (first) this.either(first);
-    else this.tell("That was no file. Save the picture first, then drop it here.", "notice");
-  }
-
-  async snap() {
-    if (this.touch || !hasCamera()) return this.photo.click();
-    const { photograph } = await import("./camera.js");
-    const shot = await photograph();
-    return shot && this.take(new File([shot], "photo.png"));
   }
 
   async draw() {

@@ -1,6 +1,7 @@
 /** The controls beside the picture: how it is read, and with what it is painted on. */
 
-import { aside, choice, h, row, slider } from "../dom.js";
+import { check, controlsOf, slider } from "../controls.js";
+import { aside, h, row } from "../dom.js";
 
 /** @type {[tool: string, words: string, image: any][]} */
 const TOOLS = [
@@ -10,6 +11,8 @@ const TOOLS = [
   ["emphasis", "Matters most", "star"],
   ["rub", "Rub out", "rub"],
 ];
+/** @type {[string, string, any][]} */
+const SHAPES = [["brush", "brush", "brush"], ["lasso", "lasso", "lasso"]];
 const MEANINGS = {
   add: "Paint over what belongs to the animal and was missed.",
   remove: "Paint over what does not belong to it.",
@@ -25,67 +28,37 @@ const MEANINGS = {
  * @param {() => void} changed
  */
 export function readingControls(reading, changed) {
-  const change = (part) => {
-    Object.assign(reading, part);
-    changed();
-  };
-  const level = slider("Where it ends", {
-    min: 0,
-    max: 1,
-    step: 0.01,
-    value: reading.threshold ?? 0.5,
-    said: (value) => (reading.threshold === null ? "found by itself" : value.toFixed(2)),
-  }, (value) => {
-    auto.checked = false;
-    change({ threshold: value });
-    level.set(value);
-  });
-  const auto = h("input", {
-    type: "checkbox",
-    checked: reading.threshold === null,
-    onchange: () => {
-      change({ threshold: auto.checked ? null : 0.5 });
-      level.set(0.5);
-    },
-  });
-  const smoothing = slider("Smoothing", {
-    min: 0,
-    max: 0.06,
-    step: 0.002,
-    value: reading.smooth,
-    said: (value) => (value ? `${(100 * value).toFixed(1)} %` : "none"),
-  }, (value) => change({ smooth: value }));
-  const growing = slider("Thin parts", {
-    min: 0,
-    max: 0.12,
-    step: 0.01,
-    value: reading.thicken,
-    said: (value) => (value ? `at least ${(100 * value).toFixed(0)} % wide` : "as they are"),
-  }, (value) => change({ thicken: value }));
-  const side = choice(
-    "The animal is",
-    [[null, "found by itself"], [false, "dark"], [true, "light"]],
-    reading.invert,
-    (value) => change({ invert: value }),
-  );
-  const root = h(
-    "section",
-    { class: "panel stack", "aria-label": "How the picture is read" },
-    side,
-    h("label", { class: "check" }, auto, "Find the edge of the animal by itself"),
-    level,
-    smoothing,
-    growing,
-  );
   /** Take other values, and show them. */
   const take = (part) => {
-    change(part);
-    auto.checked = reading.threshold === null;
+    Object.assign(reading, part);
     level.set(reading.threshold ?? 0.5);
-    smoothing.set(reading.smooth);
-    growing.set(reading.thicken);
-    side.set(reading.invert);
+    auto.set(reading.threshold === null);
+    controls.show();
+    changed();
   };
+  const level = slider(
+    "Where it ends",
+    [0, 1, 0.01],
+    reading.threshold ?? 0.5,
+    (value) => (reading.threshold === null ? "found by itself" : value.toFixed(2)),
+    (threshold) => take({ threshold }),
+  );
+  const auto = check(
+    "Find the edge of the animal by itself",
+    reading.threshold === null,
+    (found) => take({ threshold: found ? null : 0.5 }),
+  );
+  const controls = controlsOf(reading, take);
+  const width = (value) => (value ? `at least ${(100 * value).toFixed(0)} % wide` : "as they are");
+  const amount = (value) => (value ? `${(100 * value).toFixed(1)} %` : "none");
+  const sides = [[null, "found by itself"], [false, "dark"], [true, "light"]];
+  const root = h("section.panel.stack", { "aria-label": "How the picture is read" }, [
+    controls.choice("invert", "The animal is", sides),
+    auto,
+    level,
+    controls.slider("smooth", "Smoothing", [0, 0.06, 0.002], amount),
+    controls.slider("thicken", "Thin parts", [0, 0.12, 0.01], width),
+  ]);
   return { root, take };
 }
 
@@ -96,40 +69,21 @@ export function readingControls(reading, changed) {
  */
 export function paintingControls(pen, changed, buttons) {
   const meaning = aside(MEANINGS[pen.tool]);
-  const tools = choice("Paint on the picture", TOOLS, pen.tool, (tool) => {
-    pen.tool = tool;
-    meaning.textContent = MEANINGS[tool];
+  const controls = controlsOf(pen, (what) => {
+    Object.assign(pen, what);
+    meaning.textContent = MEANINGS[pen.tool];
+    size.hidden = pen.shape === "lasso";
     changed();
   });
+  const tools = controls.choice("tool", "Paint on the picture", TOOLS);
   tools.classList.add("tools");
-  const size = slider("Size of the brush", {
-    min: 1,
-    max: 20,
-    step: 0.5,
-    value: pen.size,
-    said: (value) => `${value} %`,
-  }, (value) => {
-    pen.size = value;
-    changed();
-  });
-  const shapes = choice(
-    "With a",
-    [["brush", "brush", "brush"], ["lasso", "lasso", "lasso"]],
-    pen.shape,
-    (shape) => {
-      pen.shape = shape;
-      size.hidden = shape === "lasso";
-      changed();
-    },
-    { unseen: true },
-  );
-  return h(
-    "section",
-    { class: "panel stack", "aria-label": "Paint on the picture" },
+  const size = controls.slider("size", "Size of the brush", [1, 20, 0.5], (value) => `${value} %`);
+  const shapes = controls.choice("shape", "With a", SHAPES, { unseen: true });
+  return h("section.panel.stack", { "aria-label": "Paint on the picture" }, [
     tools,
     meaning,
     shapes,
     size,
     row(buttons),
-  );
+  ]);
 }

@@ -1,28 +1,28 @@
 /** Draw a shape: each closed line adds to it or cuts from it. */
 
-import { button, choice, dialog, h, row, soft, stack } from "../dom.js";
+import { choice } from "../controls.js";
+import { button, dialog, h, handled, row, soft, stack } from "../dom.js";
 import { drawStroke, Marks } from "./marks.js";
 import { pointing } from "./pointing.js";
 import { States } from "./states.js";
 
 const SIDE = 1000;
+const LABEL =
+  "Sheet to draw on. With the keyboard: arrow keys move the pen, Space begins and ends a line.";
 
 /** Resolves with a PNG, black on white, or undefined. */
 export function drawn() {
   const marks = new Marks(SIDE, SIDE);
-  const states = new States(marks.strokes);
+  const states = new States(marks.strokes, (strokes) => {
+    marks.strokes = strokes;
+    tell();
+  });
   let black = true;
+  let tell;
   let stroke = null;
   let cross = null;
-  const canvas = h("canvas", {
-    class: "sheet",
-    width: SIDE,
-    height: SIDE,
-    tabindex: "0",
-    role: "application",
-    "aria-label":
-      "Sheet to draw on. With the keyboard: arrow keys move the pen, Space begins and ends a line.",
-  });
+  const canvas = handled("sheet", "application", LABEL);
+  canvas.width = canvas.height = SIDE;
   const context = canvas.getContext("2d");
 
   function paint() {
@@ -43,20 +43,12 @@ export function drawn() {
   }
 
   return dialog("Draw a shape", (close) => {
-    const go = (step) => () => {
-      marks.strokes = states.go(step);
-      tell();
-    };
-    const back = button("Undo", go(-1), { kind: "quiet", image: "undo" });
-    const again = button("Redo", go(1), { kind: "quiet", image: "redo" });
     const use = button("Use this shape", () => {
       cross = null;
       paint();
       canvas.toBlob(close, "image/png");
     }, { kind: "primary" });
-    const tell = () => {
-      back.disabled = !states.can(-1);
-      again.disabled = !states.can(1);
+    tell = () => {
       use.disabled = !marks.strokes.some((one) => one.black);
       paint();
     };
@@ -77,6 +69,10 @@ export function drawn() {
         stroke = null;
         tell();
       },
+      stop() {
+        stroke = null;
+        paint();
+      },
       hover(point) {
         cross = canvas.matches(":focus-visible") ? point : null;
         paint();
@@ -90,9 +86,8 @@ export function drawn() {
         choice("A line", [[true, "adds", "more"], [false, "cuts away", "cut"]], true, (chosen) => {
           black = chosen;
         }, { unseen: true }),
-        h("span", { class: "grow" }),
-        back,
-        again,
+        h("span.grow"),
+        states.buttons,
       ),
       h("footer", use),
     );

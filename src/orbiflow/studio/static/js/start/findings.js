@@ -13,29 +13,24 @@ const MANY = 6; // parts left out, from which a picture is a photograph with a b
  */
 export function findings({ doubts, notes: said, left_out: others = [] }, grow) {
   const out = others.length;
-  return h(
-    "ul",
-    { class: "notes stack" },
+  return h("ul.notes.stack", [
     doubts.map((text) =>
-      h(
-        "li",
-        { class: "notice stack" },
+      h("li.notice.stack", [
         sentence(text),
         text.includes("(Thin parts)") &&
-          button("Make thin parts thicker", () => grow(text.includes("thread") ? 0.1 : 0.04), {
-            kind: "quiet",
-          }),
-      )
+        button("Make thin parts thicker", () => grow(text.includes("thread") ? 0.1 : 0.04), {
+          kind: "quiet",
+        }),
+      ])
     ),
     out > 0 &&
-      h(
-        "li",
-        h("span", { class: "swatch" }),
-        `${number(out, "part is", "parts are")} left out: a tile is one piece. `,
-        out < MANY
-          ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
-          : "A busy photograph? Draw round the head with “Add” and the lasso, then “Remove” what is too much.",
-      ),
+    h("li", [
+      h("span.swatch"),
+      `${number(out, "part is", "parts are")} left out: a tile is one piece. `,
+      out < MANY
+        ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
+        : "A busy photograph? Draw round the head with “Add” and the lasso, then “Remove” what is too much.",
+    ]),
     said.length > 0 && h("li", notes(said)),
-  );
+  ]);
 }

@@ -14,50 +14,35 @@ const FILE_WORDS = "Go on with what you saved, here or elsewhere.";
 const other = (title, image, begin, words) =>
   h("div", button(title, begin, { image }), aside(words));
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- */
+/** @type {Show} */
 export async function show(root, page) {
   await style("start");
   const bring = new Bringing(page);
-  const art = h("img", { class: "hero-art", src: "hero.svg", alt: "A tiling of lizards" });
-  const projects = new Projects(page.api);
-  put(
-    root,
-    h(
-      "section",
-      { class: "hero" },
+  const art = h("img.hero-art", { src: "hero.svg", alt: "A tiling of lizards" });
+  const projects = new Projects(page);
+  put(root, [
+    h("section.hero", [
       stack(
         h("h1", { tabindex: "-1" }, "Turn an animal into a tile"),
         h(
-          "p",
-          { class: "lead soft" },
+          "p.lead.soft",
           "Bring a picture. We bend its outline as little as we can, until its copies fill the plane without a gap.",
         ),
         bring.panel(),
       ),
       art,
-    ),
+    ]),
     projects.root,
-    h(
-      "section",
-      { "aria-labelledby": "ours" },
+    h("section", { "aria-labelledby": "ours" }, [
       h("h2", { id: "ours" }, "Or take one of ours"),
       bring.animals(page.about),
-    ),
-    h(
-      "section",
-      { class: "others" },
+    ]),
+    h("section.others", [
       other("A solid instead of a picture", "solid", () => bring.mesh.click(), MESH_WORDS),
       other("A shape that fits", "pencil", () => page.navigate("shapes"), SHAPE_WORDS),
       other("Numbers instead of animals", "curve", () => bring.count(), TABLE_WORDS),
       other("Open a project file", "open", () => bring.saved.click(), FILE_WORDS),
-    ),
-  );
+    ]),
+  ]);
   await trying(() => projects.show());
-  return () => {
-    projects.close();
-    bring.close();
-  };
 }

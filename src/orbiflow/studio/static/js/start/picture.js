@@ -1,7 +1,21 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
-import { button, h, newest, put, row, soft, stack, style, toast, trying, zooms } from "../dom.js";
-import { sized } from "../../../../drawing/js/tiling.js";
+import {
+  button,
+  h,
+  handled,
+  newest,
+  put,
+  row,
+  soft,
+  stack,
+  style,
+  toast,
+  trying,
+  undoKeys,
+  zooms,
+} from "../dom.js";
+import { sized } from "../../../../drawing/js/turned.js";
 import { timeLeft } from "../waiting.js";
 import { wishes } from "../wishes.js";
 import { alive, sentence } from "../words.js";
@@ -20,48 +34,32 @@ const ONE_GO = 700; // ms between two moves of a slider that are undone together
 const KEYS =
   "With the keyboard: arrow keys move the brush, Space begins and ends a stroke, plus and minus zoom.";
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- * @param {number} [number] 1 for the second of two pictures
- */
-export async function show(root, page, number = 0) {
+/** @type {Show} */
+export async function show(root, page) {
+  const number = page.number === 2 ? 1 : 0;
   if (number && !page.project.second) {
     page.navigate(`p/${page.project.id}/picture`, { replace: true });
-    return () => {};
+    return;
   }
   await style("start");
-  const own = new PicturePage(page, number);
-  own.build(root);
-  return () => own.close();
+  new PicturePage(page, number).build(root);
 }
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- */
-export const showSecond = (root, page) => show(root, page, 1);
-
 class PicturePage {
-  /**
-   * @param {Page} page
-   * @param {number} number
-   */
+  /** @param {Page} page @param {number} number */
   constructor(page, number) {
-    const { api, events, project, navigate } = page;
+    const { api, project } = page;
     this.page = page;
     this.wishes = wishes(page);
     this.number = number;
     this.api = api;
-    this.events = events;
     this.project = project;
-    this.navigate = navigate;
     this.place = `projects/${project.id}`;
     this.pen = { tool: "add", shape: "brush", size: 4 };
     this.reading = { ...AS_FOUND, ...this.own.reading };
     this.kept = new Kept(page, number, { own: () => this.own, began: (told) => this.began(told) });
     this.view = new View(1, 1);
-    this.states = new States(this.state);
+    this.states = new States(this.state, (state) => this.went(state));
     /** @type {HTMLImageElement | undefined} */
     this.picture = undefined;
     this.shown = ""; // the address of the picture
@@ -74,53 +72,36 @@ class PicturePage {
   }
 
   build(root) {
-    this.canvas = h("canvas", {
-      class: "reading",
-      tabindex: "0",
-      role: "application",
-      "aria-label": `The picture with the outline that was read. ${KEYS}`,
-    });
-    this.stage = h(
-      "div",
-      { class: "stage", hidden: true },
-      this.canvas,
-    );
-    this.busy = h("p", { class: "soft grow", role: "status" });
+    const label = `The picture with the outline that was read. ${KEYS}`;
+    this.canvas = handled("reading", "application", label);
+    this.stage = h("div.stage", { hidden: true }, this.canvas);
+    this.busy = h("p.soft.grow", { role: "status" });
     this.under = row(this.busy, zooms((by) => this.zoom(by), () => this.zoom(0)));
     this.heading = h("h1", { tabindex: "-1" }, this.title);
-    this.said = h("div", { class: "said stack", role: "status" });
-    this.lead = h("p", { class: "soft" });
+    this.said = h("div.said.stack", { role: "status" });
+    this.lead = h("p.soft");
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
-    this.searches = h(
-      "p",
-      { role: "status", hidden: true },
+    this.searches = h("p", { role: "status", hidden: true }, [
       "A search is at work: ",
       h("a", { href: `#/p/${this.project.id}` }, "see its tiles"),
       ".",
-    );
+    ]);
     this.both = bothPictures(this.page, this.number);
-    this.back = button("Undo", () => this.go(-1), { kind: "quiet", image: "undo" });
-    this.again = button("Redo", () => this.go(1), { kind: "quiet", image: "redo" });
     const clear = button("Start over", () => this.startOver(), { kind: "quiet", image: "bin" });
     this.controls = readingControls(this.reading, () => this.reads());
-    this.unread = h("div", { class: "lonely stack", role: "status" });
-    this.side = h(
-      "div",
-      { class: "stack side" },
-      h("div", { class: "go" }, this.find, this.searches, this.wishes.effort),
-      paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]),
+    this.unread = h("div.lonely.stack", { role: "status" });
+    this.side = h("div.stack.side", [
+      h("div.go", this.find, this.searches, this.wishes.effort),
+      paintingControls(this.pen, () => this.paint(), [this.states.buttons, clear]),
       this.controls.root,
       this.both.root,
-    );
-    put(
-      root,
-      h(
-        "div",
-        { class: "picture" },
+    ]);
+    put(root, [
+      h("div.picture", [
         stack(this.heading, this.lead, this.stage, this.under, this.said, this.unread),
         this.side,
-      ),
-    );
+      ]),
+    ]);
     this.listen();
     this.ready();
   }
@@ -146,29 +127,11 @@ class PicturePage {
         this.paint();
       },
     });
-    this.keys = (event) => {
-      const key = event.key.toLowerCase();
-      if (
-        !(event.ctrlKey || event.metaKey) || !"zy".includes(key) || event.target.type === "text"
-      ) {
-        return;
-      }
-      event.preventDefault();
-      this.go(event.shiftKey || key === "y" ? 1 : -1);
-    };
-    document.addEventListener("keydown", this.keys);
-    this.watch = new ResizeObserver(() => this.paint());
-    this.watch.observe(this.stage);
-    const ready = () => this.ready();
-    this.off = [["silhouette", ready], ["refresh", ready], ["task", () => this.tell()]].map((
-      [kind, heard],
-    ) => this.events.on(kind, heard));
-  }
-
-  close() {
-    this.watch.disconnect();
-    document.removeEventListener("keydown", this.keys);
-    this.off.forEach((stop) => stop());
+    const { events, signal } = this.page;
+    undoKeys((step) => this.states.go(step), signal);
+    new ResizeObserver(() => this.paint()).observe(this.stage);
+    events.on("silhouette refresh", () => this.ready(), signal);
+    events.on("task", () => this.tell(), signal);
   }
 
   /**
@@ -214,7 +177,7 @@ class PicturePage {
     if (!(await this.kept.follow(silhouette))) return;
     const { width, height } = silhouette;
     this.tints.clear();
-    this.states = new States(this.state);
+    this.states.begin(this.state);
     if (this.view.width !== width || this.view.height !== height) {
       this.view = new View(width, height);
     }
@@ -232,12 +195,9 @@ class PicturePage {
     return { strokes, before, reading: { ...this.reading } };
   }
 
-  /** Undo or redo: send what differs. */
-  go(step) {
-    const { marks } = this;
-    const old = this.state;
-    const now = this.states.go(step);
-    if (!now) return;
+  /** Something was undone, or done again: send what differs. */
+  went(now) {
+    const { marks, state: old } = this;
     const differing = LAYERS.filter((layer) => {
       const [was, is] = [old, now].map(({ strokes }) => marks.of(layer, strokes));
       return old.before[layer] !== now.before[layer] || was.length !== is.length ||
@@ -273,27 +233,21 @@ class PicturePage {
   paint() {
     const { own: { silhouette }, picture, marks, pen, view } = this;
     if (!silhouette || !picture) return;
-    const { context, width, ratio } = sized(this.canvas);
+    const { width, ratio } = sized(this.canvas);
+    const context = this.canvas.getContext("2d");
     const pixel = marks.width / width / view.nearer;
     const scale = ratio / pixel;
     context.setTransform(scale, 0, 0, scale, -view.x * scale, -view.y * scale);
     paintSilhouette(context, picture, silhouette, pixel);
+    const marked = ["pins", "emphasis"].filter((layer) => marks.has(layer));
     paintStrokes(context, {
-      marks: ["pins", "emphasis"].filter((layer) => marks.has(layer)).map((layer) =>
-        this.tint(layer)
-      ),
+      marks: marked.map((layer) => this.tint(layer)),
       fresh: marks.strokes.slice(this.known).filter(({ layer }) => layer === "mend"),
       stroke: this.stroke,
       tool: pen.tool,
     });
-    if (this.cross) {
-      paintBrush(
-        context,
-        view.at(this.cross),
-        pen.shape === "lasso" ? 4 * pixel : this.brush() / 2,
-        pixel,
-      );
-    }
+    const radius = pen.shape === "lasso" ? 4 * pixel : this.brush() / 2;
+    if (this.cross) paintBrush(context, view.at(this.cross), radius, pixel);
   }
 
   tint(layer) {
@@ -308,9 +262,8 @@ class PicturePage {
 
   begin(point) {
     const { tool, shape } = this.pen;
-    const layer = { add: "mend", remove: "mend", rub: "all" }[tool] ?? tool;
     this.stroke = {
-      layer,
+      layer: { add: "mend", remove: "mend", rub: "all" }[tool] ?? tool,
       shape,
       size: this.brush(),
       points: [point],
@@ -352,7 +305,7 @@ class PicturePage {
   began({ task, layer, refused }) {
     if (layer) this.refused[layer] = refused;
     if (task && !this.project.tasks.some(({ id }) => id === task.id)) {
-      this.events.apply("task", task);
+      this.page.events.apply("task", task);
     }
     this.tell();
   }
@@ -371,33 +324,22 @@ class PicturePage {
     this.searches.hidden = !project.tasks.some((own) => own.operation === "search" && alive(own));
     this.busy.textContent = busy ? `Reading it again … ${timeLeft(task)}` : "";
     this.both.update();
-    this.back.disabled = !this.states.can(-1);
-    this.again.disabled = !this.states.can(1);
     this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
     this.paint();
-    const told = JSON.stringify([
-      busy,
-      task?.state,
-      task?.error,
-      this.project.tasks.some(alive),
-      this.refused,
-      silhouette && { ...silhouette, outline: null },
-    ]);
+    const shown = silhouette && { ...silhouette, outline: null };
+    const { state, error: why } = task ?? {};
+    const told = JSON.stringify([busy, state, why, project.tasks.some(alive), this.refused, shown]);
     if (told === this.told) return; // what is open stays open
     this.told = told;
-    const error = !busy && task?.state === "failed" &&
-      h("p", { class: "error" }, sentence(task.error));
+    const error = !busy && task?.state === "failed" && h("p.error", sentence(task.error));
     if (silhouette) {
-      put(
-        this.said,
+      put(this.said, [
         error,
-        Object.values(this.refused).map((why) => why && h("p", { class: "error" }, sentence(why))),
+        Object.values(this.refused).map((why) => why && h("p.error", sentence(why))),
         findings(silhouette, (thicken) => this.controls.take({ thicken })),
-      );
-    } else {put(
-        this.unread,
-        ...(this.project.tasks.some(alive) ? [soft("Reading the picture …")] : this.nothing(error)),
-      );}
+      ]);
+    } else if (project.tasks.some(alive)) put(this.unread, soft("Reading the picture …"));
+    else put(this.unread, this.nothing(error));
   }
 
   /** What is shown if there is no silhouette, and none to come. */
@@ -405,18 +347,14 @@ class PicturePage {
     const leave = async () => {
       if (this.number) return addSecond(this.page);
       if (!this.project.tiles.length) await this.api.remove(this.place);
-      this.navigate("");
+      this.page.navigate("");
     };
-    const without = () => this.both.remove();
+    const words = `Choose ${error ? "another" : "a"} picture`;
     return [
       error || soft("There is no picture yet."),
-      h(
-        "p",
-        button(`Choose ${error ? "another" : "a"} picture`, () => trying(leave), {
-          kind: "primary",
-        }),
-      ),
-      this.number > 0 && h("p", button("Go on without it", without, { kind: "quiet" })),
+      h("p", button(words, () => trying(leave), { kind: "primary" })),
+      this.number > 0 &&
+      h("p", button("Go on without it", () => this.both.remove(), { kind: "quiet" })),
     ];
   }
 
@@ -424,15 +362,10 @@ class PicturePage {
   search() {
     this.searching = this.find.disabled = true;
     return trying(async () => {
-      await Promise.all(
-        [this.read, ...Object.values(this.kept.send)].map((pending) => pending.done()),
-      );
+      await Promise.all([this.read, ...Object.values(this.kept.send)].map((sent) => sent.done()));
       await this.settled();
-      await this.api.post(`${this.place}/tasks`, {
-        operation: "search",
-        settings: this.wishes.settings(),
-      });
-      this.navigate(`p/${this.project.id}`);
+      await this.api.start(this.project, "search", this.wishes.settings());
+      this.page.navigate(`p/${this.project.id}`);
     }).then(() => {
       this.searching = this.find.disabled = false;
     });
@@ -441,13 +374,13 @@ class PicturePage {
   /** Resolves when nothing is being read. */
   settled() {
     return new Promise((resolve) => {
+      const settled = new AbortController();
       const check = () => {
-        if (!alive(this.task)) {
-          stop();
-          resolve();
-        }
+        if (alive(this.task)) return;
+        settled.abort();
+        resolve();
       };
-      const stop = this.events.on("task", check);
+      this.page.events.on("task", check, settled.signal);
       check();
     });
   }

@@ -1,6 +1,6 @@
 /** The projects on the first page: go on with one, rename it, duplicate it, or delete it and take that back. */
 
-import { button, dialog, h, icon, put, row, toast, trying } from "../dom.js";
+import { button, entered, h, icon, put, row, trying } from "../dom.js";
 import { ago, number } from "../words.js";
 import { thumb as tilingOf } from "./thumb.js";
 
@@ -10,20 +10,15 @@ const SIGNS = { density: "curve", solid: "solid", tile: "picture" };
 const SOME = 10; // projects that are shown at first
 
 export class Projects {
-  /** @param {Api} api */
-  constructor(api) {
+  /** @param {Page} page */
+  constructor({ api, signal }) {
     this.api = api;
     this.most = SOME;
     /** @type {Set<string>} */
     this.leaving = new Set(); // deleted when the page is left: until then that can be taken back
     this.root = h("section", { "aria-labelledby": "yours", hidden: true });
-    this.left = () => this.forget();
-    addEventListener("pagehide", this.left);
-  }
-
-  close() {
-    removeEventListener("pagehide", this.left);
-    this.forget();
+    addEventListener("pagehide", () => this.forget(), { signal });
+    signal.addEventListener("abort", () => this.forget());
   }
 
   forget() {
@@ -38,13 +33,12 @@ export class Projects {
     const found = await this.api.get("projects");
     this.root.hidden = !found.length;
     this.heading = h("h2", { id: "yours", tabindex: "-1" }, "Your projects");
-    put(
-      this.root,
+    put(this.root, [
       this.heading,
-      h("ul", { class: "projects" }, found.slice(0, this.most).map((own) => this.card(own))),
+      h("ul.projects", found.slice(0, this.most).map((own) => this.card(own))),
       found.length > this.most &&
-        button(`Show all ${found.length}`, () => this.all(), { image: "more" }),
-    );
+      button(`Show all ${found.length}`, () => this.all(), { image: "more" }),
+    ]);
   }
 
   /** Do something with the projects, then show them anew. */
@@ -61,19 +55,17 @@ export class Projects {
   }
 
   card(own) {
-    const place = h("li", { class: "project" });
+    const place = h("li.project");
     const deed = (words, image, onclick) =>
       button(`${words} ${own.name}`, onclick, { kind: "quiet icon", image });
     const whole = () => {
-      put(
-        place,
+      put(place, [
         link(this.api, own),
         row(
           deed("Rename", "pencil", () => this.rename(own)),
-          own.kind === "tile" && deed("Duplicate", "copy", () => this.duplicate(own)),
           deed("Delete", "bin", gone),
         ),
-      );
+      ]);
     };
     const gone = () => {
       this.leaving.add(own.id);
@@ -83,7 +75,7 @@ export class Projects {
         place.querySelector("a").focus();
       }, { image: "undo" });
       const text = `“${own.name}” is deleted when you leave this page.`;
-      put(place, h("div", { class: "gone stack", role: "status" }, h("p", text), undo));
+      put(place, h("div.gone.stack", { role: "status" }, h("p", text), undo));
       undo.focus();
     };
     (this.leaving.has(own.id) ? gone : whole)();
@@ -91,27 +83,8 @@ export class Projects {
   }
 
   async rename({ id, name }) {
-    const box = h("input", { type: "text", maxlength: 80, value: name, "aria-label": "Its name" });
-    const given = await dialog("Rename this project", (close) => {
-      const save = (event) => {
-        event.preventDefault();
-        close(box.value.trim());
-      };
-      const done = button("Rename it", () => {}, { kind: "primary", type: "submit" });
-      return h("form", { class: "stack", onsubmit: save }, box, h("footer", done));
-    });
+    const given = await entered("Rename this project", "Rename it", name);
     if (given) await this.after(() => this.api.patch(`projects/${id}`, { name: given }));
-  }
-
-  /** Go by the project's file, which has all but what was taken away of it. */
-  duplicate({ id, name }) {
-    toast(`Copying “${name}” …`);
-    return this.after(async () => {
-      const answer = await fetch(`api/projects/${id}/file`);
-      if (!answer.ok) throw new Error("The project cannot be copied now. Reload the page.");
-      const made = await this.api.post("projects/open", await answer.blob());
-      await this.api.patch(`projects/${made.id}`, { name: `${name} (copy)` });
-    });
   }
 }
 
@@ -122,19 +95,10 @@ function link(api, { id, kind, name, thumb, tiles, busy, changed }) {
     tiles ? number(tiles, kind) : empty[kind],
     busy ? "at work" : ago(changed),
   ];
-  return h(
-    "a",
-    { href: `#/${path}` },
-    h(
-      "span",
-      { class: "thumb" },
-      kind === "tile" && tiles
-        ? tilingOf(api, id)
-        : thumb
-        ? h("img", { src: thumb, alt: "", loading: "lazy" })
-        : icon(SIGNS[kind]),
-    ),
-    h("span", { class: "project-name" }, name),
-    h("span", { class: "soft small" }, facts.join(" · ")),
-  );
+  const picture = thumb ? h("img", { src: thumb, alt: "", loading: "lazy" }) : icon(SIGNS[kind]);
+  return h("a", { href: `#/${path}` }, [
+    h("span.thumb", kind === "tile" && tiles ? tilingOf(api, id) : picture),
+    h("span.project-name", name),
+    h("span.soft.small", facts.join(" · ")),
+  ]);
 }

@@ -13,7 +13,6 @@ import {
   stack,
   trying,
 } from "../dom.js";
-import { brief } from "../words.js";
 import { Bringing, stem } from "./bringing.js";
 
 /** Brings a picture into a project that has one already. */
@@ -21,10 +20,7 @@ class BringingSecond extends Bringing {
   /** @override */
   number = 1;
 
-  /**
-   * @param {Page} page
-   * @param {() => void} close
-   */
+  /** @param {Page} page @param {() => void} close */
   constructor(page, close) {
     super(page);
     this.page = page;
@@ -53,27 +49,23 @@ class BringingSecond extends Bringing {
   }
 }
 
-/**
- * Ask for a second picture.
- *
- * @param {Page} page
- */
+/** Ask for a second picture. @param {Page} page */
 export async function addSecond(page) {
-  /** @type {BringingSecond} */
-  let bring;
+  const closing = new AbortController();
+  const signal = AbortSignal.any([page.signal, closing.signal]);
   await dialog("Add a second picture", (close) => {
-    bring = new BringingSecond(page, close);
+    const bring = new BringingSecond({ ...page, signal }, close);
     return stack(
       soft("Both animals then fill the plane together, without a gap."),
       bring.panel(),
       row(
         button("The same picture again", () => bring.again(), { image: "picture" }),
-        h("span", { class: "soft small" }, "or one of ours:"),
+        h("span.soft.small", "or one of ours:"),
       ),
       bring.animals(page.about),
     );
   });
-  bring.close();
+  closing.abort();
 }
 
 /**
@@ -84,25 +76,18 @@ export async function addSecond(page) {
  */
 export function bothPictures(page, number) {
   const { api, events, project, navigate } = page;
-  const root = h("section", { class: "panel stack both", "aria-label": "One animal or two" });
+  const root = h("section.panel.stack.both", { "aria-label": "One animal or two" });
   const place = `p/${project.id}/picture`;
 
   const link = ({ input, silhouette }, k) =>
-    h(
-      "a",
-      { href: `#/${place}${k ? "/2" : ""}`, "aria-current": k === number && "page" },
+    h("a", { href: `#/${place}${k ? "/2" : ""}`, "aria-current": k === number && "page" }, [
       silhouette ? h("img", { src: silhouette.backdrop, alt: "" }) : icon("picture"),
-      h("span", brief(stem(input?.name ?? "picture"))),
-    );
+      h("span", stem(input?.name ?? "picture")),
+    ]);
 
   async function remove() {
-    if (
-      !(await confirmed(
-        "Take the second picture away?",
-        "What you painted over it goes, too. The tiles that were found stay.",
-        "Take it away",
-      ))
-    ) return;
+    const words = "What you painted over it goes, too. The tiles that were found stay.";
+    if (!(await confirmed("Take the second picture away?", words, "Take it away"))) return;
     await trying(async () => {
       await api.remove(`projects/${project.id}/second`);
       await events.refresh();
@@ -112,28 +97,22 @@ export function bothPictures(page, number) {
 
   let told = "";
   function update() {
-    const { input, silhouette, second } = project;
-    const now = JSON.stringify([
-      input,
-      silhouette?.backdrop,
-      second?.input,
-      second?.silhouette?.backdrop,
-    ]);
+    const { second } = project;
+    const shown = (own) => [own?.input, own?.silhouette?.backdrop];
+    const now = JSON.stringify([project, second].map(shown));
     if (now === told) return; // what has the focus stays
     told = now;
     if (second) {
-      put(
-        root,
+      put(root, [
         h("p", "These two fill the plane together:"),
-        h("nav", { class: "figures", "aria-label": "Pictures" }, [project, second].map(link)),
+        h("nav.figures", { "aria-label": "Pictures" }, [project, second].map(link)),
         button("Take the second picture away", remove, { kind: "quiet", image: "bin" }),
-      );
+      ]);
     } else {
-      put(
-        root,
+      put(root, [
         aside("Two animals can fill the plane together."),
         h("div", button("Add a second picture", () => addSecond(page), { image: "more" })),
-      );
+      ]);
     }
   }
   update();

@@ -13,12 +13,7 @@ export class View {
     this.height = height;
   }
 
-  /**
-   * The point of the picture at a point of the canvas.
-   *
-   * @param {Point} point
-   * @returns {Point}
-   */
+  /** The point of the picture at a point of the canvas. @param {Point} point @returns {Point} */
   at([x, y]) {
     return [this.x + x / this.nearer, this.y + y / this.nearer];
   }

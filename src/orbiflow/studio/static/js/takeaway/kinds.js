@@ -1,6 +1,6 @@
 /** What can be made of a tile, and what its settings are called here. */
 
-import { FEW_PALETTES } from "../dom.js";
+import { FEW_PALETTES } from "../controls.js";
 
 /** Plain names of settings. */
 const PLAIN = {

@@ -12,79 +12,54 @@ const SEEN = /\.(png|gif|svg)$/;
 const address = ({ result }, name) =>
   `api/takeaways/${result.takeaway}/files/${encodeURIComponent(name)}`;
 
-/**
- * Whether a task has made files.
- *
- * @param {Task | null} task
- */
-export const isMade = (task) =>
-  Boolean(KINDS[task?.operation] && task.state === "done" && task.result?.files?.length);
+/** Whether a task has made files. @param {Task | null} task */
+export const isMade = (task) => Boolean(task?.state === "done" && task.result?.files?.length);
 
 /** Links to the files that a task has made. */
 function files(task, kind) {
   return task.result.files.flatMap(({ name, bytes: size }) => [
-    h(
-      "a",
-      { class: `button ${kind}`, href: address(task, name), download: name },
+    h("a", { class: `button ${kind}`, href: address(task, name), download: name }, [
       icon("download"),
       name,
-      kind && size && h("span", { class: "small" }, bytes(size)),
-    ),
+      size && h("span.small", bytes(size)),
+    ]),
     name.endsWith(".html") &&
-    h("a", { class: "button", href: address(task, name), target: "_blank" }, "Open"),
+    h("a.button", { href: address(task, name), target: "_blank" }, "Open"),
   ]);
 }
 
-/**
- * A picture of what a task has made, null if there is none.
- *
- * @param {Task} task
- */
+/** A picture of what a task has made, null if there is none. @param {Task} task */
 export function picture(task) {
   const { takeaway, preview, files: [{ name }] } = task.result;
   if (!preview && !SEEN.test(name)) return null;
   const src = preview ? `api/takeaways/${takeaway}/preview.png` : address(task, name);
-  return h("img", {
-    src,
-    alt: `What was made: ${KINDS[task.operation].title.toLowerCase()}`,
-    loading: "lazy",
-  });
+  const alt = `What was made: ${KINDS[task.operation].title.toLowerCase()}`;
+  return h("img", { src, alt, loading: "lazy" });
 }
 
-/**
- * What there is to say of a task.
- *
- * @param {Task | null} task
- */
-function words(task) {
+/** What there is to say of a task. @param {Task | null} task */
+export function wordsOf(task) {
   if (alive(task)) {
     const left = clock();
     left.update(task);
-    return [
-      h(
-        "p",
-        task.state === "waiting" ? "Waiting its turn …" : capital(task.what || "At work …"),
-      ),
-      h("progress", { max: 1, value: task.share, "aria-label": "How far it is" }),
-      left.root,
-    ];
+    const what = task.state === "waiting"
+      ? "Waiting its turn …"
+      : capital(task.what || "At work …");
+    const bar = h("progress", { max: 1, value: task.share, "aria-label": "How far it is" });
+    return [h("p", what), bar, left.root];
   }
-  if (task?.state === "failed") return [h("p", { class: "error" }, sentence(task.error))];
+  if (task?.state === "failed") return [h("p.error", sentence(task.error))];
   if (task?.state === "cancelled") return [soft("Stopped.")];
   if (!isMade(task)) return [];
   const notes = task.result.notes ?? [];
   return [
     notes.length > 0 &&
-    h("ul", { class: "notice" }, notes.map((text) => h("li", sentence(text)))),
+    h("ul.notice", notes.map((text) => h("li", sentence(text)))),
     row(files(task, "primary")),
   ];
 }
 
-/**
- * What a task made, for what or how large, and when.
- *
- * @param {Task} task
- */
+/** What a task made, for what or how large, and when. @param {Task} task */
 function about({ operation, result }) {
   const { chosen = {}, facts = {}, made } = result;
   const { title, words: names } = KINDS[operation];
@@ -106,21 +81,13 @@ function about({ operation, result }) {
   ].filter(Boolean).join(" · ");
 }
 
-/** A list of what was made before. */
-const madeBefore = (tasks) =>
-  h(
-    "ul",
-    { class: "made" },
-    tasks.map((task) =>
-      h(
-        "li",
-        { class: "panel stack" },
-        picture(task) ?? h("span", { class: "no-picture" }, icon(KINDS[task.operation].image)),
-        h("span", { class: "soft small" }, about(task)),
-        files(task, ""),
-      )
-    ),
-  );
+/** What was made before, in a list. */
+const madeBefore = (task) =>
+  h("li.panel.stack", [
+    picture(task) ?? h("span.no-picture", icon(KINDS[task.operation].image)),
+    h("span.soft.small", about(task)),
+    files(task, ""),
+  ]);
 
 /** A button that makes things, what it has to say, and what was made `earlier`. */
 export class Making {
@@ -143,8 +110,8 @@ export class Making {
     this.project = project;
     this.on = on;
     this.make = button("Download", () => trying(() => this.press()), { kind: "primary big" });
-    this.said = h("div", { class: "stack said", role: "status" });
-    this.before = h("div");
+    this.said = h("div.stack.said", { role: "status" });
+    this.before = h("ul.made");
     this.earlier = section("earlier", "earlier", "Made before", this.before);
   }
 
@@ -170,8 +137,7 @@ export class Making {
   }
 
   async submit(operation, settings) {
-    const body = { operation, settings };
-    this.task = (await this.api.post(`projects/${this.project.id}/tasks`, body)).task;
+    this.task = (await this.api.start(this.project, operation, settings)).task;
     [this.stale, this.news] = [false, true];
     this.tell();
   }
@@ -190,10 +156,10 @@ export class Making {
     this.told = told;
     put(
       this.said,
-      !old ? words(this.task) : made && soft("You changed something since: see “Made before”."),
+      !old ? wordsOf(this.task) : made && soft("You changed something since: see “Made before”."),
     );
     this.earlier.hidden = !before.length;
-    put(this.before, madeBefore(before));
+    put(this.before, before.map(madeBefore));
     if (done?.id !== this.seen) this.on.show(done);
     this.seen = done?.id;
     if (!done || !this.news) return;

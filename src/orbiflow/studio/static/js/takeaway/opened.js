@@ -1,9 +1,6 @@
 /** A link that carries a tile: it becomes a project of its own, and is proved again. */
 
-/**
- * @param {HTMLElement} _root
- * @param {Page} page
- */
+/** @type {Show} */
 export async function show(_root, { api, navigate }) {
   const text = location.hash.replace(/^#\/open\//, "");
   const { id } = await api.post("projects/shared", { text });

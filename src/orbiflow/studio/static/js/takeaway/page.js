@@ -2,9 +2,10 @@
 
 import { Carry } from "../closeup/carry.js";
 import { drawnOn, marksOf } from "../closeup/drawn.js";
-import { aside, choice, h, icon, put, section, stack, style, trying } from "../dom.js";
+import { check, choice } from "../controls.js";
+import { aside, h, icon, put, section, stack, style, trying } from "../dom.js";
 import { form } from "../forms.js";
-import { keeper, lookOf, paletteOf } from "../look.js";
+import { lookKeeper, lookOf, paletteOf } from "../look.js";
 import { backdropOf, Pictures, skinsOf } from "../skin.js";
 import { figuresOf, paintCard } from "../../../../drawing/js/tiling.js";
 import { sentence } from "../words.js";
@@ -27,12 +28,9 @@ const NEVER = "tile result out force picture drawing eyes second_eyes tint".spli
 const KEPT = {};
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
-/**
- * @param {HTMLElement} root
- * @param {Page} page
- */
+/** @type {Show} */
 export async function show(root, page) {
-  const card = page.project.tiles.find(({ id }) => id === page.tileId);
+  const card = page.project.tiles.find(({ id }) => id === page.number);
   if (!card) throw new Error("This tile is not there any more.");
   await style("takeaway");
   const own = new TakeawayPage(page, card);
@@ -41,26 +39,22 @@ export async function show(root, page) {
     [place, `${place}/cannot`, `${place}/rectangles`].map((path) => page.api.get(path)),
   );
   own.build(root);
+  own.listen(page);
   await own.choose(own.kept.thing);
-  return () => own.close();
 }
 
 class TakeawayPage {
-  /**
-   * @param {Page} page
-   * @param {Card} card
-   */
-  constructor({ api, events, project, navigate, about }, card) {
+  /** @param {Page} page @param {Card} card */
+  constructor(page, card) {
+    const { api, project, about } = page;
     this.api = api;
-    this.events = events;
     this.project = project;
-    this.navigate = navigate;
     this.card = card;
     this.place = `projects/${project.id}`;
     this.kept = KEPT[project.id] ??= { thing: "poster", machines: {} };
     this.about = about;
     this.look = lookOf(project, about);
-    this.keepLook = keeper(api, project);
+    this.keepLook = lookKeeper(page);
     this.pictures = new Pictures(() => this.paint());
     /** @type {TileView | null} */
     this.view = null;
@@ -69,6 +63,7 @@ class TakeawayPage {
     /** @type {Point[][]} */
     this.rectangles = [];
     this.schemas = new Map();
+    this.layers = { drawing: null, picture: null };
     this.making = new Making(api, project, {
       asked: () => [this.kind, this.settings()],
       refused: (setting, text) => this.form.refuse(setting, text),
@@ -82,84 +77,44 @@ class TakeawayPage {
 
   build(root) {
     this.canvas = h("canvas", { role: "img", "aria-label": `A tiling: ${this.card.arrangement}` });
-    this.live = new Preview(
-      this.api,
-      `${this.place}/tiles/${this.card.id}`,
-      this.canvas,
-      (error, notes) => this.heard(error, notes),
-    );
-    this.shown = h("div", { class: "preview" }, this.live.root);
-    this.noted = h("ul", { class: "notice", hidden: true });
+    const heard = (error, notes) => this.heard(error, notes);
+    this.live = new Preview(this.api, `${this.place}/tiles/${this.card.id}`, this.canvas, heard);
+    this.shown = h("div.preview", this.live.root);
+    this.noted = h("ul.notice", { hidden: true });
     this.size = trueSize(this.card, this.rectangles);
     this.real = section("panel real", "true", "In its true size", this.size.root);
-    this.wishes = h("div", { class: "stack" });
-    this.shared = share(this.api, this.project, this.card, () => ({
-      look: this.look,
-      palette: paletteOf(this.look, this.about),
-      skins: (tiling, scale) => this.skins(tiling, scale),
-    }));
+    this.wishes = h("div.stack");
     /** @type {[string, string, any][]} */
     const choices = Object.entries(THINGS).map(([key, { title, image }]) => [key, title, image]);
-    const things = choice(
-      "What shall it be?",
-      choices,
-      this.kept.thing,
-      (thing) => trying(() => this.choose(thing)),
-    );
-    put(
-      root,
+    const choose = (thing) => trying(() => this.choose(thing));
+    const things = choice("What shall it be?", choices, this.kept.thing, choose);
+    put(root, [
       h("h1", { tabindex: "-1" }, "Take it away"),
-      h(
-        "div",
-        { class: "take" },
-        h(
-          "div",
-          { class: "stack side" },
-          h(
-            "section",
-            { class: "panel stack wishes" },
-            things,
-            this.wishes,
-            h("div", { class: "go" }, this.making.make),
-          ),
-          this.shared.root,
-          section(
-            "panel whole",
-            "whole",
-            "The whole project",
+      h("div.take", [
+        h("div.stack.side", [
+          h("section.panel.stack.wishes", things, this.wishes, h("div.go", this.making.make)),
+          share(this.api, this.project, this.card),
+          section("panel whole", "whole", "The whole project", [
             aside("One file with the picture and all tiles. It opens again here, and from Python."),
-            h(
-              "a",
-              { class: "button", href: `api/${this.place}/file`, download: true },
+            h("a.button", { href: `api/${this.place}/file`, download: true }, [
               icon("download"),
               "Save the project",
-            ),
-          ),
-        ),
+            ]),
+          ]),
+        ]),
         stack(this.shown, this.noted, this.making.said, this.real),
-      ),
+      ]),
       this.making.earlier,
-    );
-    this.listen();
+    ]);
   }
 
-  listen() {
-    this.watch = new ResizeObserver(() => this.paint());
-    this.watch.observe(this.shown);
-    const tell = () => this.making.tell();
-    const gone = ({ tile }) => {
-      if (tile === this.card.id) this.navigate(`p/${this.project.id}`);
-    };
-    this.off = [["task", tell], ["refresh", tell], ["gone", gone]].map(([kind, heard]) =>
-      this.events.on(kind, heard)
-    );
-  }
-
-  close() {
-    this.off.forEach((stop) => stop());
-    this.watch.disconnect();
-    this.live.close();
-    this.shared.close();
+  /** @param {Page} page */
+  listen({ events, navigate, signal }) {
+    new ResizeObserver(() => this.paint()).observe(this.shown);
+    events.on("task refresh", () => this.making.tell(), signal);
+    const gone = ({ tile }) => tile === this.card.id && navigate(`p/${this.project.id}`);
+    events.on("gone", gone, signal);
+    signal.addEventListener("abort", () => this.live.close());
   }
 
   /** What the preview has to say. */
@@ -182,16 +137,11 @@ class TakeawayPage {
   skins(tiling, scale) {
     const { look, pictures, project, view } = this;
     const figures = figuresOf(view);
-    const isDrawn = this.layer("drawing")?.checked ?? look.drawn;
+    const isDrawn = this.layers.drawing?.is() ?? look.drawn;
     const marks = isDrawn &&
       marksOf(project.view?.drawing, figures.map((own) => new Carry(own)), tiling);
     const how = { look, palette: paletteOf(look, this.about), pictures, marks };
     return skinsOf(project, figures, tiling.figures, how, scale);
-  }
-
-  /** The box that lays a drawing or picture on the tiles, if there is one. */
-  layer(name) {
-    return this.layers?.find((own) => own.name === name)?.box;
   }
 
   /** Show the settings of another thing. */
@@ -236,23 +186,22 @@ class TakeawayPage {
     this.form.querySelector("details").open = open;
     this.layers = this.laidOn(kind);
     this.suits = null;
-    put(
-      this.wishes,
-      this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)),
+    put(this.wishes, [
+      Object.values(this.layers),
       machine && profiles(this.api, this.form, this.kept.machines[thing] ??= {}),
       this.form,
       choice("Lengths in", [["mm", "mm"], ["in", "inches"]], unit(), (/** @type {any} */ own) => {
         showIn(own);
         trying(() => this.choose(thing));
       }),
-    );
+    ]);
     this.making.task = null;
     this.changed();
   }
 
   /** Say why this tile cannot be the thing that was chosen. */
   refuse(why) {
-    put(this.wishes, h("p", { class: "notice" }, why));
+    put(this.wishes, h("p.notice", why));
     this.making.make.hidden = this.real.hidden = true;
     this.making.task = null;
     this.making.change();
@@ -283,7 +232,7 @@ class TakeawayPage {
     return words;
   }
 
-  /** What can be laid on the tiles: {name, box, text} of each. */
+  /** What can be laid on the tiles, a box to tick for each that can. */
   laidOn(kind) {
     const two = Boolean(this.card.figures);
     const isDrawn = figuresOf(this.view).some((_, k) => {
@@ -294,28 +243,21 @@ class TakeawayPage {
       backdropOf(this.project, figure, k) &&
       PICTURES.includes((k ? this.project.second : this.project).input?.type)
     );
-    const layer = (name, text, checked) => ({
-      name,
-      text,
-      box: h("input", {
-        type: "checkbox",
-        checked,
-        onchange: ({ target }) => {
-          if (name === "picture" && this.suits) this.looks({ art: target.checked });
-          this.changed();
-        },
-      }),
-    });
-    return [
-      isDrawn && layer("drawing", "With what you drew on it", this.look.drawn),
-      pictures.length > 0 && layer(
-        "picture",
-        `With your ${two ? "pictures on the tiles" : "picture on each tile"}, in ${
-          two ? "their" : "its"
-        } own colours`,
-        this.look.art,
-      ),
-    ].filter((own) => own && ON[own.name].includes(kind));
+    const layer = (name, is, text, checked) => {
+      if (!is || !ON[name].includes(kind)) return null;
+      return check(text, checked, (on) => {
+        if (name === "picture" && this.suits) this.looks({ art: on });
+        this.changed();
+      });
+    };
+    const [which, whose] = two
+      ? ["pictures on the tiles", "their"]
+      : ["picture on each tile", "its"];
+    const words = `With your ${which}, in ${whose} own colours`;
+    return {
+      drawing: layer("drawing", isDrawn, "With what you drew on it", this.look.drawn),
+      picture: layer("picture", pictures.length > 0, words, this.look.art),
+    };
   }
 
   /** What is chosen here of the look holds everywhere. */
@@ -333,23 +275,20 @@ class TakeawayPage {
 
   /** The picture is laid on what shows its colours, as the look says; else if that is wished. */
   fitLayers() {
-    const [drawing, box] = [this.layer("drawing"), this.layer("picture")];
-    const may = (own, can) => {
-      own.disabled = own.parentElement.hidden = !can;
-    };
+    const { drawing, picture } = this.layers;
     const [purpose, format, kind] = ["purpose", "format", "kind"].map((name) =>
       this.form.now(name)
     );
     const plain = this.kind === "animate" && format === "svg"; // moves in plain colours
-    if (drawing) may(drawing, !plain && kind !== "cutter"); // which is open inside
+    if (drawing) drawing.hidden = plain || kind === "cutter"; // which is open inside
     const suits = !COLOURLESS.includes(purpose);
-    if (!box) return;
-    if (suits !== this.suits) box.checked = suits && this.look.art;
+    if (!picture) return;
+    if (suits !== this.suits) picture.set(suits && this.look.art);
     this.suits = suits;
     const turns = this.kind === "art" && format === "html";
     const holds = purpose !== "plotter" && !turns && !["dxf", "json"].includes(format);
-    const curves = this.project.input?.type === "svg" && !(turns && drawing?.checked);
-    may(box, !plain && (holds || curves));
+    const curves = this.project.input?.type === "svg" && !(turns && drawing?.is());
+    picture.hidden = plain || !(holds || curves);
   }
 
   /** Show the size at once; what was said or made before is past. */
@@ -367,10 +306,9 @@ class TakeawayPage {
 
   /** What is to be made, as the server takes it. */
   settings() {
-    const layers = this.layers.filter(({ box }) => box.checked && !box.disabled).map((
-      { name },
-    ) => [name, true]);
-    const chosen = { tile: this.card.id, ...Object.fromEntries(layers), ...this.form.values() };
+    const layers = Object.entries(this.layers).filter(([, box]) => box?.is() && !box.hidden);
+    const laid = Object.fromEntries(layers.map(([name]) => [name, true]));
+    const chosen = { tile: this.card.id, ...laid, ...this.form.values() };
     const isTinted = chosen.picture && [undefined, "none"].includes(this.form.now("cut"));
     return isTinted ? { ...chosen, tint: this.look.tint } : chosen;
   }

@@ -22,9 +22,9 @@ export class Preview {
     this.api = api;
     this.place = place;
     this.told = told;
-    this.says = h("p", { class: "soft small", "aria-live": "polite" });
+    this.says = h("p.soft.small", { "aria-live": "polite" });
     this.meanwhile = meanwhile;
-    this.image = h("div", { class: "live" }, meanwhile);
+    this.image = h("div.live", meanwhile);
     this.root = stack(this.image, this.says);
     this.wanted = "";
     /** @type {AbortController | null} */

@@ -1,6 +1,7 @@
 /** Machines with their materials: settings that are kept under a name, for all projects. */
 
-import { button, dialog, h, put, row, stack, trying, unique } from "../dom.js";
+import { labelled, select } from "../controls.js";
+import { button, entered, h, put, row, trying } from "../dom.js";
 
 /**
  * The choice of a profile for a form; `memory` keeps its name while the form's values are kept.
@@ -10,16 +11,12 @@ import { button, dialog, h, put, row, stack, trying, unique } from "../dom.js";
  * @param {{ profile?: string }} memory
  */
 export function profiles(api, form, memory) {
-  const id = unique("profile");
-  const list = h("select", { id, onchange: () => take(list.value) });
+  const list = select([], "", take);
   const drop = button("Forget it", () => change("remove", memory.profile), { kind: "quiet" });
-  const root = h(
-    "div",
-    { class: "field" },
-    h("label", { for: id, class: "label" }, "Machine and material"),
-    list,
+  const root = h("div.field", [
+    labelled("Machine and material", list),
     row(button("Keep these settings …", keep, { kind: "quiet" }), drop),
-  );
+  ]);
   /** @type {{ settings: string[], kept: Record<string, any>, name?: string }} */
   let told = { settings: [], kept: {} };
 
@@ -27,8 +24,8 @@ export function profiles(api, form, memory) {
     if (!(memory.profile in told.kept)) memory.profile = "";
     put(
       list,
-      h("option", { value: "" }, "None in particular"),
-      Object.keys(told.kept).map((name) => h("option", { value: name }, name)),
+      new Option("None in particular", ""),
+      Object.keys(told.kept).map((name) => new Option(name)),
     );
     list.value = memory.profile;
     drop.hidden = !memory.profile;
@@ -46,18 +43,9 @@ export function profiles(api, form, memory) {
       show();
     });
   async function keep() {
-    const box = h("input", {
-      type: "text",
-      maxlength: 80,
-      value: memory.profile,
-      "aria-label": "Name",
-    });
-    const name = await dialog("Keep machine and material", (close) =>
-      stack(
-        h("p", "Give them a name, such as “my K40, 3 mm birch”. The command line takes it, too."),
-        box,
-        h("footer", button("Keep", () => close(box.value.trim()), { kind: "primary" })),
-      ));
+    const name = await entered("Keep machine and material", "Keep", memory.profile, [
+      h("p", "Give them a name, such as “my K40, 3 mm birch”. The command line takes it, too."),
+    ]);
     const values = Object.entries(form.values()).filter(([own]) => told.settings.includes(own));
     if (name) await change("put", name, Object.fromEntries(values));
   }
