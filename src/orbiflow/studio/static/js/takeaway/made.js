@@ -67,7 +67,6 @@ function about({ operation, result }) {
     names[name]?.options?.[chosen[name] ?? facts[name]]
   );
   const length = lengthIn(chosen.tile_size ?? (KINDS[operation].solid && facts.tile_size));
-  const pixels = operation === "art" && `${facts.width} × ${facts.height} pixels`;
   const solid = operation === "solid" && facts.size &&
     `${facts.size.map(Math.round).join(" × ")} mm`;
   return [
@@ -75,7 +74,6 @@ function about({ operation, result }) {
     ...options,
     length && `tiles of ${measure(length)}`,
     chosen.area,
-    pixels,
     solid,
     made && ago(made),
   ].filter(Boolean).join(" · ");
