@@ -59,7 +59,7 @@ def document(name: str) -> str:
 
 FINE = (
     *("dots", "dash offset negative", "mask with a faint part that a filter makes white"),
-    *("bite without a page", "frame of the page"),
+    "bite without a page",
 )
 """Drawings with details that are read at more pixels."""
 

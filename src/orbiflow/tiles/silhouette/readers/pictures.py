@@ -9,6 +9,7 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -18,13 +19,16 @@ from orbiflow.settings import described, is_tensor
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
-from orbiflow.tiles.silhouette.readers.tracing import Level, middle_of_line, trace
+from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
 MIN_SIDE_OF_PHOTOGRAPH = 16
 MIN_TRANSPARENT = 0.005  # of the picture: less, such as rounded corners, cuts nothing out
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
+MAX_SOLID_SHARE = 0.1  # of the ink in thin lines: what of it has ink on all sides
+NOISE_FACTOR = 4.0  # times the usual deviation of the background
+FAINT_INK = 0.15  # of the usual ink: what is fainter is background beside thin lines
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {
     "alpha": ("what is not transparent", "what is transparent"),
@@ -74,12 +78,6 @@ def _traced(
     if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
     level, notes = choose_shape(path, picture, threshold, invert)
-    is_given = threshold is not None or picture.name == "photograph"
-    if (drawn := middle_of_line(level, is_given=is_given)) is not None:
-        level, width = drawn[0], drawn[1] * picture.reduced
-        notes.append(
-            f"an outline drawing: took the middle of its line, which is {width:.2g} pixels wide"
-        )
     outline, seen, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     notes = (*picture.notes, *notes, *traced)
     return Reading(outline, True, "image", picture.size, notes, seen=seen)
@@ -183,9 +181,26 @@ def choose_shape(
         notes = [f"the shape is {part} (edge at {cut:.2f}{suffix})"]
     else:
         take_high, notes = _polarity(above, invert, f"edge at {cut:.2f}{suffix}")
-    if take_high:
-        return Level(channel, cut, float(high)), notes
-    return Level(1 - channel, 1 - cut, 1 - float(low)), notes
+    level = (
+        Level(channel, cut, float(high))
+        if take_high
+        else Level(1 - channel, 1 - cut, 1 - float(low))
+    )
+    return (_with_whole_lines(level) if threshold is None else level), notes
+
+
+def _with_whole_lines(level: Level) -> Level:
+    """Return the level of a drawing in thin lines cut near its background, so that none breaks.
+
+    An anti-aliased line of a pixel is no darker than half of its ink where it lies between two.
+    """
+    ink = level.values > level.cut
+    if scipy.ndimage.binary_erosion(ink).sum() > MAX_SOLID_SHARE * ink.sum():
+        return level
+    ground = level.values[~ink]
+    background = float(np.median(ground))
+    noise = NOISE_FACTOR * float(np.median(abs(ground - background)))
+    return replace(level, cut=background + max(FAINT_INK * (level.inside - background), noise))
 
 
 def _cut(path: Source, picture: ImageChannel) -> float:

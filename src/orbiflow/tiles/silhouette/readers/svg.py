@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from copy import deepcopy
 from xml.etree.ElementTree import Element
 
@@ -60,9 +60,6 @@ MIN_EDGE_SHARE = 0.5
 
 EDGE_SHARE = 0.02
 """Of the page's longer side: a background may end so far from the edge."""
-
-MAX_STRIPS = 60
-"""The most of the lowest shapes that are looked at one by one."""
 
 MIN_VISIBLE = 0.5
 """Opacity: what is less opaque is not seen."""
@@ -125,9 +122,9 @@ def read_svg(path: Source) -> Reading:
         raise InputFileError(f"{path}: the drawing has no shape that encloses an area{left}")
     paper = None
     if drawing.window is not None and root is None:
-        root, paper, said = _without_background(drawing, drawing.window)
-        notes += said
-        if root is not None:
+        bare = _without_background(drawing, drawing.window)
+        if bare is not None:
+            root, paper, notes = bare
             box = _bounds(drawing, root) or box
     window = _framed(box, drawing.window)
     size = picture_size(window, LONG_PIXELS)
@@ -241,50 +238,24 @@ def _all_filled(drawing: Drawing) -> Element:
 
 def _without_background(
     drawing: Drawing, page: Window
-) -> tuple[Element | None, NDArray[np.uint8] | None, list[str]]:
-    """Return the document without the lowest shapes that pave the page, their colour, and a note.
+) -> tuple[Element, NDArray[np.uint8], list[str]] | None:
+    """Return the document without its lowest shape, the shape's colour, and a note.
 
-    They are as few of the lowest as pave it, and rectangles on these that reach from edge to edge;
-    something of another colour is left on them.
+    None is of one whose lowest shape does not cover the page, or has nothing of another colour on it.
     """
     size = picture_size(page, SMALL_PIXELS)
     whole = drawing.document.root
-    if not _is_paved(drawing.pixels(page, size)):
-        return None, None, []
-
-    def shown(kept: Collection[int]) -> Rgba:
-        return drawing.pixels(page, size, only(whole, kept))
-
-    count = len(list(leaves(whole)))
-    frames = {k for k in range(min(count, MAX_STRIPS)) if _is_frame(shown({k}))}
-    others = [k for k in range(count) if k not in frames]
-    ground, most = shown(range(0)), 0
-    if _is_paved(shown(others)):
-        least, most = 0, len(others)  # that leave the page bare, and that pave it
-        while most - least > 1:
-            middle = (least + most) // 2
-            is_enough = _is_paved(shown(others[:middle]))
-            least, most = (least, middle) if is_enough else (middle, most)
-        ground = shown(others[:most])
-        while most < min(len(others) - 1, MAX_STRIPS) and _is_strip(shown({others[most]}), ground):
-            most += 1
-    number = most + len(frames)
-    left = shown(others[most:])
-    solid = ground[ground[..., 3] > 127][:, :3]
-    shades, counts = np.unique(solid, axis=0, return_counts=True)
-    paper = shades[counts.argmax()] if len(shades) else WHITE
-    apart = np.abs(left[..., :3].astype(np.int16) - paper).max(axis=-1) > MAX_CHANNEL_DISTANCE
-    if not number or not (apart & (left[..., 3] > 127)).any():
-        return None, None, []
-    noun = "a background" if number == 1 else f"{number} shapes of a background"
-    note = f"left out {noun} that cover{'s' * (number == 1)} the whole drawing"
-    return only(whole, others[most:]), paper if len(shades) else None, [note]
-
-
-def _is_frame(pixels: Rgba) -> bool:
-    """Whether what is seen is a line around the page, with nothing in it."""
-    opaque = visible(pixels) >= MIN_VISIBLE
-    return bool(_is_paved(pixels) and opaque.mean() < 1 - PAVED_SHARE / 2)
+    above = range(1, len(list(leaves(whole))))
+    lowest = drawing.pixels(page, size, only(whole, {0}))
+    if not above or not _is_paved(lowest):
+        return None
+    shades, counts = np.unique(lowest[lowest[..., 3] > 127][:, :3], axis=0, return_counts=True)
+    paper, root = shades[counts.argmax()], only(whole, above)
+    others = drawing.pixels(page, size, root)
+    apart = np.abs(others[..., :3].astype(np.int16) - paper).max(axis=-1) > MAX_CHANNEL_DISTANCE
+    if not (apart & (others[..., 3] > 127)).any():
+        return None
+    return root, paper, ["left out a background that covers the whole drawing"]
 
 
 def _is_paved(pixels: Rgba) -> bool:
@@ -298,19 +269,6 @@ def _is_paved(pixels: Rgba) -> bool:
     ]
     solid = scipy.ndimage.binary_fill_holes(opaque)
     return bool(np.mean(solid) >= PAVED_SHARE and max(shares) >= MIN_EDGE_SHARE)
-
-
-def _is_strip(pixels: Rgba, ground: Rgba) -> bool:
-    """Whether rectangles are seen that reach from one edge of the page to the other, or lie beside."""
-    opaque = visible(pixels) >= MIN_VISIBLE
-    labels = scipy.ndimage.label(opaque)[0]
-    boxes = scipy.ndimage.find_objects(labels)
-    if not boxes or sum(opaque[box].size for box in boxes) * PAVED_SHARE > opaque.sum():
-        return False
-    if (opaque & (visible(ground) >= MIN_VISIBLE)).sum() <= MIN_NOTED_SHARE * opaque.sum():
-        return True
-    ends = opaque[[0, -1]].any(axis=1), opaque[:, [0, -1]].any(axis=0)
-    return any(bool(both.all()) for both in ends)
 
 
 def _shares(

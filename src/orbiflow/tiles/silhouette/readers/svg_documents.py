@@ -112,8 +112,10 @@ class Document:
                 element.set(key, self._within(text))
             elif key in LENGTHS and (size := _LENGTH.fullmatch(text)) and size[2].lower() in _RARE:
                 element.set(key, f"{float(size[1]) * _PIXELS[size[2].lower()]:.9g}")
-        if "pathLength" in element.attrib:
-            self._scale_dashes(element)
+        if element.attrib.pop("pathLength", None) is not None:
+            self.notes.add("drew whole what has dashes of a declared length (pathLength)")
+            style = properties(element) | {"stroke-dasharray": "none"}
+            element.set("style", text_of(style))
         if link is not None and element.tag != "a":
             link = link.strip()
             if link.startswith("#") or (
@@ -153,24 +155,6 @@ class Document:
         except (binascii.Error, ValueError):
             return False
         return True
-
-    def _scale_dashes(self, element: Element) -> None:
-        """Write the dashes of a shape of a declared length in user units, as renderers read them."""
-        declared = _number(element.attrib.pop("pathLength"))
-        style = properties(element)
-        dashes = style.get("stroke-dasharray", element.get("stroke-dasharray", "none"))
-        if declared <= 0 or dashes == "none":
-            return
-        length = 2 * math.pi * _number(element.get("r", "0"))
-        if element.tag == "path":
-            length = 0.0  # of a path that is damaged
-            with contextlib.suppress(*_DAMAGED):
-                length = svgelements.Path(element.get("d", "")).length(error=1e-5)
-        offset = style.get("stroke-dashoffset", element.get("stroke-dashoffset", "0"))
-        for key, text in {"stroke-dasharray": dashes, "stroke-dashoffset": offset}.items():
-            numbers = [_number(word) * length / declared for word in text.replace(",", " ").split()]
-            style[key] = " ".join(f"{number:.9g}" for number in numbers)
-        element.set("style", text_of(style))
 
     def _check_work(self) -> None:
         """Refuse a drawing whose references multiply its elements, or lead in a circle."""
