@@ -2,8 +2,8 @@
 
 - A goal polygon of Nagata and Imahori (`.dat`): a line `n`, then n lines `x y`, with y down. Source of
   the format: https://github.com/nagata-yuichi/EscherTiling.
-- Points in two columns, or in the two that a header names, with y up. In a `.dat` file a title may
-  stand above them, as in aerofoils of Selig's format.
+- Points in two columns, or in those that a header names x and y, or lon and lat, with y up. In a `.dat`
+  file a title may stand above them, as in aerofoils of Selig's format.
 - JSON: a list of [x, y], or one under "polygon", with y up unless the file says `"y_down": true`.
 - GeoJSON and WKT, as GEOS reads them: the largest polygon, with y up.
 """
@@ -11,7 +11,6 @@
 import json
 import re
 from collections.abc import Sequence
-from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,19 +27,15 @@ from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, r
 MAX_BYTES = 16 * 2**20
 MAX_PARTS = 10_000
 MAX_WIDENING = 1.1  # more than so much wider than on the ground, a shape gets a note
-MIN_PART_ROWS = 3  # on average: then equal values of a column may distinguish parts
 POLYGON_KEYS = ("polygon", "outline", "tile")
 """What a list of vertices stands under; of several, the first is taken."""
 
-COLUMNS = {
-    **dict.fromkeys(("x", "lon", "lng", "long", "longitude", "easting", "east"), "x"),
-    **dict.fromkeys(("y", "lat", "latitude", "northing", "north"), "y"),
-}
-DEGREES = frozenset(("lon", "lng", "long", "longitude", "lat", "latitude"))
+HEADERS = ("x", "y"), ("lon", "lat"), ("longitude", "latitude")
+"""The columns of points; the last two are in degrees."""
+
 UP = 'took y to point up; if it points down, write {"outline": [...], "y_down": true}'
 _KEYS = ", ".join(f'"{key}"' for key in POLYGON_KEYS)
-_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf")
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")  # of "pickup_longitude" and "decimalLatitude"
+_SEPARATOR = re.compile(r"\s*[;,\t]\s*|\s+")
 
 
 class TextLine(NamedTuple):
@@ -56,27 +51,16 @@ class TextLine(NamedTuple):
 
     @property
     def cells(self) -> list[str]:
-        """The cells, between semicolons, tabs, commas or blanks: the first of these that it has.
-
-        Where blanks part them, every number may have a decimal comma.
-        """
-        words = self.text.split()
-        for separator in (";", "\t"):
-            if separator in self.text:
-                return [c.strip(' "') for c in self.text.strip().rstrip(separator).split(separator)]
-        if "," not in self.text or (
-            len(words) > 1 and all(re.fullmatch(r"[+-]?\d+,\d+", word) for word in words)
-        ):
-            return words
-        return [cell.strip(' "') for cell in self.text.strip().rstrip(",").split(",")]
+        """The cells, between semicolons, tabs, commas or blanks."""
+        return [cell.strip('"') for cell in _SEPARATOR.split(self.text.strip().rstrip(";,"))]
 
     def values(self, columns: Sequence[int] = ()) -> list[float]:
         """The numbers in some of the cells, by default in all; none if one of them is no number."""
         cells = self.cells
-        kept = [cells[k] for k in columns if k < len(cells)] if columns else cells
-        plain = [cell.replace("\u2212", "-") for cell in kept]
-        are_numbers = all(map(_NUMBER.fullmatch, plain)) and len(kept) >= len(columns)
-        return [float(cell.replace(",", ".")) for cell in plain] if are_numbers else []
+        try:
+            return [float(cells[k]) for k in columns or range(len(cells))]
+        except (ValueError, IndexError):
+            return []
 
     def refused(self, path: Source, reason: str) -> InputFileError:
         """Return the error for a line that does not fit."""
@@ -94,11 +78,12 @@ def read_points(path: Source) -> Reading:
         return _counted(path, int(first.text.strip()[:9]), first, rest)
     if len(first.values()) == 2:
         return _columns(path, lines, (0, 1), degrees=False, notes=["took y to point up"])
-    words = [{word.lower() for word in _WORD.findall(cell)} for cell in first.cells]
-    axes = [{COLUMNS[word] for word in cell if word in COLUMNS} for cell in words]
-    named = {axis: [k for k, cell in enumerate(axes) if axis in cell] for axis in "xy"}
-    if all(named.values()) and rest and len(rest[0].cells) == len(first.cells):
-        return _table(path, first, rest, named, words)
+    header = [cell.lower() for cell in first.cells]
+    for x, y in HEADERS:
+        if x in header and y in header and rest:
+            notes = [f"took {x} for x and {y} for y, which points up"]
+            places, degrees = (header.index(x), header.index(y)), x != "x"
+            return _columns(path, rest, places, degrees=degrees, notes=notes)
     if path.suffix.lower() == ".dat" and rest and len(rest[0].values()) == 2:
         notes = [
             f"took line {first.number} for a title: {quoted(first.text)}",
@@ -107,8 +92,8 @@ def read_points(path: Source) -> Reading:
         return _columns(path, rest, (0, 1), degrees=False, notes=notes)
     raise first.refused(
         path,
-        "is not a vertex (two numbers, `x y`), a number of vertices, nor a header that names columns, "
-        "two of them x and y; give a polygon, or a picture (PNG, JPEG, WebP or SVG)",
+        "is not a vertex (two numbers, `x y`), a number of vertices, nor a header that names columns x "
+        "and y, or lon and lat; give a polygon, or a picture (PNG, JPEG, WebP or SVG)",
     )
 
 
@@ -140,8 +125,6 @@ def _counted(path: Source, count: int, first: TextLine, rest: list[TextLine]) ->
         raise first.refused(path, f"vertices cannot be read, but 3 to {MAX_VERTICES}")
     extra = rest[count:]
     also = len([line for line in extra if len(line.values()) == 2])
-    if also == 1 and extra[0].values() == rest[0].values():  # the ring is closed
-        extra, also = extra[1:], 0
     if also or len(rest) < count:
         raise first.refused(
             path,
@@ -152,31 +135,6 @@ def _counted(path: Source, count: int, first: TextLine, rest: list[TextLine]) ->
     notes = [f"{left} (line {extra[0].number} on)"] if extra else []
     points = [_vertex(path, line, (0, 1)) for line in rest[:count]]
     return read_rings(path, [points], "dat", y_down=True, notes=notes)
-
-
-def _table(
-    path: Source,
-    first: TextLine,
-    rest: list[TextLine],
-    named: dict[str, list[int]],
-    words: list[set[str]],
-) -> Reading:
-    """Read the columns x and y, or longitude and latitude, that a header names."""
-    if len(named["x"]) > 1 or len(named["y"]) > 1:
-        raise first.refused(path, "names several columns of x or of y; keep one of each")
-    places = named["x"][0], named["y"][0]
-    x, y = (quoted(first.cells[k]) for k in places)
-    rows = [line.cells for line in rest]
-    for k in set(range(len(words))) - {*places}:
-        labels = [value for value, _ in groupby(row[k] if k < len(row) else "" for row in rows)]
-        if 1 < len(labels) <= len(rows) / MIN_PART_ROWS:
-            raise InputFileError(
-                f"{path}: {quoted(first.cells[k])} has {len({*labels})} values, each in several rows, "
-                "as where there are several outlines; save the rows of one, or leave out that column"
-            )
-    degrees = all(words[k] & DEGREES for k in places)
-    notes = [f"took {x} for x and {y} for y, which points up"]
-    return _columns(path, rest, places, degrees=degrees, notes=notes)
 
 
 def _columns(
@@ -293,14 +251,9 @@ def read_rings(
     """Return the largest part of what rings of pairs make together, with notes.
 
     `degrees` says whether the pairs are longitudes and latitudes. Raises `InputFileError` for what is
-    no ring, and for one around a pole.
+    no ring.
     """
     every_note = list(notes)
-    if degrees:
-        unwrapped = [_unwrapped(path, np.asarray(ring, dtype=float)) for ring in rings]
-        is_cut = any((new != old).any() for new, old in zip(unwrapped, rings, strict=True))
-        every_note += ["joined the shape where its longitudes jump by 360 degrees"] * is_cut
-        rings = unwrapped
     cleaned = [clean_ring(ring, str(path), InputFileError) for ring in rings]
     outline, seen = cleaned[0][0], None
     every_note += [note for _, dropped in cleaned for note in dropped]
@@ -312,16 +265,6 @@ def read_rings(
         every_note += kept
     every_note += _widened(outline) if degrees else []
     return Reading(outline, y_down, kind, None, tuple(dict.fromkeys(every_note)), seen=seen)
-
-
-def _unwrapped(path: Source, ring: Array) -> Array:
-    """Return a ring of longitudes and latitudes (N, 2) without jumps at the date line."""
-    longitudes = np.unwrap(ring[:, 0], period=360.0)
-    if abs(longitudes[-1] - longitudes[0]) > 180:
-        raise InputFileError(
-            f"{path}: the ring goes around a pole or all around the globe: project it to a map first"
-        )
-    return np.stack([longitudes, ring[:, 1]], axis=1)
 
 
 def _widened(ring: Array) -> list[str]:
