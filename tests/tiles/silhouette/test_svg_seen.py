@@ -147,30 +147,12 @@ DISC = '<circle cx="50" cy="50" r="30" {}/>'
 
 
 def test_a_page_with_a_hole_is_the_shape_and_said() -> None:
-    for hole, is_said in ((FISH.split('"')[1], True), ("M40 40H50V50H40z", False)):
-        reading = read(f'<path fill-rule="evenodd" d="M0 0H100V100H0z{hole}"/>')
-        said = [note for note in reading.notes if "hole" in note and "invert" in note]
-        assert bool(said) is is_said
-        assert shapely.Polygon(reading.outline).area == pytest.approx(1e4, rel=1e-3)
+    reading = read(f'<path fill-rule="evenodd" d="M0 0H100V100H0z{FISH.split(chr(34))[1]}"/>')
+    assert any("invert" in doubt for doubt in doubts(Target(**vars(reading))))
+    assert shapely.Polygon(reading.outline).area == pytest.approx(1e4, rel=1e-3)
 
 
 INNER = FISH + ' transform="translate(18 18) scale(.65)" fill="{}"/>'
-
-
-@pytest.mark.parametrize(
-    ("drawn", "is_said"),
-    [
-        (INNER.format("#fd0"), True),
-        (INNER.format("#fff"), True),
-        (INNER.format("#028"), False),
-        ('<circle cx="40" cy="40" r="6" fill="#fd0"/>', False),
-        ("", False),
-    ],
-)
-def test_a_badge_is_the_shape_and_said(drawn: str, is_said: bool) -> None:
-    reading = read('<circle cx="50" cy="50" r="48" fill="#028"/>' + drawn)
-    assert any("disc with a drawing" in note for note in reading.notes) is is_said
-    assert shapely.Polygon(reading.outline).area == pytest.approx(np.pi * 48**2, rel=3e-3)
 
 
 CARD = '<rect x="{0}" y="{0}" width="{1}" height="{1}" rx="{2}" fill="#28c"/>'

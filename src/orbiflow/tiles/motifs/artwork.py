@@ -6,7 +6,7 @@ import io
 import math
 from itertools import pairwise
 from typing import Literal, Protocol
-from xml.etree.ElementTree import tostring
+from xml.etree.ElementTree import Element, tostring
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -24,6 +24,9 @@ from orbiflow.tiles.silhouette import Covered, Drawing, FileContent, Rgba, pictu
 
 MOST_POINTS = 200_000
 """The most points of all curves of a drawing, flattened."""
+
+MOST_ELEMENTS = 20_000
+"""The most elements of a drawing that are read as paths, those drawn again counted again."""
 
 FARTHEST = 1e6
 """The greatest reach of a drawing, in sizes of the silhouette."""
@@ -49,7 +52,10 @@ _CURRENT = "#010203"
 _PEN = ("stroke-linecap", "stroke-linejoin", "stroke-miterlimit")
 _CAPS: dict[str, Literal["round", "square"]] = {"round": "round", "square": "square"}
 _JOINS: dict[str, Literal["round", "bevel"]] = {"round": "round", "bevel": "bevel"}
-_DAMAGED = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
+_DAMAGED = (
+    *(ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError),
+    RecursionError,  # of references in a circle
+)
 
 
 class Carry(Protocol):
@@ -146,6 +152,8 @@ def _painted(drawing: Drawing, carry: Carry) -> list[_Painted] | None:
     before = dict(root.attrib)
     root.attrib.update(page, xmlns="http://www.w3.org/2000/svg", preserveAspectRatio="none")
     try:
+        if _count(root) > MOST_ELEMENTS:
+            return None
         text = tostring(root, encoding="unicode")
         tree = svgelements.SVG.parse(io.StringIO(text), reify=True, ppi=96, color=_CURRENT)
         shapes = [element for element in tree.elements() if isinstance(element, svgelements.Shape)]
@@ -168,6 +176,22 @@ def _painted(drawing: Drawing, carry: Carry) -> list[_Painted] | None:
     finally:
         root.attrib.clear()
         root.attrib.update(before)
+
+
+def _count(root: Element) -> int:
+    """Return how many elements are drawn, those that others use counted for each use."""
+    by_id = {item.get("id"): item for item in root.iter()}
+    counts: dict[Element, int] = {}
+
+    def count(element: Element) -> int:
+        if element not in counts:
+            counts[element] = 0  # until it is known: one in a circle draws nothing
+            used = by_id.get(element.get("href", "")[1:]) if element.tag == "use" else None
+            children = [*element] if used is None else [*element, used]
+            counts[element] = 1 + sum(map(count, children))
+        return counts[element]
+
+    return count(root)
 
 
 def _paints(shape: svgelements.Shape, lines: list[_Line], carry: Carry) -> list[_Painted]:

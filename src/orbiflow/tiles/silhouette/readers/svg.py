@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array, Window
 from orbiflow.drawing import level_curves
-from orbiflow.errors import Advice, InputFileError
+from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.outlines import (
     MAX_COORDINATE,
     clean_ring,
@@ -80,15 +80,6 @@ MAX_CURVE_POINTS = 300_000
 """The most points of the curves around what is seen."""
 
 MIN_NOTED_SHARE = 0.001
-MIN_HOLE_SHARE = 0.1
-"""Of what fills the page: what is cut out of it is larger."""
-
-DISC_AREA_TOLERANCE = 0.01
-"""Of its box: how nearly a disc has the area of one."""
-
-MIN_BADGE_SHARE = 0.25
-"""Of a disc: what is drawn on it is as wide or as high, and more than an eye or a spot."""
-
 WHITE = np.array([255, 255, 255], dtype=np.uint8)
 _Mask = NDArray[np.bool_]
 _AROUND = np.ones((3, 3), dtype=bool)
@@ -146,7 +137,7 @@ def read_svg(path: Source) -> Reading:
         raise InputFileError(f"{path}: the drawing encloses no area that shows at its size")
     shape, kept = outer_outline(seen)
     outline, cleaned = clean_ring(outer_ring(shape), str(path), InputFileError)
-    notes += [*said, *_doubts(drawing, shape, seen, pixels)]
+    notes += said
     if drawing.window is not None and (share := _share_beyond(drawing, root)) > MIN_NOTED_SHARE:
         notes.append(f"left out what lies beyond the page: {percent(share)} of what is painted")
     notes += [*drawing.notes(), *kept, *cleaned]
@@ -324,45 +315,6 @@ def _solid(mask: _Mask) -> int:
     """Return the pixels of the largest component of a mask with its holes filled."""
     labels = scipy.ndimage.label(scipy.ndimage.binary_fill_holes(mask))[0]
     return int(np.bincount(np.ravel(labels))[1:].max(initial=0))
-
-
-def _doubts(
-    drawing: Drawing, whole: shapely.Polygon, seen: BaseGeometry, pixels: Rgba
-) -> list[str]:
-    """Return notes on a shape that is all but the page, or a disc."""
-    page = None if drawing.box is None else shapely.box(*drawing.box)
-    shades = pixels[visible(pixels) > 0.9][:, :3] // (2 * MAX_CHANNEL_DISTANCE)
-    has_colours = len(shades) > 0 and bool((np.ptp(shades, axis=0) > 1).any())
-    if page is not None and whole.area >= PAVED_SHARE * page.area:
-        all_but = "the silhouette is all but the whole page"
-        if has_colours:
-            return [f"{all_but}; if that is a background, delete it"]
-        if seen.area < (1 - MIN_HOLE_SHARE) * whole.area:
-            return [Advice(f"{all_but}; if the hole in it is the shape, change {{invert}}")]
-        return []
-    gap = DISC_AREA_TOLERANCE * whole.envelope.area
-    is_disc = abs(whole.area - math.pi / 4 * whole.envelope.area) < gap
-    if (
-        is_disc
-        and has_colours
-        and whole.convex_hull.area - whole.area < gap
-        and _is_drawn_on(pixels)
-    ):
-        return ["the silhouette is a disc with a drawing on it; if it is a background, delete it"]
-    return []
-
-
-def _is_drawn_on(pixels: Rgba) -> bool:
-    """Whether something of another colour than most is wide and high on what is opaque."""
-    opaque = visible(pixels) > 0.9
-    shades, counts = np.unique(pixels[opaque][:, :3], axis=0, return_counts=True)
-    usual = shades[counts.argmax()].astype(np.int16)
-    other = opaque & (np.abs(pixels[..., :3] - usual).max(axis=-1) > MAX_CHANNEL_DISTANCE)
-    other = scipy.ndimage.binary_opening(other, _AROUND)
-    sides = [np.ptp(np.flatnonzero(other.any(axis=axis))) if other.any() else 0 for axis in (0, 1)]
-    whole = [np.ptp(np.flatnonzero(opaque.any(axis=axis))) for axis in (0, 1)]
-    shares = [float(side) / float(most) for side, most in zip(sides, whole, strict=True)]
-    return min(shares) > MIN_BADGE_SHARE
 
 
 def _share_beyond(drawing: Drawing, root: Element | None) -> float:

@@ -22,10 +22,6 @@ from orbiflow.tiles.silhouette.readers.svg_styles import write_styles
 from orbiflow.tiles.silhouette.readers.svg_xml import HREF, Notes, is_own, parse_xml
 
 MAX_BYTES = 16 * 2**20
-MAX_DRAWN = 10_000  # elements, those drawn again by references counted again
-MAX_NESTED = 200  # elements in elements, and referred to by these
-MAX_FILTERS = 100  # steps of filters, counted again where they are used
-MAX_CHARACTERS = 20_000  # of texts
 PAGE_TOLERANCE = 1e-9  # of the page: what is seen of the plane is the page if it differs by less
 _PIXELS = {
     **{"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "in": 96.0, "em": 16.0, "rem": 16.0, "ex": 8.0},
@@ -43,7 +39,6 @@ _DROPPED = {**dict.fromkeys(_HTML, "a piece of HTML"), "script": "", "metadata":
 _EFFECT = "vector-effect"
 # what the library raises for texts that are damaged
 _DAMAGED = (ValueError, TypeError, IndexError, AttributeError, ArithmeticError)
-_POINTS = re.compile(r"[a-df-z]|[-+.\d]\d*", re.IGNORECASE)
 
 
 class Document:
@@ -55,7 +50,8 @@ class Document:
     - `window`: What of the plane is seen, which is wider than the page where its sides' ratio is not
       that of the size; None without a page.
 
-    Raises `InputFileError` for one that is damaged, too large, or would take too long.
+    Raises `InputFileError` for one that is damaged or too large. What references multiply is for the
+    renderer to refuse, which runs within bounds.
     """
 
     def __init__(self, path: Source) -> None:
@@ -65,7 +61,7 @@ class Document:
             self.notes.add("style sheets in other files are not read")
         write_styles(path, self.root, self.notes)
         self._make_safe(self.root)
-        self._check_work()
+        self._note_missing()
         self.box, self.window = self._page()
         if self.root.attrib.pop("transform", None):
             self.notes.add("the transform of <svg> is left out: put it on a group")
@@ -156,66 +152,16 @@ class Document:
             return False
         return True
 
-    def _check_work(self) -> None:
-        """Refuse a drawing whose references multiply its elements, or lead in a circle."""
-        by_id: dict[str, Element] = {}
+    def _note_missing(self) -> None:
+        """Note references to elements that are not there."""
+        names = {item.get("id") for item in self.root.iter()}
         for item in self.root.iter():
-            by_id.setdefault(item.get("id", ""), item)
-        by_id.pop("", None)
-        counts: dict[Element, tuple[int, int]] = {}
-        self._work(self.root, by_id, counts, set())
-        elements, filters = counts[self.root]
-        if elements > MAX_DRAWN:
-            raise InputFileError(
-                f"{self.path}: draws more than {MAX_DRAWN} elements; keep only the silhouette"
-            )
-        characters = sum(len("".join(item.itertext())) for item in self.root.iter("text"))
-        if filters > MAX_FILTERS or characters > MAX_CHARACTERS:
-            raise InputFileError(
-                f"{self.path}: has too many filters or too much text; draw the silhouette alone"
-            )
-
-    def _work(
-        self,
-        element: Element,
-        by_id: dict[str, Element],
-        counts: dict[Element, tuple[int, int]],
-        above: set[Element],
-    ) -> tuple[int, int]:
-        """Return how many elements and steps of filters are drawn for one."""
-        if element in counts:
-            return counts[element]
-        if element.tag in ("linearGradient", "radialGradient"):  # which draw nothing themselves
-            return 1, 0
-        if element in above or len(above) > MAX_NESTED:
-            how = "refer to each other in a circle" if element in above else "nest too deeply"
-            raise InputFileError(f"{self.path}: <{element.tag}> elements {how}")
-        above.add(element)
-        elements, filters = 1, int(element.tag.startswith("fe"))
-        for child in element:
-            more = self._work(child, by_id, counts, above)
-            if child.tag not in DEFINED:
-                elements, filters = elements + more[0], filters + more[1]
-        for name, times in self._references(element):
-            target = by_id.get(name, by_id.get(unquote(name)))
-            if target is None:
-                self.notes.add(f"<{element.tag}> refers to '#{name[:40]}', which is not there")
-            else:
-                more = self._work(target, by_id, counts, above)
-                elements, filters = elements + times * more[0], filters + times * more[1]
-        above.discard(element)
-        counts[element] = min(elements, 10**12), min(filters, 10**12)
-        return counts[element]
-
-    def _references(self, element: Element) -> Iterator[tuple[str, int]]:
-        """Yield the names to which an element refers, and how often each is drawn for it."""
-        if (link := element.get("href", "")).startswith("#") and element.tag != "a":
-            yield link[1:], 1
-        for key, text in element.items():
-            for reference in _URL.finditer(text) if "url" in text.lower() else ():
-                is_marker = "marker" in key or (key == "style" and "marker" in text)
-                points = element.get("d", element.get("points", ""))
-                yield reference["target"].strip()[1:], 1 + is_marker * len(_POINTS.findall(points))
+            links = [] if item.tag == "a" else [item.get("href", "")]
+            for text in item.attrib.values():
+                links += [match["target"].strip() for match in _URL.finditer(text)]
+            for name in (link[1:] for link in links if link.startswith("#")):
+                if not names & {name, unquote(name)}:
+                    self.notes.add(f"<{item.tag}> refers to '#{name[:40]}', which is not there")
 
     def _page(self) -> tuple[Window | None, Window | None]:
         """Return the page in user units, and the part of the plane that shows."""
@@ -318,8 +264,3 @@ LENGTHS = {"x", "y", "cx", "cy", "r", "rx", "ry", "width", "height", "stroke-wid
 
 DRAWN = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon", "use", "image", "text"}
 """Elements that draw by themselves."""
-DEFINED = {"defs", "symbol", "clipPath", "mask", "marker", "pattern", "filter"} | {
-    "linearGradient",
-    "radialGradient",
-}
-"""Elements that are drawn only where something refers to them."""
