@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import NamedTuple
 
 import torch
@@ -18,6 +18,7 @@ from orbiflow.density.models import (
     Mixture,
     PartialDensity,
     Split,
+    Weighted,
     kernels_for,
     mixture_of,
 )
@@ -136,8 +137,7 @@ def _restricted(
         say(0.5, "comparing")
         error = _spread(whole)
     elif left:
-        parts = [_Left(*entry) for entry in left]
-        whole, error = _refined(closed, parts, space, accuracy, say)
+        whole, error = _refined(closed, left, space, accuracy, say)
     else:
         whole = _mixture(closed)
     if error.usual > MOST_OFF:
@@ -177,42 +177,9 @@ ON_GRID = Error(1e-4, 1e-3)
 """What kernels on a grid may be off however fine the nodes are, which two levels have in common."""
 
 
-@dataclass
-class _Left:
-    """A component without a closed form: its log weight, how its angles are split, and kernels for it.
-
-    - `found`: Kernels with log weights, of the last of so many `levels`.
-    - `logs`: The log densities (N,) of these kernels at the points where levels are compared.
-    - `error`: The error of the whole that is its own: its change from the level before, undivided,
-      since two levels may be off in the same direction.
-    """
-
-    log: float
-    density: Density
-    split: Split
-    levels: int = 0
-    found: list[tuple[float, Density]] = field(default_factory=list[tuple[float, Density]])
-    logs: Tensor = field(default_factory=lambda: torch.zeros(0))
-    error: Error = field(default_factory=lambda: Error(math.inf, math.inf))
-
-    def refine(self, space: Space, tick: Callable[[], None]) -> list[tuple[float, Density]]:
-        """Find kernels of the next level, and return those of the level before."""
-        before = self.found
-        more = kernels_for(self.density, self.split, space, self.levels, tick)
-        self.found, self.levels = [(self.log + log, part) for log, part in more], self.levels + 1
-        return before
-
-    def compare(self, before: Tensor, now: Tensor) -> None:
-        """Measure the error from log densities (N,) of the level before, and of the whole."""
-        # what the whole would be with the old instead of the new
-        ratio = (before - now).exp() - (self.logs - now).exp()
-        change = ratio.clamp_min(-1 + 1e-12).log1p()
-        self.error = _error_of(change)
-
-
 def _refined(
-    closed: list[tuple[float, Density]],
-    left: list[_Left],
+    closed: list[Weighted],
+    left: list[tuple[float, Density, Split]],
     space: Space,
     accuracy: float,
     say: Progress,
@@ -220,40 +187,37 @@ def _refined(
     """Return kernels for what has no closed form, level by level until they settle, and their error.
 
     After two levels only the component with the largest error is refined again, until the errors are
-    small enough together. Changes are of the whole, at its own samples.
+    small enough together. Errors are changes of the whole, at its own samples, undivided, since two
+    levels may be off in the same direction.
     """
+    levels, errors = [-1] * len(left), [Error(math.inf, math.inf)] * len(left)
+    kernels: list[list[Weighted]] = [[] for _ in left]
 
-    def refine(piece: _Left) -> list[tuple[float, Density]]:
-        share = sum(each.levels for each in left) / (LEVELS * len(left))
-        return piece.refine(space, partial(say, share, f"integrating, level {piece.levels + 1}"))
+    def refine(number: int) -> None:
+        share = (sum(levels) + len(left)) / (LEVELS * len(left))
+        levels[number] += 1
+        tick = partial(say, share, f"integrating, level {levels[number] + 1}")
+        log, density, split = left[number]
+        more = kernels_for(density, split, space, levels[number], tick)
+        kernels[number] = [(log + log_of_kernels, part) for log_of_kernels, part in more]
 
     def whole() -> Mixture:
-        return _mixture([*closed, *(part for each in left for part in each.found)])
+        return _mixture([*closed, *chain(*kernels)])
 
-    def now() -> Tensor:
-        return torch.stack([logs_of_closed, *(each.logs for each in left)]).logsumexp(dim=0)
-
-    for piece in left:
-        refine(piece)
-    before = [refine(piece) for piece in left]
-    points = _checked_points(whole(), CHECKED)
-    logs_of_closed = (
-        _log_sum(closed, points) if closed else points.new_full((len(points),), -math.inf)
-    )
-    for piece in left:
-        piece.logs = _log_sum(piece.found, points)
-    for piece, old in zip(left, before, strict=True):
-        piece.compare(_log_sum(old, points), now())
-    while math.hypot(*(piece.error.usual for piece in left)) > accuracy:
-        coarse = [piece for piece in left if piece.levels < LEVELS]
+    for number in range(len(left)):
+        refine(number)
+    now = whole()
+    while math.hypot(*(error.usual for error in errors)) > accuracy:
+        coarse = [number for number, level in enumerate(levels) if level < LEVELS - 1]
         if not coarse:
             break
-        piece = max(coarse, key=lambda piece: piece.error.usual)
-        refine(piece)
-        old, piece.logs = piece.logs, _log_sum(piece.found, points)
-        piece.compare(old, now())
-    usual = math.hypot(*(piece.error.usual for piece in left), ON_GRID.usual)
-    return whole(), Error(usual, sum(piece.error.largest for piece in left) + ON_GRID.largest)
+        number, before = max(coarse, key=lambda number: errors[number].usual), now
+        refine(number)
+        now = whole()
+        points = _checked_points(now, CHECKED)
+        errors[number] = _error_of(before.log_prob(points) - now.log_prob(points))
+    usual = math.hypot(*(error.usual for error in errors), ON_GRID.usual)
+    return now, Error(usual, sum(error.largest for error in errors) + ON_GRID.largest)
 
 
 def _checked_points(density: Density, count: int) -> Tensor:
@@ -270,11 +234,7 @@ def _error_of(off: Tensor) -> Error:
     return Error(float(usual), float(off.abs().max()))
 
 
-def _log_sum(parts: list[tuple[float, Density]], points: Tensor) -> Tensor:
-    return torch.stack([log + part.log_prob(points) for log, part in parts]).logsumexp(dim=0)
-
-
-def _mixture(parts: list[tuple[float, Density]]) -> Mixture:
+def _mixture(parts: list[Weighted]) -> Mixture:
     logs = torch.tensor([log for log, _ in parts], dtype=torch.float64)
     weights: list[float] = listed(torch.softmax(logs, dim=0).clamp_min(LEAST_WEIGHT))
     densities = [part for _, part in parts]
