@@ -13,14 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.density.data import alongside
-from orbiflow.density.fitting.likelihood import (
-    Budget,
-    HopelessAt,
-    Refinement,
-    merged,
-    refine,
-    training,
-)
+from orbiflow.density.fitting.likelihood import HopelessAt, Refinement, merged, refine, training
 from orbiflow.density.fitting.report import (
     MASS_TOLERANCE,
     MOST_REPORTED,
@@ -73,7 +66,6 @@ def refine_in_stages(
     validation: Rows,
     settings: FlowSettings,
     say: Progress,
-    budget: Budget,
     outdone: Outdone | None = None,
 ) -> list[Refinement]:
     """Refine once for each roughness; the density's flow ends with the last one's parameters and steps.
@@ -92,10 +84,10 @@ def refine_in_stages(
     def hopeless(hope: float) -> bool:
         return outdone is not None and outdone(density, hope)
 
-    while len(stages) < count and not budget.is_spent:
+    while len(stages) < count and (left := settings.evaluations - spent_on(stages)) > 0:
         number = len(stages)
         stage = _stage(
-            density, train, held, settings, number, say, budget, None if number else hopeless
+            density, train, held, settings, number, say, left, None if number else hopeless
         )
         can_double = density.flow.steps < MOST_TRAINING_STEPS
         if stage is None and not can_double:
@@ -111,6 +103,11 @@ def refine_in_stages(
     return stages
 
 
+def spent_on(stages: Sequence[Refinement]) -> int:
+    """Return how many evaluations stages of refinement took."""
+    return sum(stage.evaluations for stage in stages)
+
+
 def _stage(
     density: FlowDensity,
     train: Rows,
@@ -118,7 +115,7 @@ def _stage(
     settings: FlowSettings,
     number: int,
     say: Progress,
-    budget: Budget,
+    evaluations: int,
     hopeless: HopelessAt | None,
 ) -> Refinement | None:
     """Refine at one roughness; undo what has only exploited the integrator, and return None."""
@@ -134,7 +131,7 @@ def _stage(
         held,
         iterations=settings.iterations,
         roughness=settings.roughness[number],
-        budget=budget,
+        evaluations=evaluations,
         watch=watch,
         hopeless=hopeless,
     )
@@ -198,8 +195,7 @@ def fit_density(
     say(0.0, "matching")
     density = _start(space, train, settings, generator)
     start_nll = mean_nll(density, validation.points.to(DTYPE), validation.weights)
-    budget = Budget(settings.evaluations)
-    stages = refine_in_stages(density, train, validation, settings, say, budget, outdone)
+    stages = refine_in_stages(density, train, validation, settings, say, outdone)
     density.flow.double()
     error, mass = settle(density, validation.points[:MOST_HELD], MOST_STEPS)
     notes = [*weights_note(rows)]
@@ -208,7 +204,9 @@ def fit_density(
             f"{duplicates} of {len(rows)} points repeat another: they count as often as they come, and "
             "equal points were kept on the same side of the validation split"
         )
-    notes += [*budget.notes(), *steps_note(density.flow.steps, error)]
+    if spent_on(stages) >= settings.evaluations:
+        notes.append(f"stopped by the budget of {settings.evaluations} evaluations")
+    notes += steps_note(density.flow.steps, error)
     if mass is not None and abs(mass - 1) > MASS_TOLERANCE:
         notes.append(f"the density integrates to {mass:.4f} over the {space.name}, not to 1")
     train_nll, validation_nll = (

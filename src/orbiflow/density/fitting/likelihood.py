@@ -33,7 +33,7 @@ MAX_IDLE_ITERATIONS = 12
 """Iterations without a better validation score after which refinement ends."""
 
 MOST_EVALUATIONS = 10**9
-"""For SciPy, whose own bound is 15,000: `Budget` counts them."""
+"""The most evaluations of a descent that has no other bound; SciPy's own is 15,000."""
 
 Watch = Callable[[int, float, float], None]
 """A function called with the iteration and the training and validation scores, in nats."""
@@ -55,7 +55,7 @@ class Refinement:
     - `best`: The entry whose parameters were kept.
     - `stopped`: What ended it: "iterations", "validation", "converged", "outdone" or
       "evaluations".
-    - `seconds`: The time that it took.
+    - `seconds`, `evaluations`: The time and the evaluations that it took.
     """
 
     train: tuple[float, ...]
@@ -63,6 +63,7 @@ class Refinement:
     best: int
     stopped: str
     seconds: float
+    evaluations: int = 0
 
 
 class Stop(Exception):
@@ -90,7 +91,7 @@ class Objective:
         for field in self.fields:  # of each coefficient's square, (P,)
             magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
             self._weights.append(roughness * magnitude ** (2 * ROUGHNESS_ORDER))
-        self.last = math.inf
+        self.last, self.evaluations = math.inf, 0
 
     def get(self) -> Array:
         """Return all parameters, flat."""
@@ -114,6 +115,7 @@ class Objective:
 
     def __call__(self, values: Array) -> tuple[float, Array]:
         """Return loss and gradient, or a barrier where the density is not finite."""
+        self.evaluations += 1
         self.set(values)
         nll = _nll(self.density, self.rows)
         loss = nll + self.roughness()
@@ -140,7 +142,7 @@ def refine(
     *,
     iterations: int,
     roughness: float = 0.0,
-    budget: Budget | None = None,
+    evaluations: int = MOST_EVALUATIONS,
     watch: Watch | None = None,
     hopeless: HopelessAt | None = None,
 ) -> Refinement:
@@ -148,30 +150,25 @@ def refine(
 
     Canonical points (N, d) are in the parameters' dtype; weights, if there are any, have the sum 1. It
     ends after `iterations`, or `MAX_IDLE_ITERATIONS` of them that do not improve the held-out score, or
-    when the `budget` is spent, or where `HOPED_GAINS` ask if it is `hopeless`, which may look at the
-    density. `watch` is called with every score.
+    after the one in which so many `evaluations` are reached, or where `HOPED_GAINS` ask if it is
+    `hopeless`, which may look at the density. `watch` is called with every score.
     """
-    budget = budget or Budget()
     began = time.monotonic()
     objective = Objective(density, train, roughness)
     descent = _Descent(objective, held, watch, iterations, hopeless)
-
-    def loss(values: Array) -> tuple[float, Array]:
-        budget.spend()
-        return objective(values)
 
     stopped = "iterations"
     try:
         if iterations:  # SciPy does one at least
             result = scipy.optimize.minimize(
-                loss,
+                objective,
                 objective.get(),
                 jac=True,
                 method="L-BFGS-B",
                 callback=descent.after,
                 options={
                     "maxiter": iterations,
-                    "maxfun": MOST_EVALUATIONS,
+                    "maxfun": evaluations,
                     "maxcor": 20,
                     "maxls": 20,
                     "ftol": 1e-9,
@@ -179,12 +176,15 @@ def refine(
                 },
             )
             if result.nit < iterations:
-                stopped = "converged"
+                stopped = "evaluations" if result.nfev >= evaluations else "converged"
     except Stop as stop:
         stopped = stop.reason
     descent.finish()
     spent = time.monotonic() - began
-    return Refinement(tuple(descent.trains), tuple(descent.scores), descent.best, stopped, spent)
+    return Refinement(
+        tuple(descent.trains), tuple(descent.scores), descent.best, stopped, spent,
+        objective.evaluations,
+    )  # fmt: skip
 
 
 class _Descent:
@@ -283,43 +283,6 @@ def merged(rows: Rows, cells: int, crowd: int) -> Rows:
     sums = points.new_zeros(len(numbers), points.shape[1])
     sums.index_add_(0, where, points * weights[:, None])
     return Rows(sums / total[:, None], (total / total.sum()).to(points))
-
-
-class Spent(Stop):
-    """Raised where the next evaluation would begin, and none is left."""
-
-
-class Budget:
-    """Counts evaluations of an objective, so that a fit ends alike on a busy machine.
-
-    >>> budget = Budget(evaluations=1)
-    >>> budget.spend()
-    >>> budget.is_spent
-    True
-    """
-
-    def __init__(self, evaluations: float = math.inf) -> None:
-        self.evaluations = evaluations
-        self.used = 0
-        self._was_asked = False
-
-    @property
-    def is_spent(self) -> bool:
-        """Whether the next evaluation may not begin: ask only before one."""
-        if self.used < self.evaluations:
-            return False
-        self._was_asked = True
-        return True
-
-    def spend(self) -> None:
-        """Count an evaluation that is about to begin."""
-        if self.is_spent:
-            raise Spent("evaluations")
-        self.used += 1
-
-    def notes(self) -> list[str]:
-        """What the user should know, in words."""
-        return [f"stopped by the budget of {self.evaluations:g} evaluations"] * self._was_asked
 
 
 @contextlib.contextmanager
