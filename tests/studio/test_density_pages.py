@@ -185,8 +185,8 @@ def test_a_fit_says_what_it_is(client: Client, fitted: str) -> None:
     density, values = model_of(client, fitted), np.loadtxt(io.StringIO(ANGLES), delimiter=",")
     with torch.no_grad():
         mean = density.log_prob(density.space.to_chart(values), measure="natural").mean()
-    assert fit["likelihood"]["mean"] == pytest.approx(float(mean), abs=1e-6)
-    assert fit["likelihood"]["rows"] == fit["rows"] == fit["shown"] == ROWS
+    assert fit["likelihood"]["natural"] == pytest.approx(float(mean), abs=1e-6)
+    assert fit["likelihood"]["natural_rows"] == fit["rows"] == fit["shown"] == ROWS
     assert fit["likelihood"]["uniform"] == pytest.approx(-2 * np.log(360))
     shares = [part["share"] for part in fit["components"]]
     assert sum(shares) + fit["weights"]["uniform"] == pytest.approx(1)
@@ -201,7 +201,7 @@ def test_its_map_holds_the_whole_density_and_its_surface_is_drawn(client, fitted
     surface = client.get(f"{fitted}/density/{fit}/surface").json()
     assert len(floats(surface["points"])) == 3 * 81
     assert len(np.frombuffer(base64.b64decode(surface["levels"]), "<u2")) == 81
-    script = client.get("/api/density/surface.js")
+    script = client.get("/api/scripts/surface.js")
     assert "javascript" in script.headers["content-type"]
     assert "export function showSurface" in script.text
 

@@ -15,9 +15,10 @@ from PIL import Image
 import orbiflow.solids
 from orbiflow.solids import EscherSolid, FillSettings, Mesh, SolidLikeness, read_solid
 from orbiflow.solids.reading import READERS
+from orbiflow.studio.brought_files import ENDINGS
 from orbiflow.studio.settings import Job
 from orbiflow.studio.solid_routes import FILES
-from orbiflow.studio.solid_tasks import ENDINGS, put_solid
+from orbiflow.studio.solid_tasks import put_solid
 from solids.mesh_files import ball, bare_reads, box, bumpy_cell, cubic_group, inside_out, obj, stl
 from solids.mesh_files import three_mf as packed
 from studio.served import Client, done, new_project, studio, worked
@@ -122,7 +123,7 @@ def test_what_was_mended_is_said(client: Client) -> None:
     large, _ = uploaded(client, stl(box(30, 20, 50)), "box.stl")
     mesh = client.get(f"{large}/mesh").json()["mesh"]
     assert (mesh["usual_size"], mesh["notes"]) == (None, [])
-    assert tuple(READERS) == ENDINGS  # what is uploaded is what is read
+    assert tuple(READERS) == ENDINGS["mesh"]  # what is uploaded is what is read
 
 
 GLTF = b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "%s", "byteLength": 9}]}'
@@ -228,7 +229,7 @@ def test_a_solid_is_shown_by_the_shared_script(client: Client, filled: str) -> N
     solid = read_solid(folder)  # as the command reads it
     assert solid.certificate.valid
     assert solid.millimetres == 30
-    script = client.get("/api/solids/stack.js")
+    script = client.get("/api/scripts/stack.js")
     assert "javascript" in script.headers["content-type"]
     assert "export function showStack" in script.text
 

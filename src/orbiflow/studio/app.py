@@ -15,7 +15,7 @@ from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse
+from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -47,6 +47,12 @@ from orbiflow.studio.work_queue import WorkQueue
 STATIC = Path(__file__).parent / "static"
 SCRIPTS = Path(__file__).parents[1] / "drawing" / "js"
 """Scripts that pages of their own carry, too."""
+
+TURNED = {
+    "surface": SCRIPTS.parents[1] / "density" / "pictures" / "surface.js",
+    "stack": SCRIPTS.parents[1] / "solids" / "stack.js",
+}
+"""Scripts that come after `turned.js`."""
 
 SETTLE_SECONDS = 20.0  # seconds
 MAX_PIXELS = 128_000_000  # of a picture that is read
@@ -178,6 +184,15 @@ async def _error_answer(_request: Request, error: Exception) -> JSONResponse:
         return JSONResponse({"error": text}, error.status_code)
     log.error("a request failed", exc_info=error)
     return JSONResponse({"error": "something went wrong in the studio; reload the page"}, 500)
+
+
+@routes("GET", "/scripts/{name}.js")
+def script(name: str) -> Response:
+    """Serve a script of what is turned by hand, here and in pages of its own, as one module."""
+    if name not in TURNED:
+        raise Refused(404, "there is no such script; reload the page")
+    text = "\n".join(file.read_text("utf-8") for file in (SCRIPTS / "turned.js", TURNED[name]))
+    return Response(text, media_type="text/javascript")
 
 
 MAX_HEAD_SECONDS = 20.0  # seconds in which the first request of a connection must have a whole head

@@ -11,24 +11,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.studio.density_tasks import (
-    ENDINGS,
-    FIT,
-    SURFACE,
-    TABLE,
-    VIEW,
-    ending_of,
-    fit_folder,
-    map_file,
-)
+from orbiflow.studio.brought_files import place_of
+from orbiflow.studio.density_tasks import FIT, SURFACE, TABLE, VIEW, fit_folder, map_file
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.routes import Routes, Studio, body_object, save_body, turned_script, whole
-from orbiflow.studio.words import NAMES, plain_name
+from orbiflow.studio.routes import Routes, Studio, body_object, save_body, taken_up, whole
+from orbiflow.studio.words import plain_name
 
 EXAMPLES = {
     "backbone": ("Bends of a protein chain", "Two angles at each link, phi and psi: a doughnut."),
@@ -39,18 +30,10 @@ EXAMPLES = {
 """Tables that anybody may try: a title, and what they are."""
 
 TABLES = Path(__file__).parent / "tables"
-SCRIPT = Path(__file__).parents[1] / "density" / "pictures" / "surface.js"
 MAX_AXES = 64
 TASKS = ("density table", "density fit", "density map", "density take")
-USUAL_NAMES = (NAMES["density"], "My table")
 
 routes = Routes()
-
-
-@routes("GET", "/density/surface.js")
-def script() -> Response:
-    """Serve the script that turns surfaces, here and in the page that a plot writes."""
-    return turned_script(SCRIPT)
 
 
 @routes("GET", "/projects/{project}/density")
@@ -71,7 +54,7 @@ async def density(project: str, here: Studio) -> dict[str, Any]:
 async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
     """Take a table."""
     called = plain_name(name, "table.csv")
-    file = _home(here, project) / f"table{ending_of(called)}"
+    file = place_of(_home(here, project), "table", called)
     await save_body(request, file)
     return await _new_table(here, project, file, called)
 
@@ -110,17 +93,8 @@ def _home(here: Studio, project: str) -> Path:
 
 async def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[str, Any]:
     """Forget what was made of an earlier table, and look at this one."""
-    await run_in_threadpool(here.queue.forget, project, *TASKS)
-    home, facts = here.store.home(project), here.store.project(project)
-    for old in (home / TABLE, *(home / f"table{ending}" for ending in ENDINGS)):
-        if old != file:
-            old.unlink(missing_ok=True)
-    shutil.rmtree(home / "fits", ignore_errors=True)
-    changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
-    before = Path(facts["input"]["name"]).stem if facts["input"] else name
-    if facts["name"] in (*USUAL_NAMES, before):
-        changes["name"] = Path(name).stem
-    here.store.change(project, **changes)
+    await taken_up(here, project, file, name, [TABLE], TASKS)
+    shutil.rmtree(file.with_name("fits"), ignore_errors=True)
     return await here.submit(project, "density table", {})
 
 
@@ -130,21 +104,8 @@ def _document(file: Path) -> Response:
 
 
 def _report(fit: Path) -> dict[str, Any]:
-    """Return what a page says of a fit: its mean log density, over which rows, and its components."""
+    """Return what a page says of a fit: its mean log density, over which rows, and how it was made."""
     document = json.loads((fit / FIT / "report.json").read_text())
-    report, likelihood = document["report"], document["log_likelihood"]
-    return {
-        "likelihood": {
-            "mean": likelihood["natural"],
-            "rows": likelihood["natural_rows"],
-            "uniform": likelihood["uniform"],
-        },
-        "held_out": {
-            "rows": report["validation"],
-            "gain": report["start_nll"] - report["validation_nll"],
-        },
-        "weights": report["weights"],
-        "components": report["components"],
-        "notes": report["notes"],
-        "seconds": document["seconds"],
-    }
+    names = ("weights", "components", "notes", "validation", "start_nll", "validation_nll")
+    said = {name: document["report"][name] for name in names}
+    return {"likelihood": document["log_likelihood"], **said}

@@ -25,6 +25,7 @@ from orbiflow.runtime import (
     write_json,
 )
 from orbiflow.settings import Count, OnlyWith, Range, Settings
+from orbiflow.studio.brought_files import brought_file
 from orbiflow.studio.settings import Job
 from orbiflow.studio.taking import export_folder, files_of
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from orbiflow.density import Density
 
 TABLE, FIT, VIEW, SURFACE = "table.json", "model", "view.json", "surface.json"
-ENDINGS = (".csv", ".tsv", ".txt", ".npy")
 MAX_SHOWN = 30
 """Columns of a table that are shown, and of which a density may be."""
 
@@ -69,7 +69,7 @@ class FitChoice(Settings, group="Density"):
 def table(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Look at the table of a project."""
     on_event(Progress(0.1, "reading the table"))
-    view = table_view(table_file(job.project))
+    view = table_view(brought_file(job.project, "table"))
     cancel.check()
     write_json(job.project / TABLE, view)
     return Outcome({"rows": view["rows"], "columns": len(view["columns"])})
@@ -83,7 +83,7 @@ def density(
     if not (job.project / TABLE).is_file():
         raise SettingError("this table was not read; upload another one")
     folder = make_folder(job.project / "fits" / str(job.task))
-    data = table_file(job.project)
+    data = brought_file(job.project, "table")
     options = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
     call = find("density fit").call(options)
     fit_events = as_part(on_event, 0.0, FIT_SHARE)
@@ -209,7 +209,7 @@ def take(
             write_atomic(out / file.name, file.read_bytes())
     else:
         columns = json.loads((source / VIEW).read_text())["columns"]
-        call = choice.call(source / FIT, table_file(job.project), columns, out)
+        call = choice.call(source / FIT, brought_file(job.project, "table"), columns, out)
         call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
     files = files_of(out)
     return Outcome({"takeaway": job.task, "what": choice.what, "files": files, "preview": False})
@@ -219,24 +219,6 @@ def _model(folder: Path) -> Density:
     from orbiflow.density import read_density
 
     return read_density(folder / FIT / "density.safetensors")[0]
-
-
-def table_file(home: Path) -> Path:
-    """Return the table of a project, as it was uploaded."""
-    files = [path for ending in ENDINGS if (path := home / f"table{ending}").is_file()]
-    if not files:
-        raise OrbiflowError("there is no table in this project; upload one")
-    return files[0]
-
-
-def ending_of(name: str) -> str:
-    """Return the ending under which a table of this name is kept, or refuse it."""
-    ending = Path(name).suffix.lower()
-    if ending not in ENDINGS:
-        raise OrbiflowError(
-            f"a table's name ends in {', '.join(ENDINGS)}; save yours as CSV and give that"
-        )
-    return ending
 
 
 def fit_folder(project: Path, number: int | None = None) -> Path:

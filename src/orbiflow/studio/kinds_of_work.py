@@ -26,7 +26,7 @@ class TaskKind:
 
     - `work`: The operation that does it, in `orbiflow.settings.commands.WORK`, of a `Job`.
     - `lane`: "quick" for what somebody waits for; it waits for no search.
-    - `makes`: Of a take-away, the operation that writes it.
+    - `makes`: Of a take-away, the operation that writes it; of a preview, the settings name it.
     """
 
     work: str
@@ -36,19 +36,20 @@ class TaskKind:
     def call(self, home: Path, task: int, settings: Mapping[str, Any]) -> Call:
         """Return the call of a task. Raises `SettingError` for settings that cannot be used."""
         place = {"project": home, "task": task}
-        if not self.makes:
+        makes = self.makes or settings.get("makes", "")
+        if not makes:
             if taken := [name for name in place if name in settings]:
                 raise SettingError(f"the studio itself sets {taken[0]}; leave it out")
             return find(self.work).call({**place, **settings})
-        take_settings = {name: settings[name] for name in TAKE_SETTINGS if name in settings}
-        rest = {name: value for name, value in settings.items() if name not in take_settings}
-        making_call(self.makes, rest, Path("tile"))
+        outer = {name: settings[name] for name in TAKE_SETTINGS if name in settings}
+        rest = {name: value for name, value in settings.items() if name not in (*outer, "makes")}
+        making_call(makes, rest, Path("tile"))
         return find(self.work).call(
-            {**place, **take_settings, "makes": self.makes, "settings": json.dumps(rest)}
+            {**place, **outer, "makes": makes, "settings": json.dumps(rest)}
         )
 
 
-TAKE_SETTINGS = ("tile", "picture", "drawing", "called")
+TAKE_SETTINGS = ("tile", "picture", "drawing", "called", "side")
 """Settings of a take-away besides those of its operation."""
 
 WITH_DRAWING = ("export", "art", "solid", "animate")

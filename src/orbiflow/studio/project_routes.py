@@ -388,13 +388,12 @@ async def live_preview(request: Request, project: str, tile: int, here: Studio) 
     if operation not in ("export", "art", "solid", "animate") or not is_object(settings):
         raise OrbiflowError("a preview has an operation that makes something, and settings")
     stage_of(here, project, tile)
-    kind = kind_of_work(operation)
-    call = kind.call(here.store.home(project), 1, with_what_is_drawn(here, project, settings))
-    flat = {name: call.flat[name] for name in ("makes", "settings", "picture", "drawing")}
+    wanted = {**with_what_is_drawn(here, project, settings), "makes": operation, "tile": tile}
+    if "side" in body:
+        wanted["side"] = body["side"]
     if body.get("instead"):
         await run_in_threadpool(here.queue.forget, project, "preview")
-    size = {"side": body["side"]} if "side" in body else {}
-    task = await here.done(project, "preview", {**flat, **size, "tile": tile})
+    task = await here.done(project, "preview", wanted)
     here.store.delete_task(task["id"])
     # of one that was ended there may be something left
     shutil.rmtree(export_folder(here.store.home(project), task["id"]), ignore_errors=True)

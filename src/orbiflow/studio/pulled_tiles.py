@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from scipy.sparse import csr_matrix
 from scipy.spatial import KDTree
 
 from orbiflow.arrays import Array, Integers
@@ -195,14 +196,13 @@ def _body(space: PullSpace) -> dict[str, Any]:
 
 
 def _sparse(matrix: Array) -> dict[str, Any]:
-    rows, columns = np.nonzero(abs(matrix) > NEGLIGIBLE_ENTRY)
-    counts = np.bincount(rows, minlength=len(matrix))
+    rows = csr_matrix(np.where(abs(matrix) > NEGLIGIBLE_ENTRY, matrix, 0.0))
     return {
         "rows": matrix.shape[0],
         "cols": matrix.shape[1],
-        "indptr": [0, *np.cumsum(counts).tolist()],
-        "indices": columns.tolist(),
-        "values": matrix[rows, columns].tolist(),
+        "indptr": rows.indptr.tolist(),
+        "indices": rows.indices.tolist(),
+        "values": rows.data.tolist(),
     }
 
 
@@ -237,16 +237,21 @@ def pulled(
     if len(tile.figures) == 1:
         changed = moved_figure(tile, whole, on_the_way, COMPARED_POINTS, report, move)
     else:
-        parts = list[Any]()
-        for part, ring, kept in zip(tile.figures, space.rings, space.kept, strict=True):
-            back, before = part.place.inverse, part.figure
+
+        def moved_part(part: Any, ring: Integers, kept: Integers) -> Any:
+            place, back, before = part.place, part.place.inverse, part.figure
             corners = tuple(kept[list(before.tile.corners)].tolist())
             piece = Tile(back(points[ring]), whole.group.conjugate(*back), corners=corners)
-            count = COMPARED_POINTS // len(tile.figures)
-            way = partial(_own_ring, on_the_way, ring, back)
-            inner = None if move is None else partial(_moved_in, part.place, move)
-            figure = moved_figure(before, piece, way, count, report, inner)
-            parts.append(part._replace(figure=figure))
+            figure = moved_figure(
+                before,
+                piece,
+                lambda share: back(on_the_way(share)[ring]),
+                COMPARED_POINTS // len(tile.figures),
+                report,
+                None if move is None else partial(_moved_in, place, move),
+            )
+            return part._replace(figure=figure)
+
         changed = EscherTile(
             whole,
             name=tile.name,
@@ -254,7 +259,7 @@ def pulled(
             silhouette=tile.silhouette,
             no_map=tile.no_map,
             notes=(PULLED,),
-            division=tuple(parts),
+            division=tuple(map(moved_part, tile.figures, space.rings, space.kept)),
         )
         if all(part.figure.rating for part in changed.figures):
             changed = replace(changed, rating=Rating.of_likeness(changed.score))
@@ -294,11 +299,6 @@ def _inner_move(space: PullSpace, parameters: Array, inside: Sequence[float]) ->
 def _moved_in(place: Any, move: Move, points: Array) -> Array:
     """Return points of a figure, in its own coordinates, as they are moved on the tile."""
     return place.inverse(move(place(points)))
-
-
-def _own_ring(way: Way, ring: Integers, back: Callable[[Array], Array], share: float) -> Array:
-    """Return the ring of a figure, in its own coordinates, a share of the way."""
-    return back(way(share)[ring])
 
 
 def _carried(

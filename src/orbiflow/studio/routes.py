@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -16,11 +16,12 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from orbiflow.runtime import is_object
+from orbiflow.studio.brought_files import ENDINGS
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import UNDONE, Store
-from orbiflow.studio.words import shown_task
+from orbiflow.studio.words import NAMES, shown_task
 from orbiflow.studio.work_queue import WorkQueue
 
 Answer = TypeVar("Answer", bound=Callable[..., Any])
@@ -110,14 +111,29 @@ class Studio:
         return self.store.task(task)
 
 
-TURNED = Path(__file__).parents[1] / "drawing" / "js" / "turned.js"
-"""The script that comes before those of what is turned by hand."""
+async def taken_up(
+    here: Studio, project: str, file: Path, called: str, made: Iterable[str], tasks: Iterable[str]
+) -> None:
+    """Let a table or mesh that was brought be a project's own, and forget the one before.
 
-
-def turned_script(script: Path) -> Response:
-    """Answer with a script of what is turned by hand, here and in pages of its own, as one module."""
-    text = "\n".join(file.read_text("utf-8") for file in (TURNED, script))
-    return Response(text, media_type="text/javascript")
+    Args:
+        here: The studio.
+        project: The project.
+        file: Where what was brought is kept.
+        called: What it is called.
+        made: Files that were made of the one before.
+        tasks: Kinds of task that may still work on that.
+    """
+    await run_in_threadpool(here.queue.forget, project, *tasks)
+    record, kind = here.store.project(project), file.stem
+    for name in (*made, *(f"{kind}{ending}" for ending in ENDINGS[kind])):
+        if (old := file.with_name(name)) != file:
+            old.unlink(missing_ok=True)
+    changes: dict[str, Any] = {"input": {"name": called, "type": file.suffix.lstrip(".")}}
+    before = Path(record["input"]["name"]).stem if record["input"] else called
+    if record["name"] in (*NAMES.values(), "My table", before):
+        changes["name"] = Path(called).stem
+    here.store.change(project, **changes)
 
 
 def whole(file: Path, kind: str = "application/json", **headers: str) -> Response:

@@ -100,11 +100,8 @@ def write_linked(text: str, out: Path) -> None:
     if not unpacker.eof or not is_object(content) or not is_object(content.get("tile")):
         raise InputFileError(DAMAGED)
     look, name = content.get("look"), content.get("name")
-    view = (
-        {"look": {key: value for key, value in look.items() if key in LOOK}}
-        if is_object(look)
-        else {}
-    )
+    look = look if is_object(look) else {}
+    view = {"look": {key: look[key] for key in LOOK if key in look}}
     name = name[:MAX_NAME] if isinstance(name, str) and name.strip() else "Shared tile"
     project = {"format": FORMAT, "name": name, "kind": "tile", "view": view, "tiles": [{"id": 1}]}
     result = {

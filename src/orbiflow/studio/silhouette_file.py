@@ -218,21 +218,31 @@ def _mended(target: Target, file: Path, size: tuple[int, int]) -> Target:
     return replace(target, outline=placed(mended.outline), notes=notes, seen=seen)
 
 
+def _sampled(picture: Image.Image, by: Image.Resampling | None = None) -> Any:
+    """Return the colours of a picture on paper at few pixels, (N, N, 3) from 0 to 255."""
+    size = SAMPLED_PIXELS, SAMPLED_PIXELS
+    paper = Image.new("RGBA", size, (*PAPER, 255))
+    laid = Image.alpha_composite(paper, picture.convert("RGBA").resize(size, by))
+    return np.asarray(laid.convert("RGB"), dtype=float)
+
+
+def _inside(ring: Any, picture: Image.Image) -> Image.Image:
+    """Return where these pixels are inside of a ring."""
+    mask = Image.new("L", (SAMPLED_PIXELS, SAMPLED_PIXELS))
+    shares = np.asarray(ring) / picture.size * SAMPLED_PIXELS
+    ImageDraw.Draw(mask).polygon(list(map(tuple, shares.tolist())), fill=255)
+    return mask
+
+
 def _is_coloured(picture: Image.Image, ring: Any, read: Any) -> bool:
     """Whether a picture has several colours inside of a ring, such as eyes and lines.
 
     The background counts only where it lies inside of what was `read`, not where that was mended.
     """
-    size = SAMPLED_PIXELS, SAMPLED_PIXELS
-    small = picture.convert("RGBA").resize(size, Image.Resampling.NEAREST)
-    laid = Image.alpha_composite(Image.new("RGBA", size, (*PAPER, 255)), small)  # holes are eyes
-    colours = np.asarray(laid, dtype=float)
+    colours = _sampled(picture, Image.Resampling.NEAREST)  # holes are eyes
 
     def covered(points: Any, edge: ImageFilter.Filter) -> Any:
-        mask = Image.new("L", size)
-        shares = np.asarray(points) / picture.size * SAMPLED_PIXELS
-        ImageDraw.Draw(mask).polygon(list(map(tuple, shares.tolist())), fill=255)
-        return np.asarray(mask.filter(edge)) > 0
+        return np.asarray(_inside(points, picture).filter(edge)) > 0
 
     def differing(of: Any) -> Any:
         return np.abs(colours - np.median(colours[of], axis=0)).max(axis=2) > MIN_CONTRAST
@@ -250,13 +260,9 @@ def _is_coloured(picture: Image.Image, ring: Any, read: Any) -> bool:
 
 def _are_told_apart(picture: Image.Image, ring: Any) -> bool:
     """Whether copies that carry what lies in a ring of a picture can be told apart."""
-    size = SAMPLED_PIXELS, SAMPLED_PIXELS
-    small, mask = picture.convert("RGBA").resize(size), Image.new("1", size)
-    laid = Image.alpha_composite(Image.new("RGBA", size, (*PAPER, 255)), small).convert("RGB")
-    shares = np.asarray(ring) / picture.size * SAMPLED_PIXELS
-    ImageDraw.Draw(mask).polygon(list(map(tuple, shares.tolist())), fill=1)
+    colours, inside = _sampled(picture), np.asarray(_inside(ring, picture)) > 0
     outline = palette(DEFAULT_PALETTE).outline
-    return are_told_apart(np.asarray(laid) / 255, np.asarray(mask), outline)
+    return are_told_apart(colours / 255, inside, outline)
 
 
 def _shown(target: Target, read: Target, picture: Image.Image) -> dict[str, Any]:

@@ -9,37 +9,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import FileResponse
 
+from orbiflow.studio.brought_files import place_of
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.project_routes import SANDBOX, stage_of
-from orbiflow.studio.routes import Routes, Studio, save_body, turned_script
-from orbiflow.studio.solid_tasks import (
-    ENDINGS,
-    FIGURE,
-    MESH,
-    PAGE,
-    SHEET,
-    THUMB,
-    ending_of,
-    mesh_view,
-)
+from orbiflow.studio.routes import Routes, Studio, save_body, taken_up
+from orbiflow.studio.solid_tasks import FIGURE, MESH, PAGE, SHEET, THUMB, mesh_view
 from orbiflow.studio.tile_files import SAVED
-from orbiflow.studio.words import NAMES, plain_letters, plain_name
+from orbiflow.studio.words import plain_letters, plain_name
 
-SCRIPT = Path(__file__).parents[1] / "solids" / "stack.js"
 FILES = (SHEET, THUMB, PAGE)
 """Files of a solid that are served as they are."""
 
 routes = Routes()
-
-
-@routes("GET", "/solids/stack.js")
-def script() -> Response:
-    """Serve the script that turns stacks, here and in the page that a search writes."""
-    return turned_script(SCRIPT)
 
 
 @routes("GET", "/projects/{project}/mesh")
@@ -52,17 +36,9 @@ def mesh(project: str, here: Studio) -> dict[str, Any]:
 async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
     """Take a mesh, and forget an earlier one."""
     called = plain_name(name, "mesh.stl")
-    home = _home(here, project)
-    file = home / f"mesh{ending_of(called)}"
+    file = place_of(_home(here, project), "mesh", called)
     await save_body(request, file)
-    await run_in_threadpool(here.queue.forget, project, "mesh read", "fill")
-    for old in (home / MESH, home / FIGURE, *(home / f"mesh{ending}" for ending in ENDINGS)):
-        if old != file:
-            old.unlink(missing_ok=True)
-    changes: dict[str, Any] = {"input": {"name": called, "type": file.suffix.lstrip(".")}}
-    if here.store.project(project)["name"] == NAMES["solid"]:
-        changes["name"] = Path(called).stem
-    here.store.change(project, **changes)
+    await taken_up(here, project, file, called, [MESH, FIGURE], ["mesh read", "fill"])
     return await here.submit(project, "mesh read", {"called": called})
 
 

@@ -27,6 +27,7 @@ from orbiflow.runtime import (
     write_json,
 )
 from orbiflow.solids import FillSettings
+from orbiflow.studio.brought_files import brought_file
 from orbiflow.studio.settings import Job
 from orbiflow.studio.taking import export_folder, files_of
 from orbiflow.studio.tile_files import (
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
 
 MESH, FIGURE, BACKDROP = "mesh.json", "figure.json", "backdrop.png"
 SOLID, SHEET, THUMB, PAGE = "solid.safetensors", "sheet.png", "thumb.png", "page.html"
-ENDINGS = (".stl", ".obj", ".ply", ".3mf", ".gltf", ".glb")
 PLAIN_WORDS = {
     "(or is cut off|of a kind that is not read): .*": r"\1; export it again",
     "needs ('.*'), which cannot be read.*": r"needs \1 as well; export a .glb, which is one file",
@@ -67,7 +67,7 @@ def mesh(
     from orbiflow.drawing import png_bytes, solid_picture
     from orbiflow.solids import figure_data, read_mesh, usual_size, usual_up
 
-    file = mesh_file(job.project)
+    file = brought_file(job.project, "mesh")
     on_event(Progress(0.1, "reading the mesh"))
     try:
         body, notes, _ = read_mesh(file)
@@ -116,7 +116,7 @@ def fill(
     def keep(solid: EscherSolid) -> None:
         numbers[id(solid)] = put_solid(job, solid, on_event)
 
-    read = read_mesh(mesh_file(job.project))
+    read = read_mesh(brought_file(job.project, "mesh"))
     solids = fill(
         read.mesh,
         settings.replace(up=settings.up or view["up"], workers=cores()),
@@ -204,24 +204,6 @@ def film(
     return Outcome({**made, "preview": False})
 
 
-def mesh_file(home: Path) -> Path:
-    """Return the mesh of a project, as it was uploaded."""
-    files = [path for ending in ENDINGS if (path := home / f"mesh{ending}").is_file()]
-    if not files:
-        raise OrbiflowError("there is no mesh in this project; bring one")
-    return files[0]
-
-
 def mesh_view(home: Path) -> dict[str, Any] | None:
     """Return what a page shows of a project's mesh, None before it is read."""
     return json.loads((home / MESH).read_text()) if (home / MESH).is_file() else None
-
-
-def ending_of(name: str) -> str:
-    """Return the ending under which a mesh of this name is kept, or refuse it."""
-    ending = Path(name).suffix.lower()
-    if ending not in ENDINGS:
-        raise OrbiflowError(
-            f"a mesh's name ends in {', '.join(ENDINGS)}; export yours as one of them"
-        )
-    return ending

@@ -221,11 +221,7 @@ class Store:
         """Forget a tile."""
         with self._changing(project) as data:
             self.card(project, tile)
-            data.execute("DELETE FROM tiles WHERE id = ?", (tile,))
-            data.execute(
-                "DELETE FROM events WHERE project = ? AND kind = 'card' AND subject = ?",
-                (project, str(tile)),
-            )
+            self._forget(data, project, "card", "tiles", tile)
             self._record(project, "gone", tile, {"tile": tile})
 
     # tasks
@@ -274,11 +270,14 @@ class Store:
         with suppress(Missing):
             project = self.task(task)["project"]
             with self._changing(project) as data:
-                data.execute("DELETE FROM tasks WHERE id = ?", (task,))
-                data.execute(
-                    "DELETE FROM events WHERE project = ? AND kind = 'task' AND subject = ?",
-                    (project, str(task)),
-                )
+                self._forget(data, project, "task", "tasks", task)
+
+    @staticmethod
+    def _forget(data: sqlite3.Connection, project: str, kind: str, table: str, number: int) -> None:
+        """Delete a row, and the event about it."""
+        about = "project = ? AND kind = ? AND subject = ?"
+        data.execute(f"DELETE FROM {table} WHERE id = ?", (number,))
+        data.execute(f"DELETE FROM events WHERE {about}", (project, kind, str(number)))
 
     def change_task(self, task: int, **changes: Any) -> None:
         """Change columns of a task; one that is gone is left alone."""

@@ -50,10 +50,7 @@ def with_drawing(
     from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
     from orbiflow.tiles import read_result, save_tiles
 
-    try:
-        parts = json.loads(drawing or "{}")
-    except (ValueError, RecursionError):
-        raise OrbiflowError("the drawing is no JSON; reload the page") from None
+    parts = json.loads(drawing or "{}")
     drawings = [parts, parts.get("second")] if is_object(parts) else []
     if not any(
         is_object(layer) and (layer.get("strokes") or layer.get("eyes")) for layer in drawings

@@ -6,8 +6,8 @@ import { count, figure, PARTS, percent } from "./words.js";
 
 /** How likely rows are, those of the fit and those that were kept aside. @param {any} fit */
 export function likelihood(fit) {
-  const { mean, rows, uniform } = fit.likelihood,
-    { rows: kept, gain } = fit.held_out,
+  const { natural: mean, natural_rows: rows, uniform } = fit.likelihood,
+    { validation: kept, start_nll: before, validation_nll: after } = fit,
     times = (nats) => figure(Math.exp(nats), 2);
   const which = rows === fit.rows
     ? `all ${count(rows)} rows`
@@ -20,7 +20,7 @@ export function likelihood(fit) {
     ]),
     soft(
       `The fairer test: ${count(kept)} rows were kept aside in turn while it was made. `,
-      `They were ${times(gain)} times as likely as by chance.`,
+      `They were ${times(before - after)} times as likely as by chance.`,
     ),
   ]);
 }

@@ -1,6 +1,6 @@
 /** A density on a grid: its colours, the masses that its regions hold, and maps to draw it on. */
 
-import { unpack } from "../../api/density/surface.js";
+import { unpack } from "../../api/scripts/surface.js";
 
 const turn = (t) => t - Math.floor(t);
 

@@ -1,6 +1,6 @@
 /** The flat map of a density, with the table's rows as dots, a region that stands out, and a line that is held. */
 
-import { unpack } from "../../api/density/surface.js";
+import { unpack } from "../../api/scripts/surface.js";
 import { atNextFrame, placeOn, sized } from "../../../../drawing/js/turned.js";
 import { meridians } from "./grid.js";
 

@@ -1,6 +1,6 @@
 /** What a fit shows: the surface, the map, regions, an angle that is held, how well it fits, and files. */
 
-import { showSurface } from "../../api/density/surface.js";
+import { showSurface } from "../../api/scripts/surface.js";
 import { check, choice, labelled, select, slider } from "../controls.js";
 import { aside, h, handled, put, row, soft, stack, toast, trying } from "../dom.js";
 import { likelihood, parts } from "./facts.js";

@@ -1,6 +1,6 @@
 /** A figure or a solid that turns, by the script of the pages that `orbiflow fill` writes, and its controls. */
 
-import { showStack } from "../../api/solids/stack.js";
+import { showStack } from "../../api/scripts/stack.js";
 import { check, choice, slider } from "../controls.js";
 import { button, h, handled, put, row, unique } from "../dom.js";
 
