@@ -14,10 +14,10 @@ GRIDS = arrays(
 )
 
 
-@given(GRIDS, st.booleans())
-def test_nodes_above_the_level_are_inside(grid: np.ndarray, joined: bool) -> None:
+@given(GRIDS)
+def test_nodes_above_the_level_are_inside(grid: np.ndarray) -> None:
     values, level = np.pad(grid, 1, constant_values=-2.0), 0.25
-    curves = level_curves(values, level, joined=joined)
+    curves = level_curves(values, level)
     assert all((curve[0] == curve[-1]).all() for curve in curves)
     rings = [shapely.LinearRing(curve) for curve in curves]
     area = shapely.build_area(shapely.GeometryCollection(rings))
@@ -27,12 +27,11 @@ def test_nodes_above_the_level_are_inside(grid: np.ndarray, joined: bool) -> Non
 
 
 @given(
-    arrays(np.int64, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=st.integers(0, 2)),
-    st.booleans(),
+    arrays(np.int64, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=st.integers(0, 2))
 )
-def test_no_curve_touches_itself_or_another(grid: np.ndarray, joined: bool) -> None:
+def test_no_curve_touches_itself_or_another(grid: np.ndarray) -> None:
     # many nodes lie at the level itself
-    curves = level_curves(np.pad(grid, 1), 1.0, joined=joined)
+    curves = level_curves(np.pad(grid, 1), 1.0)
     lines = np.array([shapely.LinearRing(curve) for curve in curves], dtype=object)
     assert all(line.is_simple for line in lines)
     tree = shapely.STRtree(lines)
@@ -40,10 +39,8 @@ def test_no_curve_touches_itself_or_another(grid: np.ndarray, joined: bool) -> N
     assert (first == second).all()
 
 
-@pytest.mark.parametrize(("joined", "count"), [(False, 2), (True, 1)])
-def test_corners_hold_together_if_asked(joined: bool, count: int) -> None:
-    values = np.pad(np.eye(2), 1)
-    assert len(level_curves(values, 0.5, joined=joined)) == count
+def test_corners_do_not_hold_together() -> None:
+    assert len(level_curves(np.pad(np.eye(2), 1), 0.5)) == 2
 
 
 def test_a_ring_has_two_curves_and_nothing_none() -> None:

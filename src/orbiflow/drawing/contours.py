@@ -36,12 +36,13 @@ _STEPS = {
     12: [(LEFT, RIGHT)],
     13: [(TOP, RIGHT)],
     14: [(LEFT, TOP)],
+    # two corners that meet across the cell do not hold together
+    5: [(TOP, LEFT), (BOTTOM, RIGHT)],
+    10: [(RIGHT, TOP), (LEFT, BOTTOM)],
 }
-_APART = {5: [(TOP, LEFT), (BOTTOM, RIGHT)], 10: [(RIGHT, TOP), (LEFT, BOTTOM)]}
-_JOINED = {5: [(TOP, RIGHT), (BOTTOM, LEFT)], 10: [(LEFT, TOP), (RIGHT, BOTTOM)]}
 
 
-def level_curves(values: Array, level: float, *, joined: bool = False) -> list[Array]:
+def level_curves(values: Array, level: float) -> list[Array]:
     """Return the closed curves between values (H, W) above a level and the others.
 
     Values are linear along the sides between neighbours. No curve touches itself or another.
@@ -49,7 +50,6 @@ def level_curves(values: Array, level: float, *, joined: bool = False) -> list[A
     Args:
         values: The grid; its outermost values are not above the level.
         level: The level.
-        joined: Whether two corners of a cell that are above the level hold together across it.
 
     Returns:
         Curves (N, 2) of rows and columns, the last point equal to the first; seen with rows going down
@@ -65,7 +65,7 @@ def level_curves(values: Array, level: float, *, joined: bool = False) -> list[A
     # sides by the number of their first node, those down from it after all those to its right
     sides = np.array([0, values.size + 1, width, values.size])
     steps, cells = [np.zeros((0, 2), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    for corners, pairs in (_STEPS | (_JOINED if joined else _APART)).items():
+    for corners, pairs in _STEPS.items():
         rows, columns = np.nonzero(kind == corners)
         first = rows * width + columns
         steps += [first[:, None] + sides[list(pair)] for pair in pairs]

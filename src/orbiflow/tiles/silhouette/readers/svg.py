@@ -33,6 +33,7 @@ from orbiflow.tiles.silhouette.readers.svg_render import (
     visible,
     without_colour,
 )
+from orbiflow.tiles.silhouette.readers.tracing import region
 
 LONG_PIXELS = 1500
 """The longer side of the picture that is traced."""
@@ -154,8 +155,7 @@ def _traced(values: Array) -> BaseGeometry | None:
     curves = level_curves(np.pad(values, 1), 0.5)
     if sum(map(len, curves)) > MAX_CURVE_POINTS:
         return None
-    rings = [shapely.LinearRing(curve[:, ::-1] - 0.5) for curve in curves if len(curve) > 3]
-    area = shapely.build_area(shapely.GeometryCollection(rings))
+    area = region([curve[:, ::-1] - 0.5 for curve in curves if len(curve) > 3])
     height, width = values.shape
     # what fills the edge of the picture ends there, and not in the middle of its pixels
     simple = shapely.simplify(area, TOLERANCE_PIXELS)

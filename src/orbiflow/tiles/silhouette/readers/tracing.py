@@ -1,20 +1,19 @@
 """The outline of the largest shape in a picture, to a fraction of a pixel."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 import shapely
-from numpy.typing import NDArray
 from shapely.affinity import scale as scaled
-from shapely.geometry import Polygon, box
+from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arrays import Array, Integers
+from orbiflow.arrays import Array
 from orbiflow.drawing import level_curves
 from orbiflow.errors import Advice, InputFileError, literal
-from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import MIN_PART_SHARE, left_out, outer_ring, thinned
+from orbiflow.tiles.geometry import polygons_in, signed_area
+from orbiflow.tiles.silhouette.outlines import filled, outer_outline, outer_ring, thinned
 from orbiflow.tiles.silhouette.readers.reading import Source
 
 MIN_AREA = 30.0  # square pixels
@@ -30,10 +29,6 @@ INNER_SHARE = 0.015  # of the image's longer side
 # Components and holes of at most so many pixels, or this share of the shape, are no parts of a drawing.
 DUST_PIXELS = 4
 DUST_SHARE = 1e-4
-# for `scipy.ndimage`: background holds together across corners where the shape does not, and lines do
-# where their background does not
-_ACROSS_CORNERS = np.ones((3, 3), dtype=int)
-_Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -53,25 +48,28 @@ def trace(
     A pixel of `level` is `scale` pixels of the image wide, and the image is `size` (width, height).
     Pixels of a shape hold together along their sides, not their corners.
     """
-    mask, notes = _without_dust(level.values > level.cut)
-    shape, parts = _largest(mask)
-    if shape.all() and (inner := _within_border(mask)).any():
-        mask, notes = (
-            inner,
-            [*notes, "left out what reaches around the shape at the image's border"],
-        )
-        shape, parts = _largest(mask)
-    notes += parts
-    if shape.all():
+    rings, notes = _without_dust(_contours(level))
+    largest = max(rings, key=_area)
+    height, width = level.values.shape
+    page, seen = box(0, 0, width, height), region(rings)
+    middles = box(0.5, 0.5, width - 0.5, height - 0.5)  # of all pixels
+    if fills_page := Polygon(largest).covers(middles):
+        parts = [part for part in polygons_in(seen) if page.boundary.distance(part) > 1]
+        if parts:
+            notes.append("left out what reaches around the shape at the image's border")
+            largest = outer_ring(max(map(filled, parts), key=lambda part: part.area))
+            seen, fills_page = shapely.union_all(parts), False
+    if fills_page:
         raise InputFileError(
             Advice(
                 literal(f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels)")
                 + "; leave a margin around it, or try another {invert} to take the other part"
             )
         )
-    if _is_cut_off(shape):
+    notes += outer_outline(seen)[1]
+    polygon, stepped = _polygon(largest, page)
+    if _is_cut_off(polygon, width, height):
         notes.append("the shape touches the image's border and may be cut off there")
-    polygon, stepped = _polygon(level, shape)
     area = polygon.area * scale**2
     if area < MIN_AREA:
         raise InputFileError(
@@ -89,75 +87,52 @@ def trace(
     if moved > STEP_TOLERANCE:
         notes.append(f"simplified the outline to within {moved:.2f} traced pixels")
     ring = np.clip(outer_ring(polygon) * scale, 0, size)
-    rings = [shapely.LinearRing(contour) for contour in _contours(level, mask)]
-    seen = shapely.build_area(shapely.GeometryCollection(rings)).simplify(tolerance)
-    return ring, scaled(seen, scale, scale, origin=(0, 0)), notes
+    return ring, scaled(seen.simplify(tolerance), scale, scale, origin=(0, 0)), notes
 
 
-def _within_border(mask: _Mask) -> _Mask:
-    """Return the mask without what touches the image's border."""
-    border = np.ones_like(mask)
-    border[1:-1, 1:-1] = False
-    return mask & ~scipy.ndimage.binary_propagation(border & mask, mask=mask)
+def region(rings: Sequence[Array]) -> BaseGeometry:
+    """Return what lies within an odd number of rings (N, 2), none of which crosses another."""
+    return shapely.build_area(shapely.GeometryCollection(list(map(shapely.LinearRing, rings))))
 
 
-def _is_cut_off(shape: _Mask) -> bool:
-    inner = min(round(INNER_SHARE * max(shape.shape)) + 1, *(side - 1 for side in shape.shape))
-    sides = (shape, shape[::-1], shape.T, shape.T[::-1])
-    return any(side[0].sum() > CUT_OFF_RATIO * side[inner].sum() for side in sides)
+def _area(ring: Array) -> float:
+    return abs(float(signed_area(ring)))
 
 
-def _labelled(mask: _Mask, structure: NDArray[np.int_] | None = None) -> tuple[Integers, Integers]:
-    """Return the number of each pixel's component (H, W), and the sizes of these, 0 for none."""
-    labels = np.asarray(scipy.ndimage.label(mask, structure)[0], dtype=np.int64)
-    sizes = np.bincount(labels.ravel())
-    sizes[0] = 0
-    return labels, sizes
+def _is_cut_off(shape: Polygon, width: int, height: int) -> bool:
+    """Return whether a shape is nearly as wide at a border of the image as further in."""
+    deep = min(round(INNER_SHARE * max(width, height)) + 1, width - 1, height - 1)
+    inside = np.array([[0.5, deep + 0.5]])
+    rows, columns = (np.concatenate([inside, side - inside]).ravel() for side in (height, width))
+    lines = [LineString([(0, y), (width, y)]) for y in rows]
+    lines += [LineString([(x, 0), (x, height)]) for x in columns]
+    lengths = [line.intersection(shape).length for line in lines]
+    pairs = zip(lengths[::2], lengths[1::2], strict=True)
+    return any(at_border > CUT_OFF_RATIO * further_in for at_border, further_in in pairs)
 
 
-def _without_dust(mask: _Mask) -> tuple[_Mask, list[str]]:
-    """Return the mask without specks and pinholes, and a note if there were any."""
-    most = _labelled(mask)[1].max()
-    limit = min(max(DUST_PIXELS, DUST_SHARE * most), most - 1)
-
-    def small(part: _Mask, structure: NDArray[np.int_] | None = None) -> _Mask:
-        labels, sizes = _labelled(part, structure)
-        return ((sizes > 0) & (sizes <= limit))[labels]
-
-    filled = scipy.ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS)
-    specks, pinholes = small(mask), small(filled & ~mask, _ACROSS_CORNERS)
-    note = ["left out specks of dust"] * bool(specks.any() or pinholes.any())
-    return (mask & ~specks) | pinholes, note
+def _without_dust(rings: list[Array]) -> tuple[list[Array], list[str]]:
+    """Return rings without those around specks and pinholes, and a note if there were any."""
+    areas = np.array(list(map(_area, rings)))
+    limit = min(max(DUST_PIXELS, DUST_SHARE * areas.max()), areas.max() / 2)
+    kept = [ring for ring, area in zip(rings, areas, strict=True) if area > limit]
+    return kept, ["left out specks of dust"] * (len(kept) < len(rings))
 
 
-def _largest(mask: _Mask) -> tuple[_Mask, list[str]]:
-    """Return the component that is largest with its holes filled."""
-    labels, areas = _labelled(scipy.ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS))
-    shape = labels == areas.argmax()
-    areas = areas[areas >= max(1, MIN_PART_SHARE * areas.max())]
-    holes = shape & ~mask
-    n_holes = scipy.ndimage.label(holes, structure=_ACROSS_CORNERS)[1]
-    kept, bare = areas.max() / max(areas.sum(), 1), holes.sum() / max(shape.sum(), 1)
-    return shape, left_out(len(areas), kept, n_holes, bare)
-
-
-def _contours(level: Level, mask: _Mask) -> list[Array]:
-    """Return the borders (N, 2) of the pixels in `mask`, pixel (0, 0) spanning [0, 1] x [0, 1]."""
-    above, outside = level.values > level.cut, 2 * level.cut - level.inside
-    values = np.where(above & ~mask, outside, np.where(mask & ~above, level.inside, level.values))
+def _contours(level: Level) -> list[Array]:
+    """Return the borders (N, 2) of shapes and holes, pixel (0, 0) spanning [0, 1] x [0, 1]."""
+    outside = 2 * level.cut - level.inside
     # The margin mirrors the shape's level in the cut, so that a shape which runs off the image is
     # closed along the image's very edge.
-    values = np.pad(values, 1, constant_values=outside)
+    values = np.pad(level.values, 1, constant_values=outside)
     contours = level_curves(values, level.cut)
     return [contour[:, ::-1] - 0.5 for contour in contours if len(contour) > 3]
 
 
-def _polygon(level: Level, shape: _Mask) -> tuple[Polygon, bool]:
-    """Return the region of a shape, and whether its outline is stepped: drawn in two levels."""
-    regions = [Polygon(contour) for contour in _contours(level, shape)]
-    largest = max(regions, key=lambda polygon: polygon.area)
-    height, width = shape.shape
-    parts = polygons_in(largest.intersection(box(0, 0, width, height)))
+def _polygon(contour: Array, page: Polygon) -> tuple[Polygon, bool]:
+    """Return the region of a contour, and whether it is stepped: drawn in two levels."""
+    largest = Polygon(contour)
+    parts = polygons_in(largest.intersection(page))
     # Each vertex lies on one line of pixel centres and anywhere between two of them: stepped if
     # nearly all cut their line at the same fraction.
     fraction: Array = np.mod(outer_ring(largest) - 0.5, 1.0).sum(axis=1)
