@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from starlette.concurrency import run_in_threadpool
-from starlette.requests import Request
-
-from orbiflow.studio.routes import Routes, Studio, body_object
+from orbiflow.studio.routes import Body, Routes, Studio
 
 routes = Routes()
 
@@ -22,11 +19,11 @@ def profiles(here: Studio) -> dict[str, Any]:
 
 
 @routes("PUT", "/profiles")
-async def keep(request: Request, here: Studio, name: str = "") -> dict[str, Any]:
+def keep(body: Body, here: Studio, name: str = "") -> dict[str, Any]:
     """Keep settings under a name, and return it beside what `profiles` does."""
     from orbiflow.tiles import Profiles
 
-    title = await run_in_threadpool(Profiles().keep, name, await body_object(request))
+    title = Profiles().keep(name, body)
     return {**profiles(here), "name": title}
 
 

@@ -22,7 +22,7 @@ from orbiflow.settings import naming_extras
 from orbiflow.studio.guard import PAGE, SANDBOX, Refused
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
-from orbiflow.studio.routes import Routes, Studio, body_object, save_body, whole
+from orbiflow.studio.routes import Body, Routes, Studio, save_body, whole
 from orbiflow.studio.share_link import link_text, write_linked
 from orbiflow.studio.store import Missing
 from orbiflow.studio.taking import PREVIEW, export_folder
@@ -57,9 +57,8 @@ async def projects(here: Studio) -> list[dict[str, Any]]:
 
 
 @routes("POST", "/projects")
-async def create(request: Request, here: Studio) -> dict[str, Any]:
+async def create(body: Body, here: Studio) -> dict[str, Any]:
     """Make a project."""
-    body = await body_object(request)
     kind = body.get("kind", "tile")
     if not isinstance(kind, str) or kind not in NAMES:
         raise OrbiflowError(f"a project is of kind {', '.join(NAMES)}")
@@ -79,9 +78,9 @@ async def open_file(request: Request, here: Studio) -> dict[str, Any]:
 
 
 @routes("POST", "/projects/shared")
-async def open_link(request: Request, here: Studio) -> dict[str, Any]:
+async def open_link(body: Body, here: Studio) -> dict[str, Any]:
     """Make a project of the tile that a link carries, as of a file."""
-    text = (await body_object(request)).get("text")
+    text = body.get("text")
 
     async def write(out: Path) -> None:
         write_linked(text if isinstance(text, str) else "", out)
@@ -143,9 +142,9 @@ async def get(project: str, here: Studio) -> dict[str, Any]:
 
 
 @routes("PATCH", "/projects/{project}")
-async def patch(request: Request, project: str, here: Studio) -> dict[str, Any]:
+async def patch(request: Request, body: Body, project: str, here: Studio) -> dict[str, Any]:
     """Change a project's name, or parts of what its pages remember."""
-    body, record = await body_object(request), here.store.project(project)
+    record = here.store.project(project)
     changes: dict[str, Any] = {"changed_by": request.headers.get("x-orbiflow-client", "")[:80]}
     if "name" in body:
         changes["name"] = plain_name(body["name"], record["name"])
@@ -169,9 +168,8 @@ async def delete(project: str, here: Studio) -> dict[str, Any]:
 
 
 @routes("POST", "/projects/{project}/tasks")
-async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
+async def task(body: Body, project: str, here: Studio) -> dict[str, Any]:
     """Give a project work."""
-    body = await body_object(request)
     operation, settings = body.get("operation"), body.get("settings", {})
     if not isinstance(operation, str) or not is_object(settings):
         raise OrbiflowError("a task has an operation and settings")
@@ -227,9 +225,9 @@ async def upload(
 
 
 @routes("POST", "/projects/{project}/animal")
-async def animal(request: Request, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
+async def animal(body: Body, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Take one of the bundled animals."""
-    name = str((await body_object(request)).get("name"))
+    name = str(body.get("name"))
     end = end_of(here, project, number)
     picture = animal_file(name)
     file = here.store.home(project) / f"input{end}{picture.suffix}"
@@ -312,10 +310,10 @@ async def read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
 
 
 @routes("PUT", "/projects/{project}/reading")
-async def reading(request: Request, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
+async def reading(body: Body, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Read a picture anew, with other settings."""
     end_of(here, project, number)
-    settings = {k: v for k, v in (await body_object(request)).items() if v is not None}
+    settings = {k: v for k, v in body.items() if v is not None}
     here.store.change(project, "silhouette", number, reading=ReadingSettings(**settings).to_json())
     return await read_anew(here, project, number)
 
@@ -366,13 +364,10 @@ async def space(project: str, tile: int, here: Studio) -> Response:
 
 
 @routes("POST", "/projects/{project}/tiles/{tile}/by-hand/{way}")
-async def by_hand(
-    request: Request, project: str, tile: int, way: str, here: Studio
-) -> dict[str, Any]:
+async def by_hand(body: Body, project: str, tile: int, way: str, here: Studio) -> dict[str, Any]:
     """Make a tile of one that was pulled, or is laid in another class, and return its card."""
     if way not in ("pull", "class"):
         raise Refused(404, "there is nothing here; go back to the start page")
-    body = await body_object(request)
     stage_of(here, project, tile)
     task = await here.done(project, way, {**body, "tile": tile})
     if task["state"] != "done":
@@ -381,9 +376,8 @@ async def by_hand(
 
 
 @routes("POST", "/projects/{project}/tiles/{tile}/preview")
-async def live_preview(request: Request, project: str, tile: int, here: Studio) -> dict[str, Any]:
+async def live_preview(body: Body, project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Draw what a take-away of a tile would be, in place of one that is still being drawn."""
-    body = await body_object(request)
     operation, settings = str(body.get("operation")), body.get("settings", {})
     if operation not in ("export", "art", "solid", "animate") or not is_object(settings):
         raise OrbiflowError("a preview has an operation that makes something, and settings")

@@ -30,9 +30,9 @@ Answer = TypeVar("Answer", bound=Callable[..., Any])
 class Routes(list[Route]):
     """Routes of one topic; called with a method and an address, it decorates a function that answers.
 
-    The function is given what it names: a `Request`, the `Studio`, parts of the address in braces, and
-    what comes after its question mark, as texts or whole numbers. It returns a response, or what JSON
-    has.
+    The function is given what it names: a `Request`, its `Body`, the `Studio`, parts of the address in
+    braces, and what comes after its question mark, as texts or whole numbers. It returns a response, or
+    what JSON has.
     """
 
     def __call__(self, method: str, path: str) -> Callable[[Answer], Answer]:
@@ -43,6 +43,10 @@ class Routes(list[Route]):
             return answer
 
         return add
+
+
+class Body(dict[str, Any]):
+    """The JSON object that a request brings."""
 
 
 def _endpoint(answer: Callable[..., Any]) -> Callable[[Request], Any]:
@@ -57,6 +61,8 @@ def _endpoint(answer: Callable[..., Any]) -> Callable[[Request], Any]:
 
     async def endpoint(request: Request) -> Response:
         named = {**defaults, **request.query_params, **request.path_params}
+        if Body in kinds.values():
+            named["body"] = await _body(request)
         arguments = {name: _value(kind, name, named, request) for name, kind in kinds.items()}
         if inspect.iscoroutinefunction(answer):
             reply = await answer(**arguments)
@@ -144,7 +150,7 @@ def whole(file: Path, kind: str = "application/json", **headers: str) -> Respons
         raise Refused(404, "this is no longer here; reload the page") from None
 
 
-async def body_object(request: Request) -> dict[str, Any]:
+async def _body(request: Request) -> dict[str, Any]:
     """Return the JSON object that a request brings."""
     try:
         body = json.loads(await request.body() or b"{}")
