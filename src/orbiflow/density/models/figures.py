@@ -120,16 +120,16 @@ class WithFigures(Distribution):
             if line.kind != "linear":  # whose far ends are beyond all numbers
                 weights = weights * (line.share(values).abs() < WITHIN_TWO_SCALES)
             return line.turns((weights * values).sum() / weights.sum())
-        angle = 2 * math.pi * turns
-        mean = torch.atan2((weights * angle.sin()).sum(), (weights * angle.cos()).sum())
-        return mean / (2 * math.pi) % 1
+        return _direction(turns, weights)[0]
 
-    def _masses(self, axis: int) -> tuple[Tensor, Tensor]:
-        """Return turns (N,) of one column, and the masses (N,) about them."""
+    def _masses(self, axis: int, start: float = 0.0) -> tuple[Tensor, Tensor]:
+        """Return turns (N,) of one column from a start on, and the masses (N,) about them."""
         cells = FIRST_CELLS
         while True:
             turns, weights = _nodes(cells)
-            logs = [self.log_marginal(part[:, None], [axis]) for part in torch.split(turns, 4096)]
+            parts = torch.split(turns[:, None] + start, 4096)
+            is_alone = self.space.dim == 1
+            logs = [self.log_prob(x) if is_alone else self.log_marginal(x, [axis]) for x in parts]
             masses = weights * torch.cat(logs).exp()
             if abs(float(masses.sum()) - 1) < MASS_ERROR or cells >= MOST_CELLS:
                 return turns, masses
@@ -219,27 +219,15 @@ class WithFigures(Distribution):
         Refusals are those of `cdf`.
         """
         self._only(torch.zeros(1))
-        start, cells = self._start(), FIRST_CELLS
-        while True:
-            turns, weights = _nodes(cells)
-            masses = weights * self.log_prob(turns[:, None] + start).exp()
-            total = float(masses.sum())
-            if abs(total - 1) < MASS_ERROR or cells >= MOST_CELLS:
-                sums = masses.reshape(cells, -1).sum(dim=1).cumsum(0) / total
-                ends = torch.linspace(0, 1, cells + 1, dtype=torch.float64)
-                return Cumulative(self.log_prob, start, ends, torch.cat([sums.new_zeros(1), sums]))
-            cells *= 8
-
-    def _start(self) -> float:
-        """Return the turn at which the only column starts."""
-        if self.space.axes[0].is_real:
-            return 0.0
-        turns, weights = _nodes(FIRST_CELLS)
-        masses, angle = weights * self.log_prob(turns[:, None]).exp(), 2 * math.pi * turns
-        east, north = float(masses @ angle.cos()), float(masses @ angle.sin())
-        if math.hypot(east, north) < LEAST_RESULTANT:
-            return 0.5  # no direction is opposite to a mean that there is not
-        return (math.atan2(north, east) / (2 * math.pi) + 0.5) % 1
+        start = 0.0
+        if not self.space.axes[0].is_real:
+            mean, resultant = _direction(*self._masses(0))
+            # no direction is opposite to a mean that there is not
+            start = 0.5 if resultant < LEAST_RESULTANT else (float(mean) + 0.5) % 1
+        _, masses = self._masses(0, start)
+        sums = masses.reshape(-1, len(NODES)).sum(dim=1).cumsum(0) / masses.sum()
+        ends = torch.linspace(0, 1, len(sums) + 1, dtype=torch.float64)
+        return Cumulative(self.log_prob, start, ends, torch.cat([sums.new_zeros(1), sums]))
 
     def entropy(
         self, count: int = DRAWS, *, measure: str = CHART, generator: torch.Generator | None = None
@@ -295,6 +283,13 @@ def _nodes(cells: int) -> tuple[Tensor, Tensor]:
     middles = (torch.arange(cells, dtype=torch.float64) + 0.5) / cells
     turns = (middles[:, None] + places / (2 * cells)).flatten()
     return turns, weights.repeat(cells) / (2 * cells)
+
+
+def _direction(turns: Tensor, masses: Tensor) -> tuple[Tensor, float]:
+    """Return the mean direction, in turns, of masses (N,) at turns (N,), and its resultant length."""
+    angle = 2 * math.pi * turns
+    east, north = masses @ angle.cos(), masses @ angle.sin()
+    return torch.atan2(north, east) / (2 * math.pi) % 1, float(torch.hypot(east, north))
 
 
 def _estimate(values: Tensor) -> Estimate:
