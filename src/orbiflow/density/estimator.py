@@ -34,9 +34,8 @@ from orbiflow.density.fitting import (
     check_missing,
     fit_chosen,
     fit_conditional,
-    mean_of,
     refuse_flow_settings,
-    weighed,
+    weighted_mean,
 )
 from orbiflow.density.given_covariates import GivenCovariates
 from orbiflow.density.inference import (
@@ -362,9 +361,8 @@ class DensityEstimator(GivenCovariates):
             points = self._chart(self._checked(X))
             scores = at_observed(self._fitted(), points, measure="natural")
         else:
-            scores = torch.as_tensor(DensityEstimator.score_samples(self, X, given=given))
-        rows = weighed(scores[:, None], sample_weight)
-        return mean_of(rows.points[:, 0], rows.weights)
+            scores = torch.as_tensor(self.score_samples(X, given=given))
+        return weighted_mean(scores, sample_weight)
 
     def sample(
         self, n_samples: int = 1, random_state: RandomState = None, *, given: Any = None

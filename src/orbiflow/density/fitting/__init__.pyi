@@ -34,6 +34,7 @@ from .rows import gain_of as gain_of
 from .rows import lone_groups_note as lone_groups_note
 from .rows import mean_of as mean_of
 from .rows import weighed as weighed
+from .rows import weighted_mean as weighted_mean
 from .settings import COMPONENTS as COMPONENTS
 from .settings import KNOWN as KNOWN
 from .settings import REPORTED as REPORTED

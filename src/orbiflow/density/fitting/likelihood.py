@@ -15,6 +15,7 @@ import numpy as np
 import scipy.optimize
 import torch
 from torch import Tensor
+from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from orbiflow.arrays import Array
 from orbiflow.density.fitting.rows import Rows
@@ -95,15 +96,13 @@ class Objective:
 
     def get(self) -> Array:
         """Return all parameters, flat."""
-        flat = torch.cat([p.detach().reshape(-1) for p in self.parameters])
-        return flat.double().cpu().numpy()
+        return parameters_to_vector(self.parameters).detach().double().cpu().numpy()
 
     @torch.no_grad()
     def set(self, values: Array) -> None:
         """Put flat parameters back."""
-        parts = torch.split(torch.as_tensor(values), [p.numel() for p in self.parameters])
-        for parameter, part in zip(self.parameters, parts, strict=True):
-            parameter.copy_(part.reshape(parameter.shape))
+        flat = torch.as_tensor(values).to(self.parameters[0])
+        vector_to_parameters(flat, self.parameters)
 
     def roughness(self) -> Tensor:
         """Return the penalty, which is exact as the basis is orthonormal."""
@@ -121,10 +120,9 @@ class Objective:
         loss = nll + self.roughness()
         if not bool(torch.isfinite(loss)):
             return 1e10, np.zeros(len(values))
-        gradients = torch.autograd.grad(loss, self.parameters)
+        gradient = parameters_to_vector(torch.autograd.grad(loss, self.parameters))
         self.last = float(nll.detach())
-        flat = torch.cat([gradient.reshape(-1) for gradient in gradients])
-        return float(loss.detach()), flat.double().cpu().numpy()
+        return float(loss.detach()), gradient.double().cpu().numpy()
 
 
 def _nll(density: FlowDensity, rows: Rows) -> Tensor:

@@ -61,6 +61,12 @@ def mean_of(values: Tensor, weights: Tensor | None) -> float:
     return float((weights.to(values) * values).sum() / weights.to(values).sum())
 
 
+def weighted_mean(values: Any, weights: Any) -> float:
+    """Return the mean of values (N,) at rows with weights (N,), which are checked, or None."""
+    rows = weighed(torch.as_tensor(values)[:, None], weights)
+    return mean_of(rows.points[:, 0], rows.weights)
+
+
 def effective_rows(weights: Tensor) -> float:
     """Return the number of rows of equal weight that say as much (Kish, 1965, section 11.7).
 

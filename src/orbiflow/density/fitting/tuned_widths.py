@@ -27,9 +27,6 @@ STEPS = 30
 LEAST_CONCENTRATION, OUT_OF_REACH = 1e-2, 1e9
 """The least concentration, and a squared distance at which no kernel has any mass."""
 
-DIFFERENCE = 1e-4
-"""Step, in logarithms of concentrations, by which slopes of kernels' peaks are found."""
-
 
 def width_groups(space: Space) -> list[int]:
     """Return a number for each sphere of a space's kernels: those of one number have one width.
@@ -59,20 +56,14 @@ def tuned_concentrations(space: Space, rows: Rows, narrowest: float) -> Tensor |
     bounds = math.log(LEAST_CONCENTRATION), math.log(narrowest)
     count = len(set(groups))
 
+    @torch.enable_grad()
     def loss(logs: Array) -> tuple[float, Array]:
-        kappa = torch.tensor(np.exp(logs))[where]
-        table = away @ -kappa.float()
-        top = table.amax(dim=1, keepdim=True)
-        shares = table.sub_(top).exp_()
-        total = shares.sum(dim=1, keepdim=True)
-        likely = float((total.log() + top).double().mean())
-        # by each concentration's logarithm: of the sums, and of the peaks by differences
-        slopes = -kappa * ((shares / total).flatten() @ away.flatten(0, 1)).double() / len(away)
-        steps = torch.cat([torch.zeros(1, count), torch.eye(count), -torch.eye(count)]).double()
-        peaks = kernel_peaks(space, kappa * (DIFFERENCE * steps[:, where]).exp()).numpy()
-        gradient = np.bincount(groups, slopes.numpy(), count)
-        gradient += (peaks[1 : 1 + count] - peaks[1 + count :]) / (2 * DIFFERENCE)
-        return -likely - float(peaks[0]), -gradient
+        parameters = torch.tensor(logs, requires_grad=True)
+        kappa = parameters.exp()[where]
+        likely = (away @ -kappa.float()).logsumexp(dim=1).double().mean()
+        value = -likely - kernel_peaks(space, kappa[None])[0]
+        (gradient,) = torch.autograd.grad(value, parameters)
+        return float(value.detach()), gradient.numpy()
 
     starts = (np.full(count, start).clip(*bounds) for start in STARTS)
     how: dict[str, Any] = {"jac": True, "method": "L-BFGS-B", "bounds": [bounds] * count}

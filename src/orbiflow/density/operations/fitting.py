@@ -224,15 +224,12 @@ def _mean_score(estimator: DensityEstimator, values: Array, weights: Array | Non
     may_lack = estimator.missing == "marginalise"
     points = inference.chart_of_rows(estimator.space_, values, may_lack=may_lack)
     scores = inference.at_observed(estimator.density_, points, measure="natural")
-    counted = fitting.weighed(scores[:, None], weights)
-    return fitting.mean_of(counted.points[:, 0], counted.weights)
+    return fitting.weighted_mean(scores, weights)
 
 
 def uniform_score(estimator: DensityEstimator, values: Array, weights: Array | None) -> float:
     """Return the mean log density in natural measure of the uniform distribution at rows (N, k)."""
-    logs = inference.uniform_logs(estimator.space_, values)
-    counted = fitting.weighed(logs[:, None], weights)
-    return fitting.mean_of(counted.points[:, 0], counted.weights)
+    return fitting.weighted_mean(inference.uniform_logs(estimator.space_, values), weights)
 
 
 def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]:

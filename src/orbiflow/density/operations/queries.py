@@ -244,12 +244,10 @@ def _gradients(
 def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[Any]) -> float:
     """Return the mean of the rows that lack nothing: densities of fewer angles are in another unit."""
     import numpy as np
-    import torch
 
     chosen = whole if whole.any() else np.ones_like(whole)
     counts = None if weights is None else weights[chosen]
-    rows = fitting.weighed(torch.tensor(scores[chosen, None]), counts)
-    return fitting.mean_of(rows.points[:, 0], rows.weights)
+    return fitting.weighted_mean(scores[chosen], counts)
 
 
 def _region_note(samples: int) -> Advice:
