@@ -171,8 +171,8 @@ def test_wkt(text: str) -> None:
         ("a.wkt", "POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))", "crosses or touches itself"),
         ("a.wkt", "POLYGON EMPTY", "no polygon"),
         ("a.wkt", "CURVEPOLYGON (CIRCULARSTRING (0 0, 2 2, 4 0, 2 -2, 0 0))", "WKT"),
-        ("a.dxf", "0\nSECTION\n2\nENTITIES\n0\nENDSEC\n0\nEOF\n", "DXF drawing"),
-        ("a.dxf", "999\nmade by hand\n  0\r\nSECTION\n", "DXF drawing"),
+        ("a.dxf", "0\nSECTION\n2\nENTITIES\n0\nENDSEC\n0\nEOF\n", "SVG or PNG"),
+        ("a.dxf", "999\nmade by hand\n  0\r\nSECTION\n", "SVG or PNG"),
     ],
 )
 def test_other_kinds_are_refused_by_their_cause(name: str, text: str, about: str) -> None:

@@ -36,34 +36,10 @@ _HEAD_BYTES = 65536
 MAX_GAP_SHARE = 0.03  # of the drawing's size: such gaps in an outline are closed
 MIN_LINE_SHARE = 0.8  # of the lines' area
 GZIP = b"\x1f\x8b"
-_SAVE_SVG = "open it in the program that made it, or in Inkscape, and save it as SVG or PNG"
-_CONVERTIBLE = {
-    GZIP: "is compressed twice; decompress it first",
-    b"%PDF": f"is a PDF or Illustrator file; {_SAVE_SVG}",
-    b"%!PS": f"is a PostScript or Illustrator file; {_SAVE_SVG}",
-    b"\xc5\xd0\xd3\xc6": f"is an EPS file; {_SAVE_SVG}",
-    b"8BPS": "is a Photoshop file; save it as PNG",
-}
-_BY_ENDING = {
-    **dict.fromkeys(
-        (".ai", ".eps", ".cdr", ".pdf", ".dxf", ".dwg"),
-        f"is a drawing of another program; {_SAVE_SVG}",
-    ),
-    ".psd": "is a Photoshop file; save it as PNG",
-    **dict.fromkeys(
-        (".heic", ".heif", ".avif"),
-        "is a photograph of a kind that is not read; save it as PNG or JPEG",
-    ),
-    **{
-        f".{kind}": f"is no {kind.upper()} image, or a damaged one; export or download it again"
-        for kind in ("png", "jpg", "jpeg", "webp", "gif", "bmp", "tif", "tiff")
-    },
-}
 _SVG = re.compile(r"<(\w+:)?svg[\s>]")
 _WKT = re.compile(
     r"(SRID=\d+;)?\s*(MULTI)?(POLYGON|LINESTRING|POINT)|GEOMETRYCOLLECTION", re.IGNORECASE
 )
-_DXF = re.compile(r"(\s*999\s*\n.*\n)*\s*0\s*\n\s*SECTION\b")
 _COUNT_LINE = re.compile(r"\s*\d+\s*[\r\n]")
 _BY_NAME = {
     **{".svg": "svg", ".json": "json", ".geojson": "json", ".wkt": "wkt"},
@@ -151,21 +127,22 @@ def _kind(path: Source, head: bytes) -> str:
     if image_kind(head):
         return "image"
     text = _text(head)
-    if text is not None and not head.startswith(tuple(_CONVERTIBLE)):
+    if text is not None:
         if text.startswith("<") and _SVG.search(text):
             return "svg"
         if text.startswith(("[", "{")):
             return "json"
         if _WKT.match(text):
             return "wkt"
-        if _DXF.match(text):
-            raise InputFileError(f"{path}: is a DXF drawing; {_SAVE_SVG}")
-        if _COUNT_LINE.match(text):
+        if _COUNT_LINE.match(text) and path.suffix.lower() != ".dxf":
             return "points"
         # the reader that fits the name of a text file gives the best message
         if path.suffix.lower() in _BY_NAME:
             return _BY_NAME[path.suffix.lower()]
-    raise InputFileError(f"{path}: {_what(path, head, text)}")
+    raise InputFileError(
+        f"{path}: is damaged, or of a kind that is not read; open it in the program that made it, and "
+        f"save it as SVG or PNG; give {_READABLE}"
+    )
 
 
 def _text(head: bytes) -> str | None:
@@ -175,14 +152,3 @@ def _text(head: bytes) -> str | None:
         return None
     text = head.decode("utf-16" if utf16 else "utf-8", errors="replace")
     return text.lstrip("\ufeff").lstrip()
-
-
-def _what(path: Source, head: bytes, text: str | None) -> str:
-    for magic, what in _CONVERTIBLE.items():
-        if head.startswith(magic):
-            return what
-    if path.suffix.lower() in _BY_ENDING:
-        return _BY_ENDING[path.suffix.lower()]
-    suffix = f" although its name ends in {path.suffix}" if path.suffix else ""
-    kind = "text" if text is not None else "data"
-    return f"holds {kind} of an unknown kind{suffix}; give {_READABLE}"
