@@ -168,10 +168,6 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "size of one": (lambda: make(np.eye(2), [0, 0], size=(3,)), "size must be real numbers"),
     "nothing": (lambda: Frame.from_dict({}), "incomplete: 'size'"),
     "a list": (lambda: Frame.from_dict([]), "incomplete"),  # pyright: ignore[reportArgumentType]
-    "other sense": (
-        lambda: Frame.from_dict({**make(np.eye(2), [0, 0]).as_dict(), "y_down": True}),
-        "y_down is True",
-    ),
 }
 
 

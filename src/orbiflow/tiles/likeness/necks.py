@@ -155,7 +155,8 @@ def _facing(
     ring: Array, size: float, runs_well: Callable[[Any], Any], widest: float = math.inf
 ) -> Thinnest | None:
     """Return the nearest two points that face each other on the left of the ring, if at all near."""
-    points = _dense(ring, POINT_SPACING * size)
+    dense = shapely.segmentize(shapely.LinearRing(ring), POINT_SPACING * size)
+    points = shapely.get_coordinates(dense)[:-1]
     tree = KDTree(points)
     widest = min(widest, ring_length(ring) / 2 / OUTLINE_PER_WIDTH, MAX_NECK_WIDTH * size)
     reach = min(2 * POINT_SPACING * size, widest)
@@ -167,16 +168,6 @@ def _facing(
         if reach == widest:
             return None
         reach = min(2 * reach, widest)
-
-
-def _dense(ring: Array, step: float) -> Array:
-    """Return the ring's vertices, and points on its sides at most `step` apart."""
-    after = np.roll(ring, -1, axis=0)
-    pieces = np.maximum(np.ceil(np.linalg.norm(after - ring, axis=1) / step), 1).astype(int)
-    start = np.repeat(np.cumsum(pieces) - pieces, pieces)
-    share = (np.arange(len(start)) - start) / np.repeat(pieces, pieces)
-    sides = np.repeat(after - ring, pieces, axis=0)
-    return np.repeat(ring, pieces, axis=0) + share[:, None] * sides
 
 
 def _nearest_within(

@@ -13,7 +13,7 @@ from orbiflow.drawing import lightness, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.make.layout import BLACK, BLUE, Layout, line_style
-from orbiflow.tiles.motifs import Over, carried_picture, drawn_motif
+from orbiflow.tiles.motifs import Over, motifs_on
 from orbiflow.tiles.page import (
     INK,
     USUAL_WIDTH,
@@ -37,23 +37,23 @@ EDGE = 0.6  # least distance in mm from the tile's edge of lines, which a drawin
 MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
-def drawn_on(layout: Layout, number: int, over: Over) -> Motif:
-    """Return what the settings draw on one of the tile's figures, at its place on the page in mm."""
-    settings, (figure, within) = layout.settings, layout.tile.figures[number]
-    place = layout.page.place.after(within)
+def drawn_on(layout: Layout, overs: Sequence[Over]) -> tuple[tuple[Motif, ...], tuple[str, ...]]:
+    """Return what lies on each of the tile's figures, in its place on the page in mm, and notes.
+
+    Raises `OrbiflowError` for a picture of pixels that a pen is to draw.
+    """
+    settings, page, tile = layout.settings, layout.page, layout.tile
+    if settings.purpose == "plotter" and any(over.picture for over in overs):
+        raise OrbiflowError(
+            "a pen draws lines, and the picture is made of pixels; give an SVG drawing of fills "
+            "and strokes alone"
+        )
+    density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
     chosen = palette(settings.palette if settings.coloured else "ink")
-    wanted = settings.of_figure(number)
-    motif = drawn_motif(figure, wanted, chosen, over.drawing, hairlines=not settings.coloured)
-    rasters = ()
-    if over.picture is not None:
-        if settings.purpose == "plotter":
-            raise OrbiflowError(
-                "a pen draws lines, and the picture is made of pixels; give an SVG drawing of fills "
-                "and strokes alone"
-            )
-        density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
-        rasters = (carried_picture(over.picture, figure, density * place.scale),)
-    return Motif(motif.parts, rasters).moved(*place)
+    how = {"density": density * page.place.scale, "hairlines": not settings.coloured}
+    on = motifs_on(tile, settings, chosen, overs, tint=settings.tint, **how)
+    both = zip(on.motifs, tile.figures, strict=True)
+    return tuple(motif.moved(*page.place.after(part.place)) for motif, part in both), on.notes
 
 
 def with_drawing(scene: Scene, layout: Layout) -> Scene:

@@ -134,12 +134,11 @@ def laid_out(
     offset = [note for _, note in placed.pieces] if settings.cut == "pieces" else []
     notes = (*filter(None, [placed.outline.note, *offset]), *_neck_notes(placed))
     if overs:
-        motifs = tuple(drawn_on(placed, number, over) for number, over in enumerate(overs))
+        motifs, carried = drawn_on(placed, overs)
         placed = replace(placed, motifs=motifs, has_picture=any(pictures))
         if settings.coloured:
             notes = (*notes_on_dark_pictures(tile, overs, palette(settings.palette)), *notes)
-        carried = [note for part in tile.figures for note in part.figure.notes]
-        notes = (*carried, *(note for over in overs for note in over.notes), *notes)
+        notes = (*carried, *notes)
     return placed, notes
 
 

@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
-from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make.fit_tests import fit_test_scene
@@ -66,7 +64,7 @@ def _scenes_of(layout: Layout, kind: int) -> list[Scene]:
             f"{long:.1f} x {short:.1f} mm; choose a larger area or bed, or a smaller tile size"
         )
     shared = _shared_out(placed, layout, box)
-    return [_scene(layout, kind, part, curve, line, gap) for part in shared]
+    return [_scene(layout, kind, part, curve) for part in shared]
 
 
 def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
@@ -83,8 +81,7 @@ def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
     return [placed.select(slice(n)) for n in counts]
 
 
-def _scene(layout: Layout, kind: int, placed: Uses, curve: Curve, line: Array, gap: float) -> Scene:
-    _require_clear(placed.images(line), layout.page.box, gap)
+def _scene(layout: Layout, kind: int, placed: Uses, curve: Curve) -> Scene:
     pieces = [
         PlacedTile(aspect, placed.linear[aspect], offset, prototile=kind)
         for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
@@ -114,13 +111,3 @@ def _coloured(layout: Layout, pieces: list[PlacedTile]) -> Iterator[Layer]:
 
 def _moved(curve: Curve, pieces: list[PlacedTile]) -> tuple[Curve, ...]:
     return tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
-
-
-def _require_clear(rings: Array, box: Box, gap: float) -> None:
-    """Check that pieces keep their distance and lie on the sheet, as the arrangement promises."""
-    polygons = np.asarray(shapely.polygons(rings))
-    tree = shapely.STRtree(polygons)
-    first, second = tree.query(polygons, predicate="dwithin", distance=0.999 * gap)
-    low, high = rings.min(axis=(0, 1)), rings.max(axis=(0, 1))
-    if (first != second).any() or (low < box[:2]).any() or (high > box[2:]).any():
-        raise RuntimeError("the nesting broke its promise: pieces too close or off the sheet")

@@ -39,6 +39,7 @@ def motifs_on(
     *,
     tint: float,
     density: float,
+    hairlines: bool = False,
 ) -> FigureMotifs:
     """Return what lies on a tile with a map.
 
@@ -49,6 +50,7 @@ def motifs_on(
         overs: What lies over the silhouette of each figure, as `read_over` returns it.
         tint: How much each copy's colour tints what is from a file.
         density: The pixels of pictures along a unit of the tile.
+        hairlines: Whether engraved lines are hairlines along their middle, for a machine to follow.
 
     Raises:
         OrbiflowError: If a picture or an eye is given but there is no map of the silhouette, or an eye
@@ -59,7 +61,7 @@ def motifs_on(
     motifs = list[Motif]()
     for number, (over, part) in enumerate(zip(all_overs, tile.figures, strict=True)):
         motif_settings, rasters = settings.of_figure(number), ()
-        drawn = drawn_motif(part.figure, motif_settings, palette, over.drawing)
+        drawn = drawn_motif(part.figure, motif_settings, palette, over.drawing, hairlines=hairlines)
         if over.picture is not None:
             rasters = (carried_picture(over.picture, part.figure, density * part.place.scale),)
         motifs.append(Motif(drawn.parts, rasters))

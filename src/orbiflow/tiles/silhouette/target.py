@@ -178,21 +178,15 @@ class Frame:
         """
         try:
             size = values["size"]
-            frame = cls(
+            return cls(
                 values["linear"],
                 values["offset"],
                 str(values["kind"]),
                 None if size is None else tuple(size),
                 tuple(values["corner"]),
             )
-            y_down = values["y_down"]
         except (KeyError, TypeError) as error:
             raise OrbiflowError(f"the frame is incomplete: {error}") from error
-        if y_down is not frame.y_down:
-            raise OrbiflowError(
-                f"the frame's y_down is {y_down!r}, but its linear part has y_down {frame.y_down}"
-            )
-        return frame
 
 
 def _tensor(points: torch.Tensor) -> torch.Tensor:
