@@ -16,9 +16,9 @@ from orbiflow.density.fitting.evidence import Candidates, Course, candidates_of,
 from orbiflow.density.fitting.families import KernelFamily
 from orbiflow.density.fitting.flow_trial import (
     FIRST_TENTH_SHARE,
-    Rivals,
     TriedFlow,
     flow_beside,
+    outdone_by,
     try_flow,
 )
 from orbiflow.density.fitting.held_out import supported_weights
@@ -26,11 +26,9 @@ from orbiflow.density.fitting.likelihood import ITERATIONS_PER_SCORE, refine
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.rows import Gain
 from orbiflow.density.fitting.settings import Component
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 from orbiflow.runtime import SideBySide, one_core
-from refusals import refused
 
 SMALL: dict[str, Any] = {"max_frequency": 2, "segments": 2, "roughness": (1e-3,)}
 
@@ -88,7 +86,7 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
     with one_core():
         course = Course(lambda *_: None, 1.0)
         candidates = candidates_of(
-            SPACE, [KernelFamily(SPACE)], folds, course, SideBySide(), Rivals().meet
+            SPACE, [KernelFamily(SPACE)], folds, course, SideBySide(), lambda *_: None
         )
     return (
         folds,
@@ -166,9 +164,7 @@ def test_a_flow_is_outdone_that_gains_nothing_and_cannot_catch_up(
     flow = od.FlowDensity(
         SPACE, Flow([SplineField(SPACE.group, 1)], steps=1)
     )  # which moves nothing
-    with Rivals() as rivals:
-        rivals.meet(even + above, even, held)
-        assert rivals.outdo(flow, hope) is given_up
+    assert outdone_by(even + above, even, held)(flow, hope) is given_up
 
 
 def test_an_outdone_flow_is_refined_no_further() -> None:
@@ -187,16 +183,3 @@ def test_an_outdone_flow_is_refined_no_further() -> None:
     whole = fitted(None)
     assert fitted(lambda _, hope: hope == 0) == whole[:1]
     assert fitted(lambda *_: False) == whole
-
-
-@pytest.mark.parametrize("count", [1, 2])
-def test_who_waits_for_rivals_that_fail_waits_no_longer(count: int, monkeypatch) -> None:
-    def failing(*_: Any) -> None:
-        raise OrbiflowError("no kernels today")
-
-    monkeypatch.setattr("orbiflow.runtime.side_by_side.cores", lambda: count)
-    monkeypatch.setattr(KernelFamily, "fitted", failing)
-    points = SPACE.project(0.1 * torch.randn(400, 2, generator=torch.Generator().manual_seed(0)))
-    settings = od.DensitySettings(components=("flow", "kernels"), **QUICK)
-    with refused("kernels", "today"):
-        od.fit_automatic(SPACE, points.double(), settings)

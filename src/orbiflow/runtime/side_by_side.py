@@ -24,18 +24,15 @@ class SideBySide:
     have the same results either way. What they tell is heard in the thread that waits for them; if
     hearing it fails, such as by `Cancelled`, all end with their next word.
 
-    Args:
-        waiting: How many of the functions wait for others now and then, and leave their core to them.
-
     >>> with SideBySide() as work:
     ...     results = [work.begin(lambda tell, n=n: n * n) for n in range(3)]
     ...     [result() for result in results]
     [0, 1, 4]
     """
 
-    def __init__(self, *, waiting: int = 0) -> None:
+    def __init__(self) -> None:
         count = cores()
-        self._pool = ThreadPoolExecutor(count + waiting) if count > 1 else None
+        self._pool = ThreadPoolExecutor(count) if count > 1 else None
         self._words: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._stopping = False
 

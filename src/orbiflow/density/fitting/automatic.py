@@ -31,14 +31,14 @@ from orbiflow.density.fitting.families import (
     ParametricFamily,
     ProductChainFamily,
 )
-from orbiflow.density.fitting.flow import fit_density
+from orbiflow.density.fitting.flow import Outdone, fit_density
 from orbiflow.density.fitting.flow_trial import (
     MANY_ROWS,
     FittedFlow,
-    Rivals,
     TriedFlow,
     flow_beside,
     flow_settings,
+    outdone_by,
     try_flow,
 )
 from orbiflow.density.fitting.held_out import (
@@ -224,15 +224,21 @@ def fit_in_folds(
     flows = _is_flow_tried(space, folds, settings)
     total = work_of(len(families), folds.used) + FLOW_WORK * flows
     course = Course(lambda done, what: say(BEFORE_END * done, what), total)
-    with SideBySide(waiting=1) as beside, Rivals() as rivals:
-        fitted = _flow_fits(space, folds, settings, rivals, course, beside) if flows else None
-        candidates = candidates_of(space, families, folds, course, beside, rivals.meet)
+    with SideBySide() as beside:
+        flow_fits: list[Callable[[int], FittedFlow]] = []
+
+        def meet(others: Tensor, uniform: Tensor, held: Rows) -> None:
+            if flows:
+                outdone = outdone_by(others, uniform, held)
+                flow_fits.append(_flow_fits(space, folds, settings, outdone, course, beside))
+
+        candidates = candidates_of(space, families, folds, course, beside, meet)
         weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
         weights = without_idle(candidates, weights)  # each part costs time at every query
         others = judged(candidates, weights)  # while the flow is fitted
         tried = TriedFlow()
-        if fitted is not None:
-            tried = try_flow(folds, candidates, weights, fitted)
+        if flow_fits:
+            tried = try_flow(folds, candidates, weights, flow_fits[0])
     say(BEFORE_END, "putting together")
     evidence = Evidence.of(space, families, candidates, folds.rows, weights)
     density = evidence.assembled(tried.flow, tried.share)
@@ -274,20 +280,20 @@ def _flow_fits(
     space: Space,
     folds: Folds,
     settings: DensitySettings,
-    rivals: Rivals,
+    outdone: Outdone,
     course: Course,
     beside: SideBySide,
 ) -> Callable[[int], FittedFlow]:
     """Begin to fit a flow without the first tenth; return the fits without the first and the second.
 
-    The first is given up where the `rivals` outdo it.
+    The first is given up where it is `outdone`.
     """
     chosen = flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow)
     tell = course.part(FLOW_WORK)
 
     def begun(number: int) -> Callable[[], FittedFlow]:
-        outdone = None if number else rivals.outdo
-        return beside.begin(partial(flow_beside, space, folds, number, chosen, outdone), tell)
+        fit = partial(flow_beside, space, folds, number, chosen, None if number else outdone)
+        return beside.begin(fit, tell)
 
     first = begun(0)
     return lambda number: begun(number)() if number else first()

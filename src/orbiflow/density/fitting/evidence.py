@@ -116,7 +116,8 @@ def candidates_of(
     """Fit all families to all folds; after the first, only what may be of use.
 
     The families are fitted side by side; so are all folds after the first. `meet` is told the log
-    densities (N,) of all candidates together and the uniform one, at the first rows held out.
+    densities (N,) of all candidates together and the uniform one, at the first rows held out, before
+    the other folds begin.
     """
 
     def begun(number: int) -> list[Callable[[], Fitted]]:

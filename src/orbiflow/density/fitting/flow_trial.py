@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import replace
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -66,30 +65,20 @@ def flow_beside(
     )
 
 
-class Rivals:
-    """What a flow has to beat: the candidates of the first fold, as soon as they are known."""
+def outdone_by(others: Tensor, uniform: Tensor, held: Rows) -> Outdone:
+    """Return what says whether a flow can be given up beside candidates.
 
-    def __init__(self) -> None:
-        self._known: Future[tuple[Tensor, Tensor, Rows]] = Future()
+    It gains nothing beside them, and is more than so many nats below them. They have together the log
+    densities `others` (N,), and the uniform one `uniform`, at `held` rows.
+    """
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        """Let nobody wait any longer."""
-        self._known.cancel()
-
-    def meet(self, others: Tensor, uniform: Tensor, held: Rows) -> None:
-        """Tell the log densities (N,) of the candidates together and the uniform one at `held` rows."""
-        self._known.set_result((others, uniform, held))
-
-    def outdo(self, flow: FlowDensity, hope: float) -> bool:
-        """Return whether a flow gains nothing beside them and is more than `hope` nats below them."""
-        others, uniform, held = self._known.result()
+    def outdone(flow: FlowDensity, hope: float) -> bool:
         logs = at_observed(flow.with_steps(2 * flow.flow.steps), held.points)
         worth = _worth([torch.stack([others, logs, uniform])], [held])
         assert worth.others is not None
         return not _is_worth_it(worth) and worth.others - worth.alone > hope
+
+    return outdone
 
 
 def try_flow(
