@@ -30,12 +30,11 @@ REACH_DEVIATIONS = 7.0
 STEP_DEVIATIONS = 0.9
 """Deviations between nodes: the trapezoidal rule is then off by exp(-2 pi^2 / 0.9^2)."""
 
-MIN_NODES = 12
-"""The fewest nodes of an angle."""
+MIN_NODES, MAX_NODES = 12, 16_384
+"""The fewest and the most nodes of an angle that is hidden alone."""
 
-MAX_NODES, MAX_NODES_ALONE = 1024, 16_384
-"""The most nodes of several hidden angles of a chain together, and of one. Where several need more,
-the nodes are quasi-random."""
+QUASI_RANDOM_NODES = 512
+"""Quasi-random nodes of several hidden angles: log densities are right within some 3e-4 nats."""
 
 TABLE_POINTS = 2048
 """Points of the distribution function whose inverse gives quasi-random nodes."""
@@ -48,66 +47,32 @@ def nodes_of(
 
     Offsets are by axis; components that need as many come together.
 
-    The trapezoidal rule over each hidden angle, as fine as it and the angles after it are sharp: to
-    analytic functions it converges exponentially (Trefethen and Weideman, 2014). For means
-    (C, d, 1 + 2 d) and concentrations (C, d); observed axes before a hidden one have slopes of 0 there.
+    Of a single hidden angle it is the trapezoidal rule, as fine as it and the angles after it are
+    sharp: to analytic functions it converges exponentially (Trefethen and Weideman, 2014). Nodes of
+    several are quasi-random, by von Mises quantiles. For means (C, d, 1 + 2 d) and concentrations
+    (C, d); observed axes before a hidden one have slopes of 0 there.
     """
-    count = len(kappa)
-    if not hidden:
-        yield torch.arange(count), kappa.new_zeros(count, 1), {}
+    every = torch.arange(len(kappa))
+    if len(hidden) != 1:
+        count = QUASI_RANDOM_NODES if hidden else 1
+        engine = torch.quasirandom.SobolEngine(max(1, len(hidden)), scramble=True, seed=seed)
+        even = engine.draw(count, dtype=torch.float64)
+        offsets = {axis: quantiles(kappa[:, axis], even[:, k]) for k, axis in enumerate(hidden)}
+        yield every, kappa.new_full((len(kappa), count), -math.log(count)), offsets
         return
-    reach, sizes = node_counts(means, kappa, hidden, observed)
-    wanted, number = unique(sizes, dim=0, return_inverse=True)
-    for k, size in enumerate(listed(wanted)):
-        chosen = torch.nonzero(number == k)[:, 0]
-        size = [min(int(s), MAX_NODES_ALONE) for s in size]
-        fits = len(size) == 1 or math.prod(size) <= MAX_NODES
-        sharpness = kappa[chosen][:, hidden]
-        rule = _trapezoidal(sharpness, reach[chosen], size) if fits else _sobol(sharpness, seed)
-        yield chosen, rule[0], dict(zip(hidden, rule[1], strict=True))
-
-
-def node_counts(
-    means: Tensor, kappa: Tensor, hidden: list[int], observed: list[int]
-) -> tuple[Tensor, Tensor]:
-    """Return how far nodes reach from the mean of each hidden angle, and how many there are (C, H)."""
-    # concentrations (C, H) of the integrand in each hidden angle, which bends others
-    after, d = hidden + observed, kappa.shape[1]
-    slope = means[:, after][:, :, [1 + axis for axis in hidden]].square()
-    slope += means[:, after][:, :, [1 + d + axis for axis in hidden]].square()
-    sharp = kappa[:, hidden] + (kappa[:, after, None] * slope).sum(dim=1)
-    reach = (REACH_DEVIATIONS / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+    (axis,), d = hidden, kappa.shape[1]
+    # concentrations (C,) of the integrand, which other angles bend
+    slope = means[:, observed, 1 + axis].square() + means[:, observed, 1 + d + axis].square()
+    sharp = kappa[:, axis] + (kappa[:, observed] * slope).sum(dim=1)
+    reach = (REACH_DEVIATIONS / kappa[:, axis].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
     sizes = (2 * reach * sharp.sqrt() / STEP_DEVIATIONS).ceil().clamp_min(MIN_NODES)
-    return reach, MIN_NODES * torch.exp2((sizes / MIN_NODES).log2().ceil())  # few different ones
-
-
-def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor, list[Tensor]]:
-    """Return a product of rules: log weights (C, Q), and offsets (C, Q) for each axis."""
-    logs: list[Tensor] = []
-    offsets: list[Tensor] = []
-    for i, size in enumerate(sizes):
-        step = (torch.arange(size, dtype=kappa.dtype) + 0.5) / size * 2 - 1
-        offset = reach[:, i, None] * step
-        logs.append(torch.log_softmax(kappa[:, i, None] * (offset.cos() - 1), dim=1))
-        offsets.append(offset)
-    shape = (len(kappa), *sizes)
-
-    def spread(value: Tensor, i: int) -> Tensor:
-        axes_shape = [1] * len(sizes)
-        axes_shape[i] = sizes[i]
-        return value.reshape(len(kappa), *axes_shape).expand(shape).flatten(1)
-
-    total = torch.stack([spread(value, i) for i, value in enumerate(logs)]).sum(dim=0)
-    return total, [spread(value, i) for i, value in enumerate(offsets)]
-
-
-def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
-    """Return `MAX_NODES` quasi-random nodes of equal weights, by von Mises quantiles."""
-    count, axes = kappa.shape
-    engine = torch.quasirandom.SobolEngine(axes, scramble=True, seed=seed)
-    even = engine.draw(MAX_NODES, dtype=torch.float64)
-    logs = kappa.new_full((count, MAX_NODES), -math.log(MAX_NODES))
-    return logs, [quantiles(kappa[:, i], even[:, i]) for i in range(axes)]
+    sizes = MIN_NODES * torch.exp2((sizes / MIN_NODES).log2().ceil())  # few different ones
+    for size in listed(unique(sizes)):
+        chosen, count = torch.nonzero(sizes == size)[:, 0], min(int(size), MAX_NODES)
+        step = (torch.arange(count, dtype=kappa.dtype) + 0.5) / count * 2 - 1
+        offset = reach[chosen, None] * step
+        logs = torch.log_softmax(kappa[chosen, axis, None] * (offset.cos() - 1), dim=1)
+        yield chosen, logs, {axis: offset}
 
 
 def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
