@@ -36,7 +36,7 @@ MIN_NODES, MAX_NODES = 12, 16_384
 QUASI_RANDOM_NODES = 512
 """Quasi-random nodes of several hidden angles: log densities are right within some 3e-4 nats."""
 
-TABLE_POINTS = 2048
+TABLE_POINTS = 512
 """Points of the distribution function whose inverse gives quasi-random nodes."""
 
 
@@ -55,8 +55,7 @@ def nodes_of(
     every = torch.arange(len(kappa))
     if len(hidden) != 1:
         count = QUASI_RANDOM_NODES if hidden else 1
-        engine = torch.quasirandom.SobolEngine(max(1, len(hidden)), scramble=True, seed=seed)
-        even = engine.draw(count, dtype=torch.float64)
+        even = _quasi_random(len(hidden), count, seed)
         offsets = {axis: quantiles(kappa[:, axis], even[:, k]) for k, axis in enumerate(hidden)}
         yield every, kappa.new_full((len(kappa), count), -math.log(count)), offsets
         return
@@ -106,9 +105,6 @@ components, for others, and for heavy and narrow ones, each level beginning with
 NOISE_LEFT, GENTLE_CONCENTRATION = (0.9, 0.7, 0.3, 0.1, 0.05), 20.0
 """Share of hidden noise that is left about quasi-random nodes, level by level and for more nodes as
 one level later, and the concentration below which it is less."""
-
-SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
-"""Concentrations by which quasi-random nodes are spread."""
 
 BLOCK_ENTRIES = 2**18
 """Entries worked on at a time: few enough for the cache."""
@@ -364,29 +360,24 @@ class _Rule:
         # of angles after those kept, it would have to be known at each point of the grid
         self.left = NOISE_LEFT[level + max(step, 0)] if early and hidden > 1 else 0.0
         self.count = (1, NODES_ALONE * 2**level, NODES_OF_SEVERAL[stage])[min(hidden, 2)]
-        self.tables = _quasi_random(hidden, self.count, level) if hidden > 1 else []
+        self.even = _quasi_random(hidden, self.count, level)
 
     def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
         """Return offsets (C, Q) of a hidden angle from its mean, and the logarithms of their weights.
 
         For concentrations (C, 1).
         """
-        if self.tables:
-            kappa = kappa.clamp(float(SHARPNESS[0]), float(SHARPNESS[-2]))
-            row = torch.searchsorted(SHARPNESS, kappa[:, 0], right=True) - 1
-            part = (kappa / SHARPNESS[row, None] - 1) / (SHARPNESS[1] / SHARPNESS[0] - 1)
-            offset = torch.lerp(self.tables[number][row], self.tables[number][row + 1], part)
+        if self.even.shape[1] > 1:
             weight = -math.log(self.count) if number == 0 else 0.0
-            return offset / kappa.sqrt(), kappa.new_tensor([[weight]])
+            return quantiles(kappa[:, 0], self.even[:, number]), kappa.new_tensor([[weight]])
         reach = (REACH_DEVIATIONS / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
         offset = reach * ((2 * torch.arange(self.count) + 1) / self.count - 1)
         return offset, torch.log_softmax(kappa * (offset.cos() - 1), dim=1)
 
 
 @lru_cache(maxsize=16)
-def _quasi_random(hidden: int, count: int, seed: int) -> list[Tensor]:
-    """Return nodes (S, Q) of each hidden angle by `SHARPNESS`, in deviations."""
+def _quasi_random(hidden: int, count: int, seed: int) -> Tensor:
+    """Return quasi-random probabilities (Q, H)."""
     with torch.inference_mode(False):
-        even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=seed)
-        nodes = even.draw(count, dtype=torch.float64)
-        return [quantiles(SHARPNESS, shares) * SHARPNESS.sqrt()[:, None] for shares in nodes.mT]
+        engine = torch.quasirandom.SobolEngine(max(1, hidden), scramble=True, seed=seed)
+        return engine.draw(count, dtype=torch.float64)
