@@ -26,11 +26,11 @@ from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.silhouette import (
     Covered,
     Drawing,
+    FileContent,
     Frame,
     Target,
-    check_file,
+    content_of,
     open_image,
-    read_head,
 )
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tile_map import TileMap
@@ -119,7 +119,7 @@ class CarriedPicture:
         return CarriedPicture(small.convert("RGBA"), self.covered, self.notes)
 
 
-def read_picture(path: Path, tile: EscherTile) -> CarriedPicture:
+def read_picture(path: FileContent, tile: EscherTile) -> CarriedPicture:
     """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
     image, notes = open_image(path)
     image, covered = image.convert("RGBA"), tile.covered
@@ -181,12 +181,12 @@ MOST_CARRIED = 400_000  # greatest number of points that are carried in all
 class _Carry:
     """The map from a drawing to the tile, point by point."""
 
-    def __init__(self, path: Path, drawing: Drawing, tile: EscherTile, widest: float) -> None:
+    def __init__(self, drawing: Drawing, tile: EscherTile, widest: float) -> None:
         self.tile, self.box, self.count = tile, drawing.box, 0
         self.size, self.scale = float(np.sqrt(abs(tile.tile.signed_area))), 1.0
         if self.box is not None:
             covered, extent = tile.covered, np.subtract(self.box[2:], self.box[:2])
-            covered.require_aspect(path, "drawing", extent.tolist())
+            covered.require_aspect(drawing.path, "drawing", extent.tolist())
             self.scale = float(np.sqrt(np.prod((covered.high - covered.low) / extent)))
         self.tolerance = FLATNESS * self.size / self.scale
         self.widest = widest * self.size / self.scale
@@ -221,22 +221,21 @@ def read_over(path: str | Path, tile: EscherTile, *, followed: bool = False) -> 
     In a drawing whose lines are to be `followed` by a machine, more strokes stay lines.
     """
     tile.require_map()
-    path = as_path(path, "the picture's file")
-    check_file(path)
-    head = read_head(path, 4096).lstrip(b"\xef\xbb\xbf \t\r\n")
-    if head.startswith(b"<") or (path.suffix.lower() == ".svg" and b"\0" not in head[:64]):
-        return _read_drawing(path, tile, WIDEST_FOLLOWED if followed else WIDEST_LINE)
-    picture = read_picture(path, tile)
+    content = content_of(as_path(path, "the picture's file"))
+    head = content.data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if head.startswith(b"<") or (content.suffix.lower() == ".svg" and b"\0" not in head[:64]):
+        return _read_drawing(content, tile, WIDEST_FOLLOWED if followed else WIDEST_LINE)
+    picture = read_picture(content, tile)
     return Over(picture, None, picture.notes)
 
 
-def _read_drawing(path: Path, tile: EscherTile, widest: float) -> Over:
+def _read_drawing(path: FileContent, tile: EscherTile, widest: float) -> Over:
     """Read an SVG file over a tile: its fills and strokes as curves, or else its page as pixels.
 
     Strokes wider than `widest`, in sizes of the silhouette, are carried as areas.
     """
     drawing = Drawing(path)
-    carry = _Carry(path, drawing, tile, widest)
+    carry = _Carry(drawing, tile, widest)
     parts, notes = read_parts(drawing, carry), drawing.notes()
     if parts:
         return Over(None, Motif(tuple(parts)), tuple(notes))

@@ -24,8 +24,7 @@ from .readers.photographs import lab_of as lab_of
 from .readers.pictures import read_mask_array as read_mask_array
 from .readers.reading import FileContent as FileContent
 from .readers.reading import Reading as Reading
-from .readers.reading import check_file as check_file
-from .readers.reading import read_head as read_head
+from .readers.reading import content_of as content_of
 from .readers.svg_render import Drawing as Drawing
 from .readers.svg_render import Rgba as Rgba
 from .readers.svg_render import picture_size as picture_size

@@ -65,7 +65,7 @@ class Covered(NamedTuple):
         upright = shares if self.y_down else (shares - (0, 1)) * (1, -1)
         return upright * (self.high - self.low) + self.low
 
-    def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
+    def require_aspect(self, path: Path | FileContent, what: str, size: Sequence[float]) -> None:
         """Refuse a picture, drawing or mask of this width and height unless its aspect is the same."""
         (width, height), (wide, high) = size, self.high - self.low
         if abs(width * high / (height * wide) - 1) > ASPECT_TOLERANCE:

@@ -22,14 +22,7 @@ from orbiflow.tiles.silhouette.outlines import (
 from orbiflow.tiles.silhouette.readers.image_files import image_kind
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.polygons import read_json, read_points, read_wkt
-from orbiflow.tiles.silhouette.readers.reading import (
-    FileContent,
-    Reading,
-    Source,
-    check_file,
-    read_head,
-    unzipped,
-)
+from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, content_of, unzipped
 from orbiflow.tiles.silhouette.readers.svg_documents import MAX_BYTES
 
 _HEAD_BYTES = 65536
@@ -59,11 +52,12 @@ def read_outline(
     that is missing, of an unknown kind, damaged, too large, or without a usable shape, and
     `OrbiflowError` for a setting that cannot be used.
     """
-    path = path if isinstance(path, FileContent) else as_path(path, "the silhouette's file")
-    check_file(path)
-    if read_head(path, 2) == GZIP:
+    if not isinstance(path, FileContent):
+        path = as_path(path, "the silhouette's file")
+    path = content_of(path)
+    if path.data.startswith(GZIP):
         path = unzipped(path, MAX_BYTES)
-    kind = _kind(path, read_head(path, _HEAD_BYTES))
+    kind = _kind(path, path.data[:_HEAD_BYTES])
     if kind == "image":
         return _bridged(read_image(path, threshold=threshold, invert=invert))
     options = {"threshold": threshold, "invert": None if kind == "svg" else invert}
@@ -77,14 +71,14 @@ def read_outline(
         return _hole_of(reading, path) if invert else _bridged(reading)
 
 
-def _read_svg(path: Source) -> Reading:
+def _read_svg(path: FileContent) -> Reading:
     """Read a drawing, for which more has to be imported than for anything else."""
     from orbiflow.tiles.silhouette.readers.svg import read_svg
 
     return read_svg(path)
 
 
-def _hole_of(reading: Reading, path: Source) -> Reading:
+def _hole_of(reading: Reading, path: FileContent) -> Reading:
     """Return the largest hole in what was seen, such as an animal that is cut out of a card."""
     parts = [] if reading.seen is None else polygons_in(reading.seen.buffer(0))
     holes = shapely.union_all([filled(part) for part in parts]).difference(shapely.union_all(parts))
@@ -123,7 +117,7 @@ def _bridged(reading: Reading) -> Reading:
     return replace(reading, outline=outer_ring(thin), notes=(*kept, note))
 
 
-def _kind(path: Source, head: bytes) -> str:
+def _kind(path: FileContent, head: bytes) -> str:
     if image_kind(head):
         return "image"
     text = _text(head)

@@ -4,15 +4,15 @@ import io
 import re
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.reading import Source, check_file, read_bytes, read_head
+from orbiflow.tiles.silhouette.readers.reading import MAX_BYTES, FileContent, content_of
 
-MAX_BYTES = 64 * 2**20
 MAX_PIXELS = 40_000_000  # that are kept: of a larger image, several become one
 MAX_PIXELS_READ = 128_000_000  # before they are shrunk: telephones have 48 or 108 million
 MASK_NOTE = "took 1 for white: the levels are 0 and 1 alone"
@@ -53,24 +53,28 @@ class DecodedImage:
     notes: tuple[str, ...]
 
 
-def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
+def open_image(
+    source: Path | FileContent, *, enough: int | None = None
+) -> tuple[Image.Image, list[str]]:
     """Return the picture of `decoded_image`, 8 bits deep, and its notes."""
-    decoded = decoded_image(path, enough=enough)
+    decoded = decoded_image(source, enough=enough)
     return _eight_bits(decoded.image), list(decoded.notes)
 
 
-def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
+def decoded_image(source: Path | FileContent, *, enough: int | None = None) -> DecodedImage:
     """Decode an image file.
 
     With `enough` pixels a side, a JPEG may be decoded to fewer than it has, which is faster.
     Raises `InputFileError` for one that is too large, before a pixel of it is decoded, or damaged.
     """
-    check_file(path)
+    path = content_of(source)
+    kind = image_kind(path.data)
     try:
         with warnings.catch_warnings():
             # Pillow warns of damaged metadata and of sizes that are refused here anyway.
             warnings.simplefilter("ignore")
-            with Image.open(_stream(path), formats=_FORMATS) as file:
+            # some TIFFs that are turned Pillow misreads where it is given a path
+            with Image.open(io.BytesIO(path.within(MAX_BYTES)), formats=_FORMATS) as file:
                 return _first_frame(path, file, enough)
     except InputFileError:
         raise
@@ -78,7 +82,6 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
         n_pixels = max(map(int, re.findall(r"\d+", str(exc))), default=0)
         raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
     except UnidentifiedImageError as exc:
-        kind = image_kind(read_head(path, 12))
         named = f"{kind} image".strip()
         why = f"the {named} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
         if "TIFF" in kind:
@@ -88,18 +91,12 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
             )
         raise InputFileError(f"{path}: {why}") from exc
     except _DAMAGED as exc:
-        kind = image_kind(read_head(path, 12))
         raise InputFileError(
             f"{path}: the {kind} image is damaged or cut short ({exc}); export or download it again"
         ) from exc
 
 
-def _stream(path: Source) -> io.BytesIO:
-    """Return a file's bytes: some TIFFs that are turned Pillow misreads where it is given a path."""
-    return io.BytesIO(read_bytes(path, MAX_BYTES))
-
-
-def check_size(path: Source, size: tuple[int, int], most: int = MAX_PIXELS_READ) -> None:
+def check_size(path: FileContent, size: tuple[int, int], most: int = MAX_PIXELS_READ) -> None:
     """Raise InputFileError for a picture of `size` (width, height) that is too large or too small."""
     width, height = size
     if width * height > most:
@@ -109,11 +106,11 @@ def check_size(path: Source, size: tuple[int, int], most: int = MAX_PIXELS_READ)
         raise InputFileError(f"{path}: {width} x {height} pixels cannot hold a silhouette")
 
 
-def _too_large(path: Source, size: str, most: int = MAX_PIXELS_READ) -> str:
+def _too_large(path: FileContent, size: str, most: int = MAX_PIXELS_READ) -> str:
     return f"{path}: {size}, at most {most // 10**6} megapixels are read; downscale the image"
 
 
-def _first_frame(path: Source, file: Any, enough: int | None) -> DecodedImage:
+def _first_frame(path: FileContent, file: Any, enough: int | None) -> DecodedImage:
     frames = getattr(file, "n_frames", 1)
     notes = [f"took the first frame of {frames}"] * (frames > 1)
     check_size(path, file.size)
@@ -148,7 +145,7 @@ def _first_frame(path: Source, file: Any, enough: int | None) -> DecodedImage:
     return DecodedImage(image, size, shrunk, tuple(notes))
 
 
-def _shown(path: Source, image: Image.Image) -> Image.Image:
+def _shown(path: FileContent, image: Image.Image) -> Image.Image:
     """Return the image in one of the modes of `DecodedImage`.
 
     White is 65,535 of levels of 16 bits; of other deep levels the image's own range stands in for it.

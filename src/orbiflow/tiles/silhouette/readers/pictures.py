@@ -6,6 +6,7 @@ Masks are pictures whose light or opaque part is selected.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from orbiflow.errors import Advice, InputFileError, OrbiflowError, literal
 from orbiflow.settings import described, is_tensor
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
-from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
+from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
@@ -48,7 +49,7 @@ class ImageChannel:
 
 
 def read_image(
-    path: Source, *, threshold: float | None = None, invert: bool | None = None
+    path: FileContent, *, threshold: float | None = None, invert: bool | None = None
 ) -> Reading:
     """Read the outline of the shape in a PNG, JPEG or WebP image, in pixels with y down.
 
@@ -73,7 +74,7 @@ def read_image(
 
 
 def _traced(
-    path: Source, picture: ImageChannel, threshold: float | None, invert: bool | None
+    path: FileContent, picture: ImageChannel, threshold: float | None, invert: bool | None
 ) -> Reading:
     if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
@@ -99,7 +100,7 @@ def _drawing(
     return ImageChannel(channel, name, band.size, reduced, (*notes, *averaging, *more))
 
 
-def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> ImageChannel | None:
+def _photograph(path: FileContent, image: Image.Image, notes: Sequence[str]) -> ImageChannel | None:
     """Return how far each pixel belongs to the shape, or None for a drawing in two colours."""
     levels, reduced, averaging = _reduced(image, MAX_SIDE_OF_PHOTOGRAPH)
     rgb = levels if levels.ndim == 3 else np.repeat(levels[..., None], 3, axis=2)
@@ -114,7 +115,7 @@ def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Image
     return ImageChannel(channel, "photograph", image.size, reduced, (*notes, *averaging))
 
 
-def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
+def _channel(path: FileContent, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
     """Return the channel that shows the shape."""
     if image.mode != "RGBA":
         return (image if image.mode == "F" else image.convert("L")), "luminance", []
@@ -149,7 +150,7 @@ def _is_hardly_cut_out(image: Image.Image) -> bool:
 
 
 def choose_shape(
-    path: Source, picture: ImageChannel, threshold: float | None, invert: bool | None
+    path: FileContent, picture: ImageChannel, threshold: float | None, invert: bool | None
 ) -> tuple[Level, list[str]]:
     """Return the level turned so that the shape is high, and notes of how it was distinguished."""
     channel = picture.channel
@@ -203,7 +204,7 @@ def _with_whole_lines(level: Level) -> Level:
     return replace(level, cut=background + max(FAINT_INK * (level.inside - background), noise))
 
 
-def _cut(path: Source, picture: ImageChannel) -> float:
+def _cut(path: FileContent, picture: ImageChannel) -> float:
     """Return level midway between the usual levels of the two classes that Otsu's method finds."""
     if picture.name != "luminance":
         return 0.5
@@ -305,7 +306,7 @@ def _levels(array: Array, name: str) -> tuple[NDArray[np.float32], bool]:
 _PAINT = "paint what must survive white and the rest black"
 
 
-def read_mask(path: Source) -> ImageChannel:
+def read_mask(path: Path | FileContent) -> ImageChannel:
     """Read a mask from an image: its opacity where some is more transparent, else its luminance."""
     decoded = decoded_image(path)
     image, notes = decoded.image, [*decoded.notes]

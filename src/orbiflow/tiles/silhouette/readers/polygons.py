@@ -22,7 +22,7 @@ from orbiflow.errors import InputFileError
 from orbiflow.runtime import is_list, is_object
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring, outer_outline, outer_ring
-from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
+from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, quoted
 
 MAX_BYTES = 16 * 2**20
 MAX_PARTS = 10_000
@@ -62,12 +62,12 @@ class TextLine(NamedTuple):
         except (ValueError, IndexError):
             return []
 
-    def refused(self, path: Source, reason: str) -> InputFileError:
+    def refused(self, path: FileContent, reason: str) -> InputFileError:
         """Return the error for a line that does not fit."""
         return InputFileError(f"{path}: line {self.number}: {quoted(self.text)} {reason}")
 
 
-def read_points(path: Source) -> Reading:
+def read_points(path: FileContent) -> Reading:
     """Read a polygon from lines of text: see above.
 
     Raises `InputFileError` for anything else, with the line that does not fit.
@@ -97,10 +97,10 @@ def read_points(path: Source) -> Reading:
     )
 
 
-def _lines(path: Source) -> list[TextLine]:
+def _lines(path: FileContent) -> list[TextLine]:
     """Return lines that are neither blank nor comments."""
     try:
-        text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
+        text = path.within(MAX_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as exc:
         raise InputFileError(
             f"{path}: not a text file (byte {exc.start} is not UTF-8); a list of points is one"
@@ -119,7 +119,7 @@ def _lines(path: Source) -> list[TextLine]:
     return lines
 
 
-def _counted(path: Source, count: int, first: TextLine, rest: list[TextLine]) -> Reading:
+def _counted(path: FileContent, count: int, first: TextLine, rest: list[TextLine]) -> Reading:
     """Read a goal polygon; lines of other things may follow its vertices."""
     if not 3 <= count <= MAX_VERTICES:
         raise first.refused(path, f"vertices cannot be read, but 3 to {MAX_VERTICES}")
@@ -138,7 +138,11 @@ def _counted(path: Source, count: int, first: TextLine, rest: list[TextLine]) ->
 
 
 def _columns(
-    path: Source, lines: list[TextLine], places: tuple[int, int], *, degrees: bool, notes: list[str]
+    path: FileContent,
+    lines: list[TextLine],
+    places: tuple[int, int],
+    degrees: bool,
+    notes: list[str],
 ) -> Reading:
     points = [_vertex(path, line, places) for line in lines]
     later = next((line for line in lines if line.run != lines[0].run), None)
@@ -149,7 +153,7 @@ def _columns(
     return read_rings(path, [points], "dat", degrees=degrees, notes=notes)
 
 
-def _vertex(path: Source, line: TextLine, places: tuple[int, int]) -> list[float]:
+def _vertex(path: FileContent, line: TextLine, places: tuple[int, int]) -> list[float]:
     values = line.values(places)
     if not values or (places == (0, 1) and len(line.cells) > 2):
         raise line.refused(
@@ -161,9 +165,9 @@ def _vertex(path: Source, line: TextLine, places: tuple[int, int]) -> list[float
     return values
 
 
-def read_json(path: Source) -> Reading:
+def read_json(path: FileContent) -> Reading:
     """Read a polygon from JSON or GeoJSON, with y up unless the file says otherwise."""
-    data = read_bytes(path, MAX_BYTES)
+    data = path.within(MAX_BYTES)
     try:
         content: object = json.loads(data)
     except json.JSONDecodeError as exc:
@@ -205,16 +209,16 @@ def read_json(path: Source) -> Reading:
     return reading.with_notes(UP) if y_down is None else reading
 
 
-def read_wkt(path: Source) -> Reading:
+def read_wkt(path: FileContent) -> Reading:
     """Read the largest polygon of a text such as POLYGON ((0 0, 1 0, 0 1)), with y up."""
-    text = read_bytes(path, MAX_BYTES).decode("utf-8-sig", errors="replace").strip()
+    text = path.within(MAX_BYTES).decode("utf-8-sig", errors="replace").strip()
     srid = re.match(r"SRID=(\d+)\s*;", text, re.IGNORECASE)
     geometry = text[srid.end() :] if srid else text
     degrees = srid is not None and srid[1] == "4326"
     return _largest(path, shapely.from_wkt, geometry, "WKT", degrees=degrees)
 
 
-def _largest(path: Source, read: Any, text: str, kind: str, *, degrees: bool) -> Reading:
+def _largest(path: FileContent, read: Any, text: str, kind: str, *, degrees: bool) -> Reading:
     """Return the largest polygon of a text that GEOS reads."""
     try:
         geometry = read(text)
@@ -240,7 +244,7 @@ def _largest(path: Source, read: Any, text: str, kind: str, *, degrees: bool) ->
 
 
 def read_rings(
-    path: Source,
+    path: FileContent,
     rings: Sequence[Any],
     kind: str,
     *,

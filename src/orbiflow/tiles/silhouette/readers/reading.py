@@ -13,6 +13,9 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 
+MAX_BYTES = 64 * 2**20
+"""The most bytes of a file of any kind: of pictures."""
+
 
 @dataclass(frozen=True)
 class FileContent:
@@ -29,8 +32,12 @@ class FileContent:
     def __str__(self) -> str:
         return self.name
 
-
-Source = Path | FileContent
+    def within(self, limit: int) -> bytes:
+        """Return the data; refused when there are more than `limit` bytes."""
+        if len(self.data) > limit:
+            what = f"larger than {limit / 2**20:.0f} MB, the limit for this kind of file"
+            raise InputFileError(f"{self}: {what}; simplify or downscale it")
+        return self.data
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,53 +69,41 @@ class Reading:
         return replace(self, notes=(*self.notes, *more))
 
 
-def check_file(path: Source) -> int:
-    """Return the size in bytes of the regular file at `path`, or raise `InputFileError`."""
-    if isinstance(path, FileContent):
-        if not path.data:
-            raise InputFileError(f"{path}: there are no bytes in it; give the content of a file")
-        return len(path.data)
+def content_of(source: Path | FileContent) -> FileContent:
+    """Return what a regular file holds, of one that is larger than any may be a part.
+
+    Raises `InputFileError` for one that is missing, empty or cannot be read.
+    """
+    if isinstance(source, FileContent):
+        if not source.data:
+            raise InputFileError(f"{source}: there are no bytes in it; give the content of a file")
+        return source
     try:
-        status = path.stat()
+        mode = source.stat().st_mode
     except FileNotFoundError as exc:
-        raise InputFileError(f"{path}: no such file; check the path") from exc
+        raise InputFileError(f"{source}: no such file; check the path") from exc
     except (OSError, ValueError) as exc:
-        raise InputFileError(f"{path}: cannot be reached ({exc}); check the path") from exc
-    if stat.S_ISDIR(status.st_mode):
-        raise InputFileError(f"{path}: is a directory; give a file inside it")
-    if not stat.S_ISREG(status.st_mode):
-        raise InputFileError(f"{path}: is not a regular file; give an image, SVG or polygon file")
-    if status.st_size == 0:
-        raise InputFileError(f"{path}: the file is empty; export or download it again")
-    return status.st_size
-
-
-def read_bytes(path: Source, limit: int) -> bytes:
-    """Return content of the file at `path`; refused when it is larger than `limit` bytes."""
-    data = read_head(path, limit + 1)
-    if len(data) > limit:
-        what = f"larger than {limit / 2**20:.0f} MB, the limit for this kind of file"
-        raise InputFileError(f"{path}: {what}; simplify or downscale it")
-    return data
-
-
-def read_head(path: Source, n: int) -> bytes:
-    """Return first `n` bytes of the file at `path`, or all of a shorter one."""
-    if isinstance(path, FileContent):
-        return path.data[:n]
+        raise InputFileError(f"{source}: cannot be reached ({exc}); check the path") from exc
+    if stat.S_ISDIR(mode):
+        raise InputFileError(f"{source}: is a directory; give a file inside it")
+    if not stat.S_ISREG(mode):
+        raise InputFileError(f"{source}: is not a regular file; give an image, SVG or polygon file")
     try:
-        with path.open("rb") as file:
-            return file.read(n)
+        with source.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
     except OSError as exc:
         reason = f"cannot be read ({exc.strerror})"
-        raise InputFileError(f"{path}: {reason}; check its permissions") from exc
+        raise InputFileError(f"{source}: {reason}; check its permissions") from exc
+    if not data:
+        raise InputFileError(f"{source}: the file is empty; export or download it again")
+    return FileContent(data, str(source))
 
 
-def unzipped(path: Source, limit: int) -> FileContent:
+def unzipped(path: FileContent, limit: int) -> FileContent:
     """Return what a gzip-compressed file holds; refused if that is over `limit` bytes."""
     name = str(path).removesuffix("z") if path.suffix.lower() == ".svgz" else str(path)
     try:
-        with gzip.GzipFile(fileobj=io.BytesIO(read_bytes(path, limit))) as file:
+        with gzip.GzipFile(fileobj=io.BytesIO(path.within(limit))) as file:
             data = file.read(limit + 1)
     except (OSError, EOFError, zlib.error) as exc:
         raise InputFileError(

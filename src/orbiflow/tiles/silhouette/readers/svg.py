@@ -23,7 +23,7 @@ from orbiflow.tiles.silhouette.outlines import (
     outer_ring,
     percent,
 )
-from orbiflow.tiles.silhouette.readers.reading import Reading, Source
+from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading
 from orbiflow.tiles.silhouette.readers.svg_documents import leaves
 from orbiflow.tiles.silhouette.readers.svg_render import (
     Drawing,
@@ -87,7 +87,7 @@ _AROUND = np.ones((3, 3), dtype=bool)
 _FILLED = "path,rect,circle,ellipse,polygon,polyline{fill:#000!important;opacity:1!important}"
 
 
-def read_svg(path: Source) -> Reading:
+def read_svg(path: FileContent) -> Reading:
     """Read the outline of the silhouette in an SVG drawing, in user units of the viewBox, with y down.
 
     What is seen counts, as resvg renders it: fills, strokes, texts and pictures, cut by clips, masks

@@ -17,7 +17,7 @@ import svgelements
 from orbiflow.arrays import Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.image_files import decoded_image
-from orbiflow.tiles.silhouette.readers.reading import FileContent, Source, quoted, read_bytes
+from orbiflow.tiles.silhouette.readers.reading import FileContent, quoted
 from orbiflow.tiles.silhouette.readers.svg_styles import write_styles
 from orbiflow.tiles.silhouette.readers.svg_xml import HREF, Notes, is_own, parse_xml
 
@@ -54,9 +54,9 @@ class Document:
     renderer to refuse, which runs within bounds.
     """
 
-    def __init__(self, path: Source) -> None:
+    def __init__(self, path: FileContent) -> None:
         self.path, self.notes, self.left_out = path, Notes(), Counter[str]()
-        self.root = parse_xml(path, read_bytes(path, MAX_BYTES))
+        self.root = parse_xml(path, path.within(MAX_BYTES))
         if self.root.attrib.pop("{}xml-stylesheet", None):
             self.notes.add("style sheets in other files are not read")
         write_styles(path, self.root, self.notes)

@@ -19,7 +19,7 @@ from tinycss2.color3 import parse_color
 
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.reading import Source
+from orbiflow.tiles.silhouette.readers.reading import FileContent, content_of
 from orbiflow.tiles.silhouette.readers.svg_documents import Document, leaves, properties, text_of
 from orbiflow.tiles.silhouette.readers.svg_process import Renderer, RendererFailed
 from orbiflow.tiles.silhouette.readers.svg_xml import SVG
@@ -47,8 +47,9 @@ class Drawing:
     Raises `InputFileError` as `Document`.
     """
 
-    def __init__(self, path: Source) -> None:
-        self.path, self.document = path, Document(path)
+    def __init__(self, source: Path | FileContent) -> None:
+        self.path = content_of(source)
+        self.document = Document(self.path)
         self.box, self.window = self.document.box, self.document.window
         self._renderer = Renderer()
 

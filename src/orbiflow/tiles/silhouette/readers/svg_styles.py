@@ -14,7 +14,7 @@ from cssselect2 import ElementWrapper, Matcher, SelectorError, compile_selector_
 from tinycss2.ast import AtRule, Declaration, FunctionBlock, Node, QualifiedRule
 
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.reading import Source, quoted
+from orbiflow.tiles.silhouette.readers.reading import FileContent, quoted
 from orbiflow.tiles.silhouette.readers.svg_xml import SVG, Notes
 
 MAX_STYLE = 200_000
@@ -79,7 +79,7 @@ Declared = tuple[str, str, bool]
 """A property, its value, and whether it is important."""
 
 
-def write_styles(path: Source, root: Element, notes: Notes) -> None:
+def write_styles(path: FileContent, root: Element, notes: Notes) -> None:
     """Write all that style sheets say of a document's elements into their attribute `style`.
 
     Variables are replaced, and what CSS writes otherwise than SVG's attributes is written as these:

@@ -5,7 +5,7 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.reading import Source
+from orbiflow.tiles.silhouette.readers.reading import FileContent
 
 SVG = "http://www.w3.org/2000/svg"
 XLINK = "http://www.w3.org/1999/xlink"
@@ -18,7 +18,7 @@ MAX_EXPANDED = 16 * 2**20  # characters that all references to entities can come
 _KNOWN = {"xlink": XLINK, "xml": "http://www.w3.org/XML/1998/namespace"}
 
 
-def parse_xml(path: Source, data: bytes) -> Element:
+def parse_xml(path: FileContent, data: bytes) -> Element:
     """Return the root element of the SVG document `data`.
 
     SVG's own elements and attributes have their plain names; all others have "{namespace}name". A
@@ -79,7 +79,7 @@ class Notes:
 
 
 class _BoundedTree:
-    def __init__(self, path: Source, parser: expat.XMLParserType, references: int) -> None:
+    def __init__(self, path: FileContent, parser: expat.XMLParserType, references: int) -> None:
         self.path, self.parser, self.builder = path, parser, TreeBuilder()
         self.references, self.entities = references, 0
         self.count = 0

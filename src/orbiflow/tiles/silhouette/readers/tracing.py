@@ -14,7 +14,7 @@ from orbiflow.drawing import level_curves
 from orbiflow.errors import Advice, InputFileError, literal
 from orbiflow.tiles.geometry import polygons_in, signed_area
 from orbiflow.tiles.silhouette.outlines import filled, outer_outline, outer_ring, thinned
-from orbiflow.tiles.silhouette.readers.reading import Source
+from orbiflow.tiles.silhouette.readers.reading import FileContent
 
 MIN_AREA = 30.0  # square pixels
 MAX_OUTLINE_VERTICES = 4000
@@ -41,7 +41,7 @@ class Level:
 
 
 def trace(
-    path: Source, level: Level, *, scale: int, size: tuple[int, int]
+    path: FileContent, level: Level, *, scale: int, size: tuple[int, int]
 ) -> tuple[Array, BaseGeometry, list[str]]:
     """Return the outline (N, 2) of the largest shape in image pixels, all that was seen, and notes.
 
