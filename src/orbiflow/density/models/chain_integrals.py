@@ -98,13 +98,12 @@ MAX_GRID_SIZES = {1: 3072, 2: 768}
 FAINTEST_LOG = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-NODES_ALONE, NODES_OF_SEVERAL = 24, (2, 8, 32, 128, 512, 2048)
-"""The fewest nodes of an angle that is the only one hidden, and those of several: for light and wide
-components, for others, and for heavy and narrow ones, each level beginning with the next number."""
+NODES_ALONE, NODES_OF_SEVERAL = 24, (8, 32, 128, 512)
+"""The fewest nodes of an angle that is the only one hidden, and those of several by level."""
 
-NOISE_LEFT, GENTLE_CONCENTRATION = (0.9, 0.7, 0.3, 0.1, 0.05), 20.0
-"""Share of hidden noise that is left about quasi-random nodes, level by level and for more nodes as
-one level later, and the concentration below which it is less."""
+NOISE_LEFT, GENTLE_CONCENTRATION = (0.9, 0.7, 0.3, 0.1), 20.0
+"""Share of hidden noise that is left about quasi-random nodes, level by level, and the concentration
+below which it is less."""
 
 BLOCK_ENTRIES = 2**18
 """Entries worked on at a time: few enough for the cache."""
@@ -135,26 +134,10 @@ def chain_tables(
         )
     top = max(float(walk.likely.max()) for walk in walks)
     tables: dict[tuple[int, ...], Tensor] = {}
-    for walk, more in zip(walks, _more_nodes(walks, top), strict=True):
+    for walk in walks:
         tick()
-        for step in (-1, 0, 1):
-            walk.add_to(tables, more == step, top, (level, step), start)
+        walk.add_to(tables, top, level, start)
     return top, [*tables.values()]
-
-
-def _more_nodes(walks: list[_Walk], top: float) -> list[Tensor]:
-    """Return which components (C,) of each walk have more nodes, 1, and which fewer, -1.
-
-    For as much work, errors are least where nodes are as the root of weight over work. Others are far
-    too faint to count: 2.
-    """
-    weight = torch.cat([walk.likely for walk in walks]) - top
-    work = torch.cat([walk.widths.prod(dim=1) for walk in walks]).double()
-    counts = weight > -FAINTEST_LOG
-    wanted = (weight.exp() / work).sqrt() * counts
-    wanted *= (work * counts).sum() / (wanted * work).sum()
-    steps = (wanted.log2() / 2).round().clamp(-1, 1).masked_fill_(~counts, 2)
-    return [*torch.split(steps, [len(walk.likely) for walk in walks])]
 
 
 class _Walk:
@@ -224,18 +207,13 @@ class _Walk:
         self.widths = torch.minimum(2 * reach + 1, self.wanted)
 
     def add_to(
-        self,
-        tables: dict[tuple[int, ...], Tensor],
-        some: Tensor,
-        top: float,
-        level: tuple[int, int],
-        start: float,
+        self, tables: dict[tuple[int, ...], Tensor], top: float, level: int, start: float
     ) -> None:
-        """Add the densities of some components (C,), relative to exp(top), to tables of their sizes."""
-        likely = torch.nonzero(some)[:, 0]
+        """Add the densities of components, relative to exp(top), to tables of their sizes."""
+        likely = torch.nonzero(self.likely - top > -FAINTEST_LOG)[:, 0]
         last = max(self.order.index(axis) for axis in self.split.kept)
         early = all(self.order.index(axis) < last for axis in self.hidden)
-        rule = _Rule(len(self.hidden), *level, early=early)
+        rule = _Rule(len(self.hidden), level, early=early)
         sizes, number = unique(self.wanted[likely], dim=0, return_inverse=True)
         for k, size in enumerate(listed(sizes)):
             table = tables.setdefault(tuple(size), torch.zeros(*size, dtype=torch.float64))
@@ -355,11 +333,10 @@ def _observe(near: _Near, off: Tensor, kappa: Tensor, lean: Tensor) -> None:
 class _Rule:
     """Nodes of hidden angles: even ones of a single angle, quasi-random ones of several."""
 
-    def __init__(self, hidden: int, level: int, step: int, *, early: bool) -> None:
-        stage = 1 + level + step
+    def __init__(self, hidden: int, level: int, *, early: bool) -> None:
         # of angles after those kept, it would have to be known at each point of the grid
-        self.left = NOISE_LEFT[level + max(step, 0)] if early and hidden > 1 else 0.0
-        self.count = (1, NODES_ALONE * 2**level, NODES_OF_SEVERAL[stage])[min(hidden, 2)]
+        self.left = NOISE_LEFT[level] if early and hidden > 1 else 0.0
+        self.count = (1, NODES_ALONE * 2**level, NODES_OF_SEVERAL[level])[min(hidden, 2)]
         self.even = _quasi_random(hidden, self.count, level)
 
     def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
