@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import shapely
@@ -225,24 +224,18 @@ class Target(Reading):
 
     @classmethod
     def read(
-        cls,
-        path: str | Path | IO[bytes],
-        *,
-        threshold: float | None = None,
-        invert: bool | None = None,
+        cls, path: str | Path, *, threshold: float | None = None, invert: bool | None = None
     ) -> Self:
         """Read a silhouette from an image (PNG, JPEG, WebP), an SVG, a `.json` or a `.dat` file.
 
-        A binary stream, such as an open file or `io.BytesIO`, is read from its present position.
         For images, `threshold` (0 to 1) is the level that separates the shape from its background,
         and `invert` says that the shape is the light (or the transparent) part. By default both are
         detected, and `notes` report the result.
 
         Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
         """
-        where = path if isinstance(path, str | os.PathLike) else _held(path)
-        reading = readers.read_outline(where, threshold=threshold, invert=invert)
-        return cls(**vars(reading), source=str(where))
+        reading = readers.read_outline(path, threshold=threshold, invert=invert)
+        return cls(**vars(reading), source=str(path))
 
     @classmethod
     def from_bytes(
@@ -418,19 +411,3 @@ def _reach(part: Polygon) -> float:
     """Return the longer side of a part's box."""
     xmin, ymin, xmax, ymax = part.bounds
     return max(xmax - xmin, ymax - ymin)
-
-
-def _held(stream: Any) -> FileContent:
-    """Return the content of a binary stream, up to the size limit of files."""
-    how = "a path or a binary stream; Target.from_bytes takes bytes, Target.from_mask arrays"
-    if not callable(getattr(stream, "read", None)):
-        raise OrbiflowError(f"the silhouette's file must be {how}, got {described(stream)}")
-    name = getattr(stream, "name", None)
-    name = name if isinstance(name, str) else "stream"
-    try:
-        data = stream.read(readers.MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise InputFileError(f"{name}: cannot be read ({error})") from error
-    if not isinstance(data, bytes):
-        raise OrbiflowError(f'{name} is a stream of text; open it in binary mode, "rb"')
-    return FileContent(data, name)
