@@ -49,6 +49,15 @@ def test_published_means() -> None:
     assert found.fisher_cone == pytest.approx(7.292891411309177)
 
 
+def test_rayleighs_probability_is_the_share_of_uniform_draws_that_are_farther() -> None:
+    draws = np.random.default_rng(0).normal(size=(20_000, 5, 3))
+    draws /= np.linalg.norm(draws, axis=2, keepdims=True)
+    order = np.argsort(np.linalg.norm(draws.mean(axis=1), axis=1))
+    for share in (0.5, 0.05):
+        rayleigh = summarize_directions(draws[order[-int(share * 20_000)]]).rayleigh_p
+        assert rayleigh == pytest.approx(share, abs=0.012)
+
+
 def test_correlations() -> None:
     _, (pair,) = summarize_angles(WIND, columns="six,noon", unit="degrees")
     # Jammalamadaka and SenGupta (2001), example 8.1; Fisher (1993), example 6.8

@@ -62,6 +62,10 @@ def klein_figure_eight(points: Tensor) -> Array:
     With u = 2 pi y and v = 2 pi x, ((R + s) cos u, (R + s) sin u, t) where
     s = cos(u/2) sin v - sin(u/2) sin 2v and t = sin(u/2) sin v + cos(u/2) sin 2v (Banchoff; Wolfram
     MathWorld, "Klein Bottle"). u + 2 pi changes the sign of both, and so does -v.
+
+    >>> x, y, height = klein_figure_eight(torch.tensor([[0.125, 0.0], [0.125, 0.3]])).T
+    >>> ((np.hypot(x, y) - KLEIN_RADIUS) ** 2 + height**2).round(4)  # the eight is turned, not bent
+    array([1.5, 1.5])
     """
     v, u = _turns(points)
     cos, sin = np.cos(u / 2), np.sin(u / 2)
