@@ -25,7 +25,6 @@ from orbiflow.density.models import (
     ConditionalDensity,
     ConditionalKernels,
     JointDensity,
-    KernelShape,
     KnownRows,
     NeuralMixture,
     Unconditional,
@@ -86,8 +85,8 @@ def random_density(seed: int, space: Any, dims: int) -> ConditionalDensity:
     wide = torch.tensor(rng.uniform(0.05, 3, len(covariates.columns)))
     width = len(space.spheres)
     kappa = torch.tensor(rng.uniform(0.5, 30, width))
-    shape = KernelShape(wide, kappa, torch.tensor(rng.dirichlet([1] * 3)))
-    kernels = ConditionalKernels(space, KnownRows(points, None, x, covariates.number), shape)
+    rows = KnownRows(points, None, x, covariates.number)
+    kernels = ConditionalKernels(space, rows, wide, kappa, torch.tensor(rng.dirichlet([1] * 3)))
     hidden, out = 8, 3 * (space.features(points).shape[-1] + width + 1)
     sizes = pairwise((x.shape[1], hidden, hidden, out))
     shapes = [shape for a, b in sizes for shape in ((a, b), (1, b))]

@@ -16,7 +16,6 @@ from orbiflow.density.models import (
     LEAST_LOG_KAPPA,
     MOST_LOG_KAPPA,
     ConditionalKernels,
-    KernelShape,
     KnownRows,
 )
 from orbiflow.density.spaces import Space
@@ -47,8 +46,8 @@ def fit_kernels(space: Space, rows: Rows, x: Tensor, number: Tensor) -> Conditio
 
     def made(values: Tensor) -> ConditionalKernels:
         widths, kappa, shares = torch.split(values, [count, width, len(KERNEL_SCALES)])
-        shape = KernelShape(widths.exp(), kappa.exp(), torch.softmax(shares, 0))
-        return ConditionalKernels(space, kernel_rows, shape)
+        of_scales = torch.softmax(shares, 0)
+        return ConditionalKernels(space, kernel_rows, widths.exp(), kappa.exp(), of_scales)
 
     def loss(values: Array) -> tuple[float, Array]:
         parameters = torch.tensor(values, requires_grad=True)

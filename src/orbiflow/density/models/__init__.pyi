@@ -14,7 +14,6 @@ from .conditional import Context as Context
 from .conditional import Unconditional as Unconditional
 from .conditional_kernels import KERNEL_SCALES as KERNEL_SCALES
 from .conditional_kernels import ConditionalKernels as ConditionalKernels
-from .conditional_kernels import KernelShape as KernelShape
 from .conditional_kernels import KnownRows as KnownRows
 from .conditional_parts import LEAST_LOG_KAPPA as LEAST_LOG_KAPPA
 from .conditional_parts import MOST_LOG_KAPPA as MOST_LOG_KAPPA

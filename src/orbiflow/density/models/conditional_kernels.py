@@ -42,18 +42,6 @@ class KnownRows(NamedTuple):
     number: Tensor
 
 
-class KernelShape(NamedTuple):
-    """How wide kernels are.
-
-    - `widths`: Of covariates (c,). `concentrations`: Of the space's kernels (w,).
-    - `shares`: Those of the scales (L,), of sum 1.
-    """
-
-    widths: Tensor
-    concentrations: Tensor
-    shares: Tensor
-
-
 class ConditionalKernels(ConditionalPart):
     """Sum of K(x, x_i) k(y, y_i) over sum of K(x, x_i), over rows i (Hall, Racine and Li, 2004).
 
@@ -64,16 +52,20 @@ class ConditionalKernels(ConditionalPart):
     Args:
         space: Any space.
         rows: The rows with kernels.
-        shape: How wide these are.
+        widths: The widths (c,) of covariates.
+        concentrations: Those of the space's kernels (w,).
+        shares: Those of the scales (L,), of sum 1.
     """
 
     kind = "kernels"
     stored = ("points", "weights", "x", "widths", "concentrations", "shares")
 
-    def __init__(self, space: Space, rows: KnownRows, shape: KernelShape) -> None:
-        self.space, self.rows, self.shape = space, rows, shape
+    def __init__(
+        self, space: Space, rows: KnownRows, widths: Tensor, concentrations: Tensor, shares: Tensor
+    ) -> None:
+        self.space = space
         self.points, self.weights, self.x, self.number = rows
-        self.widths, self.concentrations, self.shares = shape
+        self.widths, self.concentrations, self.shares = widths, concentrations, shares
 
     def log_prob(self, points: Tensor, x: Tensor) -> Tensor:
         size = max(1, BLOCK_ENTRIES // len(self.points))
@@ -129,7 +121,7 @@ class ConditionalKernels(ConditionalPart):
         """Return kernels of the same widths at other rows."""
         weights = None if weights is None else weights[:MOST_ROWS]
         rows = KnownRows(points[:MOST_ROWS], weights, x[:MOST_ROWS], self.number)
-        return ConditionalKernels(self.space, rows, self.shape)
+        return ConditionalKernels(self.space, rows, self.widths, self.concentrations, self.shares)
 
     def header(self) -> dict[str, Any]:
         return {"scales": list(KERNEL_SCALES)}
@@ -154,4 +146,4 @@ class ConditionalKernels(ConditionalPart):
         ):
             raise OrbiflowError("conditional kernels of other shapes or values")
         rows = KnownRows(points, tensors.get("weights"), x, number)
-        return cls(space, rows, KernelShape(*others[:3]))
+        return cls(space, rows, *others[:3])
