@@ -49,8 +49,9 @@ class ComponentSettings(Settings, group="Density"):
         DefaultText("flow,kernels,mixture,chains,network"),
     ] = None
     """Components that may be used, such as kernels,mixture; held-out data choose among them. Chains are
-    for tori of two or more angles, a flow for three dimensions at most, a network for more. One
-    parametric family alone, such as von-mises-fisher, is fitted with intervals of its parameters."""
+    for tori of two or more angles, a network for more than three, a flow for three dimensions at most,
+    tried by itself in two. One parametric family alone, such as von-mises-fisher, is fitted with
+    intervals of its parameters."""
 
     repeats: Literal["auto", "places", "rounding"] = "auto"
     """What rows that repeat another are. Places: new rows repeat them as often. Rounding: an accident,
