@@ -132,7 +132,7 @@ def animal(name: str) -> Target:
 
 
 SMALL = LikenessSearch(
-    phases=1, placements=30, held=6, starts=2, finalists=1, rounds=8, carved=1, multiples=(4,)
+    phases=1, placements=60, held=6, starts=2, finalists=1, rounds=8, carved=1, multiples=(4,)
 )
 """A search of a fraction of a second a class."""
 
