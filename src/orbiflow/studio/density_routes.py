@@ -18,7 +18,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.studio.brought_files import place_of
 from orbiflow.studio.density_tasks import FIT, SURFACE, TABLE, VIEW, fit_folder, map_file
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.routes import Body, Routes, Studio, save_body, taken_up, whole
+from orbiflow.studio.routes import JsonObject, Routes, Studio, save_body, taken_up, whole
 from orbiflow.studio.words import plain_name
 
 EXAMPLES = {
@@ -60,7 +60,7 @@ async def upload(request: Request, project: str, here: Studio, name: str = "") -
 
 
 @routes("POST", "/projects/{project}/density/example")
-async def example(body: Body, project: str, here: Studio) -> dict[str, Any]:
+async def example(body: JsonObject, project: str, here: Studio) -> dict[str, Any]:
     """Take a table of ours."""
     name = body.get("name")
     if not isinstance(name, str) or name not in EXAMPLES:

@@ -187,16 +187,15 @@ def setting_words(error: SettingError, operation: Operation) -> str:
     return error.named(called)
 
 
-def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str) -> str:
-    """Return a name for the file that a call with these settings writes, such as cat-laser-60mm.svg.
+def file_name(call: Call, called: str) -> str:
+    """Return a name for the file that a call writes, such as cat-laser-60mm.svg.
 
     What is drawn is named where it is not what the purpose usually has: cat-laser-jigsaw-60mm.svg.
     """
-    chosen = making_call(makes, settings, result).arguments["settings"]
+    chosen = call.arguments["settings"]
 
     def cut() -> str | None:
-        purpose = {"purpose": chosen.purpose} if chosen.purpose else {}
-        usual = making_call(makes, purpose, result).arguments["settings"].cut
+        usual = type(chosen)(purpose=chosen.purpose).cut
         return None if chosen.cut == usual else "filled" if chosen.cut == "none" else chosen.cut
 
     more = {
@@ -204,5 +203,5 @@ def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str
         "art": lambda: ["picture"],
         "solid": lambda: [chosen.kind],
         "build": lambda: [chosen.kind],
-    }.get(makes, list)()
+    }.get(call.operation.name, list)()
     return f"{'-'.join([plain_letters(called, 'tile'), *filter(None, more)])}.{chosen.file_format}"

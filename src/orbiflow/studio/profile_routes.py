@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from orbiflow.studio.routes import Body, Routes, Studio
+from orbiflow.studio.routes import JsonObject, Routes, Studio
 
 routes = Routes()
 
@@ -19,7 +19,7 @@ def profiles(here: Studio) -> dict[str, Any]:
 
 
 @routes("PUT", "/profiles")
-def keep(body: Body, here: Studio, name: str = "") -> dict[str, Any]:
+def keep(body: JsonObject, here: Studio, name: str = "") -> dict[str, Any]:
     """Keep settings under a name, and return it beside what `profiles` does."""
     from orbiflow.tiles import Profiles
 

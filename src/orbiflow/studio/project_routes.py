@@ -22,7 +22,7 @@ from orbiflow.settings import naming_extras
 from orbiflow.studio.guard import PAGE, SANDBOX, Refused
 from orbiflow.studio.kinds_of_work import READS, kind_of_work
 from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
-from orbiflow.studio.routes import Body, Routes, Studio, save_body, whole
+from orbiflow.studio.routes import JsonObject, Routes, Studio, save_body, whole
 from orbiflow.studio.share_link import link_text, write_linked
 from orbiflow.studio.store import Missing
 from orbiflow.studio.taking import PREVIEW, export_folder
@@ -57,7 +57,7 @@ async def projects(here: Studio) -> list[dict[str, Any]]:
 
 
 @routes("POST", "/projects")
-async def create(body: Body, here: Studio) -> dict[str, Any]:
+async def create(body: JsonObject, here: Studio) -> dict[str, Any]:
     """Make a project."""
     kind = body.get("kind", "tile")
     if not isinstance(kind, str) or kind not in NAMES:
@@ -78,7 +78,7 @@ async def open_file(request: Request, here: Studio) -> dict[str, Any]:
 
 
 @routes("POST", "/projects/shared")
-async def open_link(body: Body, here: Studio) -> dict[str, Any]:
+async def open_link(body: JsonObject, here: Studio) -> dict[str, Any]:
     """Make a project of the tile that a link carries, as of a file."""
     text = body.get("text")
 
@@ -142,7 +142,7 @@ async def get(project: str, here: Studio) -> dict[str, Any]:
 
 
 @routes("PATCH", "/projects/{project}")
-async def patch(request: Request, body: Body, project: str, here: Studio) -> dict[str, Any]:
+async def patch(request: Request, body: JsonObject, project: str, here: Studio) -> dict[str, Any]:
     """Change a project's name, or parts of what its pages remember."""
     record = here.store.project(project)
     changes: dict[str, Any] = {"changed_by": request.headers.get("x-orbiflow-client", "")[:80]}
@@ -168,7 +168,7 @@ async def delete(project: str, here: Studio) -> dict[str, Any]:
 
 
 @routes("POST", "/projects/{project}/tasks")
-async def task(body: Body, project: str, here: Studio) -> dict[str, Any]:
+async def task(body: JsonObject, project: str, here: Studio) -> dict[str, Any]:
     """Give a project work."""
     operation, settings = body.get("operation"), body.get("settings", {})
     if not isinstance(operation, str) or not is_object(settings):
@@ -225,7 +225,7 @@ async def upload(
 
 
 @routes("POST", "/projects/{project}/animal")
-async def animal(body: Body, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
+async def animal(body: JsonObject, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Take one of the bundled animals."""
     name = str(body.get("name"))
     end = end_of(here, project, number)
@@ -310,7 +310,7 @@ async def read_anew(here: Studio, project: str, number: int) -> dict[str, Any]:
 
 
 @routes("PUT", "/projects/{project}/reading")
-async def reading(body: Body, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
+async def reading(body: JsonObject, project: str, here: Studio, number: int = 0) -> dict[str, Any]:
     """Read a picture anew, with other settings."""
     end_of(here, project, number)
     settings = {k: v for k, v in body.items() if v is not None}
@@ -364,7 +364,9 @@ async def space(project: str, tile: int, here: Studio) -> Response:
 
 
 @routes("POST", "/projects/{project}/tiles/{tile}/by-hand/{way}")
-async def by_hand(body: Body, project: str, tile: int, way: str, here: Studio) -> dict[str, Any]:
+async def by_hand(
+    body: JsonObject, project: str, tile: int, way: str, here: Studio
+) -> dict[str, Any]:
     """Make a tile of one that was pulled, or is laid in another class, and return its card."""
     if way not in ("pull", "class"):
         raise Refused(404, "there is nothing here; go back to the start page")
@@ -376,7 +378,7 @@ async def by_hand(body: Body, project: str, tile: int, way: str, here: Studio) -
 
 
 @routes("POST", "/projects/{project}/tiles/{tile}/preview")
-async def live_preview(body: Body, project: str, tile: int, here: Studio) -> dict[str, Any]:
+async def live_preview(body: JsonObject, project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Draw what a take-away of a tile would be, in place of one that is still being drawn."""
     operation, settings = str(body.get("operation")), body.get("settings", {})
     if operation not in ("export", "art", "solid", "animate") or not is_object(settings):

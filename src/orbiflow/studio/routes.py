@@ -30,9 +30,9 @@ Answer = TypeVar("Answer", bound=Callable[..., Any])
 class Routes(list[Route]):
     """Routes of one topic; called with a method and an address, it decorates a function that answers.
 
-    The function is given what it names: a `Request`, its `Body`, the `Studio`, parts of the address in
-    braces, and what comes after its question mark, as texts or whole numbers. It returns a response, or
-    what JSON has.
+    The function is given what it names: a `Request`, its `JsonObject`, the `Studio`, parts of the
+    address in braces, and what comes after its question mark, as texts or whole numbers. It returns a
+    response, or what JSON has.
     """
 
     def __call__(self, method: str, path: str) -> Callable[[Answer], Answer]:
@@ -45,7 +45,7 @@ class Routes(list[Route]):
         return add
 
 
-class Body(dict[str, Any]):
+class JsonObject(dict[str, Any]):
     """The JSON object that a request brings."""
 
 
@@ -61,7 +61,7 @@ def _endpoint(answer: Callable[..., Any]) -> Callable[[Request], Any]:
 
     async def endpoint(request: Request) -> Response:
         named = {**defaults, **request.query_params, **request.path_params}
-        if Body in kinds.values():
+        if JsonObject in kinds.values():
             named["body"] = await _body(request)
         arguments = {name: _value(kind, name, named, request) for name, kind in kinds.items()}
         if inspect.iscoroutinefunction(answer):

@@ -188,15 +188,16 @@ def take(
     """
     folder = make_folder(export_folder(job.project, job.task))
     result, files, wanted = _asked(job, choice, _pictures, folder)
-    name = file_name(choice.makes, wanted, result, called)
-    call = making_call(choice.makes, wanted, result, out=folder / name, **files)
-    done = call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
+    call = making_call(choice.makes, wanted, result, **files)
+    out = folder / file_name(call, called)
+    arguments = {**call.arguments, "out": out}
+    done = call.operation.function(**arguments, on_event=as_part(on_event), cancel=cancel)
     written = files_of(folder)
     preview = False
     with suppress(OrbiflowError):  # what was asked for is there
         preview = _preview(call, folder / written[0]["name"], folder, cancel)
     if len(written) > 1:
-        written = _in_one_file([folder / file["name"] for file in written], folder / name)
+        written = _in_one_file([folder / file["name"] for file in written], out)
     facts = {name: value for name, value in done.summary.items() if name not in ("file", "files")}
     return Outcome(
         {
