@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -69,6 +70,17 @@ def pytest_collect_file() -> Iterator[Any]:
 def pytest_runtest_setup() -> None:
     """A test that draws without a seed draws the same whichever tests went before."""
     torch.default_generator.manual_seed(0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_thread_stays() -> Iterator[None]:
+    """Check that a module leaves no thread: workers of later tests could not be forked beside it."""
+    before = {*threading.enumerate()}
+    yield
+    started = {*threading.enumerate()} - before
+    for thread in started:
+        thread.join(timeout=20)
+    assert [thread.name for thread in started if thread.is_alive()] == []
 
 
 @pytest.fixture(scope="module", name="browser")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
@@ -49,16 +50,19 @@ DEADLY = find("escherize").call({"image": "any.png"})
 def cluster_fixture() -> Iterator[Any]:
     """A Dask cluster of two worker processes, on the loopback interface alone."""
     dask = pytest.importorskip("dask", reason="the extra of Dask is not installed")
-    from distributed import LocalCluster
+    import distributed
 
     settings = {"distributed.scheduler.allowed-failures": 1, "distributed.admin.log-length": 0}
     with (
         dask.config.set(settings),
-        LocalCluster(
+        distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
         ) as cluster,
     ):
         yield cluster
+    # a thread that stays would keep the tests after this from forking their workers
+    distributed.utils._offload_executor.shutdown()
+    distributed.utils._offload_executor = ThreadPoolExecutor(1)
 
 
 @contextmanager

@@ -163,14 +163,14 @@ def test_a_line_every_ten_seconds_or_a_terminals_bar_alone(capsys, monkeypatch) 
 
 def test_what_was_done_before_does_not_count_as_speed(capsys: pytest.CaptureFixture[str]) -> None:
     clock = Clock()
-    shown = Terminal(clock=clock)
-    clock.now += 20
-    shown(Progress(0.8, "8 of 10"))
-    clock.now += 200
-    shown.watch()
-    shown(Progress(0.9, "9 of 10"))
-    clock.now += 10
-    shown.watch()
+    with Terminal(clock=clock) as shown:
+        clock.now += 20
+        shown(Progress(0.8, "8 of 10"))
+        clock.now += 200
+        shown.watch()
+        shown(Progress(0.9, "9 of 10"))
+        clock.now += 10
+        shown.watch()
     assert capsys.readouterr().err.splitlines() == [
         "  80% after 3 min: 8 of 10",
         "  90% after 4 min: 9 of 10; about 4 min left",

@@ -245,10 +245,11 @@ async def _fetched(client: Client, future: Future) -> Any:
 
 
 def _connected(address: str, timeout: float) -> Client:
-    """Return a client; one that fails is closed at once.
+    """Return a client; one that fails is closed at once, and its thread ends.
 
     The garbage collector would close it, too, but takes the lock of all clients' loops for this. If
-    another client is just starting, which holds the lock, that never ends.
+    another client is just starting, which holds the lock, that never ends. `close` leaves the thread of
+    a client that never was connected, beside which no worker could be forked.
     """
     import distributed
 
@@ -258,6 +259,8 @@ def _connected(address: str, timeout: float) -> Client:
     except BaseException:
         with suppress(Exception):
             client.close(timeout=2)
+        with suppress(Exception):
+            client._loop_runner.stop()
         raise
     return client
 
