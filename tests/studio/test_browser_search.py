@@ -97,6 +97,7 @@ def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> Non
     other = page.context.new_page()
     other.goto(f"/#/p/{own}")
     other.wait_for_selector(".cards", state="attached")
+    page.bring_to_front()  # a browser draws no frames for a page behind another
     small_searches(page, "IH1", "IH4")
     page.goto(f"/#/p/{own}/picture")
     page.get_by_role("button", name="Find tiles").click()

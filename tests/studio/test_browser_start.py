@@ -126,6 +126,7 @@ def test_two_tabs_paint_on_one_picture(page, drawing, studio: RunningStudio) -> 
     other.wait_for_selector(READ)
     seen = "() => document.querySelector('canvas.reading').toDataURL()"
     before = other.evaluate(seen)
+    page.bring_to_front()  # a browser draws no frames for a page behind another
     page.get_by_role("radio", name="Remove").check()
     page.get_by_role("radio", name="lasso").check()
     stroke(page, "canvas.reading", (0.3, 0.68), (0.6, 0.68), (0.6, 0.97), (0.3, 0.97))
@@ -133,6 +134,7 @@ def test_two_tabs_paint_on_one_picture(page, drawing, studio: RunningStudio) -> 
     cut = area_of(studio.project(own))
     studio.until(lambda: other.wait_for_timeout(50) or other.evaluate(seen) != before)
     other.wait_for_selector(READ)
+    other.bring_to_front()
     other.get_by_role("radio", name="Add").check()
     stroke(other, "canvas.reading", (0.7, 0.3), (0.9, 0.16))
     studio.until(lambda: area_of(studio.project(own)) > 1.02 * cut)
